@@ -1,0 +1,369 @@
+//! First-order quantities of many samples: sensitivities, forces, loads, compliances.
+//!
+//! Each quantity says how many numbers it is and how they follow from the linearised closures; lanes,
+//! fall-back and threads are the same for all.
+
+use super::dispatch::{Work, dispatch};
+use super::samples::{Group, Rows, Samples};
+use super::threads::for_chunks;
+use crate::kinematics::{
+    Limbs, Linearisation, SINGULAR, condition, gradients, limbs, linearise, touched,
+};
+use crate::linear::{SIX, pivot_order};
+use crate::machine::{Machine, chosen};
+use crate::scalar::Real;
+use crate::statics::{
+    closure_compliance, closure_forces, parameter_load, pose_compliance, pose_stiffness,
+};
+use crate::status::Status;
+
+/// The samples of one group, for quantities that read inputs of their own.
+#[derive(Clone, Copy)]
+pub struct Place {
+    first: usize,
+    size: usize,
+}
+
+/// A quantity of first order.
+pub trait FirstOrder: Sync {
+    /// Numbers per sample.
+    fn width(&self) -> usize;
+    /// Whether it exists where the closures' rows are singular.
+    fn survives_singular(&self) -> bool {
+        false
+    }
+    /// Computes the numbers of one group.
+    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]);
+}
+
+/// Computes a first-order quantity at `samples.poses`, which must close the struts for
+/// `samples.joints`; `out` has `width` numbers a sample, NaN where the status is not `ok`.
+pub fn first_order(
+    machine: &Machine,
+    samples: &Samples<'_>,
+    quantity: &impl FirstOrder,
+    out: &mut [f64],
+    status: &mut [Status],
+) {
+    let width = quantity.width();
+    for_chunks(samples.count, (out, width), (&mut [], 0), status, |first, out, _, status| {
+        dispatch(Chunk { machine, samples, quantity, first, out, status });
+    });
+}
+
+struct Chunk<'a, Q> {
+    machine: &'a Machine,
+    samples: &'a Samples<'a>,
+    quantity: &'a Q,
+    first: usize,
+    out: &'a mut [f64],
+    status: &'a mut [Status],
+}
+
+impl<Q: FirstOrder> Work for Chunk<'_, Q> {
+    #[inline(always)]
+    fn run<S: Real>(self) {
+        let Chunk { machine, samples, quantity, first, out, status } = self;
+        let width = quantity.width();
+        let mut group = Group::<S>::new(machine);
+        let mut at: Limbs<S> = Default::default();
+        let mut order = [0; SIX];
+        let mut columns = vec![S::default(); width];
+        let groups = out.chunks_mut((width * S::WIDTH).max(1)).zip(status.chunks_mut(S::WIDTH));
+        for (number, (out, status)) in groups.enumerate() {
+            let place = Place { first: first + number * S::WIDTH, size: status.len() };
+            if group.load(machine, samples, place.first, place.size) {
+                at = limbs(machine, &group.p, &group.q);
+            }
+            let mut proven = S::splat(-1.0);
+            if S::WIDTH > 1 {
+                if number == 0 {
+                    order = single_order(machine, &group);
+                }
+                let linear = linearise(machine, &group.p, &group.q, &at, &group.pose, &order);
+                quantity.write(&linear, place, &mut columns);
+                S::store_rows(&columns, out);
+                proven = linear.regular;
+            }
+            for lane in 0..place.size {
+                status[lane] = Status::Ok;
+                // Also true where it is NaN.
+                if !(proven.lane(lane) > 0.0) {
+                    let out = &mut out[width * lane..width * (lane + 1)];
+                    let place = Place { first: place.first + lane, size: 1 };
+                    status[lane] = alone(machine, &group, lane, quantity, place, out);
+                }
+            }
+        }
+    }
+}
+
+#[inline(never)]
+fn single_order<S: Real>(machine: &Machine, group: &Group<S>) -> [usize; SIX] {
+    let (p, q, pose) = group.single(0);
+    pivot_order(&gradients(machine, &p, &q, &pose).0)
+}
+
+/// One sample on the single road.
+#[inline(never)]
+fn alone<S: Real, Q: FirstOrder>(
+    machine: &Machine,
+    group: &Group<S>,
+    lane: usize,
+    quantity: &Q,
+    place: Place,
+    out: &mut [f64],
+) -> Status {
+    let (p, q, pose) = group.single(lane);
+    let order = pivot_order(&gradients(machine, &p, &q, &pose).0);
+    let at = limbs(machine, &p, &q);
+    let linear = linearise(machine, &p, &q, &at, &pose, &order);
+    let regular = linear.regular > 0.0 || condition(machine, &p, &q, &pose) >= SINGULAR;
+    if regular || quantity.survives_singular() {
+        quantity.write(&linear, place, out);
+    } else {
+        out.fill(f64::NAN);
+    }
+    if !regular && !quantity.survives_singular() {
+        Status::Singular
+    } else if out.iter().all(|value| value.is_finite()) {
+        Status::Ok
+    } else {
+        Status::NotConverged
+    }
+}
+
+/// For each of the given parameters the (closure, place) pairs that read it.
+fn readers(machine: &Machine, columns: &[usize]) -> Vec<Vec<(usize, usize)>> {
+    let mut by_parameter = vec![Vec::new(); machine.nominal.len()];
+    for closure in 0..machine.closure_count() {
+        for (place, parameter) in touched(machine, closure) {
+            by_parameter[parameter].push((closure, place));
+        }
+    }
+    columns.iter().map(|&column| by_parameter[column].clone()).collect()
+}
+
+/// `-W^-1 dg/dp` for some parameters: (component, parameter) per sample.
+pub struct Sensitivity {
+    components: Vec<usize>,
+    /// For each closure the (place, column) pairs that it alone reads.
+    own: Vec<Vec<(usize, usize)>>,
+    /// The columns that several closures read, or none.
+    common: Vec<(usize, Vec<(usize, usize)>)>,
+    count: usize,
+}
+
+impl Sensitivity {
+    /// For the parameters of the given indices.
+    pub fn new(machine: &Machine, columns: &[usize]) -> Self {
+        let mut own = vec![Vec::new(); machine.closure_count()];
+        let mut common = Vec::new();
+        for (column, readers) in readers(machine, columns).into_iter().enumerate() {
+            if let [(closure, place)] = readers[..] {
+                own[closure].push((place, column));
+            } else {
+                common.push((column, readers));
+            }
+        }
+        Sensitivity { components: chosen(&machine.dof), own, common, count: columns.len() }
+    }
+}
+
+impl FirstOrder for Sensitivity {
+    fn width(&self) -> usize {
+        self.components.len() * self.count
+    }
+    #[inline(always)]
+    fn write<S: Real>(&self, linear: &Linearisation<S>, _place: Place, columns: &mut [S]) {
+        for (row, &component) in columns.chunks_exact_mut(self.count.max(1)).zip(&self.components) {
+            for (closure, own) in self.own.iter().enumerate() {
+                let twist = -linear.inverse[component][closure];
+                let gradient = &linear.to_parameters[closure];
+                for &(place, column) in own {
+                    row[column] = twist * gradient[place];
+                }
+            }
+            for (column, readers) in &self.common {
+                let mut sum = S::default();
+                for &(closure, place) in readers {
+                    let gradient = linear.to_parameters[closure][place];
+                    sum = (-linear.inverse[component][closure]).mul_add(gradient, sum);
+                }
+                row[*column] = sum;
+            }
+        }
+    }
+}
+
+/// `-W^-1 dg/dq`: (component, joint) per sample.
+pub struct JointJacobian {
+    components: Vec<usize>,
+    struts: Vec<Vec<usize>>,
+}
+
+impl JointJacobian {
+    /// For all joints.
+    pub fn new(machine: &Machine) -> Self {
+        let struts = machine.drives.iter().map(|drive| drive.struts.clone()).collect();
+        JointJacobian { components: chosen(&machine.dof), struts }
+    }
+}
+
+impl FirstOrder for JointJacobian {
+    fn width(&self) -> usize {
+        self.components.len() * self.struts.len()
+    }
+    #[inline(always)]
+    fn write<S: Real>(&self, linear: &Linearisation<S>, _place: Place, columns: &mut [S]) {
+        let mut cells = columns.iter_mut();
+        for &component in &self.components {
+            for (struts, cell) in self.struts.iter().zip(&mut cells) {
+                let mut sum = S::default();
+                for &strut in struts {
+                    let twist = -linear.inverse[component][strut];
+                    sum = twist.mul_add(linear.to_joint[strut], sum);
+                }
+                *cell = sum;
+            }
+        }
+    }
+}
+
+/// Strut tensions under a wrench on the tool, N.
+pub struct Forces<'a> {
+    closures: usize,
+    wrenches: Rows<'a>,
+}
+
+impl<'a> Forces<'a> {
+    /// Wrenches (N, N m) on the tool at the tool point, base axes.
+    pub fn new(machine: &Machine, wrenches: Rows<'a>) -> Self {
+        Forces { closures: machine.closure_count(), wrenches }
+    }
+}
+
+#[inline(always)]
+fn multipliers<S: Real>(
+    linear: &Linearisation<S>,
+    wrenches: &Rows<'_>,
+    place: Place,
+) -> [S; SIX] {
+    let mut wrench = [S::default(); SIX];
+    wrenches.load(place.first, place.size, &mut wrench);
+    closure_forces(linear, &wrench)
+}
+
+impl FirstOrder for Forces<'_> {
+    fn width(&self) -> usize {
+        self.closures
+    }
+    #[inline(always)]
+    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]) {
+        let forces = multipliers(linear, &self.wrenches, place);
+        for (column, &force) in columns.iter_mut().zip(&forces) {
+            *column = -force;
+        }
+    }
+}
+
+/// Loads on some parameters under a wrench on the tool.
+pub struct Loads<'a> {
+    readers: Vec<Vec<(usize, usize)>>,
+    wrenches: Rows<'a>,
+}
+
+impl<'a> Loads<'a> {
+    /// For the parameters of the given indices.
+    pub fn new(machine: &Machine, columns: &[usize], wrenches: Rows<'a>) -> Self {
+        Loads { readers: readers(machine, columns), wrenches }
+    }
+}
+
+impl FirstOrder for Loads<'_> {
+    fn width(&self) -> usize {
+        self.readers.len()
+    }
+    #[inline(always)]
+    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]) {
+        let forces = multipliers(linear, &self.wrenches, place);
+        for (column, readers) in columns.iter_mut().zip(&self.readers) {
+            *column = parameter_load(&forces, &linear.to_parameters, readers);
+        }
+    }
+}
+
+/// Twist per unit wrench, (component, component) per sample.
+pub struct Compliance<'a> {
+    components: Vec<usize>,
+    readers: Vec<Vec<(usize, usize)>>,
+    compliances: Rows<'a>,
+}
+
+impl<'a> Compliance<'a> {
+    /// From the compliances (m/N, rad/(N m)) of the parameters of the given indices.
+    pub fn new(machine: &Machine, columns: &[usize], compliances: Rows<'a>) -> Self {
+        let readers = readers(machine, columns);
+        Compliance { components: chosen(&machine.dof), readers, compliances }
+    }
+}
+
+impl FirstOrder for Compliance<'_> {
+    fn width(&self) -> usize {
+        self.components.len() * self.components.len()
+    }
+    #[inline(always)]
+    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]) {
+        let mut compliances = vec![S::default(); self.readers.len()];
+        self.compliances.load(place.first, place.size, &mut compliances);
+        let closures = closure_compliance(linear, &self.readers, &compliances);
+        let matrix = pose_compliance(linear, &closures);
+        let mut cells = columns.iter_mut();
+        for &i in &self.components {
+            for (&k, cell) in self.components.iter().zip(&mut cells) {
+                *cell = matrix[i][k];
+            }
+        }
+    }
+}
+
+/// Wrench per unit twist, (component, component) per sample; also at singular poses.
+pub struct Stiffness<'a> {
+    from: Compliance<'a>,
+    closures: usize,
+}
+
+impl<'a> Stiffness<'a> {
+    /// From the compliances (m/N, rad/(N m)) of the parameters of the given indices.
+    pub fn new(machine: &Machine, columns: &[usize], compliances: Rows<'a>) -> Self {
+        let closures = machine.closure_count();
+        Stiffness { from: Compliance::new(machine, columns, compliances), closures }
+    }
+}
+
+impl FirstOrder for Stiffness<'_> {
+    fn width(&self) -> usize {
+        self.from.width()
+    }
+    fn survives_singular(&self) -> bool {
+        true
+    }
+    #[inline(always)]
+    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]) {
+        let mut compliances = vec![S::default(); self.from.readers.len()];
+        self.from.compliances.load(place.first, place.size, &mut compliances);
+        let closures = closure_compliance(linear, &self.from.readers, &compliances);
+        // Pivoting is per sample: the closures' compliance may be as ill-scaled as the file.
+        for lane in 0..S::WIDTH {
+            let single = closures.map(|row| row.map(|value| value.lane(lane)));
+            let rows = linear.rows.map(|row| row.map(|value| value.lane(lane)));
+            let matrix = pose_stiffness(&rows, &single, self.closures);
+            let mut cells = columns.iter_mut();
+            for &i in &self.from.components {
+                for (&k, cell) in self.from.components.iter().zip(&mut cells) {
+                    cell.set_lane(lane, matrix.map_or(f64::NAN, |matrix| matrix[i][k]));
+                }
+            }
+        }
+    }
+}

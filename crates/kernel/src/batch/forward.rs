@@ -1,0 +1,156 @@
+//! Forward kinematics of many samples.
+
+use super::dispatch::{Work, dispatch};
+use super::samples::{Group, Samples};
+use super::threads::for_chunks;
+use crate::kinematics::{Limbs, descend, forward, limbs, start_order};
+use crate::machine::{Machine, chosen};
+use crate::scalar::Real;
+use crate::spatial::{Pose, relative_rotation};
+use crate::status::Status;
+
+/// What to keep of each pose.
+#[derive(Clone, Copy)]
+enum Kept<'a> {
+    /// Seven numbers: position and unit quaternion.
+    Pose,
+    /// Displacement and rotation vector from the start, these components of six.
+    Displacement(&'a [usize]),
+}
+
+/// The poses of all samples, started at `samples.poses`: seven numbers each into `poses`.
+pub fn forward_poses(machine: &Machine, samples: &Samples<'_>, poses: &mut [f64], status: &mut [Status]) {
+    run(machine, samples, Kept::Pose, 7, poses, status);
+}
+
+/// Actual minus started: how far each sample's platform is from `samples.poses`, in the components
+/// that it can move in (m, rad, base frame).
+pub fn displacements(
+    machine: &Machine,
+    samples: &Samples<'_>,
+    errors: &mut [f64],
+    status: &mut [Status],
+) {
+    let components = chosen(&machine.dof);
+    run(machine, samples, Kept::Displacement(&components), components.len(), errors, status);
+}
+
+fn run(
+    machine: &Machine,
+    samples: &Samples<'_>,
+    kept: Kept<'_>,
+    width: usize,
+    out: &mut [f64],
+    status: &mut [Status],
+) {
+    for_chunks(samples.count, (out, width), (&mut [], 0), status, |first, out, _, status| {
+        dispatch(Chunk { machine, samples, kept, width, first, out, status });
+    });
+}
+
+struct Chunk<'a> {
+    machine: &'a Machine,
+    samples: &'a Samples<'a>,
+    kept: Kept<'a>,
+    width: usize,
+    first: usize,
+    out: &'a mut [f64],
+    status: &'a mut [Status],
+}
+
+impl Work for Chunk<'_> {
+    #[inline(always)]
+    fn run<S: Real>(self) {
+        let Chunk { machine, samples, kept, width, first, out, status } = self;
+        let mut group = Group::<S>::new(machine);
+        let mut at: Limbs<S> = Default::default();
+        let mut order = [0; 6];
+        let groups = out.chunks_mut(width * S::WIDTH).zip(status.chunks_mut(S::WIDTH));
+        for (number, (out, status)) in groups.enumerate() {
+            let size = status.len();
+            if group.load(machine, samples, first + number * S::WIDTH, size) {
+                at = limbs(machine, &group.p, &group.q);
+            }
+            if S::WIDTH == 1 {
+                alone(machine, &single_limbs(&at, 0), &group.pose.lane(0), kept, out, &mut status[0]);
+                continue;
+            }
+            if number == 0 {
+                order = start_order(machine, &single_limbs(&at, 0), &group.pose.lane(0));
+            }
+            let found = descend(machine, &at, &group.pose, &order);
+            match kept {
+                Kept::Pose => {
+                    for lane in 0..size {
+                        out[7 * lane..7 * lane + 7].copy_from_slice(&found.pose.lane(lane).to_row());
+                    }
+                }
+                Kept::Displacement(components) => {
+                    let error = displacement(&group.pose, &found.pose);
+                    let mut columns = [S::default(); 6];
+                    for (column, &component) in columns.iter_mut().zip(components) {
+                        *column = error[component];
+                    }
+                    S::store_rows(&columns[..width], out);
+                }
+            }
+            for lane in 0..size {
+                status[lane] = Status::Ok;
+                // Also true where it is NaN.
+                if !(found.proof.lane(lane) > 0.0) {
+                    let out = &mut out[width * lane..width * (lane + 1)];
+                    let start = group.pose.lane(lane);
+                    alone(machine, &single_limbs(&at, lane), &start, kept, out, &mut status[lane]);
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn displacement<S: Real>(from: &Pose<S>, to: &Pose<S>) -> [S; 6] {
+    let mut error = [S::default(); 6];
+    for k in 0..3 {
+        error[k] = to.position[k] - from.position[k];
+    }
+    error[3..].copy_from_slice(&relative_rotation(from.rotation, to.rotation));
+    error
+}
+
+#[inline(always)]
+fn single_limbs<S: Real>(limbs: &Limbs<S>, lane: usize) -> Limbs<f64> {
+    let mut single: Limbs<f64> = Default::default();
+    for (one, many) in single.iter_mut().zip(limbs) {
+        one.base = many.base.map(|value| value.lane(lane));
+        one.arm = many.arm.map(|value| value.lane(lane));
+        one.length = many.length.lane(lane);
+    }
+    single
+}
+
+/// One sample on the single road; NaN where there is no pose to tell.
+#[inline(never)]
+fn alone(
+    machine: &Machine,
+    limbs: &Limbs<f64>,
+    start: &Pose<f64>,
+    kept: Kept<'_>,
+    out: &mut [f64],
+    status: &mut Status,
+) {
+    let (pose, outcome) = forward(machine, limbs, start);
+    *status = outcome;
+    if outcome != Status::Ok {
+        out.fill(f64::NAN);
+        return;
+    }
+    match kept {
+        Kept::Pose => out.copy_from_slice(&pose.to_row()),
+        Kept::Displacement(components) => {
+            let error = displacement(start, &pose);
+            for (value, &component) in out.iter_mut().zip(components) {
+                *value = error[component];
+            }
+        }
+    }
+}

@@ -1,0 +1,23 @@
+//! The same numbers as one by one, for many samples: lanes, instruction sets, threads.
+//!
+//! A batch is cut into chunks for the threads, a chunk into groups of lanes. What a group cannot
+//! prove good is done again sample by sample on the single road, and each sample has its status.
+
+mod dispatch;
+mod first_order;
+mod forward;
+mod inverse;
+mod samples;
+mod threads;
+
+pub use dispatch::{InstructionSet, instruction_set, use_instruction_set};
+pub use first_order::{
+    Compliance, FirstOrder, Forces, JointJacobian, Loads, Sensitivity, Stiffness, first_order,
+};
+pub use forward::{displacements, forward_poses};
+pub use inverse::inverses;
+pub use samples::{Deviations, Rows, Samples};
+pub use threads::{set_threads, threads};
+
+/// Samples of one chunk.
+const CHUNK: usize = 256;

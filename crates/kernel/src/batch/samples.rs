@@ -1,0 +1,163 @@
+//! The inputs of a batch: rows that are one per sample or shared by all.
+
+use crate::linear::SIX;
+use crate::machine::Machine;
+use crate::scalar::Real;
+use crate::spatial::Pose;
+
+/// A row of `width` numbers for each sample, or one row for all.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows<'a> {
+    data: &'a [f64],
+    width: usize,
+    shared: bool,
+}
+
+impl<'a> Rows<'a> {
+    /// One row per sample.
+    pub fn each(data: &'a [f64], width: usize) -> Self {
+        Rows { data, width, shared: false }
+    }
+
+    /// One row for all samples.
+    pub fn shared(data: &'a [f64]) -> Self {
+        Rows { data, width: data.len(), shared: true }
+    }
+
+    /// Whether one row serves all samples.
+    pub fn is_shared(&self) -> bool {
+        self.shared
+    }
+
+    /// The row of one sample.
+    #[inline(always)]
+    pub fn row(&self, sample: usize) -> &'a [f64] {
+        let first = if self.shared { 0 } else { sample * self.width };
+        &self.data[first..first + self.width]
+    }
+
+    /// The rows of the `size` samples from `first` on, side by side; lanes beyond them repeat the
+    /// last sample.
+    #[inline(always)]
+    pub fn load<S: Real>(&self, first: usize, size: usize, columns: &mut [S]) {
+        if self.shared {
+            for (column, &value) in columns.iter_mut().zip(self.row(0)) {
+                *column = S::splat(value);
+            }
+            return;
+        }
+        for lane in 0..S::WIDTH {
+            let row = self.row(first + lane.min(size - 1));
+            for (column, &value) in columns.iter_mut().zip(row) {
+                column.set_lane(lane, value);
+            }
+        }
+    }
+}
+
+/// Numbers added to some of the parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct Deviations<'a> {
+    /// Which parameters.
+    pub columns: &'a [usize],
+    /// How much, in the order of `columns`.
+    pub values: Rows<'a>,
+}
+
+impl Deviations<'_> {
+    /// No deviation.
+    pub const NONE: Deviations<'static> =
+        Deviations { columns: &[], values: Rows { data: &[], width: 0, shared: true } };
+}
+
+/// Where and with which parameters each sample is evaluated.
+#[derive(Clone, Copy, Debug)]
+pub struct Samples<'a> {
+    /// How many.
+    pub count: usize,
+    /// Joint coordinates.
+    pub joints: Rows<'a>,
+    /// Poses in seven numbers: the start of a forward solution, or the pose itself.
+    pub poses: Rows<'a>,
+    /// Deviations of the parameters.
+    pub deviations: Deviations<'a>,
+}
+
+/// The lanes of one group, reused from group to group: only what differs is loaded again.
+pub struct Group<S> {
+    /// All parameters.
+    pub p: Vec<S>,
+    /// Joint coordinates.
+    pub q: Vec<S>,
+    /// Pose.
+    pub pose: Pose<S>,
+    moved: Vec<S>,
+    loaded: bool,
+}
+
+impl<S: Real> Group<S> {
+    /// A group at the nominal parameters.
+    #[inline(always)]
+    pub fn new(machine: &Machine) -> Self {
+        Group {
+            p: machine.nominal.iter().map(|&value| S::splat(value)).collect(),
+            q: vec![S::default(); machine.drives.len()],
+            pose: Pose { position: [S::default(); 3], rotation: [S::default(); 4] },
+            moved: Vec::new(),
+            loaded: false,
+        }
+    }
+
+    /// Loads parameters alone.
+    #[inline(always)]
+    pub fn load_parameters(
+        &mut self,
+        machine: &Machine,
+        deviations: &Deviations<'_>,
+        first: usize,
+        size: usize,
+    ) {
+        if self.moved.len() != deviations.columns.len() {
+            self.moved = vec![S::default(); deviations.columns.len()];
+        }
+        deviations.values.load(first, size, &mut self.moved);
+        for (&column, &moved) in deviations.columns.iter().zip(&self.moved) {
+            self.p[column] = S::splat(machine.nominal[column]) + moved;
+        }
+    }
+
+    /// Loads the `size` samples from `first` on. Returns whether parameters or joints may differ from
+    /// the group before.
+    #[inline(always)]
+    pub fn load(
+        &mut self,
+        machine: &Machine,
+        samples: &Samples<'_>,
+        first: usize,
+        size: usize,
+    ) -> bool {
+        let shared = samples.joints.is_shared() && samples.deviations.values.is_shared();
+        let fresh = !(shared && self.loaded);
+        if fresh {
+            self.load_parameters(machine, &samples.deviations, first, size);
+            samples.joints.load(first, size, &mut self.q);
+        }
+        if !(samples.poses.is_shared() && self.loaded) {
+            let mut row = [S::default(); 7];
+            samples.poses.load(first, size, &mut row);
+            self.pose.position.copy_from_slice(&row[..3]);
+            self.pose.rotation.copy_from_slice(&row[3..]);
+        }
+        self.loaded = true;
+        fresh
+    }
+
+    /// One sample of the group alone: parameters, joints, pose.
+    pub fn single(&self, lane: usize) -> (Vec<f64>, [f64; SIX], Pose<f64>) {
+        let mut joints = [0.0; SIX];
+        for (joint, q) in joints.iter_mut().zip(&self.q) {
+            *joint = q.lane(lane);
+        }
+        (self.p.iter().map(|value| value.lane(lane)).collect(), joints, self.pose.lane(lane))
+    }
+}

@@ -1,0 +1,71 @@
+//! How many threads share a batch.
+
+use super::CHUNK;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::{Arc, RwLock};
+
+static POOL: RwLock<Option<Arc<ThreadPool>>> = RwLock::new(None);
+
+/// Uses `count` threads from now on; at least one.
+pub fn set_threads(count: usize) {
+    let pool = ThreadPoolBuilder::new().num_threads(count.max(1)).build();
+    // A machine that cannot start another thread works on with what it has.
+    if let Ok(pool) = pool {
+        *POOL.write().unwrap_or_else(|poisoned| poisoned.into_inner()) = Some(Arc::new(pool));
+    }
+}
+
+/// The pool in use; by default a thread per core.
+fn pool() -> Arc<ThreadPool> {
+    if let Some(pool) = &*POOL.read().unwrap_or_else(|poisoned| poisoned.into_inner()) {
+        return Arc::clone(pool);
+    }
+    set_threads(std::thread::available_parallelism().map_or(1, |count| count.get()));
+    match &*POOL.read().unwrap_or_else(|poisoned| poisoned.into_inner()) {
+        Some(pool) => Arc::clone(pool),
+        None => Arc::new(
+            ThreadPoolBuilder::new()
+                .use_current_thread()
+                .num_threads(1)
+                .build()
+                .expect("a pool of the current thread starts no thread"),
+        ),
+    }
+}
+
+/// The number of threads in use.
+pub fn threads() -> usize {
+    pool().current_num_threads()
+}
+
+/// Calls `work(first sample, its part of a, its part of b, its part of c)` for every chunk of `count`
+/// samples; `a`, `b`, `c` have the given widths per sample.
+pub fn for_chunks<C: Send>(
+    count: usize,
+    (a, width_a): (&mut [f64], usize),
+    (b, width_b): (&mut [f64], usize),
+    c: &mut [C],
+    work: impl Fn(usize, &mut [f64], &mut [f64], &mut [C]) + Sync,
+) {
+    let chunks = count.div_ceil(CHUNK);
+    let mut pieces = Vec::with_capacity(chunks);
+    let (mut a, mut b, mut c) = (a, b, c);
+    for chunk in 0..chunks {
+        let size = CHUNK.min(count - chunk * CHUNK);
+        let (head_a, tail_a) = a.split_at_mut(size * width_a);
+        let (head_b, tail_b) = b.split_at_mut(size * width_b);
+        let (head_c, tail_c) = c.split_at_mut(size);
+        pieces.push((chunk * CHUNK, head_a, head_b, head_c));
+        (a, b, c) = (tail_a, tail_b, tail_c);
+    }
+    if chunks <= 1 || threads() == 1 {
+        for (first, a, b, c) in pieces {
+            work(first, a, b, c);
+        }
+    } else {
+        pool().install(|| {
+            pieces.into_par_iter().for_each(|(first, a, b, c)| work(first, a, b, c));
+        });
+    }
+}

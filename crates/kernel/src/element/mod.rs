@@ -1,0 +1,381 @@
+//! What a machine is made of. One element = one file, and one line in the list at the end.
+//!
+//! An element is written as functions of joint-centre points, lengths and joint coordinates, on any
+//! scalar. It knows nothing of poses and nobody derives a Jacobian: how points move with the platform
+//! and with the drives is the library's business ([`crate::kinematics`]).
+
+mod crank;
+mod slider;
+pub mod strut;
+mod telescopic;
+
+use crate::scalar::{Dual, Scalar};
+use crate::spatial::{Vector, dot, norm, scale, tangents};
+
+/// What a number measures; the machine file's units follow from it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimension {
+    /// m.
+    Length,
+    /// rad.
+    Angle,
+    /// A vector of which only the direction counts.
+    Direction,
+    /// The drive's own joint coordinate: m or rad.
+    Coordinate,
+    /// No unit.
+    Scale,
+}
+
+impl Dimension {
+    /// The word that the machine file's model uses.
+    pub fn name(self) -> &'static str {
+        match self {
+            Dimension::Length => "length",
+            Dimension::Angle => "angle",
+            Dimension::Direction => "direction",
+            Dimension::Coordinate => "coordinate",
+            Dimension::Scale => "scale",
+        }
+    }
+
+    /// The SI unit of a parameter.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Dimension::Length | Dimension::Coordinate => "m",
+            Dimension::Angle => "rad",
+            Dimension::Direction | Dimension::Scale => "1",
+        }
+    }
+}
+
+/// One key of an element's table in the machine file.
+#[derive(Clone, Copy, Debug)]
+pub struct Field {
+    /// The key.
+    pub name: &'static str,
+    /// 0: one number; 3: a vector.
+    pub shape: usize,
+    /// What it measures.
+    pub dimension: Dimension,
+    /// The value of every component where the key is missing; `None`: the key is required.
+    pub default: Option<f64>,
+    /// One line for the reader of the machine file.
+    pub doc: &'static str,
+}
+
+/// A number that the closure reads and that a deviation may move.
+#[derive(Clone, Copy, Debug)]
+pub struct ParameterField {
+    /// The last part of the parameter's name, as in `origin.x`.
+    pub name: &'static str,
+    /// What it measures.
+    pub dimension: Dimension,
+}
+
+const fn parameter(name: &'static str, dimension: Dimension) -> ParameterField {
+    ParameterField { name, dimension }
+}
+
+/// How an element is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Drawing {
+    /// A straight guideway along the travel.
+    Line,
+    /// The circle on which the joint centre turns.
+    Circle,
+    /// Nothing beyond the strut itself.
+    None,
+}
+
+impl Drawing {
+    /// The word in the element table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Drawing::Line => "line",
+            Drawing::Circle => "circle",
+            Drawing::None => "none",
+        }
+    }
+}
+
+/// Everything the rest of the software needs to know of an element's kind.
+#[derive(Clone, Copy, Debug)]
+pub struct ElementTable {
+    /// The word in the machine file.
+    pub kind: &'static str,
+    /// One sentence.
+    pub doc: &'static str,
+    /// How it is drawn.
+    pub drawing: Drawing,
+    /// The keys it reads.
+    pub fields: &'static [Field],
+    /// The parameters it contributes.
+    pub parameters: &'static [ParameterField],
+    /// What its joint coordinate measures ([`Dimension::Length`] or [`Dimension::Angle`]).
+    pub coordinate: Dimension,
+}
+
+/// The nominal axis of a drive and the two directions in which its `axis.u`, `axis.v` tilt it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DriveFrame {
+    /// Unit vector.
+    pub axis: Vector<f64>,
+    /// Unit vectors; with the axis a right-handed frame.
+    pub tangents: [Vector<f64>; 2],
+}
+
+impl DriveFrame {
+    /// From any non-zero direction.
+    pub fn new(direction: Vector<f64>) -> Self {
+        let axis = scale(direction, 1.0 / norm(direction));
+        DriveFrame { axis, tangents: tangents(axis) }
+    }
+
+    /// The unit axis tilted by `u` and `v` (tangents of the tilt angles).
+    #[inline(always)]
+    pub fn tilted<S: Scalar>(&self, u: S, v: S) -> Vector<S> {
+        let mut axis = [u; 3];
+        for k in 0..3 {
+            let first = u.mul_add(u.lift(self.tangents[0][k]), u.lift(self.axis[k]));
+            axis[k] = v.mul_add(v.lift(self.tangents[1][k]), first);
+        }
+        scale(axis, u.lift(1.0) / norm(axis))
+    }
+}
+
+/// The closed-form inverse of a drive at one platform-side joint centre.
+#[derive(Clone, Copy, Debug)]
+pub struct Reach<S> {
+    /// The joint coordinate; where `margin < 0` that of the nearest reachable point.
+    pub joint: S,
+    /// Not negative exactly where the strut reaches.
+    pub margin: S,
+}
+
+/// An actuated joint.
+pub trait Drive {
+    /// Kind, fields and parameters.
+    const TABLE: ElementTable;
+    /// Directions of a dual number that differentiates [`Drive::place`]: its parameters, the joint
+    /// coordinate, the strut's base point and length.
+    const WIDTH: usize = Self::TABLE.parameters.len() + 5;
+
+    /// The base-side joint centre (base frame) and the length of a strut that this drive carries.
+    ///
+    /// `base` is the joint centre as the machine file gives it; `length` the strut's own length
+    /// (unused where the drive is the length).
+    fn place<S: Scalar>(
+        frame: &DriveFrame,
+        parameters: &[S],
+        joint: S,
+        base: Vector<S>,
+        length: S,
+    ) -> (Vector<S>, S);
+
+    /// The joint coordinate for a platform-side joint centre; `mode` (+1 or -1) picks the branch.
+    fn inverse<S: Scalar>(
+        frame: &DriveFrame,
+        parameters: &[S],
+        mode: f64,
+        base: Vector<S>,
+        length: S,
+        platform: Vector<S>,
+    ) -> Reach<S>;
+
+    /// The shortest and the longest strut that reaches `platform` from some joint coordinate.
+    fn span(
+        frame: &DriveFrame,
+        parameters: &[f64],
+        base: Vector<f64>,
+        platform: Vector<f64>,
+    ) -> [f64; 2];
+}
+
+/// The derivatives of one closure to all that it reads. Unused places are zero.
+#[derive(Clone, Copy, Debug)]
+pub struct ClosureGradient<S> {
+    /// To the platform-side joint centre, base frame.
+    pub centre: Vector<S>,
+    /// To `strut.base.x|y|z`.
+    pub base: Vector<S>,
+    /// To `strut.length`.
+    pub length: S,
+    /// To the drive's parameters, in their order.
+    pub drive: [S; MAX_DRIVE_PARAMETERS],
+    /// To the joint coordinate.
+    pub joint: S,
+}
+
+/// No drive has more parameters than this.
+pub const MAX_DRIVE_PARAMETERS: usize = 7;
+
+/// The gradient of the strut closure at a base-side centre that hangs on the frame.
+#[inline(always)]
+pub fn fixed_gradient<S: Scalar>(
+    base: Vector<S>,
+    platform: Vector<S>,
+    length: S,
+) -> ClosureGradient<S> {
+    let zero = length.lift(0.0);
+    let closure = strut_dual(base, platform, length);
+    ClosureGradient {
+        centre: [closure.parts[3], closure.parts[4], closure.parts[5]],
+        base: [closure.parts[0], closure.parts[1], closure.parts[2]],
+        length: closure.parts[6],
+        drive: [zero; MAX_DRIVE_PARAMETERS],
+        joint: zero,
+    }
+}
+
+/// The strut closure with its derivatives to base-side centre, platform-side centre and length.
+#[inline(always)]
+fn strut_dual<S: Scalar>(base: Vector<S>, platform: Vector<S>, length: S) -> Dual<S, 7> {
+    strut::closure(
+        [Dual::variable(base[0], 0), Dual::variable(base[1], 1), Dual::variable(base[2], 2)],
+        [Dual::variable(platform[0], 3), Dual::variable(platform[1], 4), Dual::variable(platform[2], 5)],
+        Dual::variable(length, 6),
+    )
+}
+
+/// The gradient of the strut closure through the drive `D`; `N` is its [`Drive::WIDTH`].
+#[inline(always)]
+fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
+    frame: &DriveFrame,
+    parameters: &[S],
+    joint: S,
+    base: Vector<S>,
+    length: S,
+    platform: Vector<S>,
+) -> ClosureGradient<S> {
+    let count = D::TABLE.parameters.len();
+    let mut inputs = [Dual::<S, N>::constant(joint); MAX_DRIVE_PARAMETERS];
+    for k in 0..count {
+        inputs[k] = Dual::variable(parameters[k], k);
+    }
+    let (centre, own) = D::place(
+        frame,
+        &inputs[..count],
+        Dual::variable(joint, count),
+        [
+            Dual::variable(base[0], count + 1),
+            Dual::variable(base[1], count + 2),
+            Dual::variable(base[2], count + 3),
+        ],
+        Dual::variable(length, count + 4),
+    );
+    let closure =
+        strut_dual([centre[0].value, centre[1].value, centre[2].value], platform, own.value);
+    let to_centre = [closure.parts[0], closure.parts[1], closure.parts[2]];
+    let mut chained = [joint; N];
+    for j in 0..N {
+        let along = [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]];
+        chained[j] = closure.parts[6].mul_add(own.parts[j], dot(to_centre, along));
+    }
+    let mut drive = [joint.lift(0.0); MAX_DRIVE_PARAMETERS];
+    drive[..count].copy_from_slice(&chained[..count]);
+    ClosureGradient {
+        centre: [closure.parts[3], closure.parts[4], closure.parts[5]],
+        base: [chained[count + 1], chained[count + 2], chained[count + 3]],
+        length: chained[count + 4],
+        drive,
+        joint: chained[count],
+    }
+}
+
+/// Makes the closed set of drives from its list, with static dispatch on any scalar.
+macro_rules! drives {
+    ($($name:ident => $type:path),+ $(,)?) => {
+        /// The kinds of drive.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[allow(missing_docs)] // each is described by its table
+        pub enum DriveKind { $($name),+ }
+
+        impl DriveKind {
+            /// Every kind, in the order of the list.
+            pub const ALL: &[DriveKind] = &[$(DriveKind::$name),+];
+
+            /// Kind, fields and parameters.
+            pub fn table(self) -> &'static ElementTable {
+                match self { $(DriveKind::$name => const { &<$type as Drive>::TABLE }),+ }
+            }
+
+            /// See [`Drive::place`].
+            #[inline(always)]
+            pub fn place<S: Scalar>(
+                self,
+                frame: &DriveFrame,
+                parameters: &[S],
+                joint: S,
+                base: Vector<S>,
+                length: S,
+            ) -> (Vector<S>, S) {
+                match self {
+                    $(DriveKind::$name => <$type as Drive>::place(frame, parameters, joint, base, length)),+
+                }
+            }
+
+            /// See [`Drive::inverse`].
+            #[inline(always)]
+            pub fn inverse<S: Scalar>(
+                self,
+                frame: &DriveFrame,
+                parameters: &[S],
+                mode: f64,
+                base: Vector<S>,
+                length: S,
+                platform: Vector<S>,
+            ) -> Reach<S> {
+                match self {
+                    $(DriveKind::$name => <$type as Drive>::inverse(frame, parameters, mode, base, length, platform)),+
+                }
+            }
+
+            /// See [`Drive::span`].
+            pub fn span(
+                self,
+                frame: &DriveFrame,
+                parameters: &[f64],
+                base: Vector<f64>,
+                platform: Vector<f64>,
+            ) -> [f64; 2] {
+                match self {
+                    $(DriveKind::$name => <$type as Drive>::span(frame, parameters, base, platform)),+
+                }
+            }
+
+            /// The derivatives of the closure of a strut that this drive carries.
+            #[inline(always)]
+            pub fn gradient<S: Scalar>(
+                self,
+                frame: &DriveFrame,
+                parameters: &[S],
+                joint: S,
+                base: Vector<S>,
+                length: S,
+                platform: Vector<S>,
+            ) -> ClosureGradient<S> {
+                match self {
+                    $(DriveKind::$name => driven_gradient::<S, $type, { <$type as Drive>::WIDTH }>(
+                        frame, parameters, joint, base, length, platform,
+                    )),+
+                }
+            }
+        }
+    };
+}
+
+// The list: a new drive is its file, its `mod` line above and one line here.
+drives! {
+    Slider => slider::Slider,
+    Crank => crank::Crank,
+    Telescopic => telescopic::Telescopic,
+}
+
+/// `origin.x|y|z`, `axis.u|v`, `offset`, `scale`: the parameters of every drive with an axis.
+#[inline(always)]
+fn axis_parameters<S: Scalar>(parameters: &[S]) -> [S; 7] {
+    let mut values = [parameters[0]; 7];
+    values.copy_from_slice(&parameters[..7]);
+    values
+}

@@ -1,0 +1,109 @@
+//! A carriage on a straight guideway.
+
+use super::{Dimension, Drawing, Drive, DriveFrame, ElementTable, Field, ParameterField, Reach};
+use super::{axis_parameters, parameter};
+use crate::scalar::Scalar;
+use crate::spatial::{Vector, add, dot, norm, scale as scaled, subtract};
+
+/// The carriage stands at `origin + (scale q + offset) axis`.
+pub struct Slider;
+
+const FIELDS: &[Field] = &[
+    Field {
+        name: "origin",
+        shape: 3,
+        dimension: Dimension::Length,
+        default: Some(0.0),
+        doc: "the carriage's reference point where the joint coordinate is 0",
+    },
+    Field {
+        name: "axis",
+        shape: 3,
+        dimension: Dimension::Direction,
+        default: None,
+        doc: "direction of the guideway",
+    },
+    Field {
+        name: "offset",
+        shape: 0,
+        dimension: Dimension::Coordinate,
+        default: Some(0.0),
+        doc: "added to the joint coordinate (home switch, encoder zero)",
+    },
+    Field {
+        name: "scale",
+        shape: 0,
+        dimension: Dimension::Scale,
+        default: Some(1.0),
+        doc: "true travel per commanded travel (lead, scale factor)",
+    },
+];
+
+const PARAMETERS: &[ParameterField] = &[
+    parameter("origin.x", Dimension::Length),
+    parameter("origin.y", Dimension::Length),
+    parameter("origin.z", Dimension::Length),
+    parameter("axis.u", Dimension::Angle),
+    parameter("axis.v", Dimension::Angle),
+    parameter("offset", Dimension::Length),
+    parameter("scale", Dimension::Scale),
+];
+
+impl Drive for Slider {
+    const TABLE: ElementTable = ElementTable {
+        kind: "slider",
+        doc: "A carriage on a straight guideway; struts of fixed length hang on it. \
+              Working mode +: the carriage on the +axis side of the platform joint.",
+        drawing: Drawing::Line,
+        fields: FIELDS,
+        parameters: PARAMETERS,
+        coordinate: Dimension::Length,
+    };
+
+    #[inline(always)]
+    fn place<S: Scalar>(
+        frame: &DriveFrame,
+        parameters: &[S],
+        joint: S,
+        base: Vector<S>,
+        length: S,
+    ) -> (Vector<S>, S) {
+        let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
+        let carriage = add([x, y, z], scaled(frame.tilted(u, v), scale.mul_add(joint, offset)));
+        (add(carriage, base), length)
+    }
+
+    #[inline(always)]
+    fn inverse<S: Scalar>(
+        frame: &DriveFrame,
+        parameters: &[S],
+        mode: f64,
+        base: Vector<S>,
+        length: S,
+        platform: Vector<S>,
+    ) -> Reach<S> {
+        let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
+        let axis = frame.tilted(u, v);
+        let from_origin = subtract(platform, add([x, y, z], base));
+        let foot = dot(from_origin, axis);
+        let perpendicular = subtract(from_origin, scaled(axis, foot));
+        // Half the chord that the guideway cuts out of the sphere about the platform joint.
+        let margin = length.square() - dot(perpendicular, perpendicular);
+        let half_chord = margin.select(margin, margin.lift(0.0)).sqrt();
+        let travelled = half_chord.mul_add(half_chord.lift(mode), foot);
+        Reach { joint: (travelled - offset) / scale, margin }
+    }
+
+    fn span(
+        frame: &DriveFrame,
+        parameters: &[f64],
+        base: Vector<f64>,
+        platform: Vector<f64>,
+    ) -> [f64; 2] {
+        let [x, y, z, u, v, _, _] = axis_parameters(parameters);
+        let axis = frame.tilted(u, v);
+        let from_origin = subtract(platform, add([x, y, z], base));
+        let foot = dot(from_origin, axis);
+        [norm(subtract(from_origin, scaled(axis, foot))), f64::INFINITY]
+    }
+}

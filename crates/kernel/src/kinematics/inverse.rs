@@ -1,0 +1,283 @@
+//! Inverse kinematics: the joints of a commanded pose.
+//!
+//! Where every freedom of the platform is commanded each drive answers in closed form. Where some are
+//! parasitic (a delta commanded in x, y, z whose platform can tilt) joints and parasitic freedoms are
+//! solved for together by Newton's iteration, started from the closed forms at the home attitude.
+
+use super::closures::{closure_rows, limbs};
+use super::linearisation::gradients;
+use super::SINGULAR;
+use crate::element::{Dimension, Reach};
+use crate::linear::{Matrix6, SIX, condition_index, factor_pivoting, solve};
+use crate::machine::{Machine, MachineDrive, chosen};
+use crate::scalar::Real;
+use crate::spatial::{
+    Pose, RotationMatrix, Vector, add, dot, euler_axes, norm, rotate, rotation_matrix, subtract,
+};
+use crate::status::Status;
+
+/// Longest iteration for parasitic freedoms.
+const STEPS: usize = 30;
+/// Relative step after which the quadratic convergence has reached rounding level.
+const SETTLED: f64 = 1e-9;
+/// Share of the travel by which rounding may overstep it.
+const TRAVEL_SLACK: f64 = 1e-12;
+
+/// Joints and full pose of one command.
+pub struct Inverse {
+    /// Joint coordinates; NaN where a strut does not reach.
+    pub joints: Vec<f64>,
+    /// The platform's pose, parasitic freedoms solved.
+    pub pose: Pose<f64>,
+    /// What became of it.
+    pub status: Status,
+}
+
+/// Closed-form joints of all lanes for a machine whose every freedom is commanded. Returns the
+/// smallest margin: not negative where all struts reach.
+#[inline(always)]
+pub fn lane_inverse<S: Real>(machine: &Machine, p: &[S], pose: &Pose<S>, joints: &mut [S]) -> S {
+    let rotation = rotation_matrix(pose.rotation);
+    let mut margin = S::splat(f64::INFINITY);
+    for (joint, drive) in joints.iter_mut().zip(&machine.drives) {
+        let reach = closed_form(machine, drive, p, pose.position, &rotation);
+        *joint = reach.joint;
+        margin = margin.min(reach.margin);
+        if drive.kind.table().coordinate == Dimension::Angle {
+            let scale = p[drive.first + 6];
+            for lane in 0..S::WIDTH {
+                joint.set_lane(lane, drive.wrapped(reach.joint.lane(lane), scale.lane(lane)));
+            }
+        }
+    }
+    margin
+}
+
+/// A drive's closed form for the first strut that it carries.
+#[inline(always)]
+fn closed_form<S: Real>(
+    machine: &Machine,
+    drive: &MachineDrive,
+    p: &[S],
+    position: Vector<S>,
+    rotation: &RotationMatrix<S>,
+) -> Reach<S> {
+    let strut = &machine.struts[drive.struts[0]];
+    let own = &p[strut.first..];
+    let tool = &p[machine.tool..];
+    let arm = rotate(rotation, [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]]);
+    let length = match strut.own_length {
+        Some(index) => p[index],
+        None => S::splat(0.0),
+    };
+    let parameters = &p[drive.first..];
+    let base = [own[0], own[1], own[2]];
+    drive.kind.inverse(&drive.frame, parameters, drive.mode, base, length, add(arm, position))
+}
+
+/// Whether every joint lies in its travel; rounding at the ends does not count.
+pub fn in_travel(machine: &Machine, joints: &[f64]) -> bool {
+    joints.iter().zip(&machine.drives).all(|(&joint, drive)| {
+        let [low, high] = drive.travel;
+        let slack = TRAVEL_SLACK * (high - low).abs().max(low.abs()).max(high.abs());
+        joint >= low - slack && joint <= high + slack
+    })
+}
+
+/// The joints of one command. `pose` holds the commanded freedoms and, where there are parasitic
+/// ones, their start.
+pub fn inverse(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Inverse {
+    let mut joints = vec![0.0; machine.drives.len()];
+    let margin = lane_inverse(machine, p, pose, &mut joints);
+    let mut solved = Inverse { joints, pose: *pose, status: Status::Ok };
+    if machine.has_direct_inverse() {
+        // Also true where it is NaN.
+        if !(margin >= 0.0) {
+            solved.status = Status::Unreachable;
+        }
+    } else {
+        solve_parasitic(machine, p, margin, &mut solved);
+    }
+    if !solved.status.is_solved() {
+        solved.joints.fill(f64::NAN);
+    } else if !in_travel(machine, &solved.joints) {
+        solved.status = Status::OutOfTravel;
+    }
+    solved
+}
+
+/// Newton's iteration on parasitic freedoms and joints together.
+fn solve_parasitic(machine: &Machine, p: &[f64], seed_margin: f64, solved: &mut Inverse) {
+    let parasitic: Vec<usize> =
+        (0..SIX).filter(|&k| machine.dof[k] && !machine.commanded[k]).collect();
+    // Where all the platform's rotations are parasitic they are stepped as rotation vectors, free of
+    // the singularity of Euler angles; where an angle is commanded the others are stepped as angles.
+    let by_angle = machine.commanded[3..].contains(&true);
+    let l = machine.characteristic_length;
+    let count = machine.struts.len();
+    let branch = |rates: &[f64]| rates.iter().map(|rate| rate.signum()).collect::<Vec<_>>();
+    let mut wanted: Option<Vec<f64>> = None;
+    for _ in 0..STEPS {
+        let at = limbs(machine, p, &solved.joints);
+        let (_, residuals) = closure_rows(machine, &at, &solved.pose);
+        let (rows, gradients, _) = gradients(machine, p, &solved.joints, &solved.pose);
+        let [_, _, _, a, b, c] = solved.pose.to_coordinates();
+        let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let axes = if by_angle { euler_axes([a, b, c]) } else { unit };
+        let mut system: Matrix6<f64> = [[0.0; SIX]; SIX];
+        for i in 0..SIX {
+            // Identity rows for the freedoms that the frame holds are not needed: the unknowns are
+            // as many as the closures.
+            if i >= count {
+                system[i][i] = 1.0;
+                continue;
+            }
+            for (column, &freedom) in parasitic.iter().enumerate() {
+                system[i][column] = if freedom < 3 {
+                    rows[i][freedom]
+                } else {
+                    dot([rows[i][3], rows[i][4], rows[i][5]], axes[freedom - 3]) / l
+                };
+            }
+            if let Some(drive) = machine.struts[i].drive {
+                system[i][parasitic.len() + drive] = gradients[i].joint / joint_length(machine, drive);
+            }
+        }
+        let rates: Vec<f64> =
+            machine.drives.iter().map(|drive| gradients[drive.struts[0]].joint).collect();
+        let wanted = wanted.get_or_insert_with(|| branch(&rates));
+        let right = std::array::from_fn(|i| if i < count { -residuals[i] } else { 0.0 });
+        let step = solve(&factor_pivoting(&system), &right);
+        let size = step.iter().fold(0.0_f64, |size, value| size.max(value.abs())) / l;
+        // Also true where it is NaN.
+        if !(size < 10.0) {
+            solved.status =
+                if seed_margin < 0.0 { Status::Unreachable } else { Status::NotConverged };
+            return;
+        }
+        apply(machine, &parasitic, by_angle, &step, solved);
+        if size < SETTLED {
+            if condition_index(&system, count, &std::array::from_fn(|k| k < count)) < SINGULAR {
+                solved.status = Status::Singular;
+            } else if &branch(&rates) != wanted {
+                solved.status = Status::BranchLost;
+            }
+            return;
+        }
+    }
+    solved.status = if seed_margin < 0.0 { Status::Unreachable } else { Status::NotConverged };
+}
+
+/// What one unit of the scaled unknown of a joint is: 1 m of travel, or the angle that the
+/// characteristic length is to a crank.
+fn joint_length(machine: &Machine, drive: usize) -> f64 {
+    match machine.drives[drive].kind.table().coordinate {
+        Dimension::Angle => machine.characteristic_length,
+        _ => 1.0,
+    }
+}
+
+/// Moves parasitic freedoms and joints by the scaled step.
+fn apply(
+    machine: &Machine,
+    parasitic: &[usize],
+    by_angle: bool,
+    step: &[f64; SIX],
+    solved: &mut Inverse,
+) {
+    let l = machine.characteristic_length;
+    let mut twist = [0.0; SIX];
+    let mut angles = solved.pose.to_coordinates();
+    for (column, &freedom) in parasitic.iter().enumerate() {
+        if freedom < 3 {
+            twist[freedom] = step[column];
+        } else if by_angle {
+            angles[freedom] += step[column] / l;
+        } else {
+            twist[freedom] = step[column] / l;
+        }
+    }
+    if by_angle {
+        solved.pose.rotation = Pose::from_coordinates(angles).rotation;
+    }
+    solved.pose.step(twist);
+    for (drive, joint) in solved.joints.iter_mut().enumerate() {
+        *joint += step[parasitic.len() + drive] / joint_length(machine, drive);
+    }
+}
+
+/// One thing that keeps a pose from being used, for messages.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Obstacle {
+    /// Strut number, and by how much it is too short (positive) or too long (negative), m.
+    Strut(usize, f64),
+    /// Drive number, and by how much its joint is above (positive) or below (negative) its travel.
+    Travel(usize, f64),
+    /// Smallest over largest singular value.
+    Singular(f64),
+}
+
+/// What keeps a commanded pose from being used, with amounts.
+pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle> {
+    let mut found = Vec::new();
+    let rotation = rotation_matrix(pose.rotation);
+    for (index, strut) in machine.struts.iter().enumerate() {
+        let Some(length) = strut.own_length.map(|own| p[own]) else { continue };
+        let arm = rotate(&rotation, machine.platform_arm(p, strut));
+        let platform = add(arm, pose.position);
+        let base = [0, 1, 2].map(|k| p[strut.first + k]);
+        let [least, most] = match strut.drive {
+            None => [norm(subtract(platform, base)); 2],
+            Some(drive) => {
+                let drive = &machine.drives[drive];
+                drive.kind.span(&drive.frame, &p[drive.first..], base, platform)
+            }
+        };
+        let fixed_in_closed_pose = strut.drive.is_none() && !machine.has_direct_inverse();
+        if length < least && !fixed_in_closed_pose {
+            found.push(Obstacle::Strut(index, least - length));
+        } else if length > most && !fixed_in_closed_pose {
+            found.push(Obstacle::Strut(index, most - length));
+        }
+    }
+    let solved = inverse(machine, p, pose);
+    if solved.status.is_solved() {
+        for (index, (&joint, drive)) in solved.joints.iter().zip(&machine.drives).enumerate() {
+            let [low, high] = drive.travel;
+            if joint > high {
+                found.push(Obstacle::Travel(index, joint - high));
+            } else if joint < low {
+                found.push(Obstacle::Travel(index, joint - low));
+            }
+        }
+        let index = condition(machine, p, &solved.joints, &solved.pose);
+        if index < SINGULAR {
+            found.push(Obstacle::Singular(index));
+        }
+    }
+    found
+}
+
+/// Smallest over largest singular value of the scaled closure Jacobian: 1 isotropic, 0 singular.
+pub fn condition(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> f64 {
+    let (mut rows, _, _) = gradients(machine, p, q, pose);
+    for row in &mut rows {
+        for value in &mut row[3..] {
+            *value /= machine.characteristic_length;
+        }
+    }
+    condition_index(&rows, machine.struts.len(), &machine.dof)
+}
+
+/// The commanded pose that a row of values in the order of the commanded freedoms names; what is not
+/// commanded stays at home.
+pub fn commanded_pose(machine: &Machine, values: &[f64]) -> Pose<f64> {
+    if machine.commanded == [true; SIX] {
+        return Pose::from_coordinates(std::array::from_fn(|k| values[k]));
+    }
+    let mut coordinates = machine.home.to_coordinates();
+    for (&freedom, &value) in chosen(&machine.commanded).iter().zip(values) {
+        coordinates[freedom] = value;
+    }
+    Pose::from_coordinates(coordinates)
+}

@@ -1,0 +1,19 @@
+//! Parallel kinematic machines: closures, kinematics, sensitivities and statics.
+//!
+//! A machine is a platform pose `X`, joint coordinates `q`, parameters `p` and closures
+//! `g(X, q, p) = 0`; everything else follows from the closures (`ARCHITECTURE.md` in the
+//! repository's root tells the whole way). Pure mathematics: no files, no Python, no clock.
+//! SI units, radians; vectors and wrenches along the base axes, linear part first.
+
+pub mod batch;
+pub mod element;
+pub mod kinematics;
+pub mod linear;
+pub mod machine;
+pub mod scalar;
+pub mod spatial;
+pub mod statics;
+mod status;
+
+pub use machine::{Description, DriveDescription, Machine, MachineError, StrutDescription};
+pub use status::Status;

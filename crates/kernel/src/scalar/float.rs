@@ -1,0 +1,72 @@
+//! `f64`: one machine, one pose.
+
+use super::{Real, Scalar};
+
+impl Scalar for f64 {
+    #[inline(always)]
+    fn lift(self, value: f64) -> f64 {
+        value
+    }
+    // Not `f64::mul_add`: outside a function compiled for fused arithmetic that is a library call,
+    // twenty times slower than the two operations.
+    #[inline(always)]
+    fn mul_add(self, factor: f64, term: f64) -> f64 {
+        self * factor + term
+    }
+    #[inline(always)]
+    fn square(self) -> f64 {
+        self * self
+    }
+    #[inline(always)]
+    fn sqrt(self) -> f64 {
+        f64::sqrt(self)
+    }
+    #[inline(always)]
+    fn sin_cos(self) -> (f64, f64) {
+        f64::sin_cos(self)
+    }
+    #[inline(always)]
+    fn atan2(self, x: f64) -> f64 {
+        f64::atan2(self, x)
+    }
+    #[inline(always)]
+    fn select(self, then: f64, otherwise: f64) -> f64 {
+        if self >= 0.0 { then } else { otherwise }
+    }
+}
+
+impl Real for f64 {
+    const WIDTH: usize = 1;
+    #[inline(always)]
+    fn splat(value: f64) -> f64 {
+        value
+    }
+    #[inline(always)]
+    fn lane(&self, _lane: usize) -> f64 {
+        *self
+    }
+    #[inline(always)]
+    fn set_lane(&mut self, _lane: usize, value: f64) {
+        *self = value;
+    }
+    #[inline(always)]
+    fn abs(self) -> f64 {
+        f64::abs(self)
+    }
+    #[inline(always)]
+    fn min(self, other: f64) -> f64 {
+        if self < other { self } else { other }
+    }
+    #[inline(always)]
+    fn max(self, other: f64) -> f64 {
+        if self > other { self } else { other }
+    }
+    #[inline(always)]
+    fn largest(self) -> f64 {
+        self
+    }
+    #[inline(always)]
+    fn store_rows(columns: &[f64], rows: &mut [f64]) {
+        rows.copy_from_slice(columns);
+    }
+}

@@ -1,0 +1,76 @@
+//! The numbers that a closure may be evaluated on: a closed set.
+//!
+//! | scalar | what a closure on it gives |
+//! |---|---|
+//! | `f64` | the residual of one machine at one pose |
+//! | [`Lanes`] | the residuals of eight samples at once |
+//! | [`Dual`] | the residual and its exact derivatives |
+//! | [`Interval`] | an enclosure of all residuals over a box |
+//! | [`Trace`] | the operations themselves, printable as C |
+//!
+//! A formula never branches on a scalar's value: what must not be a branch is a named method
+//! ([`Scalar::select`], [`Scalar::sin_cos`], ...), so that each member can answer in its own way.
+
+mod dual;
+mod float;
+mod interval;
+mod lanes;
+mod trace;
+
+pub use dual::Dual;
+pub use interval::Interval;
+pub use lanes::{LANES, Lanes};
+pub use trace::{Tape, Trace};
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A number that closures, drives and rigid-body algebra are written in.
+///
+/// Kernels mark everything `#[inline(always)]` and use plain loops: a lambda inside a kernel is not
+/// inlined into a function compiled for a wider instruction set, which costs a factor of 30.
+pub trait Scalar:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+{
+    /// The constant `value`, of the same kind (tape, width) as `self`.
+    fn lift(self, value: f64) -> Self;
+    /// `self * factor + term`; fused only where the hardware fuses.
+    fn mul_add(self, factor: Self, term: Self) -> Self;
+    /// `self * self`, never negative.
+    fn square(self) -> Self;
+    /// The square root.
+    fn sqrt(self) -> Self;
+    /// Sine and cosine of an angle in radians.
+    fn sin_cos(self) -> (Self, Self);
+    /// The angle of the point (`x`, `self`) in (-pi, pi].
+    fn atan2(self, x: Self) -> Self;
+    /// `then` where `self >= 0`, else `otherwise`.
+    fn select(self, then: Self, otherwise: Self) -> Self;
+}
+
+/// A scalar that carries plain values: `f64` itself, or lanes of them. Solvers run on these.
+pub trait Real: Scalar + Default + PartialEq {
+    /// How many samples one value holds.
+    const WIDTH: usize;
+    /// The same value in every lane.
+    fn splat(value: f64) -> Self;
+    /// The value of one lane, `lane < WIDTH`.
+    fn lane(&self, lane: usize) -> f64;
+    /// Sets the value of one lane, `lane < WIDTH`.
+    fn set_lane(&mut self, lane: usize, value: f64);
+    /// Absolute value.
+    fn abs(self) -> Self;
+    /// The smaller of two, lane by lane.
+    fn min(self, other: Self) -> Self;
+    /// The larger of two, lane by lane.
+    fn max(self, other: Self) -> Self;
+    /// The largest value over the lanes; NaN if any lane is NaN.
+    fn largest(self) -> f64;
+    /// Writes `columns[j]` of lane `k` to `rows[k * columns.len() + j]` for the first
+    /// `rows.len() / columns.len()` lanes.
+    fn store_rows(columns: &[Self], rows: &mut [f64]);
+}

@@ -1,0 +1,35 @@
+//! Closure forces under a wrench on the tool.
+
+use crate::kinematics::{Linearisation, PLACES};
+use crate::linear::SIX;
+use crate::scalar::Real;
+
+/// The multipliers of `W^T lambda + F = 0` for a wrench `F` on the tool at the tool point, base axes
+/// (N, N m). A strut's tension is minus its multiplier.
+#[inline(always)]
+pub fn closure_forces<S: Real>(linear: &Linearisation<S>, wrench: &[S; SIX]) -> [S; SIX] {
+    let mut multipliers = [S::default(); SIX];
+    for i in 0..SIX {
+        let mut sum = S::default();
+        for k in 0..SIX {
+            sum = linear.inverse[k][i].mul_add(wrench[k], sum);
+        }
+        multipliers[i] = -sum;
+    }
+    multipliers
+}
+
+/// The load on a parameter by virtual work, `lambda . dg/dp`, over the closures that read it at the
+/// given (closure, place): positive drives the parameter up. For a strut's length it is the tension.
+#[inline(always)]
+pub fn parameter_load<S: Real>(
+    multipliers: &[S; SIX],
+    to_parameters: &[[S; PLACES]; SIX],
+    readers: &[(usize, usize)],
+) -> S {
+    let mut load = S::default();
+    for &(closure, place) in readers {
+        load = multipliers[closure].mul_add(to_parameters[closure][place], load);
+    }
+    load
+}

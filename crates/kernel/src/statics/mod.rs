@@ -1,0 +1,8 @@
+//! Forces in the closures, loads on parameters, compliance and stiffness: virtual work through the
+//! same first-order picture as the kinematics.
+
+mod compliance;
+mod forces;
+
+pub use compliance::{closure_compliance, pose_compliance, pose_stiffness};
+pub use forces::{closure_forces, parameter_load};

@@ -1,0 +1,103 @@
+//! Arrays in and out: any real dtype and layout in, C-contiguous float64 out.
+
+use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use truepose_kernel::batch::Rows;
+
+/// An array of rows: any leading shape, a fixed last dimension.
+pub struct Input<'py> {
+    array: PyReadonlyArrayDyn<'py, f64>,
+    /// The shape before the last dimension.
+    pub leading: Vec<usize>,
+    /// The last dimension.
+    pub width: usize,
+    /// Product of `leading`.
+    pub count: usize,
+}
+
+impl<'py> Input<'py> {
+    /// From anything that NumPy takes for a real array. `widths` lists the last dimensions that are
+    /// allowed; `what` names the argument and its last dimension in messages.
+    pub fn new(object: &Bound<'py, PyAny>, widths: &[usize], what: &str) -> PyResult<Self> {
+        let array = contiguous(object, what)?;
+        let shape = array.shape();
+        let Some((&width, leading)) = shape.split_last() else {
+            let message = format!("{what}: a single number has no rows; give an array (..., {})", widths[0]);
+            return Err(PyValueError::new_err(message));
+        };
+        if !widths.contains(&width) {
+            let expected: Vec<String> = widths.iter().map(|width| format!("(..., {width})")).collect();
+            let message =
+                format!("{what}: found shape {shape:?}, expected {}", expected.join(" or "));
+            return Err(PyValueError::new_err(message));
+        }
+        let (leading, count) = (leading.to_vec(), leading.iter().product());
+        Ok(Input { array, leading, width, count })
+    }
+
+    /// The numbers, row after row.
+    pub fn data(&self) -> &[f64] {
+        self.array.as_slice().unwrap_or(&[])
+    }
+
+    /// Whether there is exactly one row without leading shape, or a leading shape of one.
+    pub fn is_single(&self) -> bool {
+        self.count == 1
+    }
+
+    /// The rows from `first` on, or the single row for all samples where `shared`.
+    pub fn rows(&self, first: usize, shared: bool) -> Rows<'_> {
+        if shared {
+            Rows::shared(&self.data()[..self.width])
+        } else {
+            Rows::each(&self.data()[first * self.width..], self.width)
+        }
+    }
+
+    /// Checks that there is a row for each of `count` samples, or one for all; returns whether one
+    /// serves all.
+    pub fn serves(&self, count: usize, what: &str) -> PyResult<bool> {
+        if self.count == count && count != 1 {
+            Ok(false)
+        } else if self.count == 1 {
+            Ok(true)
+        } else {
+            let message = format!("{what}: found {} rows for {count} samples, expected {count} or 1", self.count);
+            Err(PyValueError::new_err(message))
+        }
+    }
+}
+
+/// A C-contiguous float64 array with the object's numbers; the object itself where it is one.
+fn contiguous<'py>(object: &Bound<'py, PyAny>, what: &str) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    if let Ok(array) = object.cast::<PyArrayDyn<f64>>()
+        && array.is_c_contiguous()
+    {
+        return Ok(array.readonly());
+    }
+    let py = object.py();
+    static ASARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let asarray = ASARRAY.import(py, "numpy", "ascontiguousarray")?;
+    let array = asarray.call1((object,))?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    if !["f", "i", "u", "b"].contains(&kind.as_str()) {
+        let message = format!("{what}: expected real numbers, found dtype {}", array.getattr("dtype")?);
+        return Err(PyTypeError::new_err(message));
+    }
+    // ascontiguousarray makes a scalar an array of one; keep it a scalar for the shape's message.
+    let shape_source = if object.hasattr("ndim")? && object.getattr("ndim")?.extract::<usize>()? == 0 {
+        array.call_method1("reshape", (pyo3::types::PyTuple::empty(py),))?
+    } else {
+        array
+    };
+    let array = shape_source.call_method1("astype", ("float64", "C"))?;
+    Ok(array.cast::<PyArrayDyn<f64>>()?.readonly())
+}
+
+/// A new array of zeros of the leading shape and further dimensions.
+pub fn output<'py>(py: Python<'py>, leading: &[usize], further: &[usize]) -> Bound<'py, PyArrayDyn<f64>> {
+    let shape: Vec<usize> = leading.iter().chain(further).copied().collect();
+    PyArrayDyn::zeros(py, shape, false)
+}

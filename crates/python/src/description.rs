@@ -1,0 +1,130 @@
+//! A machine's description from a Python dict.
+
+use crate::failure::KernelError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+use std::collections::BTreeMap;
+use truepose_kernel::element::DriveKind;
+use truepose_kernel::machine::FREEDOMS;
+use truepose_kernel::{Description, DriveDescription, StrutDescription};
+
+fn refused<T>(code: &'static str, message: String, place: &str) -> PyResult<T> {
+    Err(KernelError::new_err((code, message, place.to_owned())))
+}
+
+fn item<'py>(table: &Bound<'py, PyDict>, key: &str, place: &str) -> PyResult<Bound<'py, PyAny>> {
+    match table.get_item(key)? {
+        Some(value) => Ok(value),
+        None => refused("missing-field", format!("it has no {key:?}"), place),
+    }
+}
+
+/// A value that may be missing or None.
+fn optional<'py>(table: &Bound<'py, PyDict>, key: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+    Ok(table.get_item(key)?.filter(|value| !value.is_none()))
+}
+
+/// Freedoms by name, which must be in the order x y z a b c.
+fn freedoms(names: &[String], place: &str) -> PyResult<[bool; 6]> {
+    let mut flags = [false; 6];
+    let mut last = None;
+    for name in names {
+        let Some(index) = FREEDOMS.iter().position(|freedom| freedom == name) else {
+            return refused("unknown-freedom", format!("{name:?} is none of x y z a b c"), place);
+        };
+        if last.is_some_and(|last| index <= last) {
+            let message = format!("{name:?} is out of order: name each once, in the order x y z a b c");
+            return refused("freedom-order", message, place);
+        }
+        last = Some(index);
+        flags[index] = true;
+    }
+    Ok(flags)
+}
+
+fn drive(table: &Bound<'_, PyDict>) -> PyResult<DriveDescription> {
+    let name: String = item(table, "name", "drive")?.extract()?;
+    let place = format!("drive.{name}");
+    let word: String = item(table, "kind", &place)?.extract()?;
+    let Some(&kind) = DriveKind::ALL.iter().find(|kind| kind.table().kind == word) else {
+        return refused("unknown-kind", format!("there is no drive of kind {word:?}"), &place);
+    };
+    let working_mode = match optional(table, "working_mode")? {
+        None => None,
+        Some(mode) => match mode.extract::<String>()?.as_str() {
+            "+" => Some(1.0),
+            "-" => Some(-1.0),
+            other => {
+                let message = format!("the working mode is {other:?}, expected \"+\" or \"-\"");
+                return refused("working-mode", message, &place);
+            }
+        },
+    };
+    let mut fields = BTreeMap::new();
+    for field in kind.table().fields {
+        if let Some(value) = optional(table, field.name)? {
+            let numbers =
+                if field.shape == 0 { vec![value.extract::<f64>()?] } else { value.extract()? };
+            fields.insert(field.name.to_owned(), numbers);
+        }
+    }
+    let travel = item(table, "travel", &place)?.extract()?;
+    Ok(DriveDescription { name, kind, travel, working_mode, fields })
+}
+
+fn strut(table: &Bound<'_, PyDict>) -> PyResult<StrutDescription> {
+    let name: String = item(table, "name", "strut")?.extract()?;
+    let place = format!("strut.{name}");
+    let extracted = |key: &str| optional(table, key);
+    Ok(StrutDescription {
+        drive: extracted("drive")?.map(|value| value.extract()).transpose()?,
+        base: item(table, "base", &place)?.extract()?,
+        platform: item(table, "platform", &place)?.extract()?,
+        length: extracted("length")?.map(|value| value.extract()).transpose()?,
+        name,
+    })
+}
+
+/// Reads the whole dict; what it may hold is told in `truepose/_kernel.pyi`.
+pub fn description(table: &Bound<'_, PyDict>) -> PyResult<Description> {
+    let dof: Vec<String> = item(table, "dof", "machine")?.extract()?;
+    let commanded = match optional(table, "commanded")? {
+        None => dof.clone(),
+        Some(names) => names.extract()?,
+    };
+    let mut home = [0.0; 6];
+    if let Some(values) = optional(table, "home")? {
+        let values: BTreeMap<String, f64> = values.extract()?;
+        for (name, value) in values {
+            match FREEDOMS.iter().position(|freedom| *freedom == name) {
+                Some(index) => home[index] = value,
+                None => {
+                    let message = format!("{name:?} is none of x y z a b c");
+                    return refused("unknown-freedom", message, "workspace.home");
+                }
+            }
+        }
+    }
+    let tool = match optional(table, "tool")? {
+        None => [0.0; 3],
+        Some(point) => point.extract()?,
+    };
+    let length = optional(table, "characteristic_length")?;
+    let drives = item(table, "drives", "machine")?.cast_into::<PyList>()?;
+    let struts = item(table, "struts", "machine")?.cast_into::<PyList>()?;
+    Ok(Description {
+        dof: freedoms(&dof, "machine.dof")?,
+        commanded: freedoms(&commanded, "machine.commanded")?,
+        home,
+        tool,
+        characteristic_length: length.map(|value| value.extract()).transpose()?,
+        drives: drives
+            .iter()
+            .map(|table| drive(table.cast::<PyDict>()?))
+            .collect::<PyResult<_>>()?,
+        struts: struts
+            .iter()
+            .map(|table| strut(table.cast::<PyDict>()?))
+            .collect::<PyResult<_>>()?,
+    })
+}

@@ -1,0 +1,36 @@
+//! Errors of the kernel as Python exceptions.
+
+use pyo3::create_exception;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use truepose_kernel::MachineError;
+
+create_exception!(
+    truepose._kernel,
+    KernelError,
+    PyValueError,
+    "A description is no machine. args: (code, message, place)."
+);
+
+/// A machine error as an exception with its three parts.
+pub fn kernel_error(error: MachineError) -> PyErr {
+    KernelError::new_err((error.code, error.message, error.place))
+}
+
+/// A `truepose.errors.PoseError`: how many poses failed, the first one, its status and why.
+pub fn pose_error(
+    py: Python<'_>,
+    count: usize,
+    index: usize,
+    status: &'static str,
+    reason: String,
+) -> PyErr {
+    let raised = py
+        .import("truepose.errors")
+        .and_then(|module| module.getattr("PoseError"))
+        .and_then(|class| class.call1((count, index, status, reason)));
+    match raised {
+        Ok(error) => PyErr::from_value(error),
+        Err(error) => error,
+    }
+}

@@ -1,0 +1,68 @@
+//! `truepose._kernel`: the kernel as a Python module. Conversion, shapes and errors only.
+
+mod arrays;
+mod description;
+mod elements;
+mod failure;
+mod machine;
+mod toml_lines;
+
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use truepose_kernel::Status;
+use truepose_kernel::batch::{self, InstructionSet};
+
+/// Sets (where a number is given) and returns the number of threads that share a batch.
+#[pyfunction]
+#[pyo3(signature = (n=None))]
+fn threads(n: Option<usize>) -> PyResult<usize> {
+    if let Some(count) = n {
+        if count == 0 {
+            return Err(pyo3::exceptions::PyValueError::new_err("at least one thread is needed"));
+        }
+        batch::set_threads(count);
+    }
+    Ok(batch::threads())
+}
+
+/// The instruction set that batches run on: "scalar", "portable", "avx2" or "avx512".
+#[pyfunction]
+fn instruction_set() -> &'static str {
+    batch::instruction_set().name()
+}
+
+/// Runs batches on the named instruction set, or on the best there is ("best").
+#[pyfunction]
+fn use_instruction_set(name: &str) -> PyResult<()> {
+    let set = match name {
+        "best" => None,
+        _ => match InstructionSet::ALL.into_iter().find(|set| set.name() == name) {
+            Some(set) => Some(set),
+            None => {
+                let message = format!("{name:?} is none of scalar, portable, avx2, avx512, best");
+                return Err(pyo3::exceptions::PyValueError::new_err(message));
+            }
+        },
+    };
+    if batch::use_instruction_set(set) {
+        Ok(())
+    } else {
+        let message = format!("this processor does not have {name}");
+        Err(pyo3::exceptions::PyRuntimeError::new_err(message))
+    }
+}
+
+#[pymodule]
+fn _kernel(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("STATUS", PyTuple::new(py, Status::ALL.map(Status::name))?)?;
+    module.add("KernelError", py.get_type::<failure::KernelError>())?;
+    module.add_class::<machine::Machine>()?;
+    module.add_function(wrap_pyfunction!(threads, module)?)?;
+    module.add_function(wrap_pyfunction!(instruction_set, module)?)?;
+    module.add_function(wrap_pyfunction!(use_instruction_set, module)?)?;
+    module.add_function(wrap_pyfunction!(elements::elements, module)?)?;
+    module.add_function(wrap_pyfunction!(toml_lines::toml_lines, module)?)?;
+    module.add_function(wrap_pyfunction!(machine::_rebuild, module)?)?;
+    Ok(())
+}

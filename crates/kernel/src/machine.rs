@@ -133,6 +133,8 @@ pub struct Machine {
     pub dof: [bool; SIX],
     /// Which of them the user commands.
     pub commanded: [bool; SIX],
+    /// The freedoms of a rigid body that the frame holds: those not in `dof`.
+    pub held: Vec<usize>,
     /// The drives, in the order of the joints.
     pub drives: Vec<MachineDrive>,
     /// The struts, in the order of the closures.
@@ -147,6 +149,9 @@ pub struct Machine {
     pub characteristic_length: f64,
     /// Start of the forward solution.
     pub home: Pose<f64>,
+    /// What [`crate::kinematics::proven_regular`] multiplies by: `l^r / (n-1)^((n-1)/2)` for n
+    /// closures, r rotations and the characteristic length l.
+    pub regularity_scale: f64,
 }
 
 /// The indices whose flag is set.
@@ -165,6 +170,7 @@ impl Machine {
         let mut machine = Machine {
             dof: description.dof,
             commanded: description.commanded,
+            held: (0..SIX).filter(|&k| !description.dof[k]).collect(),
             drives: Vec::new(),
             struts: Vec::new(),
             parameters: Vec::new(),
@@ -172,6 +178,7 @@ impl Machine {
             tool: 0,
             characteristic_length: 0.0,
             home: Pose::from_coordinates(description.home),
+            regularity_scale: 0.0,
         };
         for strut in &description.struts {
             machine.add_strut(strut, &description.drives)?;
@@ -198,6 +205,10 @@ impl Machine {
                 format!("the characteristic length is {} m", machine.characteristic_length),
             );
         }
+        let rotations = machine.dof[3..].iter().filter(|&&free| free).count() as i32;
+        let others = machine.closure_count() as f64 - 1.0;
+        machine.regularity_scale =
+            machine.characteristic_length.powi(rotations) / others.max(1.0).powf(0.5 * others);
         for (index, drive) in description.drives.iter().enumerate() {
             if drive.working_mode.is_none() {
                 machine.drives[index].mode = machine.nearest_mode(index);

@@ -96,8 +96,20 @@ fn contiguous<'py>(object: &Bound<'py, PyAny>, what: &str) -> PyResult<PyReadonl
     Ok(array.cast::<PyArrayDyn<f64>>()?.readonly())
 }
 
-/// A new array of zeros of the leading shape and further dimensions.
-pub fn output<'py>(py: Python<'py>, leading: &[usize], further: &[usize]) -> Bound<'py, PyArrayDyn<f64>> {
+/// From this many numbers on a result is not zeroed first: every number of it is written anyway.
+const LARGE: usize = 4096;
+
+/// A new array of the leading shape and further dimensions, to be written whole.
+pub fn output<'py>(
+    py: Python<'py>,
+    leading: &[usize],
+    further: &[usize],
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let shape: Vec<usize> = leading.iter().chain(further).copied().collect();
-    PyArrayDyn::zeros(py, shape, false)
+    if shape.iter().product::<usize>() < LARGE {
+        return Ok(PyArrayDyn::zeros(py, shape, false));
+    }
+    static EMPTY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let empty = EMPTY.import(py, "numpy", "empty")?;
+    Ok(empty.call1((shape,))?.cast_into::<PyArrayDyn<f64>>()?)
 }

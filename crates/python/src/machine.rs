@@ -143,7 +143,7 @@ impl Machine {
         further: &[usize],
         quantity: impl Fn(usize) -> Quantity<'a>,
     ) -> PyResult<(Array<'py>, Vec<Status>)> {
-        let out = output(py, leading, further);
+        let out = output(py, leading, further)?;
         let width: usize = further.iter().product();
         let mut status = vec![Status::Ok; at.count];
         {
@@ -415,7 +415,7 @@ impl Machine {
     ) -> PyResult<Bound<'py, PyAny>> {
         let commands = self.commands(poses)?;
         let placed = self.placed(py, &commands, None)?;
-        let out = output(py, &commands.leading, &[self.machine.drives.len()]);
+        let out = output(py, &commands.leading, &[self.machine.drives.len()])?;
         out.readwrite().as_slice_mut()?.copy_from_slice(&placed.joints);
         self.answer(py, out, &commands.leading, &placed.status, status, Some(&commands))
     }
@@ -441,7 +441,7 @@ impl Machine {
             }
         };
         let freedoms = chosen(&machine.dof);
-        let out = output(py, &joints.leading, &[freedoms.len()]);
+        let out = output(py, &joints.leading, &[freedoms.len()])?;
         let mut codes = vec![Status::Ok; count];
         {
             let mut writable = out.readwrite();
@@ -516,7 +516,7 @@ impl Machine {
     ) -> PyResult<Bound<'py, PyAny>> {
         let commands = self.commands(poses)?;
         let placed = self.placed(py, &commands, None)?;
-        let out = output(py, &commands.leading, &[]);
+        let out = output(py, &commands.leading, &[])?;
         {
             let mut writable = out.readwrite();
             let data = writable.as_slice_mut()?;
@@ -597,7 +597,7 @@ impl Machine {
         let shared_poses = placements.serves(count, "placements")?;
         let shared_values = values.serves(count, "values")?;
         let width = self.components();
-        let out = output(py, &[count], &[width]);
+        let out = output(py, &[count], &[width])?;
         let mut status = vec![Status::Ok; count];
         {
             let mut writable = out.readwrite();
@@ -701,7 +701,7 @@ impl Machine {
         let placements = Input::new(placements, &[7], "placements")?;
         let shared = joints.serves(placements.count, "joints")?;
         let width = machine.closure_count();
-        let out = output(py, &[placements.count], &[width]);
+        let out = output(py, &[placements.count], &[width])?;
         {
             let mut writable = out.readwrite();
             for (i, row) in writable.as_slice_mut()?.chunks_exact_mut(width).enumerate() {
@@ -718,7 +718,7 @@ impl Machine {
     fn pose_of<'py>(&self, py: Python<'py>, placements: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
         let placements = Input::new(placements, &[7], "placements")?;
         let freedoms = chosen(&self.machine.dof);
-        let out = output(py, &placements.leading, &[freedoms.len()]);
+        let out = output(py, &placements.leading, &[freedoms.len()])?;
         {
             let mut writable = out.readwrite();
             let rows = writable.as_slice_mut()?.chunks_exact_mut(freedoms.len());
@@ -733,7 +733,7 @@ impl Machine {
     fn placement_of<'py>(&self, py: Python<'py>, poses: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
         let widths = [self.components(), self.machine.commanded_count()];
         let poses = Input::new(poses, &widths, "poses")?;
-        let out = output(py, &poses.leading, &[7]);
+        let out = output(py, &poses.leading, &[7])?;
         out.readwrite().as_slice_mut()?.copy_from_slice(&self.rows_of_poses(&poses));
         Ok(out)
     }
@@ -750,7 +750,7 @@ impl Machine {
         let placements = Input::new(placements, &[7], "placements")?;
         let shared = joints.serves(placements.count, "joints")?;
         let width = machine.closure_count();
-        let out = output(py, &[placements.count], &[width, 2, 3]);
+        let out = output(py, &[placements.count], &[width, 2, 3])?;
         {
             let mut writable = out.readwrite();
             for (i, cell) in writable.as_slice_mut()?.chunks_exact_mut(6 * width).enumerate() {
@@ -818,9 +818,9 @@ impl Machine {
 
     fn placed_arrays<'py>(&self, py: Python<'py>, placed: &Placed) -> PyResult<Bound<'py, PyAny>> {
         let count = placed.status.len();
-        let joints = output(py, &[count], &[self.machine.drives.len()]);
+        let joints = output(py, &[count], &[self.machine.drives.len()])?;
         joints.readwrite().as_slice_mut()?.copy_from_slice(&placed.joints);
-        let poses = output(py, &[count], &[7]);
+        let poses = output(py, &[count], &[7])?;
         poses.readwrite().as_slice_mut()?.copy_from_slice(&placed.poses);
         (joints, poses, codes(py, &[count], &placed.status)?).into_bound_py_any(py)
     }

@@ -6,10 +6,8 @@
 use super::dispatch::{Work, dispatch};
 use super::samples::{Group, Rows, Samples};
 use super::threads::for_chunks;
-use crate::kinematics::{
-    Limbs, Linearisation, SINGULAR, condition, gradients, limbs, linearise, touched,
-};
-use crate::linear::{SIX, pivot_order};
+use crate::kinematics::{Limbs, Linearisation, SINGULAR, condition, limbs, touched};
+use crate::linear::{Order, SIX, pivot_order};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::statics::{
@@ -69,6 +67,7 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
         let mut at: Limbs<S> = Default::default();
         let mut order = [0; SIX];
         let mut columns = vec![S::default(); width];
+        let mut linear = Linearisation::default();
         let groups = out.chunks_mut((width * S::WIDTH).max(1)).zip(status.chunks_mut(S::WIDTH));
         for (number, (out, status)) in groups.enumerate() {
             let place = Place { first: first + number * S::WIDTH, size: status.len() };
@@ -80,7 +79,7 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
                 if number == 0 {
                     order = single_order(machine, &group);
                 }
-                let linear = linearise(machine, &group.p, &group.q, &at, &group.pose, &order);
+                linear.fill(machine, &group.p, &group.q, &at, &group.pose, &order);
                 quantity.write(&linear, place, &mut columns);
                 S::store_rows(&columns, out);
                 proven = linear.regular;
@@ -99,9 +98,11 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
 }
 
 #[inline(never)]
-fn single_order<S: Real>(machine: &Machine, group: &Group<S>) -> [usize; SIX] {
+fn single_order<S: Real>(machine: &Machine, group: &Group<S>) -> Order {
     let (p, q, pose) = group.single(0);
-    pivot_order(&gradients(machine, &p, &q, &pose).0)
+    let mut linear = Linearisation::default();
+    linear.differentiate(machine, &p, &q, &pose);
+    pivot_order(&linear.rows).0
 }
 
 /// One sample on the single road.
@@ -115,9 +116,10 @@ fn alone<S: Real, Q: FirstOrder>(
     out: &mut [f64],
 ) -> Status {
     let (p, q, pose) = group.single(lane);
-    let order = pivot_order(&gradients(machine, &p, &q, &pose).0);
-    let at = limbs(machine, &p, &q);
-    let linear = linearise(machine, &p, &q, &at, &pose, &order);
+    let mut linear = Linearisation::default();
+    linear.differentiate(machine, &p, &q, &pose);
+    let order = pivot_order(&linear.rows).0;
+    linear.fill(machine, &p, &q, &limbs(machine, &p, &q), &pose, &order);
     let regular = linear.regular > 0.0 || condition(machine, &p, &q, &pose) >= SINGULAR;
     if regular || quantity.survives_singular() {
         quantity.write(&linear, place, out);

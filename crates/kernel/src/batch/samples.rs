@@ -46,12 +46,8 @@ impl<'a> Rows<'a> {
             }
             return;
         }
-        for lane in 0..S::WIDTH {
-            let row = self.row(first + lane.min(size - 1));
-            for (column, &value) in columns.iter_mut().zip(row) {
-                column.set_lane(lane, value);
-            }
-        }
+        let rows = &self.data[first * self.width..(first + size) * self.width];
+        S::load_rows(rows, columns);
     }
 }
 

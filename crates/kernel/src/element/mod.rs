@@ -192,23 +192,24 @@ pub trait Drive {
     ) -> [f64; 2];
 }
 
-/// The derivatives of one closure to all that it reads. Unused places are zero.
+/// No drive has more parameters than this.
+pub const MAX_DRIVE_PARAMETERS: usize = 7;
+/// Where a closure's gradient keeps the derivatives to the strut's own parameters, in their order.
+const OWN: usize = 7;
+/// Where the drive's parameters end.
+pub const DRIVE_END: usize = OWN + MAX_DRIVE_PARAMETERS;
+/// Places of one closure's gradient: `base`, `platform`, `length`, the drive's parameters, `tool`.
+/// The platform's and the tool's are the library's to fill, since they depend on the attitude.
+pub const PLACES: usize = DRIVE_END + 3;
+
+/// The derivatives of one closure that need no knowledge of poses, beside those in its places.
 #[derive(Clone, Copy, Debug)]
 pub struct ClosureGradient<S> {
     /// To the platform-side joint centre, base frame.
     pub centre: Vector<S>,
-    /// To `strut.base.x|y|z`.
-    pub base: Vector<S>,
-    /// To `strut.length`.
-    pub length: S,
-    /// To the drive's parameters, in their order.
-    pub drive: [S; MAX_DRIVE_PARAMETERS],
     /// To the joint coordinate.
     pub joint: S,
 }
-
-/// No drive has more parameters than this.
-pub const MAX_DRIVE_PARAMETERS: usize = 7;
 
 /// The gradient of the strut closure at a base-side centre that hangs on the frame.
 #[inline(always)]
@@ -216,15 +217,14 @@ pub fn fixed_gradient<S: Scalar>(
     base: Vector<S>,
     platform: Vector<S>,
     length: S,
+    places: &mut [S; PLACES],
 ) -> ClosureGradient<S> {
-    let zero = length.lift(0.0);
     let closure = strut_dual(base, platform, length);
+    places[..3].copy_from_slice(&closure.parts[..3]);
+    places[6] = closure.parts[6];
     ClosureGradient {
         centre: [closure.parts[3], closure.parts[4], closure.parts[5]],
-        base: [closure.parts[0], closure.parts[1], closure.parts[2]],
-        length: closure.parts[6],
-        drive: [zero; MAX_DRIVE_PARAMETERS],
-        joint: zero,
+        joint: length.lift(0.0),
     }
 }
 
@@ -247,6 +247,7 @@ fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
     base: Vector<S>,
     length: S,
     platform: Vector<S>,
+    places: &mut [S; PLACES],
 ) -> ClosureGradient<S> {
     let count = D::TABLE.parameters.len();
     let mut inputs = [Dual::<S, N>::constant(joint); MAX_DRIVE_PARAMETERS];
@@ -272,13 +273,11 @@ fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
         let along = [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]];
         chained[j] = closure.parts[6].mul_add(own.parts[j], dot(to_centre, along));
     }
-    let mut drive = [joint.lift(0.0); MAX_DRIVE_PARAMETERS];
-    drive[..count].copy_from_slice(&chained[..count]);
+    places[..3].copy_from_slice(&chained[count + 1..count + 4]);
+    places[6] = chained[count + 4];
+    places[OWN..OWN + count].copy_from_slice(&chained[..count]);
     ClosureGradient {
         centre: [closure.parts[3], closure.parts[4], closure.parts[5]],
-        base: [chained[count + 1], chained[count + 2], chained[count + 3]],
-        length: chained[count + 4],
-        drive,
         joint: chained[count],
     }
 }
@@ -354,10 +353,11 @@ macro_rules! drives {
                 base: Vector<S>,
                 length: S,
                 platform: Vector<S>,
+                places: &mut [S; PLACES],
             ) -> ClosureGradient<S> {
                 match self {
                     $(DriveKind::$name => driven_gradient::<S, $type, { <$type as Drive>::WIDTH }>(
-                        frame, parameters, joint, base, length, platform,
+                        frame, parameters, joint, base, length, platform, places,
                     )),+
                 }
             }

@@ -4,10 +4,10 @@
 //! (translation of the tool point, then rotation) is added here, once for all elements.
 
 use crate::element::strut;
-use crate::linear::{Matrix6, SIX};
+use crate::linear::{IN_ORDER, Matrix6, Order, SIX};
 use crate::machine::Machine;
-use crate::scalar::{Dual, Real, Scalar};
-use crate::spatial::{Pose, RotationMatrix, Vector, add, cross, rotate, rotation_matrix};
+use crate::scalar::{Dual, Real};
+use crate::spatial::{Pose, Vector, add, cross, rotate, rotation_matrix};
 
 
 /// One strut of one sample, ready for the iteration: everything that does not depend on the pose.
@@ -49,29 +49,41 @@ pub fn limbs<S: Real>(machine: &Machine, p: &[S], q: &[S]) -> Limbs<S> {
 }
 
 /// A row from the derivative to the platform joint: the same force, and its moment about the tool
-/// point.
+/// point; zero in the freedoms that the frame holds.
 #[inline(always)]
-pub fn row<S: Scalar>(to_centre: Vector<S>, arm: Vector<S>) -> [S; SIX] {
+pub fn row<S: Real>(machine: &Machine, to_centre: Vector<S>, arm: Vector<S>) -> [S; SIX] {
     let moment = cross(arm, to_centre);
-    [to_centre[0], to_centre[1], to_centre[2], moment[0], moment[1], moment[2]]
+    let mut row = [to_centre[0], to_centre[1], to_centre[2], moment[0], moment[1], moment[2]];
+    for &freedom in &machine.held {
+        row[freedom] = S::default();
+    }
+    row
 }
 
-/// Residuals and rows of the given generic closure for all struts, the held freedoms zeroed and
-/// their identity rows added.
+/// Residuals and rows of a closure for all struts, in the given order of elimination: rows
+/// `0..closure_count` are closures, those beyond are identity rows of the freedoms that the frame
+/// holds, which are taken out of the closures.
 #[inline(always)]
 fn rows_of<S: Real, const SQUARED: bool>(
     machine: &Machine,
     limbs: &Limbs<S>,
-    position: Vector<S>,
-    rotation: &RotationMatrix<S>,
-) -> (Matrix6<S>, [S; SIX]) {
-    let mut rows = [[S::default(); SIX]; SIX];
-    let mut residuals = [S::default(); SIX];
+    pose: &Pose<S>,
+    order: &Order,
+    rows: &mut Matrix6<S>,
+    residuals: &mut [S; SIX],
+) {
+    let rotation = rotation_matrix(pose.rotation);
     let count = machine.struts.len();
-    for i in 0..count {
+    for slot in 0..SIX {
+        let i = order[slot];
+        if i >= count {
+            rows[slot] = held_row(machine, i - count);
+            residuals[slot] = S::default();
+            continue;
+        }
         let limb = &limbs[i];
-        let arm = rotate(rotation, limb.arm);
-        let centre = add(arm, position);
+        let arm = rotate(&rotation, limb.arm);
+        let centre = add(arm, pose.position);
         let at = [
             Dual::<S, 3>::variable(centre[0], 0),
             Dual::variable(centre[1], 1),
@@ -88,30 +100,17 @@ fn rows_of<S: Real, const SQUARED: bool>(
         } else {
             strut::closure(base, at, length)
         };
-        rows[i] = row(closure.parts, arm);
-        residuals[i] = closure.value;
+        rows[slot] = row(machine, closure.parts, arm);
+        residuals[slot] = closure.value;
     }
-    hold(machine, &mut rows);
-    (rows, residuals)
 }
 
-/// Takes the freedoms that the frame holds out of the closures and gives each an identity row.
+/// The identity row of the freedom that the frame holds as its number `number`.
 #[inline(always)]
-pub fn hold<S: Real>(machine: &Machine, rows: &mut Matrix6<S>) {
-    let mut next = machine.struts.len();
-    if next == SIX {
-        return;
-    }
-    for k in 0..SIX {
-        if !machine.dof[k] {
-            for i in 0..machine.struts.len() {
-                rows[i][k] = S::default();
-            }
-            rows[next] = [S::default(); SIX];
-            rows[next][k] = S::splat(1.0);
-            next += 1;
-        }
-    }
+pub fn held_row<S: Real>(machine: &Machine, number: usize) -> [S; SIX] {
+    let mut result = [S::default(); SIX];
+    result[machine.held[number]] = S::splat(1.0);
+    result
 }
 
 /// Residuals and rows of the squared closures: what Newton's iteration runs on.
@@ -120,33 +119,41 @@ pub fn squared_rows<S: Real>(
     machine: &Machine,
     limbs: &Limbs<S>,
     pose: &Pose<S>,
-) -> (Matrix6<S>, [S; SIX]) {
-    rows_of::<S, true>(machine, limbs, pose.position, &rotation_matrix(pose.rotation))
+    order: &Order,
+    rows: &mut Matrix6<S>,
+    residuals: &mut [S; SIX],
+) {
+    rows_of::<S, true>(machine, limbs, pose, order, rows, residuals);
 }
 
-/// Residuals (m) and rows (unit wrenches) of the closures themselves.
-#[inline(always)]
-pub fn closure_rows<S: Real>(
+/// Residuals (m) and rows (unit wrenches) of the closures themselves, as they come.
+pub fn closure_rows(
     machine: &Machine,
-    limbs: &Limbs<S>,
-    pose: &Pose<S>,
-) -> (Matrix6<S>, [S; SIX]) {
-    rows_of::<S, false>(machine, limbs, pose.position, &rotation_matrix(pose.rotation))
+    limbs: &Limbs<f64>,
+    pose: &Pose<f64>,
+) -> (Matrix6<f64>, [f64; SIX]) {
+    let (mut rows, mut residuals) = ([[0.0; SIX]; SIX], [0.0; SIX]);
+    rows_of::<f64, false>(machine, limbs, pose, &IN_ORDER, &mut rows, &mut residuals);
+    (rows, residuals)
 }
 
-/// Residuals of the squared closures alone.
+/// Residuals of the squared closures alone, in the given order.
 #[inline(always)]
 pub fn squared_residuals<S: Real>(
     machine: &Machine,
     limbs: &Limbs<S>,
     pose: &Pose<S>,
-) -> [S; SIX] {
+    order: &Order,
+    residuals: &mut [S; SIX],
+) {
     let rotation = rotation_matrix(pose.rotation);
-    let mut residuals = [S::default(); SIX];
-    for i in 0..machine.struts.len() {
-        let limb = &limbs[i];
-        let centre = add(rotate(&rotation, limb.arm), pose.position);
-        residuals[i] = strut::squared_closure(limb.base, centre, limb.length);
+    for slot in 0..SIX {
+        residuals[slot] = if order[slot] < machine.struts.len() {
+            let limb = &limbs[order[slot]];
+            let centre = add(rotate(&rotation, limb.arm), pose.position);
+            strut::squared_closure(limb.base, centre, limb.length)
+        } else {
+            S::default()
+        };
     }
-    residuals
 }

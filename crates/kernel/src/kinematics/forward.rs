@@ -8,7 +8,7 @@
 use super::closures::{Limbs, closure_rows, squared_residuals, squared_rows};
 use super::linearisation::proven_regular;
 use super::SINGULAR;
-use crate::linear::{SIX, condition_index, factor, factor_pivoting, pivot_order, solve};
+use crate::linear::{IN_ORDER, Order, SIX, condition_index, factor, pivot_order, solve};
 use crate::machine::Machine;
 use crate::scalar::Real;
 use crate::spatial::Pose;
@@ -45,17 +45,11 @@ fn relative_size<S: Real>(machine: &Machine, twist: &[S; SIX]) -> S {
     (displacement * S::splat(1.0 / machine.characteristic_length)).max(rotation)
 }
 
-#[inline(always)]
-fn negated<S: Real>(mut values: [S; SIX]) -> [S; SIX] {
-    for value in &mut values {
-        *value = -*value;
-    }
-    values
-}
-
 /// The row order for a group of samples near one pose.
-pub fn start_order(machine: &Machine, limbs: &Limbs<f64>, pose: &Pose<f64>) -> [usize; SIX] {
-    pivot_order(&squared_rows(machine, limbs, pose).0)
+pub fn start_order(machine: &Machine, limbs: &Limbs<f64>, pose: &Pose<f64>) -> Order {
+    let (mut rows, mut residuals) = ([[0.0; SIX]; SIX], [0.0; SIX]);
+    squared_rows(machine, limbs, pose, &IN_ORDER, &mut rows, &mut residuals);
+    pivot_order(&rows).0
 }
 
 /// Newton's iteration on all lanes at once, rows in the given order.
@@ -64,24 +58,26 @@ pub fn descend<S: Real>(
     machine: &Machine,
     limbs: &Limbs<S>,
     start: &Pose<S>,
-    order: &[usize; SIX],
+    order: &Order,
 ) -> Descent<S> {
     let mut pose = *start;
     let mut first = S::splat(0.0);
     let mut same_branch = S::splat(1.0);
+    let mut rows = [[S::default(); SIX]; SIX];
+    let mut twist = [S::default(); SIX];
     for step in 0..LANE_STEPS {
-        let (rows, residuals) = squared_rows(machine, limbs, &pose);
-        let factored = factor(&rows, order);
-        let twist = solve(&factored, &negated(residuals));
-        pose.step(twist);
-        let determinant = factored.pivot_product;
+        squared_rows(machine, limbs, &pose, order, &mut rows, &mut twist);
+        let determinant = factor(&mut rows);
+        solve(&rows, &mut twist);
+        pose.step_back(&twist);
         if step == 0 {
             first = determinant;
         }
         same_branch = same_branch.min(first * determinant);
         if relative_size(machine, &twist).largest() < CHORD {
-            let twist = solve(&factored, &negated(squared_residuals(machine, limbs, &pose)));
-            pose.step(twist);
+            squared_residuals(machine, limbs, &pose, order, &mut twist);
+            solve(&rows, &mut twist);
+            pose.step_back(&twist);
             let settled = S::splat(SETTLED) - relative_size(machine, &twist);
             let regular = proven_regular(machine, limbs, determinant);
             return Descent { pose, proof: settled.min(same_branch).min(regular) };
@@ -109,29 +105,34 @@ fn settle(
     longest: f64,
     sign: &mut f64,
 ) -> Ending {
-    let missing = |residuals: [f64; SIX]| std::array::from_fn(|i| target[i] - residuals[i]);
+    let (mut rows, mut twist) = ([[0.0; SIX]; SIX], [0.0; SIX]);
     for _ in 0..STEPS {
-        let (rows, residuals) = squared_rows(machine, limbs, pose);
-        let factored = factor_pivoting(&rows);
-        let side = (factored.pivot_product * factored.order_sign).signum();
+        squared_rows(machine, limbs, pose, &IN_ORDER, &mut rows, &mut twist);
+        let (order, parity) = pivot_order(&rows);
+        let mut factors = order.map(|row| rows[row]);
+        let side = (factor(&mut factors) * parity).signum();
         if *sign == 0.0 {
             *sign = side;
         }
         if side != *sign {
             return Ending::Crossed;
         }
-        let twist = solve(&factored, &missing(residuals));
+        twist = std::array::from_fn(|k| twist[order[k]] - target[order[k]]);
+        solve(&factors, &mut twist);
         let size = relative_size(machine, &twist);
         // Also true where it is NaN.
         if !(size <= longest) {
             return Ending::Lost;
         }
-        pose.step(twist);
+        pose.step_back(&twist);
         if size < CHORD {
-            let residuals = squared_residuals(machine, limbs, pose);
-            let twist = solve(&factored, &missing(residuals));
+            squared_residuals(machine, limbs, pose, &order, &mut twist);
+            for k in 0..SIX {
+                twist[k] -= target[order[k]];
+            }
+            solve(&factors, &mut twist);
             if relative_size(machine, &twist) < SETTLED {
-                pose.step(twist);
+                pose.step_back(&twist);
                 return Ending::Settled;
             }
         }
@@ -163,7 +164,8 @@ pub fn forward(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pos
 
 /// Takes the residual at the start down to zero in shares.
 fn follow(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64>, Status) {
-    let whole = squared_residuals(machine, limbs, start);
+    let mut whole = [0.0; SIX];
+    squared_residuals(machine, limbs, start, &IN_ORDER, &mut whole);
     let mut sign = 0.0;
     let mut pose = *start;
     let mut left = 1.0;
@@ -201,8 +203,9 @@ fn follow(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64
 
 /// A settled pose is `ok` only where the platform is held.
 fn judged(machine: &Machine, limbs: &Limbs<f64>, pose: Pose<f64>) -> (Pose<f64>, Status) {
-    let (rows, _) = squared_rows(machine, limbs, &pose);
-    let determinant = factor_pivoting(&rows).pivot_product;
+    let (mut rows, mut residuals) = ([[0.0; SIX]; SIX], [0.0; SIX]);
+    squared_rows(machine, limbs, &pose, &IN_ORDER, &mut rows, &mut residuals);
+    let determinant = factor(&mut pivot_order(&rows).0.map(|row| rows[row]));
     let regular = proven_regular(machine, limbs, determinant) > 0.0
         || condition_at(machine, limbs, &pose) >= SINGULAR;
     (pose, if regular { Status::Ok } else { Status::Singular })

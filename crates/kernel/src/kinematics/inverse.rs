@@ -5,10 +5,10 @@
 //! solved for together by Newton's iteration, started from the closed forms at the home attitude.
 
 use super::closures::{closure_rows, limbs};
-use super::linearisation::gradients;
+use super::linearisation::Linearisation;
 use super::SINGULAR;
 use crate::element::{Dimension, Reach};
-use crate::linear::{Matrix6, SIX, condition_index, factor_pivoting, solve};
+use crate::linear::{Matrix6, SIX, condition_index, factor, pivot_order, solve};
 use crate::machine::{Machine, MachineDrive, chosen};
 use crate::scalar::Real;
 use crate::spatial::{
@@ -117,10 +117,12 @@ fn solve_parasitic(machine: &Machine, p: &[f64], seed_margin: f64, solved: &mut 
     let count = machine.struts.len();
     let branch = |rates: &[f64]| rates.iter().map(|rate| rate.signum()).collect::<Vec<_>>();
     let mut wanted: Option<Vec<f64>> = None;
+    let mut linear = Linearisation::default();
     for _ in 0..STEPS {
         let at = limbs(machine, p, &solved.joints);
         let (_, residuals) = closure_rows(machine, &at, &solved.pose);
-        let (rows, gradients, _) = gradients(machine, p, &solved.joints, &solved.pose);
+        linear.differentiate(machine, p, &solved.joints, &solved.pose);
+        let rows = &linear.rows;
         let [_, _, _, a, b, c] = solved.pose.to_coordinates();
         let unit = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         let axes = if by_angle { euler_axes([a, b, c]) } else { unit };
@@ -140,14 +142,17 @@ fn solve_parasitic(machine: &Machine, p: &[f64], seed_margin: f64, solved: &mut 
                 };
             }
             if let Some(drive) = machine.struts[i].drive {
-                system[i][parasitic.len() + drive] = gradients[i].joint / joint_length(machine, drive);
+                system[i][parasitic.len() + drive] = linear.to_joint[i] / joint_length(machine, drive);
             }
         }
         let rates: Vec<f64> =
-            machine.drives.iter().map(|drive| gradients[drive.struts[0]].joint).collect();
+            machine.drives.iter().map(|drive| linear.to_joint[drive.struts[0]]).collect();
         let wanted = wanted.get_or_insert_with(|| branch(&rates));
-        let right = std::array::from_fn(|i| if i < count { -residuals[i] } else { 0.0 });
-        let step = solve(&factor_pivoting(&system), &right);
+        let (order, _) = pivot_order(&system);
+        let mut factors = order.map(|row| system[row]);
+        factor(&mut factors);
+        let mut step = order.map(|row| if row < count { -residuals[row] } else { 0.0 });
+        solve(&factors, &mut step);
         let size = step.iter().fold(0.0_f64, |size, value| size.max(value.abs())) / l;
         // Also true where it is NaN.
         if !(size < 10.0) {
@@ -260,7 +265,9 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
 
 /// Smallest over largest singular value of the scaled closure Jacobian: 1 isotropic, 0 singular.
 pub fn condition(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> f64 {
-    let (mut rows, _, _) = gradients(machine, p, q, pose);
+    let mut linear = Linearisation::default();
+    linear.differentiate(machine, p, q, pose);
+    let mut rows = linear.rows;
     for row in &mut rows {
         for value in &mut row[3..] {
             *value /= machine.characteristic_length;

@@ -1,15 +1,17 @@
 //! Everything of first order at one pose: rows, their inverse, and the gradients of the closures to
 //! parameters and joints. By implicit differentiation, never through an iteration.
 
-use super::closures::{Limbs, hold, row};
 use super::SINGULAR;
-use crate::element::{ClosureGradient, MAX_DRIVE_PARAMETERS, fixed_gradient};
-use crate::linear::{Factored, Matrix6, SIX, factor, invert};
+use super::closures::{Limbs, held_row, row};
+use crate::element::{DRIVE_END, PLACES, fixed_gradient};
+use crate::linear::{Matrix6, Order, SIX, factor, invert};
 use crate::machine::Machine;
 use crate::scalar::Real;
-use crate::spatial::{Pose, RotationMatrix, add, rotate, rotate_back, rotation_matrix};
+use crate::spatial::{Pose, add, rotate, rotate_back, rotation_matrix};
 
-/// The closures of one sample (or one group of lanes) to first order.
+/// The closures of one sample (or one group of lanes) to first order: scratch of its caller, filled
+/// anew for each.
+#[derive(Clone, Debug, Default)]
 pub struct Linearisation<S> {
     /// Closure i to the platform's twist: the unit wrench of its force. Held freedoms are zero.
     pub rows: Matrix6<S>,
@@ -22,10 +24,6 @@ pub struct Linearisation<S> {
     /// Positive where the rows are proven regular.
     pub regular: S,
 }
-
-const DRIVE_END: usize = 7 + MAX_DRIVE_PARAMETERS;
-/// Places of one closure's gradient: base, platform, length, the drive's parameters, tool.
-pub const PLACES: usize = DRIVE_END + 3;
 
 /// The parameters that closure `i` reads: (place in its gradient, parameter).
 pub fn touched(machine: &Machine, i: usize) -> Vec<(usize, usize)> {
@@ -40,41 +38,69 @@ pub fn touched(machine: &Machine, i: usize) -> Vec<(usize, usize)> {
     places
 }
 
-/// Rows and gradients of all closures, by dual numbers through drive and strut at once.
-#[inline(always)]
-pub fn gradients<S: Real>(
-    machine: &Machine,
-    p: &[S],
-    q: &[S],
-    pose: &Pose<S>,
-) -> (Matrix6<S>, [ClosureGradient<S>; SIX], RotationMatrix<S>) {
-    let rotation = rotation_matrix(pose.rotation);
-    let zero = S::splat(0.0);
-    let none = fixed_gradient([zero; 3], [S::splat(1.0); 3], zero);
-    let mut gradients = [none; SIX];
-    let mut rows = [[zero; SIX]; SIX];
-    let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
-    for i in 0..machine.struts.len() {
-        let strut = &machine.struts[i];
-        let own = &p[strut.first..];
-        let base = [own[0], own[1], own[2]];
-        let arm = rotate(&rotation, [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]]);
-        let centre = add(arm, pose.position);
-        let length = match strut.own_length {
-            Some(index) => p[index],
-            None => zero,
-        };
-        gradients[i] = match strut.drive {
-            None => fixed_gradient(base, centre, length),
-            Some(index) => {
-                let drive = &machine.drives[index];
-                drive.kind.gradient(&drive.frame, &p[drive.first..], q[index], base, length, centre)
+impl<S: Real> Linearisation<S> {
+    /// Fills rows and gradients of all closures, by dual numbers through drive and strut at once.
+    #[inline(always)]
+    pub fn differentiate(&mut self, machine: &Machine, p: &[S], q: &[S], pose: &Pose<S>) {
+        let rotation = rotation_matrix(pose.rotation);
+        let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
+        let count = machine.struts.len();
+        for i in 0..count {
+            let strut = &machine.struts[i];
+            let own = &p[strut.first..];
+            let base = [own[0], own[1], own[2]];
+            let arm = rotate(&rotation, [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]]);
+            let centre = add(arm, pose.position);
+            let length = match strut.own_length {
+                Some(index) => p[index],
+                None => S::default(),
+            };
+            let places = &mut self.to_parameters[i];
+            let gradient = match strut.drive {
+                None => fixed_gradient(base, centre, length, places),
+                Some(index) => {
+                    let drive = &machine.drives[index];
+                    let parameters = &p[drive.first..];
+                    let (frame, joint) = (&drive.frame, q[index]);
+                    drive.kind.gradient(frame, parameters, joint, base, length, centre, places)
+                }
+            };
+            let platform = rotate_back(&rotation, gradient.centre);
+            for k in 0..3 {
+                places[3 + k] = platform[k];
+                places[DRIVE_END + k] = -platform[k];
             }
-        };
-        rows[i] = row(gradients[i].centre, arm);
+            self.to_joint[i] = gradient.joint;
+            self.rows[i] = row(machine, gradient.centre, arm);
+        }
+        for number in 0..machine.held.len() {
+            self.rows[count + number] = held_row(machine, number);
+        }
     }
-    hold(machine, &mut rows);
-    (rows, gradients, rotation)
+
+    /// Fills everything, at a pose that closes the struts; rows are eliminated in the given order.
+    #[inline(always)]
+    pub fn fill(
+        &mut self,
+        machine: &Machine,
+        p: &[S],
+        q: &[S],
+        limbs: &Limbs<S>,
+        pose: &Pose<S>,
+        order: &Order,
+    ) {
+        self.differentiate(machine, p, q, pose);
+        let mut factors = [[S::default(); SIX]; SIX];
+        for k in 0..SIX {
+            factors[k] = self.rows[order[k]];
+        }
+        let mut determinant = factor(&mut factors);
+        for limb in &limbs[..machine.struts.len()] {
+            determinant = determinant * limb.length;
+        }
+        self.regular = proven_regular(machine, limbs, determinant);
+        invert(&factors, order, &mut self.inverse);
+    }
 }
 
 /// Positive where the rows are certainly regular: a lower bound of smallest over largest singular
@@ -83,14 +109,14 @@ pub fn gradients<S: Real>(
 /// With n unit wrenches W (rotation columns divided by the characteristic length l), Frobenius norm
 /// F and determinant D, the smallest singular value is at least |D| ((n-1) / F^2)^((n-1)/2), since the
 /// others' squares have a sum of at most F^2 (arithmetic and geometric mean), and the largest is at
-/// most F; F^2 is at most n + sum |arm|^2 / l^2. `determinant` is that of the squared rows, W times the strut lengths.
-/// The factor of two covers that it may belong to the last but one iterate.
+/// most F; F^2 is at most n + sum |arm|^2 / l^2. `determinant` is that of the squared rows, W times
+/// the strut lengths. The factor of two covers that it may belong to the last but one iterate.
 #[inline(always)]
 pub fn proven_regular<S: Real>(machine: &Machine, limbs: &Limbs<S>, determinant: S) -> S {
     let count = machine.struts.len();
     let l = machine.characteristic_length;
     let mut arms = S::splat(0.0);
-    let mut lengths = S::splat(1.0);
+    let mut lengths = S::splat(2.0 * SINGULAR * machine.regularity_scale);
     let mut shortest = limbs[0].length;
     for limb in &limbs[..count] {
         for k in 0..3 {
@@ -99,52 +125,13 @@ pub fn proven_regular<S: Real>(machine: &Machine, limbs: &Limbs<S>, determinant:
         lengths = lengths * limb.length;
         shortest = shortest.min(limb.length);
     }
-    let n = count as f64;
-    let rotations = machine.dof[3..].iter().filter(|&&free| free).count() as i32;
-    let frobenius2 = arms.mul_add(S::splat(1.0 / (l * l)), S::splat(n));
-    let mut power = S::splat(1.0);
+    let frobenius2 = arms.mul_add(S::splat(1.0 / (l * l)), S::splat(count as f64));
+    let mut asked = lengths;
     for _ in 0..count / 2 {
-        power = power * frobenius2;
+        asked = asked * frobenius2;
     }
     if count % 2 == 1 {
-        power = power * frobenius2.sqrt();
+        asked = asked * frobenius2.sqrt();
     }
-    let gained = S::splat((n - 1.0).max(1.0).powf(0.5 * (n - 1.0)));
-    let asked = S::splat(2.0 * SINGULAR * l.powi(rotations)) * lengths.abs() * power;
-    (determinant.abs() * gained - asked).min(shortest)
-}
-
-/// The first-order picture at a pose that closes the struts, rows eliminated in the given order.
-#[inline(always)]
-pub fn linearise<S: Real>(
-    machine: &Machine,
-    p: &[S],
-    q: &[S],
-    limbs: &Limbs<S>,
-    pose: &Pose<S>,
-    order: &[usize; SIX],
-) -> Linearisation<S> {
-    let (rows, gradients, rotation) = gradients(machine, p, q, pose);
-    let factored: Factored<S> = factor(&rows, order);
-    let mut lengths = S::splat(1.0);
-    for limb in &limbs[..machine.struts.len()] {
-        lengths = lengths * limb.length;
-    }
-    let regular = proven_regular(machine, limbs, factored.pivot_product * lengths);
-    let mut to_joint = [S::default(); SIX];
-    let mut to_parameters = [[S::default(); PLACES]; SIX];
-    for i in 0..machine.struts.len() {
-        let gradient = &gradients[i];
-        let platform = rotate_back(&rotation, gradient.centre);
-        let own = &mut to_parameters[i];
-        own[..3].copy_from_slice(&gradient.base);
-        own[3..6].copy_from_slice(&platform);
-        own[6] = gradient.length;
-        own[7..DRIVE_END].copy_from_slice(&gradient.drive);
-        for k in 0..3 {
-            own[DRIVE_END + k] = -platform[k];
-        }
-        to_joint[i] = gradient.joint;
-    }
-    Linearisation { rows, inverse: invert(&factored), to_joint, to_parameters, regular }
+    (determinant.abs() - asked).min(shortest)
 }

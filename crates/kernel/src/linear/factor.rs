@@ -1,29 +1,16 @@
 //! Elimination of a 6 x 6 system without heap.
 //!
 //! Lanes share one row order, found by pivoting at a nearby pose: pivoting lane by lane costs half as
-//! much again. Whether the order served is checked per lane by its caller, which falls back to
-//! [`factor_pivoting`].
+//! much again. Whether the order served is checked per lane by its caller, which falls back to an
+//! order found for the sample alone.
 
-use super::{Matrix6, SIX};
+use super::{IN_ORDER, Matrix6, Order, SIX};
 use crate::scalar::Real;
 
-/// A matrix after elimination: multipliers below the diagonal, inverse pivots on it.
-pub struct Factored<S> {
-    matrix: Matrix6<S>,
-    order: [usize; SIX],
-    /// The product of the pivots: the determinant up to the sign of the row order.
-    pub pivot_product: S,
-    /// +1 or -1: the sign of the row order.
-    pub order_sign: f64,
-}
-
-/// Eliminates with the rows in the given order (`rows[order[k]]` becomes row k).
+/// Eliminates in place, rows in the order in which they stand: multipliers below the diagonal, inverse
+/// pivots on it. Returns the product of the pivots, the determinant.
 #[inline(always)]
-pub fn factor<S: Real>(rows: &Matrix6<S>, order: &[usize; SIX]) -> Factored<S> {
-    let mut m = [[S::default(); SIX]; SIX];
-    for k in 0..SIX {
-        m[k] = rows[order[k]];
-    }
+pub fn factor<S: Real>(m: &mut Matrix6<S>) -> S {
     let mut product = S::splat(1.0);
     for k in 0..SIX {
         product = product * m[k][k];
@@ -38,19 +25,19 @@ pub fn factor<S: Real>(rows: &Matrix6<S>, order: &[usize; SIX]) -> Factored<S> {
             }
         }
     }
-    Factored { matrix: m, order: *order, pivot_product: product, order_sign: 1.0 }
+    product
 }
 
-/// Eliminates one matrix with row pivoting; rows are compared by their size relative to their norm.
-pub fn factor_pivoting(rows: &Matrix6<f64>) -> Factored<f64> {
+/// The row order of one matrix that brings a large element, relative to its row's norm, to every
+/// pivot; and the sign of that order.
+pub fn pivot_order(rows: &Matrix6<f64>) -> (Order, f64) {
     let mut m = *rows;
-    let mut order = [0, 1, 2, 3, 4, 5];
+    let mut order = IN_ORDER;
     let mut weight = [0.0; SIX];
     for i in 0..SIX {
-        let norm = m[i].iter().map(|value| value * value).sum::<f64>().sqrt();
-        weight[i] = if norm > 0.0 { 1.0 / norm } else { 0.0 };
+        let square = m[i].iter().map(|value| value * value).sum::<f64>();
+        weight[i] = if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 };
     }
-    let mut product = 1.0;
     let mut sign = 1.0;
     for k in 0..SIX {
         let mut best = k;
@@ -65,52 +52,42 @@ pub fn factor_pivoting(rows: &Matrix6<f64>) -> Factored<f64> {
             weight.swap(k, best);
             sign = -sign;
         }
-        product *= m[k][k];
         let inverse = 1.0 / m[k][k];
-        m[k][k] = inverse;
         for i in k + 1..SIX {
             let multiplier = m[i][k] * inverse;
-            m[i][k] = multiplier;
             for j in k + 1..SIX {
                 m[i][j] -= multiplier * m[k][j];
             }
         }
     }
-    Factored { matrix: m, order, pivot_product: product, order_sign: sign }
+    (order, sign)
 }
 
-/// The row order that pivoting chooses for one matrix.
-pub fn pivot_order(rows: &Matrix6<f64>) -> [usize; SIX] {
-    factor_pivoting(rows).order
-}
-
-/// Solves for one right-hand side, given in the rows' own order.
+/// Solves in place for one right-hand side in the order of the eliminated rows.
 #[inline(always)]
-pub fn solve<S: Real>(factored: &Factored<S>, right: &[S; SIX]) -> [S; SIX] {
-    let m = &factored.matrix;
-    let mut x = [S::default(); SIX];
-    for k in 0..SIX {
-        x[k] = right[factored.order[k]];
-    }
+pub fn solve<S: Real>(m: &Matrix6<S>, x: &mut [S; SIX]) {
     for k in 0..SIX {
         for i in k + 1..SIX {
             x[i] = (-m[i][k]).mul_add(x[k], x[i]);
         }
     }
-    for k in (0..SIX).rev() {
-        for j in k + 1..SIX {
-            x[k] = (-m[k][j]).mul_add(x[j], x[k]);
-        }
-        x[k] = x[k] * m[k][k];
-    }
-    x
+    back_substitute(m, x);
 }
 
-/// The inverse matrix, its columns in the rows' own order.
 #[inline(always)]
-pub fn invert<S: Real>(factored: &Factored<S>) -> Matrix6<S> {
-    let m = &factored.matrix;
-    let mut inverse = [[S::default(); SIX]; SIX];
+fn back_substitute<S: Real>(m: &Matrix6<S>, x: &mut [S; SIX]) {
+    for k in (0..SIX).rev() {
+        let mut value = x[k];
+        for j in k + 1..SIX {
+            value = (-m[k][j]).mul_add(x[j], value);
+        }
+        x[k] = value * m[k][k];
+    }
+}
+
+/// The inverse of the eliminated matrix; `order[k]` is the column that row k answers to.
+#[inline(always)]
+pub fn invert<S: Real>(m: &Matrix6<S>, order: &Order, inverse: &mut Matrix6<S>) {
     for column in 0..SIX {
         // The right-hand side is a unit vector: elimination starts at its own place.
         let mut x = [S::default(); SIX];
@@ -120,16 +97,20 @@ pub fn invert<S: Real>(factored: &Factored<S>) -> Matrix6<S> {
                 x[i] = (-m[i][k]).mul_add(x[k], x[i]);
             }
         }
-        for k in (0..SIX).rev() {
-            for j in k + 1..SIX {
-                x[k] = (-m[k][j]).mul_add(x[j], x[k]);
-            }
-            x[k] = x[k] * m[k][k];
-        }
+        back_substitute(m, &mut x);
         for k in 0..SIX {
-            inverse[k][factored.order[column]] = x[k];
+            inverse[k][order[column]] = x[k];
         }
     }
+}
+
+/// The inverse of one matrix, pivoted; not finite where it has none.
+pub fn inverse_of(rows: &Matrix6<f64>) -> Matrix6<f64> {
+    let (order, _) = pivot_order(rows);
+    let mut m = order.map(|row| rows[row]);
+    factor(&mut m);
+    let mut inverse = [[0.0; SIX]; SIX];
+    invert(&m, &order, &mut inverse);
     inverse
 }
 
@@ -153,15 +134,16 @@ mod tests {
     fn inverse_and_solution_give_back_the_right_hand_side() {
         for seed in 0..50 {
             let rows = sample(seed);
-            let factored = factor_pivoting(&rows);
-            let inverse = invert(&factored);
+            let inverse = inverse_of(&rows);
             let right = [1.0, -2.0, 0.5, 3.0, -1.0, 0.25];
-            let x = solve(&factored, &right);
-            let y = solve(&factor(&rows, &pivot_order(&rows)), &right);
+            let (order, _) = pivot_order(&rows);
+            let mut m = order.map(|row| rows[row]);
+            factor(&mut m);
+            let mut x = order.map(|row| right[row]);
+            solve(&m, &mut x);
             for i in 0..SIX {
                 let product: f64 = (0..SIX).map(|j| rows[i][j] * x[j]).sum();
                 assert!((product - right[i]).abs() < 1e-11);
-                assert!((x[i] - y[i]).abs() < 1e-11);
                 for j in 0..SIX {
                     let unit: f64 = (0..SIX).map(|k| rows[i][k] * inverse[k][j]).sum();
                     assert!((unit - f64::from(u8::from(i == j))).abs() < 1e-11);
@@ -175,9 +157,11 @@ mod tests {
         let rows = sample(3);
         let mut exchanged = rows;
         exchanged.swap(1, 4);
-        let a = factor_pivoting(&rows);
-        let b = factor_pivoting(&exchanged);
-        let ratio = a.pivot_product * a.order_sign / (b.pivot_product * b.order_sign);
+        let determinant = |rows: &Matrix6<f64>| {
+            let (order, sign) = pivot_order(rows);
+            factor(&mut order.map(|row| rows[row])) * sign
+        };
+        let ratio = determinant(&rows) / determinant(&exchanged);
         assert!((ratio + 1.0).abs() < 1e-12);
     }
 }

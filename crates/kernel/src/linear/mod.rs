@@ -3,10 +3,14 @@
 mod factor;
 mod singular;
 
-pub use factor::{Factored, factor, factor_pivoting, invert, pivot_order, solve};
+pub use factor::{factor, inverse_of, invert, pivot_order, solve};
 pub use singular::condition_index;
 
 /// Six freedoms of a rigid body.
 pub const SIX: usize = 6;
 /// Six rows of six.
 pub type Matrix6<S> = [[S; SIX]; SIX];
+/// Which of the system's rows stands at each place of the elimination.
+pub type Order = [usize; SIX];
+/// The rows as they come.
+pub const IN_ORDER: Order = [0, 1, 2, 3, 4, 5];

@@ -66,6 +66,10 @@ impl Real for f64 {
         self
     }
     #[inline(always)]
+    fn load_rows(rows: &[f64], columns: &mut [f64]) {
+        columns.copy_from_slice(&rows[..columns.len()]);
+    }
+    #[inline(always)]
     fn store_rows(columns: &[f64], rows: &mut [f64]) {
         rows.copy_from_slice(columns);
     }

@@ -146,24 +146,54 @@ impl<const FUSED: bool> Real for Lanes<FUSED> {
         if (self - self) == Lanes([0.0; LANES]) { result } else { f64::NAN }
     }
     #[inline(always)]
+    fn load_rows(rows: &[f64], columns: &mut [Self]) {
+        let width = columns.len();
+        if width < LANES || rows.len() < width * LANES {
+            let last = rows.len() / width.max(1) - 1;
+            for k in 0..LANES {
+                let row = &rows[k.min(last) * width..(k.min(last) + 1) * width];
+                for (column, &value) in columns.iter_mut().zip(row) {
+                    column.0[k] = value;
+                }
+            }
+            return;
+        }
+        for first in tiles(width) {
+            let mut tile = [Lanes([0.0; LANES]); LANES];
+            for k in 0..LANES {
+                let row = &rows[k * width + first..k * width + first + LANES];
+                tile[k].0.copy_from_slice(row);
+            }
+            columns[first..first + LANES].copy_from_slice(&transpose(tile));
+        }
+    }
+    #[inline(always)]
     fn store_rows(columns: &[Self], rows: &mut [f64]) {
         let width = columns.len();
-        let count = rows.len() / width.max(1);
-        let whole = if count == LANES { width / LANES * LANES } else { 0 };
-        for first in (0..whole).step_by(LANES) {
+        if width < LANES || rows.len() < width * LANES {
+            for (k, row) in rows.chunks_exact_mut(width.max(1)).enumerate() {
+                for (value, column) in row.iter_mut().zip(columns) {
+                    *value = column.0[k];
+                }
+            }
+            return;
+        }
+        for first in tiles(width) {
             let mut tile = [Lanes([0.0; LANES]); LANES];
             tile.copy_from_slice(&columns[first..first + LANES]);
             let tile = transpose(tile);
             for k in 0..LANES {
-                rows[k * width + first..k * width + first + LANES].copy_from_slice(&tile[k].0);
-            }
-        }
-        for j in whole..width {
-            for k in 0..count {
-                rows[k * width + j] = columns[j].0[k];
+                let row = &mut rows[k * width + first..k * width + first + LANES];
+                row.copy_from_slice(&tile[k].0);
             }
         }
     }
+}
+
+/// Where the 8-wide tiles of `width >= 8` columns begin; the last may overlap the one before.
+#[inline(always)]
+fn tiles(width: usize) -> impl Iterator<Item = usize> {
+    (0..width.div_ceil(LANES)).map(move |tile| (tile * LANES).min(width - LANES))
 }
 
 /// Rows and columns of an 8 x 8 tile exchanged, by three rounds of pairwise exchanges (half, quarter,
@@ -275,6 +305,13 @@ mod tests {
                     .collect();
                 let mut rows = vec![0.0; count * width];
                 Lanes::store_rows(&columns, &mut rows);
+                let mut back = vec![Lanes::<false>::default(); width];
+                Lanes::load_rows(&rows, &mut back);
+                for (column, back) in columns.iter().zip(&back) {
+                    for k in 0..LANES {
+                        assert_eq!(back.0[k], column.0[k.min(count - 1)]);
+                    }
+                }
                 for k in 0..count {
                     for j in 0..width {
                         assert_eq!(rows[k * width + j], (100 * k + j) as f64);

@@ -70,6 +70,9 @@ pub trait Real: Scalar + Default + PartialEq {
     fn max(self, other: Self) -> Self;
     /// The largest value over the lanes; NaN if any lane is NaN.
     fn largest(self) -> f64;
+    /// Reads `rows[k * columns.len() + j]` into lane `k` of `columns[j]`; lanes beyond the rows repeat
+    /// the last row. `rows` must hold at least one row.
+    fn load_rows(rows: &[f64], columns: &mut [Self]);
     /// Writes `columns[j]` of lane `k` to `rows[k * columns.len() + j]` for the first
     /// `rows.len() / columns.len()` lanes.
     fn store_rows(columns: &[Self], rows: &mut [f64]);

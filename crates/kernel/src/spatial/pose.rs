@@ -86,6 +86,16 @@ impl<S: Real> Pose<S> {
 }
 
 impl<S: Scalar> Pose<S> {
+    /// Moves by minus a twist increment: what Newton's iteration does with its solution.
+    #[inline(always)]
+    pub fn step_back(&mut self, twist: &[S; 6]) {
+        let mut forward = *twist;
+        for k in 0..6 {
+            forward[k] = -twist[k];
+        }
+        self.step(forward);
+    }
+
     /// Moves by a twist increment (translation of the tool point, then rotation, both along the base
     /// axes). The rotation is a Cayley map: rational, so it exists on every scalar.
     #[inline(always)]

@@ -4,7 +4,7 @@
 //! `C_g = G diag(c) G^T` per unit force, and the platform by `W^-1 C_g W^-T`.
 
 use crate::kinematics::Linearisation;
-use crate::linear::{Matrix6, SIX, factor_pivoting, invert};
+use crate::linear::{Matrix6, SIX, inverse_of};
 use crate::scalar::Real;
 
 /// `G diag(c) G^T`: how far closures open per unit force in closures. `readers[j]` lists the
@@ -45,7 +45,7 @@ pub fn pose_stiffness(
         padded[i] = [0.0; SIX];
         padded[i][i] = 1.0;
     }
-    let inverse = invert(&factor_pivoting(&padded));
+    let inverse = inverse_of(&padded);
     if inverse.iter().flatten().any(|value| !value.is_finite()) {
         return None;
     }

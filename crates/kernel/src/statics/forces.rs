@@ -1,6 +1,7 @@
 //! Closure forces under a wrench on the tool.
 
-use crate::kinematics::{Linearisation, PLACES};
+use crate::element::PLACES;
+use crate::kinematics::Linearisation;
 use crate::linear::SIX;
 use crate::scalar::Real;
 

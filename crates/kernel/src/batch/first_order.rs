@@ -3,11 +3,11 @@
 //! Each quantity says how many numbers it is and how they follow from the linearised closures; lanes,
 //! fall-back and threads are the same for all.
 
-use super::dispatch::{Work, dispatch};
 use super::samples::{Group, Rows, Samples};
 use super::threads::for_chunks;
 use crate::kinematics::{Limbs, Linearisation, SINGULAR, condition, limbs, touched};
-use crate::linear::{Order, SIX, pivot_order};
+use crate::linear::{Order, SIX, factor_pivoting};
+use crate::dispatch::{Work, dispatch};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::statics::{
@@ -102,7 +102,7 @@ fn single_order<S: Real>(machine: &Machine, group: &Group<S>) -> Order {
     let (p, q, pose) = group.single(0);
     let mut linear = Linearisation::default();
     linear.differentiate(machine, &p, &q, &pose);
-    pivot_order(&linear.rows).0
+    factor_pivoting(&linear.rows).order
 }
 
 /// One sample on the single road.
@@ -118,7 +118,7 @@ fn alone<S: Real, Q: FirstOrder>(
     let (p, q, pose) = group.single(lane);
     let mut linear = Linearisation::default();
     linear.differentiate(machine, &p, &q, &pose);
-    let order = pivot_order(&linear.rows).0;
+    let order = factor_pivoting(&linear.rows).order;
     linear.fill(machine, &p, &q, &limbs(machine, &p, &q), &pose, &order);
     let regular = linear.regular > 0.0 || condition(machine, &p, &q, &pose) >= SINGULAR;
     if regular || quantity.survives_singular() {

@@ -1,9 +1,9 @@
 //! Forward kinematics of many samples.
 
-use super::dispatch::{Work, dispatch};
 use super::samples::{Group, Samples};
 use super::threads::for_chunks;
 use crate::kinematics::{Limbs, descend, forward, limbs, start_order};
+use crate::dispatch::{Work, dispatch};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::spatial::{Pose, relative_rotation};

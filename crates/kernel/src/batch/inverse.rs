@@ -1,10 +1,10 @@
 //! Inverse kinematics of many samples.
 
-use super::dispatch::{Work, dispatch};
 use super::samples::{Deviations, Group, Rows};
 use super::threads::for_chunks;
 use crate::kinematics::{commanded_pose, in_travel, inverse, lane_inverse};
 use crate::linear::SIX;
+use crate::dispatch::{Work, dispatch};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::spatial::{Pose, quaternion_from_euler};

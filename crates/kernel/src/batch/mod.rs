@@ -3,14 +3,13 @@
 //! A batch is cut into chunks for the threads, a chunk into groups of lanes. What a group cannot
 //! prove good is done again sample by sample on the single road, and each sample has its status.
 
-mod dispatch;
 mod first_order;
 mod forward;
 mod inverse;
 mod samples;
 mod threads;
 
-pub use dispatch::{InstructionSet, instruction_set, use_instruction_set};
+pub use crate::dispatch::{InstructionSet, instruction_set, use_instruction_set};
 pub use first_order::{
     Compliance, FirstOrder, Forces, JointJacobian, Loads, Sensitivity, Stiffness, first_order,
 };

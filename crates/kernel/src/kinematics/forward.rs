@@ -8,17 +8,21 @@
 use super::closures::{Limbs, closure_rows, squared_residuals, squared_rows};
 use super::linearisation::proven_regular;
 use super::SINGULAR;
-use crate::linear::{IN_ORDER, Order, SIX, condition_index, factor, pivot_order, solve};
+use crate::linear::{
+    IN_ORDER, Order, Pivoted, SIX, condition_index, factor, factor_pivoting, solve,
+};
 use crate::machine::Machine;
 use crate::scalar::Real;
 use crate::spatial::Pose;
 use crate::status::Status;
 
-/// Below this relative step the next one is a chord step on the same factors: Newton squares the
-/// error, the chord multiplies it by the last step, so 1e-5 leaves at most about 1e-15.
-const CHORD: f64 = 1e-5;
-/// A chord step must not be longer than this: then what remains is below 1e-9 * 1e-5.
-const SETTLED: f64 = 1e-9;
+/// After a full step s shorter than this (relative) come chord steps on the same factors: Newton
+/// leaves an error of about s^2, each chord step multiplies it by about s.
+const CHORD: f64 = 2e-4;
+/// Chord steps before the next full one.
+const CHORD_STEPS: usize = 3;
+/// A chord step c on factors of a full step s leaves about c s: settled below this.
+const SETTLED: f64 = 1e-15;
 /// Full steps before a group of lanes gives up to the single road.
 const LANE_STEPS: usize = 12;
 /// Full steps of one plain iteration on the single road.
@@ -49,7 +53,7 @@ fn relative_size<S: Real>(machine: &Machine, twist: &[S; SIX]) -> S {
 pub fn start_order(machine: &Machine, limbs: &Limbs<f64>, pose: &Pose<f64>) -> Order {
     let (mut rows, mut residuals) = ([[0.0; SIX]; SIX], [0.0; SIX]);
     squared_rows(machine, limbs, pose, &IN_ORDER, &mut rows, &mut residuals);
-    pivot_order(&rows).0
+    factor_pivoting(&rows).order
 }
 
 /// Newton's iteration on all lanes at once, rows in the given order.
@@ -74,13 +78,18 @@ pub fn descend<S: Real>(
             first = determinant;
         }
         same_branch = same_branch.min(first * determinant);
-        if relative_size(machine, &twist).largest() < CHORD {
-            squared_residuals(machine, limbs, &pose, order, &mut twist);
-            solve(&rows, &mut twist);
-            pose.step_back(&twist);
-            let settled = S::splat(SETTLED) - relative_size(machine, &twist);
-            let regular = proven_regular(machine, limbs, determinant);
-            return Descent { pose, proof: settled.min(same_branch).min(regular) };
+        let size = relative_size(machine, &twist);
+        if size.largest() < CHORD {
+            for _ in 0..CHORD_STEPS {
+                squared_residuals(machine, limbs, &pose, order, &mut twist);
+                solve(&rows, &mut twist);
+                pose.step_back(&twist);
+                let settled = S::splat(SETTLED) - relative_size(machine, &twist) * size;
+                if (-settled).largest() < 0.0 {
+                    let regular = proven_regular(machine, limbs, determinant);
+                    return Descent { pose, proof: same_branch.min(regular) };
+                }
+            }
         }
     }
     Descent { pose, proof: S::splat(-1.0) }
@@ -88,8 +97,8 @@ pub fn descend<S: Real>(
 
 /// How one plain iteration ended.
 enum Ending {
-    /// At a root, the determinant's sign kept all the way.
-    Settled,
+    /// At a root, the determinant's sign kept all the way; the last determinant.
+    Settled(f64),
     /// The determinant changed its sign.
     Crossed,
     /// A step too long, a singular matrix, or too many steps.
@@ -108,13 +117,11 @@ fn settle(
     let (mut rows, mut twist) = ([[0.0; SIX]; SIX], [0.0; SIX]);
     for _ in 0..STEPS {
         squared_rows(machine, limbs, pose, &IN_ORDER, &mut rows, &mut twist);
-        let (order, parity) = pivot_order(&rows);
-        let mut factors = order.map(|row| rows[row]);
-        let side = (factor(&mut factors) * parity).signum();
+        let Pivoted { factors, order, determinant } = factor_pivoting(&rows);
         if *sign == 0.0 {
-            *sign = side;
+            *sign = determinant.signum();
         }
-        if side != *sign {
+        if determinant.signum() != *sign {
             return Ending::Crossed;
         }
         twist = std::array::from_fn(|k| twist[order[k]] - target[order[k]]);
@@ -126,14 +133,16 @@ fn settle(
         }
         pose.step_back(&twist);
         if size < CHORD {
-            squared_residuals(machine, limbs, pose, &order, &mut twist);
-            for k in 0..SIX {
-                twist[k] -= target[order[k]];
-            }
-            solve(&factors, &mut twist);
-            if relative_size(machine, &twist) < SETTLED {
+            for _ in 0..CHORD_STEPS {
+                squared_residuals(machine, limbs, pose, &order, &mut twist);
+                for k in 0..SIX {
+                    twist[k] -= target[order[k]];
+                }
+                solve(&factors, &mut twist);
                 pose.step_back(&twist);
-                return Ending::Settled;
+                if relative_size(machine, &twist) * size < SETTLED {
+                    return Ending::Settled(determinant);
+                }
             }
         }
     }
@@ -153,8 +162,9 @@ pub fn forward(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pos
     }
     let mut sign = 0.0;
     let mut pose = *start;
-    if let Ending::Settled = settle(machine, limbs, &mut pose, &[0.0; SIX], LONG_STEP, &mut sign) {
-        return judged(machine, limbs, pose);
+    let plain = settle(machine, limbs, &mut pose, &[0.0; SIX], LONG_STEP, &mut sign);
+    if let Ending::Settled(determinant) = plain {
+        return judged(machine, limbs, pose, determinant);
     }
     if condition_at(machine, limbs, &pose) < SINGULAR {
         return (pose, Status::Singular);
@@ -171,13 +181,15 @@ fn follow(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64
     let mut left = 1.0;
     let mut share = 0.25;
     let mut crossed = false;
+    let mut last = 0.0;
     while left > 0.0 {
         let next = if share >= left { 0.0 } else { left - share };
         let target = whole.map(|residual| residual * next);
         let mut trial = pose;
         match settle(machine, limbs, &mut trial, &target, FOLLOWED_STEP, &mut sign) {
-            Ending::Settled => {
+            Ending::Settled(determinant) => {
                 pose = trial;
+                last = determinant;
                 left = next;
                 share *= 2.0;
                 continue;
@@ -198,14 +210,16 @@ fn follow(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64
             return (pose, status);
         }
     }
-    judged(machine, limbs, pose)
+    judged(machine, limbs, pose, last)
 }
 
 /// A settled pose is `ok` only where the platform is held.
-fn judged(machine: &Machine, limbs: &Limbs<f64>, pose: Pose<f64>) -> (Pose<f64>, Status) {
-    let (mut rows, mut residuals) = ([[0.0; SIX]; SIX], [0.0; SIX]);
-    squared_rows(machine, limbs, &pose, &IN_ORDER, &mut rows, &mut residuals);
-    let determinant = factor(&mut pivot_order(&rows).0.map(|row| rows[row]));
+fn judged(
+    machine: &Machine,
+    limbs: &Limbs<f64>,
+    pose: Pose<f64>,
+    determinant: f64,
+) -> (Pose<f64>, Status) {
     let regular = proven_regular(machine, limbs, determinant) > 0.0
         || condition_at(machine, limbs, &pose) >= SINGULAR;
     (pose, if regular { Status::Ok } else { Status::Singular })

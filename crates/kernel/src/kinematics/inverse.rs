@@ -8,7 +8,7 @@ use super::closures::{closure_rows, limbs};
 use super::linearisation::Linearisation;
 use super::SINGULAR;
 use crate::element::{Dimension, Reach};
-use crate::linear::{Matrix6, SIX, condition_index, factor, pivot_order, solve};
+use crate::linear::{Matrix6, Pivoted, SIX, condition_index, factor_pivoting, solve};
 use crate::machine::{Machine, MachineDrive, chosen};
 use crate::scalar::Real;
 use crate::spatial::{
@@ -148,9 +148,7 @@ fn solve_parasitic(machine: &Machine, p: &[f64], seed_margin: f64, solved: &mut 
         let rates: Vec<f64> =
             machine.drives.iter().map(|drive| linear.to_joint[drive.struts[0]]).collect();
         let wanted = wanted.get_or_insert_with(|| branch(&rates));
-        let (order, _) = pivot_order(&system);
-        let mut factors = order.map(|row| system[row]);
-        factor(&mut factors);
+        let Pivoted { factors, order, .. } = factor_pivoting(&system);
         let mut step = order.map(|row| if row < count { -residuals[row] } else { 0.0 });
         solve(&factors, &mut step);
         let size = step.iter().fold(0.0_f64, |size, value| size.max(value.abs())) / l;

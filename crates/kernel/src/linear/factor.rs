@@ -5,7 +5,7 @@
 //! order found for the sample alone.
 
 use super::{IN_ORDER, Matrix6, Order, SIX};
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
 
 /// Eliminates in place, rows in the order in which they stand: multipliers below the diagonal, inverse
 /// pivots on it. Returns the product of the pivots, the determinant.
@@ -28,39 +28,53 @@ pub fn factor<S: Real>(m: &mut Matrix6<S>) -> S {
     product
 }
 
-/// The row order of one matrix that brings a large element, relative to its row's norm, to every
-/// pivot; and the sign of that order.
-pub fn pivot_order(rows: &Matrix6<f64>) -> (Order, f64) {
+/// One matrix eliminated with pivoting.
+pub struct Pivoted {
+    /// As [`factor`] leaves them.
+    pub factors: Matrix6<f64>,
+    /// Which row stands at each place.
+    pub order: Order,
+    /// With the sign of the order.
+    pub determinant: f64,
+}
+
+/// Eliminates with the row that has the largest element, relative to its row's norm, at every pivot.
+pub fn factor_pivoting(rows: &Matrix6<f64>) -> Pivoted {
     let mut m = *rows;
     let mut order = IN_ORDER;
     let mut weight = [0.0; SIX];
     for i in 0..SIX {
         let square = m[i].iter().map(|value| value * value).sum::<f64>();
-        weight[i] = if square > 0.0 { 1.0 / square.sqrt() } else { 0.0 };
+        weight[i] = if square > 0.0 { 1.0 / square } else { 0.0 };
     }
-    let mut sign = 1.0;
+    let mut determinant = 1.0;
     for k in 0..SIX {
         let mut best = k;
+        let mut largest = m[k][k].square() * weight[k];
         for i in k + 1..SIX {
-            if (m[i][k] * weight[i]).abs() > (m[best][k] * weight[best]).abs() {
-                best = i;
+            let size = m[i][k].square() * weight[i];
+            if size > largest {
+                (best, largest) = (i, size);
             }
         }
         if best != k {
             m.swap(k, best);
             order.swap(k, best);
             weight.swap(k, best);
-            sign = -sign;
+            determinant = -determinant;
         }
+        determinant *= m[k][k];
         let inverse = 1.0 / m[k][k];
+        m[k][k] = inverse;
         for i in k + 1..SIX {
             let multiplier = m[i][k] * inverse;
+            m[i][k] = multiplier;
             for j in k + 1..SIX {
                 m[i][j] -= multiplier * m[k][j];
             }
         }
     }
-    (order, sign)
+    Pivoted { factors: m, order, determinant }
 }
 
 /// Solves in place for one right-hand side in the order of the eliminated rows.
@@ -106,11 +120,9 @@ pub fn invert<S: Real>(m: &Matrix6<S>, order: &Order, inverse: &mut Matrix6<S>) 
 
 /// The inverse of one matrix, pivoted; not finite where it has none.
 pub fn inverse_of(rows: &Matrix6<f64>) -> Matrix6<f64> {
-    let (order, _) = pivot_order(rows);
-    let mut m = order.map(|row| rows[row]);
-    factor(&mut m);
+    let Pivoted { factors, order, .. } = factor_pivoting(rows);
     let mut inverse = [[0.0; SIX]; SIX];
-    invert(&m, &order, &mut inverse);
+    invert(&factors, &order, &mut inverse);
     inverse
 }
 
@@ -136,14 +148,18 @@ mod tests {
             let rows = sample(seed);
             let inverse = inverse_of(&rows);
             let right = [1.0, -2.0, 0.5, 3.0, -1.0, 0.25];
-            let (order, _) = pivot_order(&rows);
-            let mut m = order.map(|row| rows[row]);
-            factor(&mut m);
+            let Pivoted { factors, order, determinant } = factor_pivoting(&rows);
             let mut x = order.map(|row| right[row]);
-            solve(&m, &mut x);
+            solve(&factors, &mut x);
+            let mut again = order.map(|row| rows[row]);
+            let product = factor(&mut again);
+            assert!((product.abs() - determinant.abs()).abs() < 1e-14);
+            let mut y = order.map(|row| right[row]);
+            solve(&again, &mut y);
             for i in 0..SIX {
                 let product: f64 = (0..SIX).map(|j| rows[i][j] * x[j]).sum();
                 assert!((product - right[i]).abs() < 1e-11);
+                assert!((x[i] - y[i]).abs() < 1e-11);
                 for j in 0..SIX {
                     let unit: f64 = (0..SIX).map(|k| rows[i][k] * inverse[k][j]).sum();
                     assert!((unit - f64::from(u8::from(i == j))).abs() < 1e-11);
@@ -157,11 +173,7 @@ mod tests {
         let rows = sample(3);
         let mut exchanged = rows;
         exchanged.swap(1, 4);
-        let determinant = |rows: &Matrix6<f64>| {
-            let (order, sign) = pivot_order(rows);
-            factor(&mut order.map(|row| rows[row])) * sign
-        };
-        let ratio = determinant(&rows) / determinant(&exchanged);
+        let ratio = factor_pivoting(&rows).determinant / factor_pivoting(&exchanged).determinant;
         assert!((ratio + 1.0).abs() < 1e-12);
     }
 }

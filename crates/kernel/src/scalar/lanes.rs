@@ -1,22 +1,23 @@
 //! Eight samples side by side, as plain arrays that the compiler turns into vector registers.
 //!
 //! No vector crate: those either fix the instruction set when compiled or hide the lanes. A newtype
-//! over `[f64; 8]`, compiled once per instruction set (see [`crate::batch`]), measured fastest.
+//! over `[f64; 8]`, compiled once per instruction set (see [`crate::dispatch`]), measured fastest.
 
 use super::{Real, Scalar};
+use crate::dispatch::{PORTABLE, transpose};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Samples in one [`Lanes`]: one 512-bit or two 256-bit registers.
 pub const LANES: usize = 8;
 
-/// Eight `f64`. `FUSED`: the code around is compiled for hardware with fused multiply-add.
+/// Eight `f64`. `LEVEL`: the instruction set that the code around is compiled for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C, align(64))]
-pub struct Lanes<const FUSED: bool>(pub [f64; LANES]);
+pub struct Lanes<const LEVEL: u8>(pub [f64; LANES]);
 
 macro_rules! lane_wise {
     ($trait:ident, $method:ident, $operator:tt) => {
-        impl<const FUSED: bool> $trait for Lanes<FUSED> {
+        impl<const LEVEL: u8> $trait for Lanes<LEVEL> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
@@ -34,7 +35,7 @@ lane_wise!(Sub, sub, -);
 lane_wise!(Mul, mul, *);
 lane_wise!(Div, div, /);
 
-impl<const FUSED: bool> Neg for Lanes<FUSED> {
+impl<const LEVEL: u8> Neg for Lanes<LEVEL> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -46,7 +47,7 @@ impl<const FUSED: bool> Neg for Lanes<FUSED> {
     }
 }
 
-impl<const FUSED: bool> Scalar for Lanes<FUSED> {
+impl<const LEVEL: u8> Scalar for Lanes<LEVEL> {
     #[inline(always)]
     fn lift(self, value: f64) -> Self {
         Lanes([value; LANES])
@@ -55,7 +56,7 @@ impl<const FUSED: bool> Scalar for Lanes<FUSED> {
     fn mul_add(self, factor: Self, term: Self) -> Self {
         let mut result = [0.0; LANES];
         for k in 0..LANES {
-            result[k] = if FUSED {
+            result[k] = if LEVEL > PORTABLE {
                 self.0[k].mul_add(factor.0[k], term.0[k])
             } else {
                 self.0[k] * factor.0[k] + term.0[k]
@@ -98,7 +99,7 @@ impl<const FUSED: bool> Scalar for Lanes<FUSED> {
     }
 }
 
-impl<const FUSED: bool> Real for Lanes<FUSED> {
+impl<const LEVEL: u8> Real for Lanes<LEVEL> {
     const WIDTH: usize = LANES;
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -196,38 +197,13 @@ fn tiles(width: usize) -> impl Iterator<Item = usize> {
     (0..width.div_ceil(LANES)).map(move |tile| (tile * LANES).min(width - LANES))
 }
 
-/// Rows and columns of an 8 x 8 tile exchanged, by three rounds of pairwise exchanges (half, quarter,
-/// eighth): constant index patterns, which compile to register shuffles instead of 64 stores.
-#[inline(always)]
-fn transpose<const F: bool>(tile: [Lanes<F>; LANES]) -> [Lanes<F>; LANES] {
-    let tile = exchange::<4, F>(tile);
-    let tile = exchange::<2, F>(tile);
-    exchange::<1, F>(tile)
-}
-
-/// Exchanges the off-diagonal blocks of size `STEP` in every diagonal block of size `2 STEP`.
-#[inline(always)]
-fn exchange<const STEP: usize, const F: bool>(tile: [Lanes<F>; LANES]) -> [Lanes<F>; LANES] {
-    let mut result = tile;
-    for i in 0..LANES {
-        if i & STEP == 0 {
-            let (a, b) = (tile[i], tile[i + STEP]);
-            for k in 0..LANES {
-                result[i].0[k] = if k & STEP == 0 { a.0[k] } else { b.0[k - STEP] };
-                result[i + STEP].0[k] = if k & STEP == 0 { a.0[k + STEP] } else { b.0[k] };
-            }
-        }
-    }
-    result
-}
-
 /// Sine and cosine by reduction to [-pi/4, pi/4] (pi/2 in three parts, after Cody & Waite 1980) and
 /// the Taylor polynomials to degree 17 and 18, whose truncation there is below 1e-17.
 ///
 /// Relative to the library's the difference stays below 4e-16 for angles up to 1e5 rad, far beyond
 /// any joint.
 #[inline(always)]
-fn sin_cos<const F: bool>(angle: Lanes<F>) -> (Lanes<F>, Lanes<F>) {
+fn sin_cos<const LEVEL: u8>(angle: Lanes<LEVEL>) -> (Lanes<LEVEL>, Lanes<LEVEL>) {
     // pi/2 as a sum of three numbers; the first two have 33 significant bits, so that their
     // products with the quadrant are exact.
     const FIRST: f64 = 1.570_796_326_734_125_6;
@@ -287,7 +263,7 @@ mod tests {
         for i in 0..200_000 {
             let first = (i as f64 - 100_000.0) * 0.37e-3;
             let angles: [f64; LANES] = std::array::from_fn(|k| first * (1.0 + 10.0 * k as f64));
-            let (sine, cosine) = Lanes::<false>(angles).sin_cos();
+            let (sine, cosine) = Lanes::<PORTABLE>(angles).sin_cos();
             for k in 0..LANES {
                 let (s, c) = angles[k].sin_cos();
                 worst = worst.max((sine.0[k] - s).abs()).max((cosine.0[k] - c).abs());
@@ -300,12 +276,12 @@ mod tests {
     fn rows_are_stored_sample_by_sample() {
         for width in [1, 5, 8, 19] {
             for count in [1, 3, 8] {
-                let columns: Vec<Lanes<false>> = (0..width)
+                let columns: Vec<Lanes<PORTABLE>> = (0..width)
                     .map(|j| Lanes(std::array::from_fn(|k| (100 * k + j) as f64)))
                     .collect();
                 let mut rows = vec![0.0; count * width];
                 Lanes::store_rows(&columns, &mut rows);
-                let mut back = vec![Lanes::<false>::default(); width];
+                let mut back = vec![Lanes::<PORTABLE>::default(); width];
                 Lanes::load_rows(&rows, &mut back);
                 for (column, back) in columns.iter().zip(&back) {
                     for k in 0..LANES {
@@ -326,8 +302,8 @@ mod tests {
         for k in 0..LANES {
             let mut values = [1.0; LANES];
             values[k] = f64::NAN;
-            assert!(Lanes::<false>(values).largest().is_nan());
+            assert!(Lanes::<PORTABLE>(values).largest().is_nan());
         }
-        assert_eq!(Lanes::<false>([1.0, 3.0, 2.0, 0.0, -4.0, 0.0, 0.0, 0.0]).largest(), 3.0);
+        assert_eq!(Lanes::<PORTABLE>([1.0, 3.0, 2.0, 0.0, -4.0, 0.0, 0.0, 0.0]).largest(), 3.0);
     }
 }

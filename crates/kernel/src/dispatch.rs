@@ -174,9 +174,12 @@ fn transpose_avx512<const LEVEL: u8>(tile: [Lanes<LEVEL>; LANES]) -> [Lanes<LEVE
     let mut half = row;
     for i in [0, 4] {
         // Pairs of rows, then quadruples: `half[i + c]` has columns c and c + 4 of rows i to i + 3.
-        let (a, b) = (_mm512_unpacklo_pd(row[i], row[i + 1]), _mm512_unpackhi_pd(row[i], row[i + 1]));
-        let (c, d) =
-            (_mm512_unpacklo_pd(row[i + 2], row[i + 3]), _mm512_unpackhi_pd(row[i + 2], row[i + 3]));
+        let (a, b) =
+            (_mm512_unpacklo_pd(row[i], row[i + 1]), _mm512_unpackhi_pd(row[i], row[i + 1]));
+        let (c, d) = (
+            _mm512_unpacklo_pd(row[i + 2], row[i + 3]),
+            _mm512_unpackhi_pd(row[i + 2], row[i + 3]),
+        );
         half[i] = _mm512_permutex2var_pd(a, even, c);
         half[i + 1] = _mm512_permutex2var_pd(b, even, d);
         half[i + 2] = _mm512_permutex2var_pd(a, odd, c);

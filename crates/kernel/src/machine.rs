@@ -1,6 +1,6 @@
 //! The immutable machine: elements, platform and the flat vector of parameters.
 
-use crate::element::{Dimension, DriveFrame, DriveKind, strut};
+use crate::element::{DRIVE_END, Dimension, DriveFrame, DriveKind, OWN, strut};
 use crate::linear::SIX;
 use crate::spatial::{Pose, Vector, norm, rotate, rotation_matrix, subtract};
 use std::collections::BTreeMap;
@@ -79,7 +79,11 @@ impl fmt::Display for MachineError {
 
 impl std::error::Error for MachineError {}
 
-fn error<T>(code: &'static str, place: impl Into<String>, message: String) -> Result<T, MachineError> {
+fn error<T>(
+    code: &'static str,
+    place: impl Into<String>,
+    message: String,
+) -> Result<T, MachineError> {
     Err(MachineError { code, message, place: place.into() })
 }
 
@@ -149,7 +153,9 @@ pub struct Machine {
     pub characteristic_length: f64,
     /// Start of the forward solution.
     pub home: Pose<f64>,
-    /// What [`crate::kinematics::proven_regular`] multiplies by: `l^r / (n-1)^((n-1)/2)` for n
+    /// For each parameter the closures that read it: (closure, place in its gradient).
+    pub readers: Vec<Vec<(usize, usize)>>,
+    /// What [`crate::kinematics::proven_regular`] multiplies by: `2^n l^r / (n-1)^((n-1)/2)` for n
     /// closures, r rotations and the characteristic length l.
     pub regularity_scale: f64,
 }
@@ -178,6 +184,7 @@ impl Machine {
             tool: 0,
             characteristic_length: 0.0,
             home: Pose::from_coordinates(description.home),
+            readers: Vec::new(),
             regularity_scale: 0.0,
         };
         for strut in &description.struts {
@@ -188,7 +195,11 @@ impl Machine {
         }
         machine.tool = machine.nominal.len();
         for k in 0..3 {
-            machine.add_parameter(format!("tool.{}", FREEDOMS[k]), Dimension::Length, description.tool[k]);
+            machine.add_parameter(
+                format!("tool.{}", FREEDOMS[k]),
+                Dimension::Length,
+                description.tool[k],
+            );
         }
         for strut in &mut machine.struts {
             if let (None, Some(drive)) = (strut.own_length, strut.drive) {
@@ -196,6 +207,7 @@ impl Machine {
             }
         }
         machine.check_counts()?;
+        machine.find_readers();
         machine.characteristic_length =
             description.characteristic_length.unwrap_or_else(|| machine.geometric_length());
         if !(machine.characteristic_length > 0.0 && machine.characteristic_length.is_finite()) {
@@ -206,9 +218,10 @@ impl Machine {
             );
         }
         let rotations = machine.dof[3..].iter().filter(|&&free| free).count() as i32;
-        let others = machine.closure_count() as f64 - 1.0;
-        machine.regularity_scale =
-            machine.characteristic_length.powi(rotations) / others.max(1.0).powf(0.5 * others);
+        let closures = machine.closure_count() as f64;
+        let others = closures - 1.0;
+        machine.regularity_scale = closures.exp2() * machine.characteristic_length.powi(rotations)
+            / others.max(1.0).powf(0.5 * others);
         for (index, drive) in description.drives.iter().enumerate() {
             if drive.working_mode.is_none() {
                 machine.drives[index].mode = machine.nearest_mode(index);
@@ -258,21 +271,29 @@ impl Machine {
     ) -> Result<(), MachineError> {
         let place = format!("strut.{}", strut.name);
         if self.struts.iter().any(|other| other.name == strut.name) {
-            return error("duplicate-name", place, format!("two struts are named {:?}", strut.name));
+            return error(
+                "duplicate-name",
+                place,
+                format!("two struts are named {:?}", strut.name),
+            );
         }
         let drive = match &strut.drive {
             None => None,
             Some(name) => match drives.iter().position(|drive| &drive.name == name) {
                 Some(index) => Some(index),
                 None => {
-                    return error("unknown-drive", place + ".drive", format!("there is no drive {name:?}"));
+                    return error(
+                        "unknown-drive",
+                        place + ".drive",
+                        format!("there is no drive {name:?}"),
+                    );
                 }
             },
         };
-        let is_length = drive.is_some_and(|index| drives[index].kind == DriveKind::Telescopic);
+        let is_length = drive.is_some_and(|index| drives[index].kind.table().sets_length);
         if is_length != strut.length.is_none() {
             let message = if is_length {
-                "its drive is telescopic and is its length; it has none of its own"
+                "its drive is its length; it has none of its own"
             } else {
                 "it needs a length"
             };
@@ -298,7 +319,11 @@ impl Machine {
     fn add_drive(&mut self, index: usize, drive: &DriveDescription) -> Result<(), MachineError> {
         let place = format!("drive.{}", drive.name);
         if self.drives.iter().any(|other| other.name == drive.name) {
-            return error("duplicate-name", place, format!("two drives are named {:?}", drive.name));
+            return error(
+                "duplicate-name",
+                place,
+                format!("two drives are named {:?}", drive.name),
+            );
         }
         let table = drive.kind.table();
         let mut frame = DriveFrame::default();
@@ -317,7 +342,11 @@ impl Machine {
                 let direction = [value[0], value[1], value[2]];
                 let length = norm(direction);
                 if !(length > 0.0 && length.is_finite()) {
-                    return error("zero-direction", format!("{place}.{}", field.name), "it points nowhere".into());
+                    return error(
+                        "zero-direction",
+                        format!("{place}.{}", field.name),
+                        "it points nowhere".into(),
+                    );
                 }
                 frame = DriveFrame::new(direction);
             }
@@ -326,14 +355,17 @@ impl Machine {
         let first = self.nominal.len();
         for parameter in table.parameters {
             let (field, component) = match parameter.name.split_once('.') {
-                Some((field, component)) => (field, FREEDOMS.iter().position(|name| name == &component)),
+                Some((field, component)) => {
+                    (field, FREEDOMS.iter().position(|name| name == &component))
+                }
                 None => (parameter.name, Some(0)),
             };
             // A tilt (u, v) of a direction is measured from the nominal axis.
             let value = component.map_or(0.0, |k| values[field][k]);
             self.add_parameter(format!("{place}.{}", parameter.name), parameter.dimension, value);
         }
-        let struts = (0..self.struts.len()).filter(|&i| self.struts[i].drive == Some(index)).collect();
+        let struts =
+            (0..self.struts.len()).filter(|&i| self.struts[i].drive == Some(index)).collect();
         self.drives.push(MachineDrive {
             name: drive.name.clone(),
             kind: drive.kind,
@@ -344,6 +376,29 @@ impl Machine {
             struts,
         });
         Ok(())
+    }
+
+    /// Fills in who reads which parameter, at the places of [`crate::element::PLACES`].
+    fn find_readers(&mut self) {
+        let mut readers = vec![Vec::new(); self.nominal.len()];
+        for (i, strut) in self.struts.iter().enumerate() {
+            for place in 0..6 {
+                readers[strut.first + place].push((i, place));
+            }
+            if let Some(index) = strut.own_length {
+                readers[index].push((i, 6));
+            }
+            if let Some(drive) = strut.drive {
+                let drive = &self.drives[drive];
+                for place in 0..drive.kind.table().parameters.len() {
+                    readers[drive.first + place].push((i, OWN + place));
+                }
+            }
+            for k in 0..3 {
+                readers[self.tool + k].push((i, DRIVE_END + k));
+            }
+        }
+        self.readers = readers;
     }
 
     fn check_counts(&self) -> Result<(), MachineError> {
@@ -424,7 +479,8 @@ impl Machine {
         let middle = 0.5 * (drive.travel[0] + drive.travel[1]);
         let away = |mode: f64| {
             let parameters = &self.nominal[drive.first..];
-            let joint = drive.kind.inverse(&drive.frame, parameters, mode, base, length, platform).joint;
+            let joint =
+                drive.kind.inverse(&drive.frame, parameters, mode, base, length, platform).joint;
             let joint = drive.wrapped(joint, self.scale_of(index));
             (joint - middle).abs()
         };

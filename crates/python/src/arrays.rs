@@ -24,11 +24,13 @@ impl<'py> Input<'py> {
         let array = contiguous(object, what)?;
         let shape = array.shape();
         let Some((&width, leading)) = shape.split_last() else {
-            let message = format!("{what}: a single number has no rows; give an array (..., {})", widths[0]);
+            let message =
+                format!("{what}: a single number has no rows; give an array (..., {})", widths[0]);
             return Err(PyValueError::new_err(message));
         };
         if !widths.contains(&width) {
-            let expected: Vec<String> = widths.iter().map(|width| format!("(..., {width})")).collect();
+            let expected: Vec<String> =
+                widths.iter().map(|width| format!("(..., {width})")).collect();
             let message =
                 format!("{what}: found shape {shape:?}, expected {}", expected.join(" or "));
             return Err(PyValueError::new_err(message));
@@ -64,14 +66,20 @@ impl<'py> Input<'py> {
         } else if self.count == 1 {
             Ok(true)
         } else {
-            let message = format!("{what}: found {} rows for {count} samples, expected {count} or 1", self.count);
+            let message = format!(
+                "{what}: found {} rows for {count} samples, expected {count} or 1",
+                self.count
+            );
             Err(PyValueError::new_err(message))
         }
     }
 }
 
 /// A C-contiguous float64 array with the object's numbers; the object itself where it is one.
-fn contiguous<'py>(object: &Bound<'py, PyAny>, what: &str) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+fn contiguous<'py>(
+    object: &Bound<'py, PyAny>,
+    what: &str,
+) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
     if let Ok(array) = object.cast::<PyArrayDyn<f64>>()
         && array.is_c_contiguous()
     {
@@ -83,15 +91,17 @@ fn contiguous<'py>(object: &Bound<'py, PyAny>, what: &str) -> PyResult<PyReadonl
     let array = asarray.call1((object,))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if !["f", "i", "u", "b"].contains(&kind.as_str()) {
-        let message = format!("{what}: expected real numbers, found dtype {}", array.getattr("dtype")?);
+        let message =
+            format!("{what}: expected real numbers, found dtype {}", array.getattr("dtype")?);
         return Err(PyTypeError::new_err(message));
     }
     // ascontiguousarray makes a scalar an array of one; keep it a scalar for the shape's message.
-    let shape_source = if object.hasattr("ndim")? && object.getattr("ndim")?.extract::<usize>()? == 0 {
-        array.call_method1("reshape", (pyo3::types::PyTuple::empty(py),))?
-    } else {
-        array
-    };
+    let shape_source =
+        if object.hasattr("ndim")? && object.getattr("ndim")?.extract::<usize>()? == 0 {
+            array.call_method1("reshape", (pyo3::types::PyTuple::empty(py),))?
+        } else {
+            array
+        };
     let array = shape_source.call_method1("astype", ("float64", "C"))?;
     Ok(array.cast::<PyArrayDyn<f64>>()?.readonly())
 }

@@ -33,7 +33,8 @@ fn freedoms(names: &[String], place: &str) -> PyResult<[bool; 6]> {
             return refused("unknown-freedom", format!("{name:?} is none of x y z a b c"), place);
         };
         if last.is_some_and(|last| index <= last) {
-            let message = format!("{name:?} is out of order: name each once, in the order x y z a b c");
+            let message =
+                format!("{name:?} is out of order: name each once, in the order x y z a b c");
             return refused("freedom-order", message, place);
         }
         last = Some(index);

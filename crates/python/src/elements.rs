@@ -8,6 +8,7 @@ fn entry<'py>(py: Python<'py>, table: &ElementTable) -> PyResult<Bound<'py, PyDi
     let entry = PyDict::new(py);
     entry.set_item("kind", table.kind)?;
     entry.set_item("doc", table.doc)?;
+    entry.set_item("sets_length", table.sets_length)?;
     entry.set_item("drawing", table.drawing.name())?;
     entry.set_item("coordinate", table.coordinate.name())?;
     let fields = PyList::empty(py);
@@ -36,8 +37,8 @@ fn entry<'py>(py: Python<'py>, table: &ElementTable) -> PyResult<Bound<'py, PyDi
     Ok(entry)
 }
 
-/// Every element by family: `{"drive": [...], "strut": [...]}`, each with kind, doc, drawing,
-/// coordinate, fields (name, shape, dimension, default, doc) and parameters (name, dimension).
+/// Every element by family: `{"drive": [...], "strut": [...]}`, each with kind, doc, sets_length,
+/// drawing, coordinate, fields (name, shape, dimension, default, doc) and parameters (name, dimension).
 #[pyfunction]
 pub fn elements(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let families = PyDict::new(py);

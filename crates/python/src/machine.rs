@@ -53,9 +53,15 @@ fn in_blocks(
     Ok(())
 }
 
-fn codes<'py>(py: Python<'py>, leading: &[usize], status: &[Status]) -> PyResult<Bound<'py, PyAny>> {
+fn codes<'py>(
+    py: Python<'py>,
+    leading: &[usize],
+    status: &[Status],
+) -> PyResult<Bound<'py, PyAny>> {
     let numbers: Vec<u8> = status.iter().map(|&status| status as u8).collect();
-    PyArray1::from_vec(py, numbers).into_any().call_method1("reshape", (PyTuple::new(py, leading)?,))
+    PyArray1::from_vec(py, numbers)
+        .into_any()
+        .call_method1("reshape", (PyTuple::new(py, leading)?,))
 }
 
 fn names(flags: &[bool; 6], all: [&'static str; 6]) -> Vec<&'static str> {
@@ -63,12 +69,10 @@ fn names(flags: &[bool; 6], all: [&'static str; 6]) -> Vec<&'static str> {
 }
 
 impl Machine {
-    fn build(
-        table: &Bound<'_, PyDict>,
-        replaced: BTreeMap<usize, f64>,
-    ) -> PyResult<Self> {
+    fn build(table: &Bound<'_, PyDict>, replaced: BTreeMap<usize, f64>) -> PyResult<Self> {
         let machine = truepose_kernel::Machine::new(&description(table)?).map_err(kernel_error)?;
-        let values: Vec<(usize, f64)> = replaced.iter().map(|(&index, &value)| (index, value)).collect();
+        let values: Vec<(usize, f64)> =
+            replaced.iter().map(|(&index, &value)| (index, value)).collect();
         Ok(Machine {
             machine: machine.with_values(&values),
             description: table.copy()?.unbind(),
@@ -81,7 +85,8 @@ impl Machine {
     }
 
     fn columns(&self, columns: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
-        let columns: Vec<usize> = columns.try_iter()?.map(|item| item?.extract()).collect::<PyResult<_>>()?;
+        let columns: Vec<usize> =
+            columns.try_iter()?.map(|item| item?.extract()).collect::<PyResult<_>>()?;
         match columns.iter().find(|&&column| column >= self.machine.nominal.len()) {
             Some(column) => {
                 let message = format!(
@@ -189,6 +194,7 @@ impl Machine {
         };
         let (out, mut status) = self.quantity(py, at, &commands.leading, further, quantity)?;
         for (status, &inverse) in status.iter_mut().zip(&placed.status) {
+            // Out of travel is the least that can be wrong with a pose.
             if !inverse.is_solved() || *status == Status::Ok {
                 *status = inverse;
             }
@@ -216,7 +222,10 @@ impl Machine {
                 let reason = match commands {
                     Some(commands) => {
                         let width = commands.width;
-                        self.reason(&commands.data()[index * width..(index + 1) * width], status[index])
+                        self.reason(
+                            &commands.data()[index * width..(index + 1) * width],
+                            status[index],
+                        )
                     }
                     None => plain_reason(status[index]).to_owned(),
                 };
@@ -240,8 +249,11 @@ impl Machine {
                     let drive = &machine.drives[i];
                     let word = if amount > 0.0 { "above" } else { "below" };
                     let angle = drive.kind.table().coordinate.unit() == "rad";
-                    let (amount, unit) =
-                        if angle { (amount.abs().to_degrees(), "deg") } else { (1e3 * amount.abs(), "mm") };
+                    let (amount, unit) = if angle {
+                        (amount.abs().to_degrees(), "deg")
+                    } else {
+                        (1e3 * amount.abs(), "mm")
+                    };
                     format!("drive {} is {amount:.6} {unit} {word} its travel", drive.name)
                 }
                 Obstacle::Singular(index) => {
@@ -281,7 +293,7 @@ struct At<'a> {
 
 /// Any of the kernel's first-order quantities.
 enum Quantity<'a> {
-    Sensitivity(batch::Sensitivity),
+    Sensitivity(batch::Sensitivity<'a>),
     JointJacobian(batch::JointJacobian),
     Forces(batch::Forces<'a>),
     Loads(batch::Loads<'a>),
@@ -379,7 +391,10 @@ impl Machine {
     }
     #[getter]
     fn length_parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        PyArray1::from_iter(py, self.machine.struts.iter().map(|strut| strut.length_parameter as i64))
+        PyArray1::from_iter(
+            py,
+            self.machine.struts.iter().map(|strut| strut.length_parameter as i64),
+        )
     }
     #[getter]
     fn working_modes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
@@ -393,7 +408,9 @@ impl Machine {
             let found = self.machine.parameters.iter().position(|parameter| parameter.name == name);
             let refused = |code, message| Err(KernelError::new_err((code, message, name.clone())));
             match found {
-                None => return refused("unknown-parameter", format!("there is no parameter {name:?}")),
+                None => {
+                    return refused("unknown-parameter", format!("there is no parameter {name:?}"));
+                }
                 Some(_) if !value.is_finite() => {
                     return refused("not-finite", format!("the value of {name} is {value}"));
                 }
@@ -435,7 +452,8 @@ impl Machine {
         let (starts, shared) = match start {
             None => (machine.home.to_row().to_vec(), true),
             Some(start) => {
-                let start = Input::new(start, &[self.components(), machine.commanded_count()], "start")?;
+                let start =
+                    Input::new(start, &[self.components(), machine.commanded_count()], "start")?;
                 let shared = start.serves(count, "start")?;
                 (self.rows_of_poses(&start), shared)
             }
@@ -557,7 +575,11 @@ impl Machine {
     // ---- blocks: two-dimensional arrays, a status per sample, nothing raised for a pose ----
 
     /// (joints, placements, status) of commanded poses.
-    fn place<'py>(&self, py: Python<'py>, poses: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    fn place<'py>(
+        &self,
+        py: Python<'py>,
+        poses: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
         let commands = self.commands(poses)?;
         let placed = self.placed(py, &commands, None)?;
         self.placed_arrays(py, &placed)
@@ -645,10 +667,17 @@ impl Machine {
         let columns = self.columns(columns)?;
         let wrenches = Input::new(wrenches, &[6], "wrenches")?;
         let further = [columns.len()];
-        self.at_placements(py, joints, placements, Some((&wrenches, "wrenches")), &further, |first, shared| {
-            let rows = wrenches.rows(first, shared);
-            Quantity::Loads(batch::Loads::new(&self.machine, &columns, rows))
-        })
+        self.at_placements(
+            py,
+            joints,
+            placements,
+            Some((&wrenches, "wrenches")),
+            &further,
+            |first, shared| {
+                let rows = wrenches.rows(first, shared);
+                Quantity::Loads(batch::Loads::new(&self.machine, &columns, rows))
+            },
+        )
     }
 
     /// (compliance (n, n_component, n_component), status) from parameter compliances (n or 1, k).
@@ -705,7 +734,8 @@ impl Machine {
         {
             let mut writable = out.readwrite();
             for (i, row) in writable.as_slice_mut()?.chunks_exact_mut(width).enumerate() {
-                let limbs = kinematics::limbs(machine, &machine.nominal, joints.rows(0, shared).row(i));
+                let limbs =
+                    kinematics::limbs(machine, &machine.nominal, joints.rows(0, shared).row(i));
                 for (value, limb) in row.iter_mut().zip(&limbs) {
                     *value = limb.length;
                 }
@@ -715,7 +745,11 @@ impl Machine {
     }
 
     /// Poses (n, n_dof), Euler angles R = Rz(c) Ry(b) Rx(a), of placements (n, 7).
-    fn pose_of<'py>(&self, py: Python<'py>, placements: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
+    fn pose_of<'py>(
+        &self,
+        py: Python<'py>,
+        placements: &Bound<'py, PyAny>,
+    ) -> PyResult<Array<'py>> {
         let placements = Input::new(placements, &[7], "placements")?;
         let freedoms = chosen(&self.machine.dof);
         let out = output(py, &placements.leading, &[freedoms.len()])?;
@@ -730,7 +764,11 @@ impl Machine {
     }
 
     /// Placements (n, 7) of poses (n, n_dof) or (n, n_commanded).
-    fn placement_of<'py>(&self, py: Python<'py>, poses: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
+    fn placement_of<'py>(
+        &self,
+        py: Python<'py>,
+        poses: &Bound<'py, PyAny>,
+    ) -> PyResult<Array<'py>> {
         let widths = [self.components(), self.machine.commanded_count()];
         let poses = Input::new(poses, &widths, "poses")?;
         let out = output(py, &poses.leading, &[7])?;
@@ -754,7 +792,8 @@ impl Machine {
         {
             let mut writable = out.readwrite();
             for (i, cell) in writable.as_slice_mut()?.chunks_exact_mut(6 * width).enumerate() {
-                let limbs = kinematics::limbs(machine, &machine.nominal, joints.rows(0, shared).row(i));
+                let limbs =
+                    kinematics::limbs(machine, &machine.nominal, joints.rows(0, shared).row(i));
                 let pose = Pose::from_row(&placements.data()[7 * i..7 * i + 7]);
                 let rotation = rotation_matrix(pose.rotation);
                 for (cell, limb) in cell.chunks_exact_mut(6).zip(&limbs) {
@@ -770,7 +809,11 @@ impl Machine {
     }
 
     /// What keeps one commanded pose from being used: a list of dicts (what, name, amount, unit).
-    fn explain<'py>(&self, py: Python<'py>, pose: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyList>> {
+    fn explain<'py>(
+        &self,
+        py: Python<'py>,
+        pose: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyList>> {
         let command = self.commands(pose)?;
         let machine = &self.machine;
         let list = PyList::empty(py);
@@ -780,7 +823,9 @@ impl Machine {
         let pose = kinematics::commanded_pose(machine, command.data());
         for obstacle in kinematics::obstacles(machine, &machine.nominal, &pose) {
             let (what, name, amount, unit) = match obstacle {
-                Obstacle::Strut(i, amount) => ("strut", machine.struts[i].name.as_str(), amount, "m"),
+                Obstacle::Strut(i, amount) => {
+                    ("strut", machine.struts[i].name.as_str(), amount, "m")
+                }
                 Obstacle::Travel(i, amount) => {
                     let drive = &machine.drives[i];
                     ("travel", drive.name.as_str(), amount, drive.kind.table().coordinate.unit())
@@ -803,8 +848,11 @@ impl Machine {
     fn rows_of_poses(&self, poses: &Input<'_>) -> Vec<f64> {
         let machine = &self.machine;
         let home = machine.home.to_coordinates();
-        let freedoms =
-            chosen(if poses.width == self.components() { &machine.dof } else { &machine.commanded });
+        let freedoms = chosen(if poses.width == self.components() {
+            &machine.dof
+        } else {
+            &machine.commanded
+        });
         let mut rows = Vec::with_capacity(7 * poses.count);
         for pose in poses.data().chunks_exact(poses.width) {
             let mut coordinates = home;
@@ -846,9 +894,8 @@ impl Machine {
             shared_poses: placements.serves(count, "placements")?,
         };
         let shared = given.map(|(rows, what)| rows.serves(count, what)).transpose()?;
-        let (out, status) = self.quantity(py, at, &[count], further, |first| {
-            quantity(first, shared == Some(true))
-        })?;
+        let (out, status) = self
+            .quantity(py, at, &[count], further, |first| quantity(first, shared == Some(true)))?;
         (out, codes(py, &[count], &status)?).into_bound_py_any(py)
     }
 }

@@ -14,15 +14,16 @@ enum Step {
     Index(usize),
 }
 
-struct Finder<'a> {
-    text: &'a str,
+struct Finder {
+    /// Where each line ends.
+    ends: Vec<usize>,
     found: Vec<(Vec<Step>, usize)>,
 }
 
-impl Finder<'_> {
+impl Finder {
     fn note(&mut self, path: &[Step], span: Option<Range<usize>>) {
         if let Some(span) = span {
-            let line = 1 + self.text[..span.start].bytes().filter(|&byte| byte == b'\n').count();
+            let line = 1 + self.ends.partition_point(|&end| end < span.start);
             self.found.push((path.to_vec(), line));
         }
     }
@@ -76,7 +77,8 @@ impl Finder<'_> {
 pub fn toml_lines<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyList>> {
     let document =
         Document::parse(text).map_err(|error| PyValueError::new_err(error.to_string()))?;
-    let mut finder = Finder { text, found: Vec::new() };
+    let ends = text.match_indices('\n').map(|(end, _)| end).collect();
+    let mut finder = Finder { ends, found: Vec::new() };
     finder.table(&mut Vec::new(), document.as_table());
     let list = PyList::empty(py);
     for (path, line) in finder.found {

@@ -5,9 +5,9 @@
 
 use super::samples::{Group, Rows, Samples};
 use super::threads::for_chunks;
-use crate::kinematics::{Limbs, Linearisation, SINGULAR, condition, limbs, touched};
-use crate::linear::{Order, SIX, factor_pivoting};
 use crate::dispatch::{Work, dispatch};
+use crate::kinematics::{Limbs, Linearisation, SINGULAR, condition, limbs};
+use crate::linear::{Order, SIX, factor_pivoting};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::statics::{
@@ -30,8 +30,18 @@ pub trait FirstOrder: Sync {
     fn survives_singular(&self) -> bool {
         false
     }
-    /// Computes the numbers of one group.
-    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]);
+    /// Into how many equal parts the numbers are cut, so that a part's lanes stay in the cache.
+    fn parts(&self) -> usize {
+        1
+    }
+    /// Computes one part of the numbers of one group.
+    fn write<S: Real>(
+        &self,
+        linear: &Linearisation<S>,
+        place: Place,
+        part: usize,
+        columns: &mut [S],
+    );
 }
 
 /// Computes a first-order quantity at `samples.poses`, which must close the struts for
@@ -66,7 +76,7 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
         let mut group = Group::<S>::new(machine);
         let mut at: Limbs<S> = Default::default();
         let mut order = [0; SIX];
-        let mut columns = vec![S::default(); width];
+        let mut columns = vec![S::default(); width / quantity.parts()];
         let mut linear = Linearisation::default();
         let groups = out.chunks_mut((width * S::WIDTH).max(1)).zip(status.chunks_mut(S::WIDTH));
         for (number, (out, status)) in groups.enumerate() {
@@ -77,11 +87,13 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
             let mut proven = S::splat(-1.0);
             if S::WIDTH > 1 {
                 if number == 0 {
-                    order = single_order(machine, &group);
+                    order = single_order(machine, &group, place.size);
                 }
                 linear.fill(machine, &group.p, &group.q, &at, &group.pose, &order);
-                quantity.write(&linear, place, &mut columns);
-                S::store_rows(&columns, out);
+                for part in 0..quantity.parts() {
+                    quantity.write(&linear, place, part, &mut columns);
+                    S::store_rows(&columns, &mut out[part * columns.len()..], width, place.size);
+                }
                 proven = linear.regular;
             }
             for lane in 0..place.size {
@@ -98,8 +110,8 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
 }
 
 #[inline(never)]
-fn single_order<S: Real>(machine: &Machine, group: &Group<S>) -> Order {
-    let (p, q, pose) = group.single(0);
+fn single_order<S: Real>(machine: &Machine, group: &Group<S>, size: usize) -> Order {
+    let (p, q, pose) = group.single(group.first_finite(size));
     let mut linear = Linearisation::default();
     linear.differentiate(machine, &p, &q, &pose);
     factor_pivoting(&linear.rows).order
@@ -122,7 +134,10 @@ fn alone<S: Real, Q: FirstOrder>(
     linear.fill(machine, &p, &q, &limbs(machine, &p, &q), &pose, &order);
     let regular = linear.regular > 0.0 || condition(machine, &p, &q, &pose) >= SINGULAR;
     if regular || quantity.survives_singular() {
-        quantity.write(&linear, place, out);
+        let width = out.len() / quantity.parts();
+        for (part, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
+            quantity.write(&linear, place, part, out);
+        }
     } else {
         out.fill(f64::NAN);
     }
@@ -136,64 +151,82 @@ fn alone<S: Real, Q: FirstOrder>(
 }
 
 /// For each of the given parameters the (closure, place) pairs that read it.
-fn readers(machine: &Machine, columns: &[usize]) -> Vec<Vec<(usize, usize)>> {
-    let mut by_parameter = vec![Vec::new(); machine.nominal.len()];
-    for closure in 0..machine.closure_count() {
-        for (place, parameter) in touched(machine, closure) {
-            by_parameter[parameter].push((closure, place));
-        }
-    }
-    columns.iter().map(|&column| by_parameter[column].clone()).collect()
+fn readers<'a>(machine: &'a Machine, columns: &[usize]) -> Vec<&'a [(usize, usize)]> {
+    columns.iter().map(|&column| machine.readers[column].as_slice()).collect()
 }
 
 /// `-W^-1 dg/dp` for some parameters: (component, parameter) per sample.
-pub struct Sensitivity {
+pub struct Sensitivity<'a> {
     components: Vec<usize>,
-    /// For each closure the (place, column) pairs that it alone reads.
-    own: Vec<Vec<(usize, usize)>>,
-    /// The columns that several closures read, or none.
-    common: Vec<(usize, Vec<(usize, usize)>)>,
+    runs: Vec<Run>,
+    /// The columns that several closures read, or none, with their readers.
+    common: Vec<(usize, &'a [(usize, usize)])>,
     count: usize,
 }
 
-impl Sensitivity {
+/// Neighbouring columns that one closure alone reads at neighbouring places.
+struct Run {
+    closure: usize,
+    place: usize,
+    column: usize,
+    length: usize,
+}
+
+impl<'a> Sensitivity<'a> {
     /// For the parameters of the given indices.
-    pub fn new(machine: &Machine, columns: &[usize]) -> Self {
-        let mut own = vec![Vec::new(); machine.closure_count()];
+    pub fn new(machine: &'a Machine, columns: &[usize]) -> Self {
+        let mut runs: Vec<Run> = Vec::new();
         let mut common = Vec::new();
         for (column, readers) in readers(machine, columns).into_iter().enumerate() {
-            if let [(closure, place)] = readers[..] {
-                own[closure].push((place, column));
-            } else {
+            let &[(closure, place)] = readers else {
                 common.push((column, readers));
+                continue;
+            };
+            match runs.last_mut() {
+                Some(run)
+                    if run.closure == closure
+                        && run.place + run.length == place
+                        && run.column + run.length == column =>
+                {
+                    run.length += 1;
+                }
+                _ => runs.push(Run { closure, place, column, length: 1 }),
             }
         }
-        Sensitivity { components: chosen(&machine.dof), own, common, count: columns.len() }
+        Sensitivity { components: chosen(&machine.dof), runs, common, count: columns.len() }
     }
 }
 
-impl FirstOrder for Sensitivity {
+impl FirstOrder for Sensitivity<'_> {
     fn width(&self) -> usize {
         self.components.len() * self.count
     }
+    fn parts(&self) -> usize {
+        self.components.len()
+    }
     #[inline(always)]
-    fn write<S: Real>(&self, linear: &Linearisation<S>, _place: Place, columns: &mut [S]) {
-        for (row, &component) in columns.chunks_exact_mut(self.count.max(1)).zip(&self.components) {
-            for (closure, own) in self.own.iter().enumerate() {
-                let twist = -linear.inverse[component][closure];
-                let gradient = &linear.to_parameters[closure];
-                for &(place, column) in own {
-                    row[column] = twist * gradient[place];
-                }
+    fn write<S: Real>(
+        &self,
+        linear: &Linearisation<S>,
+        _place: Place,
+        part: usize,
+        columns: &mut [S],
+    ) {
+        let inverse = &linear.inverse[self.components[part]];
+        for run in &self.runs {
+            let twist = -inverse[run.closure];
+            let gradient = &linear.to_parameters[run.closure][run.place..run.place + run.length];
+            let cells = &mut columns[run.column..run.column + run.length];
+            for (cell, &derivative) in cells.iter_mut().zip(gradient) {
+                *cell = twist * derivative;
             }
-            for (column, readers) in &self.common {
-                let mut sum = S::default();
-                for &(closure, place) in readers {
-                    let gradient = linear.to_parameters[closure][place];
-                    sum = (-linear.inverse[component][closure]).mul_add(gradient, sum);
-                }
-                row[*column] = sum;
+        }
+        for (column, readers) in &self.common {
+            let mut sum = S::default();
+            for &(closure, place) in *readers {
+                sum = (-inverse[closure]).mul_add(linear.to_parameters[closure][place], sum);
             }
+            columns[*column] = sum;
         }
     }
 }
@@ -217,7 +250,13 @@ impl FirstOrder for JointJacobian {
         self.components.len() * self.struts.len()
     }
     #[inline(always)]
-    fn write<S: Real>(&self, linear: &Linearisation<S>, _place: Place, columns: &mut [S]) {
+    fn write<S: Real>(
+        &self,
+        linear: &Linearisation<S>,
+        _place: Place,
+        _part: usize,
+        columns: &mut [S],
+    ) {
         let mut cells = columns.iter_mut();
         for &component in &self.components {
             for (struts, cell) in self.struts.iter().zip(&mut cells) {
@@ -246,11 +285,7 @@ impl<'a> Forces<'a> {
 }
 
 #[inline(always)]
-fn multipliers<S: Real>(
-    linear: &Linearisation<S>,
-    wrenches: &Rows<'_>,
-    place: Place,
-) -> [S; SIX] {
+fn multipliers<S: Real>(linear: &Linearisation<S>, wrenches: &Rows<'_>, place: Place) -> [S; SIX] {
     let mut wrench = [S::default(); SIX];
     wrenches.load(place.first, place.size, &mut wrench);
     closure_forces(linear, &wrench)
@@ -261,7 +296,13 @@ impl FirstOrder for Forces<'_> {
         self.closures
     }
     #[inline(always)]
-    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]) {
+    fn write<S: Real>(
+        &self,
+        linear: &Linearisation<S>,
+        place: Place,
+        _part: usize,
+        columns: &mut [S],
+    ) {
         let forces = multipliers(linear, &self.wrenches, place);
         for (column, &force) in columns.iter_mut().zip(&forces) {
             *column = -force;
@@ -271,13 +312,13 @@ impl FirstOrder for Forces<'_> {
 
 /// Loads on some parameters under a wrench on the tool.
 pub struct Loads<'a> {
-    readers: Vec<Vec<(usize, usize)>>,
+    readers: Vec<&'a [(usize, usize)]>,
     wrenches: Rows<'a>,
 }
 
 impl<'a> Loads<'a> {
     /// For the parameters of the given indices.
-    pub fn new(machine: &Machine, columns: &[usize], wrenches: Rows<'a>) -> Self {
+    pub fn new(machine: &'a Machine, columns: &[usize], wrenches: Rows<'a>) -> Self {
         Loads { readers: readers(machine, columns), wrenches }
     }
 }
@@ -287,7 +328,13 @@ impl FirstOrder for Loads<'_> {
         self.readers.len()
     }
     #[inline(always)]
-    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]) {
+    fn write<S: Real>(
+        &self,
+        linear: &Linearisation<S>,
+        place: Place,
+        _part: usize,
+        columns: &mut [S],
+    ) {
         let forces = multipliers(linear, &self.wrenches, place);
         for (column, readers) in columns.iter_mut().zip(&self.readers) {
             *column = parameter_load(&forces, &linear.to_parameters, readers);
@@ -298,13 +345,13 @@ impl FirstOrder for Loads<'_> {
 /// Twist per unit wrench, (component, component) per sample.
 pub struct Compliance<'a> {
     components: Vec<usize>,
-    readers: Vec<Vec<(usize, usize)>>,
+    readers: Vec<&'a [(usize, usize)]>,
     compliances: Rows<'a>,
 }
 
 impl<'a> Compliance<'a> {
     /// From the compliances (m/N, rad/(N m)) of the parameters of the given indices.
-    pub fn new(machine: &Machine, columns: &[usize], compliances: Rows<'a>) -> Self {
+    pub fn new(machine: &'a Machine, columns: &[usize], compliances: Rows<'a>) -> Self {
         let readers = readers(machine, columns);
         Compliance { components: chosen(&machine.dof), readers, compliances }
     }
@@ -315,7 +362,13 @@ impl FirstOrder for Compliance<'_> {
         self.components.len() * self.components.len()
     }
     #[inline(always)]
-    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]) {
+    fn write<S: Real>(
+        &self,
+        linear: &Linearisation<S>,
+        place: Place,
+        _part: usize,
+        columns: &mut [S],
+    ) {
         let mut compliances = vec![S::default(); self.readers.len()];
         self.compliances.load(place.first, place.size, &mut compliances);
         let closures = closure_compliance(linear, &self.readers, &compliances);
@@ -337,7 +390,7 @@ pub struct Stiffness<'a> {
 
 impl<'a> Stiffness<'a> {
     /// From the compliances (m/N, rad/(N m)) of the parameters of the given indices.
-    pub fn new(machine: &Machine, columns: &[usize], compliances: Rows<'a>) -> Self {
+    pub fn new(machine: &'a Machine, columns: &[usize], compliances: Rows<'a>) -> Self {
         let closures = machine.closure_count();
         Stiffness { from: Compliance::new(machine, columns, compliances), closures }
     }
@@ -351,7 +404,13 @@ impl FirstOrder for Stiffness<'_> {
         true
     }
     #[inline(always)]
-    fn write<S: Real>(&self, linear: &Linearisation<S>, place: Place, columns: &mut [S]) {
+    fn write<S: Real>(
+        &self,
+        linear: &Linearisation<S>,
+        place: Place,
+        _part: usize,
+        columns: &mut [S],
+    ) {
         let mut compliances = vec![S::default(); self.from.readers.len()];
         self.from.compliances.load(place.first, place.size, &mut compliances);
         let closures = closure_compliance(linear, &self.from.readers, &compliances);

@@ -2,8 +2,8 @@
 
 use super::samples::{Group, Samples};
 use super::threads::for_chunks;
-use crate::kinematics::{Limbs, descend, forward, limbs, start_order};
 use crate::dispatch::{Work, dispatch};
+use crate::kinematics::{Limbs, descend, forward, limbs, start_order};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::spatial::{Pose, relative_rotation};
@@ -19,7 +19,12 @@ enum Kept<'a> {
 }
 
 /// The poses of all samples, started at `samples.poses`: seven numbers each into `poses`.
-pub fn forward_poses(machine: &Machine, samples: &Samples<'_>, poses: &mut [f64], status: &mut [Status]) {
+pub fn forward_poses(
+    machine: &Machine,
+    samples: &Samples<'_>,
+    poses: &mut [f64],
+    status: &mut [Status],
+) {
     run(machine, samples, Kept::Pose, 7, poses, status);
 }
 
@@ -72,17 +77,26 @@ impl Work for Chunk<'_> {
                 at = limbs(machine, &group.p, &group.q);
             }
             if S::WIDTH == 1 {
-                alone(machine, &single_limbs(&at, 0), &group.pose.lane(0), kept, out, &mut status[0]);
+                alone(
+                    machine,
+                    &single_limbs(&at, 0),
+                    &group.pose.lane(0),
+                    kept,
+                    out,
+                    &mut status[0],
+                );
                 continue;
             }
             if number == 0 {
-                order = start_order(machine, &single_limbs(&at, 0), &group.pose.lane(0));
+                let lane = group.first_finite(size);
+                order = start_order(machine, &single_limbs(&at, lane), &group.pose.lane(lane));
             }
             let found = descend(machine, &at, &group.pose, &order);
             match kept {
                 Kept::Pose => {
                     for lane in 0..size {
-                        out[7 * lane..7 * lane + 7].copy_from_slice(&found.pose.lane(lane).to_row());
+                        out[7 * lane..7 * lane + 7]
+                            .copy_from_slice(&found.pose.lane(lane).to_row());
                     }
                 }
                 Kept::Displacement(components) => {
@@ -91,7 +105,7 @@ impl Work for Chunk<'_> {
                     for (column, &component) in columns.iter_mut().zip(components) {
                         *column = error[component];
                     }
-                    S::store_rows(&columns[..width], out);
+                    S::store_rows(&columns[..width], out, width, size);
                 }
             }
             for lane in 0..size {

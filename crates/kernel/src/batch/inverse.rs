@@ -2,9 +2,9 @@
 
 use super::samples::{Deviations, Group, Rows};
 use super::threads::for_chunks;
+use crate::dispatch::{Work, dispatch};
 use crate::kinematics::{commanded_pose, in_travel, inverse, lane_inverse};
 use crate::linear::SIX;
-use crate::dispatch::{Work, dispatch};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::spatial::{Pose, quaternion_from_euler};
@@ -21,10 +21,16 @@ pub fn inverses(
     status: &mut [Status],
 ) {
     let width = machine.drives.len();
-    for_chunks(status.len(), (joints, width), (poses, 7), status, |first, joints, poses, status| {
-        let chunk = Chunk { machine, commands, deviations, first, joints, poses, status };
-        if machine.has_direct_inverse() { dispatch(chunk) } else { chunk.run::<f64>() }
-    });
+    for_chunks(
+        status.len(),
+        (joints, width),
+        (poses, 7),
+        status,
+        |first, joints, poses, status| {
+            let chunk = Chunk { machine, commands, deviations, first, joints, poses, status };
+            if machine.has_direct_inverse() { dispatch(chunk) } else { chunk.run::<f64>() }
+        },
+    );
 }
 
 struct Chunk<'a> {
@@ -81,7 +87,7 @@ impl Work for Chunk<'_> {
                 pose.rotation = quaternion_from_euler([a, b, c]);
             }
             let margin = lane_inverse(machine, &group.p, &pose, &mut found);
-            S::store_rows(&found, joints);
+            S::store_rows(&found, joints, width, size);
             for lane in 0..size {
                 poses[7 * lane..7 * lane + 7].copy_from_slice(&pose.lane(lane).to_row());
                 let joints = &mut joints[width * lane..width * (lane + 1)];

@@ -148,6 +148,14 @@ impl<S: Real> Group<S> {
         fresh
     }
 
+    /// The first of the `size` samples whose joints and pose are finite, to find a row order with.
+    pub fn first_finite(&self, size: usize) -> usize {
+        let finite = |lane: &usize| {
+            self.q.iter().chain(&self.pose.position).all(|value| value.lane(*lane).is_finite())
+        };
+        (0..size).find(finite).unwrap_or(0)
+    }
+
     /// One sample of the group alone: parameters, joints, pose.
     pub fn single(&self, lane: usize) -> (Vec<f64>, [f64; SIX], Pose<f64>) {
         let mut joints = [0.0; SIX];

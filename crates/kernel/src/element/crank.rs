@@ -55,6 +55,7 @@ impl Drive for Crank {
         doc: "An arm that turns about a fixed axis; struts of fixed length hang on its end. \
               Strut bases are vectors from the origin at angle 0. \
               Working mode +: the elbow ahead of the platform joint in the sense of rotation.",
+        sets_length: false,
         drawing: Drawing::Circle,
         fields: FIELDS,
         parameters: PARAMETERS,
@@ -91,8 +92,8 @@ impl Drive for Crank {
         let arm = Arm::new(frame.tilted(u, v), base);
         let w = subtract(platform, [x, y, z]);
         let (p, q) = (dot(w, arm.radial), dot(w, arm.ahead));
-        let c = (dot(w, w) + dot(base, base) - length.square()) * length.lift(0.5)
-            - dot(w, arm.axial);
+        let c =
+            (dot(w, w) + dot(base, base) - length.square()) * length.lift(0.5) - dot(w, arm.axial);
         let margin = p.square() + q.square() - c.square();
         let side = margin.select(margin, margin.lift(0.0)).sqrt() * margin.lift(mode);
         let angle = (q * c + p * side).atan2(p * c - q * side);

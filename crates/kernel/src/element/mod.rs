@@ -106,6 +106,8 @@ pub struct ElementTable {
     pub kind: &'static str,
     /// One sentence.
     pub doc: &'static str,
+    /// Whether it is the length of the strut that it carries, which then has none of its own.
+    pub sets_length: bool,
     /// How it is drawn.
     pub drawing: Drawing,
     /// The keys it reads.
@@ -195,7 +197,7 @@ pub trait Drive {
 /// No drive has more parameters than this.
 pub const MAX_DRIVE_PARAMETERS: usize = 7;
 /// Where a closure's gradient keeps the derivatives to the strut's own parameters, in their order.
-const OWN: usize = 7;
+pub const OWN: usize = 7;
 /// Where the drive's parameters end.
 pub const DRIVE_END: usize = OWN + MAX_DRIVE_PARAMETERS;
 /// Places of one closure's gradient: `base`, `platform`, `length`, the drive's parameters, `tool`.
@@ -211,42 +213,47 @@ pub struct ClosureGradient<S> {
     pub joint: S,
 }
 
-/// The gradient of the strut closure at a base-side centre that hangs on the frame.
+/// The gradient of the closure of a strut that hangs on the frame; `points` are its base-side and its
+/// platform-side joint centre.
 #[inline(always)]
 pub fn fixed_gradient<S: Scalar>(
-    base: Vector<S>,
-    platform: Vector<S>,
+    points: [Vector<S>; 2],
     length: S,
     places: &mut [S; PLACES],
 ) -> ClosureGradient<S> {
-    let closure = strut_dual(base, platform, length);
-    places[..3].copy_from_slice(&closure.parts[..3]);
-    places[6] = closure.parts[6];
-    ClosureGradient {
-        centre: [closure.parts[3], closure.parts[4], closure.parts[5]],
-        joint: length.lift(0.0),
+    let (to_centre, to_length) = strut_gradient(points, length);
+    for k in 0..3 {
+        places[k] = -to_centre[k];
     }
+    places[6] = to_length;
+    ClosureGradient { centre: to_centre, joint: length.lift(0.0) }
 }
 
-/// The strut closure with its derivatives to base-side centre, platform-side centre and length.
+/// The derivatives of the strut closure to the platform-side centre and to the length. That to the
+/// base-side centre is the former's opposite: moving both points alike changes no distance.
 #[inline(always)]
-fn strut_dual<S: Scalar>(base: Vector<S>, platform: Vector<S>, length: S) -> Dual<S, 7> {
-    strut::closure(
-        [Dual::variable(base[0], 0), Dual::variable(base[1], 1), Dual::variable(base[2], 2)],
-        [Dual::variable(platform[0], 3), Dual::variable(platform[1], 4), Dual::variable(platform[2], 5)],
-        Dual::variable(length, 6),
-    )
+fn strut_gradient<S: Scalar>([base, platform]: [Vector<S>; 2], length: S) -> (Vector<S>, S) {
+    let closure = strut::closure(
+        [Dual::constant(base[0]), Dual::constant(base[1]), Dual::constant(base[2])],
+        [
+            Dual::<S, 4>::variable(platform[0], 0),
+            Dual::variable(platform[1], 1),
+            Dual::variable(platform[2], 2),
+        ],
+        Dual::variable(length, 3),
+    );
+    ([closure.parts[0], closure.parts[1], closure.parts[2]], closure.parts[3])
 }
 
-/// The gradient of the strut closure through the drive `D`; `N` is its [`Drive::WIDTH`].
+/// The gradient of the strut closure through the drive `D`; `N` is its [`Drive::WIDTH`]. `points` are
+/// the strut's base as the machine file gives it and its platform-side joint centre.
 #[inline(always)]
 fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
     frame: &DriveFrame,
     parameters: &[S],
     joint: S,
-    base: Vector<S>,
+    [base, platform]: [Vector<S>; 2],
     length: S,
-    platform: Vector<S>,
     places: &mut [S; PLACES],
 ) -> ClosureGradient<S> {
     let count = D::TABLE.parameters.len();
@@ -265,21 +272,17 @@ fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
         ],
         Dual::variable(length, count + 4),
     );
-    let closure =
-        strut_dual([centre[0].value, centre[1].value, centre[2].value], platform, own.value);
-    let to_centre = [closure.parts[0], closure.parts[1], closure.parts[2]];
+    let at = [centre[0].value, centre[1].value, centre[2].value];
+    let (to_centre, to_length) = strut_gradient([at, platform], own.value);
     let mut chained = [joint; N];
     for j in 0..N {
         let along = [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]];
-        chained[j] = closure.parts[6].mul_add(own.parts[j], dot(to_centre, along));
+        chained[j] = to_length.mul_add(own.parts[j], -dot(to_centre, along));
     }
     places[..3].copy_from_slice(&chained[count + 1..count + 4]);
     places[6] = chained[count + 4];
     places[OWN..OWN + count].copy_from_slice(&chained[..count]);
-    ClosureGradient {
-        centre: [closure.parts[3], closure.parts[4], closure.parts[5]],
-        joint: chained[count],
-    }
+    ClosureGradient { centre: to_centre, joint: chained[count] }
 }
 
 /// Makes the closed set of drives from its list, with static dispatch on any scalar.
@@ -350,14 +353,13 @@ macro_rules! drives {
                 frame: &DriveFrame,
                 parameters: &[S],
                 joint: S,
-                base: Vector<S>,
+                points: [Vector<S>; 2],
                 length: S,
-                platform: Vector<S>,
                 places: &mut [S; PLACES],
             ) -> ClosureGradient<S> {
                 match self {
                     $(DriveKind::$name => driven_gradient::<S, $type, { <$type as Drive>::WIDTH }>(
-                        frame, parameters, joint, base, length, platform, places,
+                        frame, parameters, joint, points, length, places,
                     )),+
                 }
             }

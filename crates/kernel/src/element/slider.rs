@@ -54,6 +54,7 @@ impl Drive for Slider {
         kind: "slider",
         doc: "A carriage on a straight guideway; struts of fixed length hang on it. \
               Working mode +: the carriage on the +axis side of the platform joint.",
+        sets_length: false,
         drawing: Drawing::Line,
         fields: FIELDS,
         parameters: PARAMETERS,

@@ -8,6 +8,7 @@ use crate::spatial::{Vector, norm, subtract};
 pub const TABLE: ElementTable = ElementTable {
     kind: "strut",
     doc: "Two joint centres, one on the base side and one on the platform, at a distance.",
+    sets_length: false,
     drawing: Drawing::Line,
     fields: &[
         Field {
@@ -46,10 +47,10 @@ pub fn closure<S: Scalar>(base: Vector<S>, platform: Vector<S>, length: S) -> S 
     norm(subtract(platform, base)) - length
 }
 
-/// A residual with the same root, quicker to iterate on: (|B - A|^2 - L^2) / 2, in m^2. Its rows are
-/// those of [`closure`] times |B - A|, so Newton's step differs only in the second order.
+/// A residual with the same root, quicker to iterate on: |B - A|^2 - L^2, in m^2. Its rows are those
+/// of [`closure`] times 2 |B - A|, so Newton's step differs only in the second order.
 #[inline(always)]
 pub fn squared_closure<S: Scalar>(base: Vector<S>, platform: Vector<S>, length: S) -> S {
     let d = subtract(platform, base);
-    (d[0].square() + d[1].square() + d[2].square() - length.square()) * length.lift(0.5)
+    d[0].square_plus(d[1].square_plus(d[2].square_plus(-length.square())))
 }

@@ -1,7 +1,7 @@
 //! A strut whose own length is driven.
 
-use super::{Dimension, Drawing, Drive, DriveFrame, ElementTable, Field, ParameterField, Reach};
 use super::parameter;
+use super::{Dimension, Drawing, Drive, DriveFrame, ElementTable, Field, ParameterField, Reach};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, norm, subtract};
 
@@ -32,6 +32,7 @@ impl Drive for Telescopic {
     const TABLE: ElementTable = ElementTable {
         kind: "telescopic",
         doc: "The strut itself grows and shrinks; its length is the joint coordinate plus an offset.",
+        sets_length: true,
         drawing: Drawing::None,
         fields: FIELDS,
         parameters: PARAMETERS,

@@ -9,7 +9,6 @@ use crate::machine::Machine;
 use crate::scalar::{Dual, Real};
 use crate::spatial::{Pose, Vector, add, cross, rotate, rotation_matrix};
 
-
 /// One strut of one sample, ready for the iteration: everything that does not depend on the pose.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limb<S> {

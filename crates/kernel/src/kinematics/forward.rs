@@ -5,9 +5,9 @@
 //! iteration is not trustworthy follows the residual down in steps, so that a pose of another
 //! assembly is never returned as `ok`.
 
+use super::SINGULAR;
 use super::closures::{Limbs, closure_rows, squared_residuals, squared_rows};
 use super::linearisation::proven_regular;
-use super::SINGULAR;
 use crate::linear::{
     IN_ORDER, Order, Pivoted, SIX, condition_index, factor, factor_pivoting, solve,
 };
@@ -41,12 +41,13 @@ pub struct Descent<S> {
     pub proof: S,
 }
 
-/// The size of a twist relative to the machine: displacement over characteristic length, or rad.
+/// The size of a twist relative to the machine: displacement over characteristic length, plus rad.
+/// A sum, so that no NaN is lost.
 #[inline(always)]
 fn relative_size<S: Real>(machine: &Machine, twist: &[S; SIX]) -> S {
-    let displacement = twist[0].abs().max(twist[1].abs()).max(twist[2].abs());
-    let rotation = twist[3].abs().max(twist[4].abs()).max(twist[5].abs());
-    (displacement * S::splat(1.0 / machine.characteristic_length)).max(rotation)
+    let displacement = twist[0].abs() + twist[1].abs() + twist[2].abs();
+    let rotation = twist[3].abs() + twist[4].abs() + twist[5].abs();
+    displacement.mul_add(S::splat(1.0 / machine.characteristic_length), rotation)
 }
 
 /// The row order for a group of samples near one pose.
@@ -79,13 +80,13 @@ pub fn descend<S: Real>(
         }
         same_branch = same_branch.min(first * determinant);
         let size = relative_size(machine, &twist);
-        if size.largest() < CHORD {
+        if size.all_below(CHORD) {
             for _ in 0..CHORD_STEPS {
                 squared_residuals(machine, limbs, &pose, order, &mut twist);
                 solve(&rows, &mut twist);
                 pose.step_back(&twist);
                 let settled = S::splat(SETTLED) - relative_size(machine, &twist) * size;
-                if (-settled).largest() < 0.0 {
+                if (-settled).all_below(0.0) {
                     let regular = proven_regular(machine, limbs, determinant);
                     return Descent { pose, proof: same_branch.min(regular) };
                 }
@@ -155,7 +156,8 @@ fn settle(
 /// residual at the start is taken down to zero in shares, each a short iteration: the pose then moves
 /// continuously, as the machine itself would.
 pub fn forward(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64>, Status) {
-    let shortest = limbs[..machine.struts.len()].iter().map(|limb| limb.length).fold(f64::INFINITY, f64::min);
+    let shortest =
+        limbs[..machine.struts.len()].iter().map(|limb| limb.length).fold(f64::INFINITY, f64::min);
     // Also true where it is NaN.
     if !(shortest > 0.0) {
         return (*start, Status::Unreachable);

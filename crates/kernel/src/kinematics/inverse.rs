@@ -4,9 +4,9 @@
 //! parasitic (a delta commanded in x, y, z whose platform can tilt) joints and parasitic freedoms are
 //! solved for together by Newton's iteration, started from the closed forms at the home attitude.
 
+use super::SINGULAR;
 use super::closures::{closure_rows, limbs};
 use super::linearisation::Linearisation;
-use super::SINGULAR;
 use crate::element::{Dimension, Reach};
 use crate::linear::{Matrix6, Pivoted, SIX, condition_index, factor_pivoting, solve};
 use crate::machine::{Machine, MachineDrive, chosen};
@@ -72,7 +72,14 @@ fn closed_form<S: Real>(
     };
     let parameters = &p[drive.first..];
     let base = [own[0], own[1], own[2]];
-    drive.kind.inverse(&drive.frame, parameters, drive.mode, base, length, add(arm, position))
+    let platform = add(arm, position);
+    let mut reach =
+        drive.kind.inverse(&drive.frame, parameters, drive.mode, base, length, platform);
+    if strut.own_length.is_some() {
+        // The closed forms know the length's square only; no strut of negative length reaches.
+        reach.margin = reach.margin.min(length);
+    }
+    reach
 }
 
 /// Whether every joint lies in its travel; rounding at the ends does not count.
@@ -99,6 +106,7 @@ pub fn inverse(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Inverse {
         solve_parasitic(machine, p, margin, &mut solved);
     }
     if !solved.status.is_solved() {
+        solved.pose = *pose;
         solved.joints.fill(f64::NAN);
     } else if !in_travel(machine, &solved.joints) {
         solved.status = Status::OutOfTravel;
@@ -142,7 +150,8 @@ fn solve_parasitic(machine: &Machine, p: &[f64], seed_margin: f64, solved: &mut 
                 };
             }
             if let Some(drive) = machine.struts[i].drive {
-                system[i][parasitic.len() + drive] = linear.to_joint[i] / joint_length(machine, drive);
+                system[i][parasitic.len() + drive] =
+                    linear.to_joint[i] / joint_length(machine, drive);
             }
         }
         let rates: Vec<f64> =
@@ -151,7 +160,7 @@ fn solve_parasitic(machine: &Machine, p: &[f64], seed_margin: f64, solved: &mut 
         let Pivoted { factors, order, .. } = factor_pivoting(&system);
         let mut step = order.map(|row| if row < count { -residuals[row] } else { 0.0 });
         solve(&factors, &mut step);
-        let size = step.iter().fold(0.0_f64, |size, value| size.max(value.abs())) / l;
+        let size = step.iter().map(|value| value.abs()).sum::<f64>() / l;
         // Also true where it is NaN.
         if !(size < 10.0) {
             solved.status =
@@ -161,7 +170,9 @@ fn solve_parasitic(machine: &Machine, p: &[f64], seed_margin: f64, solved: &mut 
         apply(machine, &parasitic, by_angle, &step, solved);
         if size < SETTLED {
             if condition_index(&system, count, &std::array::from_fn(|k| k < count)) < SINGULAR {
-                solved.status = Status::Singular;
+                // A strut stretched to its last is both; that it does not reach is the cause.
+                solved.status =
+                    if seed_margin < 0.0 { Status::Unreachable } else { Status::Singular };
             } else if &branch(&rates) != wanted {
                 solved.status = Status::BranchLost;
             }

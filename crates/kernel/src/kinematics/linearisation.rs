@@ -4,10 +4,13 @@
 use super::SINGULAR;
 use super::closures::{Limbs, held_row, row};
 use crate::element::{DRIVE_END, PLACES, fixed_gradient};
-use crate::linear::{Matrix6, Order, SIX, factor, invert};
+use crate::linear::{Matrix6, Order, SIX, factor, growth, invert};
 use crate::machine::Machine;
 use crate::scalar::Real;
 use crate::spatial::{Pose, add, rotate, rotate_back, rotation_matrix};
+
+/// A larger growth of rounding errors asks for an order of elimination of the sample's own.
+const GROWTH: f64 = 40.0;
 
 /// The closures of one sample (or one group of lanes) to first order: scratch of its caller, filled
 /// anew for each.
@@ -19,23 +22,10 @@ pub struct Linearisation<S> {
     pub inverse: Matrix6<S>,
     /// Closure i to its joint.
     pub to_joint: [S; SIX],
-    /// Closure i to its parameters, at the places that [`touched`] names.
+    /// Closure i to its parameters, at the places that [`Machine::readers`] names.
     pub to_parameters: [[S; PLACES]; SIX],
-    /// Positive where the rows are proven regular.
+    /// Positive where the rows are proven regular and their order of elimination served.
     pub regular: S,
-}
-
-/// The parameters that closure `i` reads: (place in its gradient, parameter).
-pub fn touched(machine: &Machine, i: usize) -> Vec<(usize, usize)> {
-    let strut = &machine.struts[i];
-    let mut places: Vec<(usize, usize)> = (0..6).map(|k| (k, strut.first + k)).collect();
-    places.extend(strut.own_length.map(|index| (6, index)));
-    if let Some(drive) = strut.drive {
-        let drive = &machine.drives[drive];
-        places.extend((0..drive.kind.table().parameters.len()).map(|k| (7 + k, drive.first + k)));
-    }
-    places.extend((0..3).map(|k| (DRIVE_END + k, machine.tool + k)));
-    places
 }
 
 impl<S: Real> Linearisation<S> {
@@ -57,12 +47,12 @@ impl<S: Real> Linearisation<S> {
             };
             let places = &mut self.to_parameters[i];
             let gradient = match strut.drive {
-                None => fixed_gradient(base, centre, length, places),
+                None => fixed_gradient([base, centre], length, places),
                 Some(index) => {
                     let drive = &machine.drives[index];
                     let parameters = &p[drive.first..];
                     let (frame, joint) = (&drive.frame, q[index]);
-                    drive.kind.gradient(frame, parameters, joint, base, length, centre, places)
+                    drive.kind.gradient(frame, parameters, joint, [base, centre], length, places)
                 }
             };
             let platform = rotate_back(&rotation, gradient.centre);
@@ -96,9 +86,10 @@ impl<S: Real> Linearisation<S> {
         }
         let mut determinant = factor(&mut factors);
         for limb in &limbs[..machine.struts.len()] {
-            determinant = determinant * limb.length;
+            determinant = determinant * (limb.length + limb.length);
         }
-        self.regular = proven_regular(machine, limbs, determinant);
+        let stable = S::splat(GROWTH) - growth(&factors);
+        self.regular = proven_regular(machine, limbs, determinant).min(stable);
         invert(&factors, order, &mut self.inverse);
     }
 }
@@ -110,7 +101,7 @@ impl<S: Real> Linearisation<S> {
 /// F and determinant D, the smallest singular value is at least |D| ((n-1) / F^2)^((n-1)/2), since the
 /// others' squares have a sum of at most F^2 (arithmetic and geometric mean), and the largest is at
 /// most F; F^2 is at most n + sum |arm|^2 / l^2. `determinant` is that of the squared rows, W times
-/// the strut lengths. The factor of two covers that it may belong to the last but one iterate.
+/// twice the strut lengths. The factor of two covers that it may belong to the last but one iterate.
 #[inline(always)]
 pub fn proven_regular<S: Real>(machine: &Machine, limbs: &Limbs<S>, determinant: S) -> S {
     let count = machine.struts.len();

@@ -10,7 +10,7 @@ pub use forward::{Descent, descend, forward, start_order};
 pub use inverse::{
     Inverse, Obstacle, commanded_pose, condition, in_travel, inverse, lane_inverse, obstacles,
 };
-pub use linearisation::{Linearisation, proven_regular, touched};
+pub use linearisation::{Linearisation, proven_regular};
 
 /// Singular: smallest scaled singular value below this share of the largest.
 pub const SINGULAR: f64 = 1e-6;

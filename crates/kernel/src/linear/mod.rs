@@ -3,7 +3,7 @@
 mod factor;
 mod singular;
 
-pub use factor::{Pivoted, factor, factor_pivoting, inverse_of, invert, solve};
+pub use factor::{Pivoted, factor, factor_pivoting, growth, inverse_of, invert, solve};
 pub use singular::condition_index;
 
 /// Six freedoms of a rigid body.

@@ -119,6 +119,15 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
         self.chain(self.value.square(), self.value + self.value)
     }
     #[inline(always)]
+    fn square_plus(self, term: Self) -> Self {
+        let twice = self.value + self.value;
+        let mut parts = self.parts;
+        for k in 0..N {
+            parts[k] = parts[k].mul_add(twice, term.parts[k]);
+        }
+        Dual { value: self.value.square_plus(term.value), parts }
+    }
+    #[inline(always)]
     fn sqrt(self) -> Self {
         let root = self.value.sqrt();
         self.chain(root, root.lift(0.5) / root)
@@ -157,7 +166,7 @@ mod tests {
         let (sine, cosine) = (x * y).sin_cos();
         let angle = (sine + x.lift(2.0)).atan2(cosine - y);
         let chosen = (x - y).select(angle.square(), -angle);
-        (chosen.mul_add(x, y) / (y.square() + x.lift(1.0))).square().sqrt() - x
+        (chosen.mul_add(x, y) / y.square_plus(x.lift(1.0))).square().sqrt() - x
     }
 
     #[test]

@@ -18,6 +18,10 @@ impl Scalar for f64 {
         self * self
     }
     #[inline(always)]
+    fn square_plus(self, term: f64) -> f64 {
+        self * self + term
+    }
+    #[inline(always)]
     fn sqrt(self) -> f64 {
         f64::sqrt(self)
     }
@@ -55,22 +59,18 @@ impl Real for f64 {
     }
     #[inline(always)]
     fn min(self, other: f64) -> f64 {
-        if self < other { self } else { other }
+        if self <= other || self.is_nan() { self } else { other }
     }
     #[inline(always)]
-    fn max(self, other: f64) -> f64 {
-        if self > other { self } else { other }
-    }
-    #[inline(always)]
-    fn largest(self) -> f64 {
-        self
+    fn all_below(self, limit: f64) -> bool {
+        self < limit
     }
     #[inline(always)]
     fn load_rows(rows: &[f64], columns: &mut [f64]) {
         columns.copy_from_slice(&rows[..columns.len()]);
     }
     #[inline(always)]
-    fn store_rows(columns: &[f64], rows: &mut [f64]) {
-        rows.copy_from_slice(columns);
+    fn store_rows(columns: &[f64], rows: &mut [f64], _stride: usize, _count: usize) {
+        rows[..columns.len()].copy_from_slice(columns);
     }
 }

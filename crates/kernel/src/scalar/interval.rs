@@ -72,7 +72,8 @@ impl Interval {
     fn holds_multiple(self, offset: f64) -> bool {
         let turn = 2.0 * PI;
         let slack = 1e-9;
-        ((self.upper - offset) / turn + slack).floor() >= ((self.lower - offset) / turn - slack).ceil()
+        ((self.upper - offset) / turn + slack).floor()
+            >= ((self.lower - offset) / turn - slack).ceil()
     }
 }
 
@@ -135,6 +136,9 @@ impl Scalar for Interval {
         let (a, b) = (self.lower * self.lower, self.upper * self.upper);
         let lower = if self.contains(0.0) { 0.0 } else { a.min(b).next_down() };
         Interval { lower: lower.max(0.0), upper: a.max(b).next_up() }
+    }
+    fn square_plus(self, term: Self) -> Self {
+        self.square() + term
     }
     fn sqrt(self) -> Self {
         if self.upper < 0.0 {
@@ -213,7 +217,7 @@ mod tests {
             assert!((x - y).contains(a - b));
             assert!((x * y).contains(a * b));
             assert!((x / y).contains(a / b));
-            assert!(x.square().contains(a * a));
+            assert!(x.square().contains(a * a) && x.square_plus(y).contains(a * a + b));
             assert!(x.square().sqrt().contains(a.abs()));
             assert!(x.sin_cos().0.contains(a.sin()) && x.sin_cos().1.contains(a.cos()));
             assert!(y.atan2(x).contains(b.atan2(a)), "{y:?} {x:?} {b} {a}");

@@ -69,6 +69,10 @@ impl<const LEVEL: u8> Scalar for Lanes<LEVEL> {
         self * self
     }
     #[inline(always)]
+    fn square_plus(self, term: Self) -> Self {
+        self.mul_add(self, term)
+    }
+    #[inline(always)]
     fn sqrt(self) -> Self {
         let mut result = self.0;
         for k in 0..LANES {
@@ -125,26 +129,19 @@ impl<const LEVEL: u8> Real for Lanes<LEVEL> {
     fn min(self, other: Self) -> Self {
         let mut result = self.0;
         for k in 0..LANES {
-            result[k] = if result[k] < other.0[k] { result[k] } else { other.0[k] };
+            // Twice, so that a NaN on either side stays.
+            result[k] = if self.0[k] <= other.0[k] { self.0[k] } else { other.0[k] };
+            result[k] = if self.0[k].is_nan() { self.0[k] } else { result[k] };
         }
         Lanes(result)
     }
     #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        let mut result = self.0;
+    fn all_below(self, limit: f64) -> bool {
+        let mut below = true;
         for k in 0..LANES {
-            result[k] = if result[k] > other.0[k] { result[k] } else { other.0[k] };
+            below &= self.0[k] < limit;
         }
-        Lanes(result)
-    }
-    #[inline(always)]
-    fn largest(self) -> f64 {
-        let mut result = self.0[0];
-        for k in 1..LANES {
-            // Written so that a NaN on either side stays.
-            result = if self.0[k] <= result { result } else { self.0[k] };
-        }
-        if (self - self) == Lanes([0.0; LANES]) { result } else { f64::NAN }
+        below
     }
     #[inline(always)]
     fn load_rows(rows: &[f64], columns: &mut [Self]) {
@@ -169,10 +166,11 @@ impl<const LEVEL: u8> Real for Lanes<LEVEL> {
         }
     }
     #[inline(always)]
-    fn store_rows(columns: &[Self], rows: &mut [f64]) {
+    fn store_rows(columns: &[Self], rows: &mut [f64], stride: usize, count: usize) {
         let width = columns.len();
-        if width < LANES || rows.len() < width * LANES {
-            for (k, row) in rows.chunks_exact_mut(width.max(1)).enumerate() {
+        if width < LANES || count < LANES {
+            for k in 0..count {
+                let row = &mut rows[k * stride..k * stride + width];
                 for (value, column) in row.iter_mut().zip(columns) {
                     *value = column.0[k];
                 }
@@ -184,7 +182,7 @@ impl<const LEVEL: u8> Real for Lanes<LEVEL> {
             tile.copy_from_slice(&columns[first..first + LANES]);
             let tile = transpose(tile);
             for k in 0..LANES {
-                let row = &mut rows[k * width + first..k * width + first + LANES];
+                let row = &mut rows[k * stride + first..k * stride + first + LANES];
                 row.copy_from_slice(&tile[k].0);
             }
         }
@@ -280,7 +278,7 @@ mod tests {
                     .map(|j| Lanes(std::array::from_fn(|k| (100 * k + j) as f64)))
                     .collect();
                 let mut rows = vec![0.0; count * width];
-                Lanes::store_rows(&columns, &mut rows);
+                Lanes::store_rows(&columns, &mut rows, width, count);
                 let mut back = vec![Lanes::<PORTABLE>::default(); width];
                 Lanes::load_rows(&rows, &mut back);
                 for (column, back) in columns.iter().zip(&back) {
@@ -298,12 +296,23 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_lane_keeps_a_nan() {
+    fn the_smaller_keeps_a_nan_from_either_side() {
+        let nan = Lanes::<PORTABLE>::splat(f64::NAN);
+        let one = Lanes::splat(1.0);
+        assert!(nan.min(one).0[3].is_nan() && one.min(nan).0[3].is_nan());
+        assert!(Real::min(f64::NAN, 1.0).is_nan() && Real::min(1.0, f64::NAN).is_nan());
+        assert_eq!(Real::min(2.0, 1.0), 1.0);
+    }
+
+    #[test]
+    fn a_nan_lane_is_not_below() {
+        assert!(Lanes::<PORTABLE>([1.0, 3.0, 2.0, 0.0, -4.0, 0.0, 0.0, 0.0]).all_below(3.1));
         for k in 0..LANES {
-            let mut values = [1.0; LANES];
-            values[k] = f64::NAN;
-            assert!(Lanes::<PORTABLE>(values).largest().is_nan());
+            for value in [f64::NAN, 2.0, f64::INFINITY] {
+                let mut values = [1.0; LANES];
+                values[k] = value;
+                assert!(!Lanes::<PORTABLE>(values).all_below(2.0));
+            }
         }
-        assert_eq!(Lanes::<PORTABLE>([1.0, 3.0, 2.0, 0.0, -4.0, 0.0, 0.0, 0.0]).largest(), 3.0);
     }
 }

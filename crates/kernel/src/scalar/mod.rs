@@ -42,6 +42,8 @@ pub trait Scalar:
     fn mul_add(self, factor: Self, term: Self) -> Self;
     /// `self * self`, never negative.
     fn square(self) -> Self;
+    /// `self * self + term`: half the derivatives' work of a product.
+    fn square_plus(self, term: Self) -> Self;
     /// The square root.
     fn sqrt(self) -> Self;
     /// Sine and cosine of an angle in radians.
@@ -64,16 +66,13 @@ pub trait Real: Scalar + Default + PartialEq {
     fn set_lane(&mut self, lane: usize, value: f64);
     /// Absolute value.
     fn abs(self) -> Self;
-    /// The smaller of two, lane by lane.
+    /// The smaller of two, lane by lane; NaN where either is NaN.
     fn min(self, other: Self) -> Self;
-    /// The larger of two, lane by lane.
-    fn max(self, other: Self) -> Self;
-    /// The largest value over the lanes; NaN if any lane is NaN.
-    fn largest(self) -> f64;
+    /// Whether every lane is below the limit; a NaN is not.
+    fn all_below(self, limit: f64) -> bool;
     /// Reads `rows[k * columns.len() + j]` into lane `k` of `columns[j]`; lanes beyond the rows repeat
     /// the last row. `rows` must hold at least one row.
     fn load_rows(rows: &[f64], columns: &mut [Self]);
-    /// Writes `columns[j]` of lane `k` to `rows[k * columns.len() + j]` for the first
-    /// `rows.len() / columns.len()` lanes.
-    fn store_rows(columns: &[Self], rows: &mut [f64]);
+    /// Writes `columns[j]` of lane `k` to `rows[k * stride + j]` for the first `count` lanes.
+    fn store_rows(columns: &[Self], rows: &mut [f64], stride: usize, count: usize);
 }

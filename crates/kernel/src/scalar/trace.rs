@@ -71,7 +71,8 @@ impl Tape {
                 Operation::Angle(y, x) => format!("atan2(v{y}, v{x})"),
                 Operation::Select(c, a, b) => format!("v{c} >= 0.0 ? v{a} : v{b}"),
             };
-            writeln!(code, "    const double v{place} = {expression};").expect("writing to a String");
+            writeln!(code, "    const double v{place} = {expression};")
+                .expect("writing to a String");
         }
         for (index, output) in outputs.iter().enumerate() {
             writeln!(code, "    y[{index}] = v{};", output.place).expect("writing to a String");
@@ -123,6 +124,9 @@ impl Scalar for Trace<'_> {
     }
     fn square(self) -> Self {
         self * self
+    }
+    fn square_plus(self, term: Self) -> Self {
+        self * self + term
     }
     fn sqrt(self) -> Self {
         self.tape.record(Operation::SquareRoot(self.place))

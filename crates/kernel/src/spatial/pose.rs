@@ -169,7 +169,8 @@ pub fn quaternion_from_euler<S: Scalar>(angles: [S; 3]) -> Quaternion<S> {
 /// only a sum of a and c is defined; then a = 0.
 pub fn euler_angles(r: &RotationMatrix<f64>) -> [f64; 3] {
     let horizontal = r[0][0].hypot(r[1][0]);
-    let b = (-r[2][0]).atan2(horizontal);
+    // 0 - x, not -x: a level platform has b = 0, not -0.
+    let b = (0.0 - r[2][0]).atan2(horizontal);
     if horizontal < 1e-12 {
         return [0.0, b, (-r[0][1]).atan2(r[1][1])];
     }
@@ -201,7 +202,7 @@ pub fn relative_rotation<S: Real>(from: Quaternion<S>, to: Quaternion<S>) -> Vec
     ];
     let length2 = v[0].square() + v[1].square() + v[2].square();
     let x2 = length2 / w.square();
-    if x2.largest() < 1e-3 {
+    if x2.all_below(1e-3) {
         let mut series = x2.lift(-1.0 / 11.0);
         for term in [1.0 / 9.0, -1.0 / 7.0, 0.2, -1.0 / 3.0, 1.0] {
             series = series.mul_add(x2, x2.lift(term));
@@ -244,9 +245,9 @@ mod tests {
 
     #[test]
     fn relative_rotation_is_the_same_by_series_and_by_arc_tangent() {
-        for angle in [1e-9, 1e-4, 0.05, 0.063, 0.064, 0.5, 3.0] {
+        for angle in [1e-9_f64, 1e-4, 0.05, 0.063, 0.064, 0.5, 3.0] {
             let axis = [0.6, -0.48, 0.64];
-            let (s, c) = (0.5 * angle as f64).sin_cos();
+            let (s, c) = (0.5_f64 * angle).sin_cos();
             let to = [c, s * axis[0], s * axis[1], s * axis[2]];
             let vector = relative_rotation([1.0, 0.0, 0.0, 0.0], to);
             for k in 0..3 {

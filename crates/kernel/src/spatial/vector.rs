@@ -43,7 +43,7 @@ pub fn cross<S: Scalar>(a: Vector<S>, b: Vector<S>) -> Vector<S> {
 /// non-negative.
 #[inline(always)]
 pub fn norm<S: Scalar>(a: Vector<S>) -> S {
-    (a[0].square() + a[1].square() + a[2].square()).sqrt()
+    a[0].square_plus(a[1].square_plus(a[2].square())).sqrt()
 }
 
 /// Two unit vectors that make a right-handed frame `(first, second, axis)` with a unit `axis`: the

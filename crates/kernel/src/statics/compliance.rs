@@ -12,14 +12,14 @@ use crate::scalar::Real;
 #[inline(always)]
 pub fn closure_compliance<S: Real>(
     linear: &Linearisation<S>,
-    readers: &[Vec<(usize, usize)>],
+    readers: &[&[(usize, usize)]],
     compliances: &[S],
 ) -> Matrix6<S> {
     let mut matrix = [[S::default(); SIX]; SIX];
     for (readers, &compliance) in readers.iter().zip(compliances) {
-        for &(i, place) in readers {
+        for &(i, place) in *readers {
             let scaled = linear.to_parameters[i][place] * compliance;
-            for &(k, other) in readers {
+            for &(k, other) in *readers {
                 matrix[i][k] = scaled.mul_add(linear.to_parameters[k][other], matrix[i][k]);
             }
         }

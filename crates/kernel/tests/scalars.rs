@@ -1,0 +1,195 @@
+//! One generic closure serves all five scalars.
+
+use std::path::Path;
+use std::process::Command;
+use truepose_kernel::element::{DriveFrame, DriveKind, strut};
+use truepose_kernel::scalar::{Dual, Interval, LANES, Lanes, Scalar, Tape, Trace};
+
+type Many = Lanes<{ truepose_kernel::dispatch::PORTABLE }>;
+
+/// Numbers of the closure below: base (3), platform (3), length, drive parameters (7), joint.
+const INPUTS: usize = 15;
+
+/// The closure of a strut on a drive with an axis: everything that an element reads.
+fn residual<S: Scalar>(kind: DriveKind, frame: &DriveFrame, x: &[S; INPUTS]) -> S {
+    let (centre, length) = kind.place(frame, &x[7..14], x[14], [x[0], x[1], x[2]], x[6]);
+    strut::closure(centre, [x[3], x[4], x[5]], length)
+}
+
+fn kinds() -> [DriveKind; 2] {
+    [DriveKind::Slider, DriveKind::Crank]
+}
+
+fn frame() -> DriveFrame {
+    DriveFrame::new([0.2, -0.5, 0.9])
+}
+
+/// Samples of the inputs, the same everywhere.
+fn samples(count: usize) -> Vec<[f64; INPUTS]> {
+    let mut state = 7_u64;
+    let mut next = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let middle =
+        [0.3, 0.1, -0.2, 0.4, 0.5, -0.9, 0.8, 0.05, 0.1, -0.1, 0.02, -0.03, 0.01, 1.01, 0.4];
+    (0..count).map(|_| middle.map(|value| value + 0.1 * (next() - 0.5))).collect()
+}
+
+#[test]
+fn lanes_give_the_numbers_of_f64() {
+    for kind in kinds() {
+        let many = samples(LANES);
+        let lanes: [Many; INPUTS] =
+            std::array::from_fn(|i| Lanes(std::array::from_fn(|k| many[k][i])));
+        let result = residual(kind, &frame(), &lanes);
+        for k in 0..LANES {
+            let single = residual(kind, &frame(), &many[k]);
+            assert!((result.0[k] - single).abs() < 1e-15, "{kind:?} lane {k}");
+        }
+    }
+}
+
+#[test]
+fn dual_derivatives_equal_central_differences() {
+    for kind in kinds() {
+        for x in samples(20) {
+            let dual: [Dual<f64, INPUTS>; INPUTS] =
+                std::array::from_fn(|i| Dual::variable(x[i], i));
+            let result = residual(kind, &frame(), &dual);
+            for i in 0..INPUTS {
+                let (mut above, mut below) = (x, x);
+                above[i] += 1e-6;
+                below[i] -= 1e-6;
+                let difference =
+                    (residual(kind, &frame(), &above) - residual(kind, &frame(), &below)) / 2e-6;
+                assert!((result.parts[i] - difference).abs() < 1e-9, "{kind:?} input {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_gradient_that_kinematics_uses_is_the_dual_one() {
+    for kind in kinds() {
+        for x in samples(20) {
+            let dual: [Dual<f64, INPUTS>; INPUTS] =
+                std::array::from_fn(|i| Dual::variable(x[i], i));
+            let expected = residual(kind, &frame(), &dual).parts;
+            let mut places = [0.0; truepose_kernel::element::PLACES];
+            let points = [[x[0], x[1], x[2]], [x[3], x[4], x[5]]];
+            let gradient = kind.gradient(&frame(), &x[7..14], x[14], points, x[6], &mut places);
+            let found: Vec<f64> = places[..3]
+                .iter()
+                .chain(&gradient.centre)
+                .chain(&places[6..14])
+                .chain([&gradient.joint])
+                .copied()
+                .collect();
+            for i in 0..INPUTS {
+                assert!((found[i] - expected[i]).abs() < 1e-14, "{kind:?} input {i}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_interval_result_contains_samples() {
+    for kind in kinds() {
+        let many = samples(2000);
+        let boxed: [Interval; INPUTS] = std::array::from_fn(|i| {
+            let values = many.iter().map(|x| x[i]);
+            let lower = values.clone().fold(f64::INFINITY, f64::min);
+            Interval::new(lower, values.fold(f64::NEG_INFINITY, f64::max))
+        });
+        let result = residual(kind, &frame(), &boxed);
+        assert!(result.upper - result.lower < 10.0, "an empty statement: {result:?}");
+        for x in &many {
+            assert!(result.contains(residual(kind, &frame(), x)), "{kind:?}");
+        }
+    }
+}
+
+#[test]
+fn a_traced_closure_prints_c_that_equals_f64() {
+    let Ok(version) = Command::new("cc").arg("--version").output() else {
+        assert!(std::env::var_os("TRUEPOSE_CI").is_none(), "no C compiler");
+        eprintln!("skipped: no C compiler");
+        return;
+    };
+    assert!(version.status.success());
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    for (number, kind) in kinds().into_iter().enumerate() {
+        let tape = Tape::new();
+        let inputs: [Trace<'_>; INPUTS] = std::array::from_fn(|i| tape.input(i));
+        let output = residual(kind, &frame(), &inputs);
+        let function = tape.print_c("closure", &[output]);
+        let many = samples(50);
+        let rows: Vec<String> = many
+            .iter()
+            .map(|x| {
+                let numbers: Vec<String> = x.iter().map(|value| format!("{value:?}")).collect();
+                format!("{{{}}}", numbers.join(", "))
+            })
+            .collect();
+        let code = format!(
+            "#include <math.h>\n#include <stdio.h>\n{function}\
+             static const double rows[][{INPUTS}] = {{{}}};\n\
+             int main(void) {{ for (int i = 0; i < {}; i++) {{ double y; closure(rows[i], &y); \
+             printf(\"%a\\n\", y); }} return 0; }}\n",
+            rows.join(",\n"),
+            many.len()
+        );
+        let source = folder.join(format!("closure{number}.c"));
+        let program = folder.join(format!("closure{number}"));
+        std::fs::write(&source, code).unwrap();
+        let compiled = Command::new("cc")
+            .args(["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic"])
+            .args(["-Werror", "-Wno-missing-prototypes"])
+            .args([&source, Path::new("-o"), &program, Path::new("-lm")])
+            .output()
+            .unwrap();
+        assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
+        let printed = Command::new(&program).output().unwrap();
+        let lines = String::from_utf8(printed.stdout).unwrap();
+        assert_eq!(lines.lines().count(), many.len());
+        for (line, x) in lines.lines().zip(&many) {
+            let expected = residual(kind, &frame(), x);
+            let found = hexadecimal(line);
+            assert!((found - expected).abs() <= 2.0 * f64::EPSILON, "{kind:?}: {line} {expected}");
+        }
+    }
+}
+
+/// The value of C's `%a`: sign, 0x, mantissa with a point, p, exponent.
+fn hexadecimal(text: &str) -> f64 {
+    let (sign, text) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest));
+    let (mantissa, exponent) = text.trim_start_matches("0x").split_once('p').unwrap();
+    let (whole, fraction) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let digits = u64::from_str_radix(&format!("{whole}{fraction}"), 16).unwrap();
+    let shift = exponent.parse::<i32>().unwrap() - 4 * fraction.len() as i32;
+    sign * digits as f64 * 2.0_f64.powi(shift)
+}
+
+#[test]
+fn the_closed_form_inverse_gives_back_the_joint() {
+    for kind in kinds() {
+        for x in samples(200) {
+            let (centre, _) = kind.place(&frame(), &x[7..14], x[14], [x[0], x[1], x[2]], x[6]);
+            let platform = [x[3], x[4], x[5]];
+            let length = truepose_kernel::spatial::norm([0, 1, 2].map(|k| platform[k] - centre[k]));
+            let base = [x[0], x[1], x[2]];
+            let closest = [1.0, -1.0]
+                .map(|mode| {
+                    let reach = kind.inverse(&frame(), &x[7..14], mode, base, length, platform);
+                    assert!(reach.margin >= 0.0);
+                    (reach.joint - x[14]).abs()
+                })
+                .into_iter()
+                .fold(f64::INFINITY, f64::min);
+            assert!(closest < 1e-9, "{kind:?} {closest}");
+            let [least, most] = kind.span(&frame(), &x[7..14], base, platform);
+            assert!(least <= length * (1.0 + 1e-12) && length <= most * (1.0 + 1e-12));
+        }
+    }
+}

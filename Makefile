@@ -1,0 +1,132 @@
+# Everything from a fresh checkout: `make demo` and `make test` each set up all that they need. What
+# must be there already is Python, cargo with a C linker, and make; the rest comes from
+# requirements.lock by plain pip, into .venv.
+
+VENV := .venv
+BIN := $(VENV)/bin
+MACHINE := machines/planar_two_slider.toml
+REPORT := build/planar_two_slider.html
+
+# Stamps: what they stand for is up to date while they are newer than what it is made from.
+MADE := $(VENV)/.made
+PACKAGE := $(VENV)/.package
+TOOLS := $(VENV)/.tools
+
+RUST_SOURCES := Cargo.toml Cargo.lock rust-toolchain.toml $(shell find crates -name '*.rs' -o -name Cargo.toml)
+KERNEL := $(wildcard python/truepose/_kernel*.so)
+
+# Byte code is kept, whatever the shell says: without it every start compiles the sources anew.
+unexport PYTHONDONTWRITEBYTECODE
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+.PHONY: help
+help: ## say what can be made
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{ printf "%-18s %s\n", $$1, $$2 }'
+
+# ---- what users run ----
+
+.PHONY: demo
+demo: package ## build, evaluate the planar machine and write its report
+	@mkdir -p $(dir $(REPORT))
+	$(BIN)/truepose report $(MACHINE) --output $(REPORT)
+	@echo "The report is $(CURDIR)/$(REPORT): open it in a browser."
+
+.PHONY: package
+package: $(PACKAGE) ## build the kernel and install truepose into .venv
+
+# ---- what developers run, and the CI ----
+
+.PHONY: test
+test: test-rust test-python ## run all tests
+
+.PHONY: test-rust
+test-rust: cargo $(MADE) ## run the kernel's tests
+	$(CARGO) test --workspace --release --locked
+
+.PHONY: test-python
+test-python: package tools ## run the package's tests
+	$(BIN)/python -m pytest
+
+.PHONY: lint
+lint: lint-python lint-types lint-imports lint-rust ## check form, types and the direction of imports
+
+.PHONY: lint-python
+lint-python: tools
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+
+.PHONY: lint-types
+lint-types: tools
+	$(BIN)/mypy
+
+.PHONY: lint-imports
+lint-imports: tools
+	PYTHONPATH=python $(BIN)/lint-imports
+
+.PHONY: lint-rust
+lint-rust: cargo $(MADE)
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --workspace --all-targets --locked -- -D warnings
+
+.PHONY: format
+format: tools ## put Python and Rust sources into form
+	$(BIN)/ruff check --fix --select I
+	$(BIN)/ruff format
+	cargo fmt --all
+
+.PHONY: bench
+bench: package tools ## measure, and write benchmarks/RESULTS.md
+	$(BIN)/python -m benchmarks
+
+.PHONY: docs
+docs: package tools ## write the generated pages of docs/ anew; tests refuse stale ones
+	for page in docs/generate_*.py; do $(BIN)/python $$page || exit 1; done
+
+.PHONY: lock
+lock: tools ## resolve requirements.lock anew from pyproject.toml
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --extra report --extra netcdf --extra dev \
+		--custom-compile-command "make lock" --output-file requirements.lock pyproject.toml
+
+.PHONY: tools
+tools: $(TOOLS)
+
+.PHONY: clean
+clean: ## remove what was built
+	rm -rf build target dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache $(PACKAGE)
+	rm -f python/truepose/_kernel*.so
+	find python tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
+
+.PHONY: distclean
+distclean: clean ## remove the virtual environment too
+	rm -rf $(VENV)
+
+# ---- how it is made ----
+
+# PyO3 looks at the same Python in every build, so that none of them undoes another's.
+CARGO := PYO3_PYTHON=$(abspath $(BIN)/python) cargo
+
+.PHONY: cargo
+cargo:
+	@.ci/check-cargo
+
+$(MADE):
+	@python=$$(.ci/find-python $(PYTHON)) && echo "making $(VENV) with $$python" && "$$python" -m venv $(VENV)
+	@touch $@
+
+# The kernel is compiled with all optimisation; the Python sources are used where they lie.
+$(PACKAGE): $(MADE) pyproject.toml requirements.lock $(RUST_SOURCES) $(if $(KERNEL),,kernel-missing) | cargo
+	$(BIN)/python -m pip install --quiet --constraint requirements.lock maturin
+	VIRTUAL_ENV=$(abspath $(VENV)) PIP_CONSTRAINT=$(abspath requirements.lock) \
+		$(BIN)/maturin develop --release --locked --extras report,netcdf
+	$(BIN)/python -m compileall -q python/truepose
+	@touch $@
+
+.PHONY: kernel-missing
+kernel-missing:
+
+$(TOOLS): $(MADE) requirements.lock
+	$(BIN)/python -m pip install --quiet --requirement requirements.lock
+	@touch $@

@@ -1,0 +1,103 @@
+"""Where the tool of a parallel kinematic machine really is, why, and what to command instead.
+
+    import truepose as tp
+
+    machine = tp.load("machines/planar_two_slider.toml")
+    errors = tp.budget(machine)
+    corrections = tp.compensate(machine)
+
+Everything is imported when it is first used, so that `import truepose` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+    from truepose import errors
+    from truepose._kernel import threads
+    from truepose.budget.poses import Progress
+    from truepose.machine import Condition, Machine
+
+    __version__: str
+
+_WHERE = {
+    "Condition": "truepose.machine",
+    "Machine": "truepose.machine",
+    "threads": "truepose._kernel",
+}
+
+__all__ = [
+    "Condition",
+    "Machine",
+    "__version__",
+    "budget",
+    "compensate",
+    "errors",
+    "load",
+    "threads",
+]
+
+
+def load(path: str | Path, settings: Mapping[str, str] | Sequence[str] = ()) -> Machine:
+    """Read a machine file.
+
+    `settings` changes its values before they are validated: `["strut.1.length=501"]` or
+    `{"strut.1.length": "501"}`, in the file's units. Raises `truepose.errors.MachineFileError`
+    with every problem of the file at once, `RequestError` for a setting that leads nowhere.
+    """
+    from truepose import machine, sources
+
+    return machine.load(path, settings=settings, registry=sources.REGISTRY)
+
+
+def budget(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The error budget; see `truepose.budget.evaluate.budget`."""
+    from truepose.budget.evaluate import budget as evaluate
+
+    return evaluate(machine, poses, condition, progress=progress)
+
+
+def compensate(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Corrected commands and what then remains; see `truepose.compensation.compensate`."""
+    from truepose.compensation.compensate import compensate as correct
+
+    return correct(machine, poses, condition, progress=progress)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _WHERE:
+        value = getattr(import_module(_WHERE[name]), name)
+    elif name == "errors":
+        value = import_module("truepose.errors")
+    elif name == "__version__":
+        from importlib.metadata import version
+
+        value = version("truepose")
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,151 @@
+"""What goes wrong, as data: codes, problems and the exceptions that carry them.
+
+A `Problem` is one thing that is wrong with what the user gave: a code from `CATALOGUE`, where it
+is, what was found there, what was expected instead, and a hint. A `TrueposeError` carries one or
+more of them. A pose that cannot be used is not a problem of the input but of the machine: it is a
+status code in a result, or one `PoseError` for the whole call.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+CATALOGUE: dict[str, str] = {
+    # the file as such
+    "file-missing": "the machine file is not there",
+    "file-is-directory": "a directory was given where a machine file is wanted",
+    "file-unreadable": "the machine file is there but cannot be read",
+    "not-utf8": "the file is not UTF-8 text",
+    "not-toml": "the file is not TOML",
+    "unsupported-schema": "the file is written for another version of the machine file",
+    # keys and values
+    "unknown-key": "a key that nothing reads, most often a misspelt one",
+    "missing-key": "a key that must be there is not",
+    "wrong-type": "the value is of another type than the key takes",
+    "unknown-choice": "the value is none of the words that the key takes",
+    "excluding-keys": "two keys that exclude each other",
+    # quantities
+    "no-unit": "a bare number whose unit the file does not declare",
+    "unknown-unit": "a unit that is not known, or text that is not a number with a unit",
+    "wrong-dimension": "a quantity of another dimension than the key takes",
+    "not-finite": "not a finite number",
+    "not-positive": "zero or negative where only a positive quantity makes sense",
+    "negative": "negative where only zero or more makes sense",
+    "zero-direction": "a direction of no length",
+    # the machine's structure
+    "bad-name": "a name that cannot be used",
+    "duplicate-name": "two drives, two struts or two freedoms with one name",
+    "unknown-drive": "a strut names a drive that is not there",
+    "unused-drive": "a drive that carries no strut",
+    "unwanted-length": "a length for a strut whose length is its drive's coordinate",
+    "closure-count": "too few or too many closures for the platform's freedoms",
+    "drive-count": "not as many drives as commanded freedoms",
+    "unknown-freedom": "a freedom that the platform does not have, or that is not commanded",
+    "freedom-order": "freedoms in another order than x y z a b c",
+    "unknown-part": "a part that the machine does not have",
+    "travel-reversed": "a travel whose end is not above its start",
+    "not-buildable": "the kernel cannot build this machine",
+    # materials and tolerances
+    "unknown-material": "a material that is not in the table",
+    "unknown-tolerance-class": "a tolerance class that is not in the tables",
+    "tolerance-out-of-range": "the standard gives this class no value for this size",
+    "tolerance-matches-nothing": "a tolerance for parameters that the machine does not have",
+    "tolerance-twice": "two tolerances for one parameter",
+    "no-expansion": "a temperature is given for a strut that gives no expansion",
+    "tolerance-reversed": "a tolerance whose upper limit is below its lower one",
+    # the workspace
+    "grid-count": "a grid count that is not a whole number of one or more",
+    "grid-ends": "a grid count of one with two different ends",
+    "grid-too-large": "a grid of more poses than are allowed",
+    "no-workspace": "poses are wanted from a file that gives no workspace",
+    # requests
+    "bad-setting": "a --set that is not key=value, or that leads nowhere",
+    "unknown-parameter": "a parameter that the machine does not have",
+    "no-stiffness": "a stiffness is wanted of a strut that gives none",
+    "bad-condition": "a condition of values that cannot be",
+    "no-source": "the file gives no error source to evaluate",
+    "bad-poses": "the poses given are not finite numbers of the right shape",
+    "no-pose-left": "the machine can reach none of the poses",
+    "unusable-pose": "a pose cannot be used, and --strict makes that an error",
+    "output-not-writable": "the output cannot be written",
+    "extra-missing": "an optional package that this needs is not installed",
+    "output-ending": "the ending of the output file does not say what to write",
+    "output-is-input": "the output would write over the machine file",
+}
+"""Every code with its meaning in one line. A `Problem` refuses a code that is not here."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong with the input, for people (`str`) and for programs (`to_dict`).
+
+    `line` counts from 1. `path` is the key inside the file, rows of an array by their name:
+    `strut.1.length`.
+    """
+
+    code: str
+    message: str
+    file: str | None = None
+    line: int | None = None
+    path: str | None = None
+    found: str | None = None
+    expected: str | None = None
+    hint: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.code not in CATALOGUE:
+            raise ValueError(f"{self.code!r} is not in truepose.errors.CATALOGUE")
+
+    def __str__(self) -> str:
+        place = "" if self.file is None else f"{self.file}:"
+        if place and self.line is not None:
+            place += f"{self.line}:"
+        lines = [f"{place} error[{self.code}]: {self.message}".lstrip()]
+        for label in ("found", "expected", "hint"):
+            value = getattr(self, label)
+            if value is not None:
+                lines.append(f"  {label + ':':9} {value}")
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, str | int | None]:
+        """The fields by name, for JSON."""
+        return asdict(self)
+
+
+class TrueposeError(Exception):
+    """The input cannot be used; `problems` says why, one entry per thing that is wrong."""
+
+    def __init__(self, *problems: Problem) -> None:
+        super().__init__(*problems)
+        self.problems: tuple[Problem, ...] = problems
+
+    def __str__(self) -> str:
+        return "\n".join(str(problem) for problem in self.problems)
+
+
+class MachineFileError(TrueposeError):
+    """The machine file, or the machine that it describes, is wrong."""
+
+
+class RequestError(TrueposeError):
+    """What was asked of a good machine file is wrong: a setting, an option, poses, an output."""
+
+
+class PoseError(ValueError):
+    """Some poses of a call cannot be used.
+
+    `count` is how many, `index` the first of them (flat, over the leading shape), `status` its
+    status by name (`unreachable`, `singular`, ...), `reason` a sentence that says why.
+    """
+
+    def __init__(self, count: int, index: int, status: str, reason: str) -> None:
+        super().__init__(count, index, status, reason)
+        self.count = count
+        self.index = index
+        self.status = status
+        self.reason = reason
+
+    def __str__(self) -> str:
+        poses = "1 pose" if self.count == 1 else f"{self.count} poses"
+        first = f"the first is number {self.index}"
+        return f"{poses} cannot be used, {first}: {self.status}: {self.reason}"

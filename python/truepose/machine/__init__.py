@@ -1,0 +1,33 @@
+"""Machine file -> machine: TOML, validated with units and dimensions, handed to the kernel.
+
+Sources bring models for the keys that they read; the loader is given their registry, so that
+nothing here imports them.
+"""
+
+from __future__ import annotations
+
+from truepose.machine.condition import Condition
+from truepose.machine.file_parts import ErrorSource, FileParts, SourceType
+from truepose.machine.loader import load
+from truepose.machine.model import Machine
+from truepose.machine.parts_of_machine import Drive, Strut
+from truepose.machine.tolerance import Band, Tolerance
+from truepose.machine.units import FileUnit
+from truepose.machine.workspace import Accuracy, GridAxis, Workspace
+
+__all__ = [
+    "Accuracy",
+    "Band",
+    "Condition",
+    "Drive",
+    "ErrorSource",
+    "FileParts",
+    "FileUnit",
+    "GridAxis",
+    "Machine",
+    "SourceType",
+    "Strut",
+    "Tolerance",
+    "Workspace",
+    "load",
+]

@@ -1,0 +1,299 @@
+"""The machine: what `truepose.load` returns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truepose import _kernel
+from truepose.errors import PoseError, Problem, RequestError
+from truepose.machine.condition import Condition
+from truepose.machine.parts_of_machine import Drive, Strut
+from truepose.machine.suggestion import did_you_mean
+from truepose.machine.units import FileUnit
+from truepose.machine.workspace import Accuracy, Workspace
+
+if TYPE_CHECKING:
+    from truepose.machine.file_parts import ErrorSource
+
+Floats = NDArray[np.float64]
+WithStatus = tuple[Floats, NDArray[np.uint8]]
+
+_HANDED_THROUGH = (
+    "forward",
+    "inverse",
+    "sensitivity",
+    "jac_pose_joint",
+    "conditioning",
+    "forces",
+)
+
+_POSITIVE = (".length", ".scale")
+"""Endings of the parameters that make sense above zero only."""
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """A machine as its file describes it. Immutable; SI, radians and kelvin throughout.
+
+    Poses are (..., n_commanded) or, where all freedoms are meant, (..., n_dof), in the order of
+    `commanded` and `dof`; the orientation is `R = Rz(c) Ry(b) Rx(a)`. Joints are (..., n_joint).
+    Calls that meet poses they cannot use raise one `PoseError`; with `status=True` they return
+    `(result, status)`, status codes being positions in `truepose._kernel.STATUS`.
+
+    The kinematic calls are the kernel's own methods:
+
+    * `inverse(poses)`: (..., n_commanded) -> (..., n_joint)
+    * `forward(joints, start=None)`: (..., n_joint) -> (..., n_dof); `start` (..., n_dof) or
+      (..., n_commanded), default home
+    * `sensitivity(poses)`: (..., n_component, n_parameter), small displacement of the tool point
+      and rotation vector, base frame, per unit of each parameter
+    * `jac_pose_joint(poses)`: (..., n_component, n_joint)
+    * `conditioning(poses)`: (...), smallest to largest singular value of the scaled Jacobian
+    * `forces(poses, wrench)`: (..., n_closure), strut tension in N under the wrench (..., 6) on
+      the tool at the tool point, base axes
+    """
+
+    kernel: _kernel.Machine
+    name: str
+    description: str
+    origin: str
+    file: str
+    file_hash: str
+    settings: Mapping[str, str]
+    condition: Condition
+    workspace: Workspace | None
+    accuracy: Accuracy
+    drives: tuple[Drive, ...]
+    struts: tuple[Strut, ...]
+    sources: tuple[ErrorSource, ...]
+    file_units: Mapping[str, FileUnit]
+    replaced: Mapping[str, float] = field(default_factory=dict)
+
+    forward: Callable[..., Any] = field(init=False, repr=False)
+    inverse: Callable[..., Any] = field(init=False, repr=False)
+    sensitivity: Callable[..., Any] = field(init=False, repr=False)
+    jac_pose_joint: Callable[..., Any] = field(init=False, repr=False)
+    conditioning: Callable[..., Any] = field(init=False, repr=False)
+    forces: Callable[..., Any] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("settings", "file_units", "replaced"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+        for name in _HANDED_THROUGH:
+            object.__setattr__(self, name, getattr(self.kernel, name))
+
+    def __repr__(self) -> str:
+        return f"<Machine {self.name!r}: {' '.join(self.dof)}, {len(self.struts)} struts>"
+
+    def __reduce__(self) -> tuple[Callable[..., Machine], tuple[dict[str, Any]]]:
+        state = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
+        for name in ("settings", "file_units", "replaced"):
+            state[name] = dict(state[name])
+        return _restored, (state,)
+
+    @property
+    def dof(self) -> tuple[str, ...]:
+        """The platform's freedoms, among x y z a b c."""
+        return self.kernel.dof
+
+    @property
+    def commanded(self) -> tuple[str, ...]:
+        """The freedoms that a pose commands."""
+        return self.kernel.commanded
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Those of x y z rx ry rz that the platform can move in."""
+        return self.kernel.components
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joint coordinates: the drives'."""
+        return self.kernel.joints
+
+    @property
+    def closures(self) -> tuple[str, ...]:
+        """Names of the closures: the struts'."""
+        return self.kernel.closures
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters: `strut.1.length`, `drive.d1.axis.u`, `tool.x`, ..."""
+        return self.kernel.parameters
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """SI unit of each parameter."""
+        return self.kernel.units
+
+    @property
+    def nominal(self) -> Floats:
+        """(n_parameter,) nominal values, SI."""
+        return self.kernel.nominal
+
+    @property
+    def home(self) -> Floats:
+        """(n_dof,) the pose at which solutions start, SI."""
+        return self.kernel.home
+
+    @property
+    def characteristic_length(self) -> float:
+        """The length in m that weighs rotations against displacements."""
+        return self.kernel.characteristic_length
+
+    @property
+    def unit_labels(self) -> dict[str, str]:
+        """The file's word for the unit of each dimension; the SI unit where it declares none."""
+        return {name: unit.label for name, unit in self.file_units.items()}
+
+    @property
+    def axial_stiffness_known(self) -> NDArray[np.bool_]:
+        """(n_closure,) whether the file says how stiff each strut is."""
+        return np.array([strut.axial_stiffness(1.0) is not None for strut in self.struts], np.bool_)
+
+    def poses(self) -> Floats:
+        """(n_pose, n_commanded) the poses of the file's workspace, first axis fastest, SI.
+
+        Raises `RequestError` (no-workspace) where the file gives none.
+        """
+        if self.workspace is None:
+            raise RequestError(
+                Problem(
+                    "no-workspace",
+                    "the machine file gives no poses",
+                    self.file,
+                    found="no [workspace]",
+                    expected="a [workspace] with a grid or poses, or poses in the call",
+                )
+            )
+        return self.workspace.poses()
+
+    def axial_compliance(self, lengths: ArrayLike) -> Floats:
+        """m/N of every strut, for its length in m; both (..., n_closure).
+
+        0, a rigid strut, where the file says nothing.
+        """
+        given = np.asarray(lengths, np.float64)
+        result = np.zeros_like(given)
+        for index, strut in enumerate(self.struts):
+            if strut.stiffness is not None:
+                result[..., index] = 1.0 / strut.stiffness
+            elif strut.area is not None and strut.modulus is not None:
+                result[..., index] = given[..., index] / (strut.area * strut.modulus)
+        return result
+
+    @overload
+    def stiffness(self, poses: ArrayLike, *, status: Literal[False] = False) -> Floats: ...
+    @overload
+    def stiffness(self, poses: ArrayLike, *, status: Literal[True]) -> WithStatus: ...
+    def stiffness(self, poses: ArrayLike, *, status: bool = False) -> Floats | WithStatus:
+        """Wrench on the tool per small displacement, (..., n_component, n_component), SI.
+
+        At the tool point, base axes, from the struts' axial stiffness. Raises `RequestError`
+        (no-stiffness) where a strut gives none, `PoseError` as all calls do.
+        """
+        return self._elastic(self.kernel.stiffness_at, poses, status)
+
+    @overload
+    def compliance(self, poses: ArrayLike, *, status: Literal[False] = False) -> Floats: ...
+    @overload
+    def compliance(self, poses: ArrayLike, *, status: Literal[True]) -> WithStatus: ...
+    def compliance(self, poses: ArrayLike, *, status: bool = False) -> Floats | WithStatus:
+        """Small displacement per wrench on the tool: the inverse of `stiffness`, same shapes."""
+        return self._elastic(self.kernel.compliance_at, poses, status)
+
+    def _elastic(
+        self, block: Callable[..., WithStatus], poses: ArrayLike, status: bool
+    ) -> Floats | WithStatus:
+        self._require_stiffness()
+        given = np.asarray(poses)
+        # The public inverse checks the poses, and raises for those that it cannot use.
+        self.kernel.inverse(given, status=status)
+        leading, size = given.shape[:-1], len(self.components)
+        joints, placements, placed = self.kernel.place(given.reshape(-1, given.shape[-1]))
+        lengths = self.kernel.lengths_at(joints, placements)
+        matrices, solved = block(
+            joints, placements, self.kernel.length_parameters, self.axial_compliance(lengths)
+        )
+        result = matrices.reshape(*leading, size, size)
+        codes = np.where(placed == 0, solved, placed)
+        if status:
+            return result, codes.reshape(leading)
+        failed = np.flatnonzero(codes)
+        if failed.size:
+            first = int(failed[0])
+            name = _kernel.STATUS[codes[first]]
+            raise PoseError(int(failed.size), first, name, "the struts do not hold the platform")
+        return result
+
+    def _require_stiffness(self) -> None:
+        lacking = [
+            strut.name
+            for strut, known in zip(self.struts, self.axial_stiffness_known, strict=True)
+            if not known
+        ]
+        if lacking:
+            raise RequestError(
+                Problem(
+                    "no-stiffness",
+                    f"nothing says how stiff strut {', '.join(lacking)} is",
+                    self.file,
+                    path=f"strut.{lacking[0]}",
+                    found="no stiffness",
+                    expected="section_area and modulus (or material), or an outright stiffness",
+                )
+            )
+
+    def replace(self, values: Mapping[str, float]) -> Machine:
+        """The machine with other parameter values, SI: `{"strut.1.length": 0.5003}`.
+
+        Properties, condition and sources stay. Raises `RequestError` with every name that is none
+        (unknown-parameter) and every value that is not finite, or not above zero where it must be.
+        """
+        problems = [
+            problem
+            for name, value in values.items()
+            if (problem := self._bad_value(name, value)) is not None
+        ]
+        if problems:
+            raise RequestError(*problems)
+        changed = {name: float(value) for name, value in values.items()}
+        kernel = self.kernel.replace(changed)
+        return replace(self, kernel=kernel, replaced={**self.replaced, **changed})
+
+    def _bad_value(self, name: str, value: float) -> Problem | None:
+        if name not in self.parameters:
+            return Problem(
+                "unknown-parameter",
+                f"the machine has no parameter {name}",
+                self.file,
+                path=name,
+                found=name,
+                expected="a name of machine.parameters",
+                hint=did_you_mean(name, self.parameters),
+            )
+        positive = name.endswith(_POSITIVE)
+        if np.isfinite(value) and (value > 0.0 or not positive):
+            return None
+        return Problem(
+            "not-positive" if np.isfinite(value) else "not-finite",
+            f"{name} cannot be {value:g}",
+            self.file,
+            path=name,
+            found=str(value),
+            expected="a number above zero, SI" if positive else "a finite number, SI",
+        )
+
+    def with_condition(self, condition: Condition) -> Machine:
+        """The machine in another condition."""
+        return replace(self, condition=condition)
+
+
+def _restored(state: dict[str, Any]) -> Machine:
+    return Machine(**state)

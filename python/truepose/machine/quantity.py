@@ -1,0 +1,214 @@
+"""Types for the fields of a machine file: quantities with a dimension, points, directions.
+
+Each is a pydantic type whose validated value is a plain SI float (or a tuple of them). The units
+of bare numbers come with the validation's context: `context={"units": UnitSystem}`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, NoReturn
+
+from pydantic import BeforeValidator, GetJsonSchemaHandler, ValidationInfo
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import PydanticCustomError, core_schema
+
+from truepose.machine.dimensions import DIMENSIONS
+from truepose.machine.tolerance import Tolerance, read_tolerance
+from truepose.machine.tolerance_standards import designations
+from truepose.machine.units import QuantityError, UnitSystem, shown_value, type_phrase
+
+Sign = Literal["any", "positive", "not negative"]
+
+_MESSAGE = "{message}"
+
+
+def refuse(
+    code: str,
+    message: str,
+    *,
+    found: str | None = None,
+    expected: str | None = None,
+    hint: str | None = None,
+) -> NoReturn:
+    """Refuse a value inside a pydantic validator, with the fields of a `Problem`."""
+    parts = {"message": message, "found": found, "expected": expected, "hint": hint}
+    raise PydanticCustomError(code, _MESSAGE, parts)
+
+
+def _units(info: ValidationInfo) -> UnitSystem:
+    context = info.context
+    if not context or "units" not in context:
+        raise RuntimeError("a quantity is validated with context={'units': UnitSystem}")
+    units = context["units"]
+    assert isinstance(units, UnitSystem)
+    return units
+
+
+@dataclass(frozen=True)
+class _FileType:
+    """Metadata of an `Annotated` type: a validator, and the JSON schema of what a file writes."""
+
+    dimension: str
+
+    def read(self, value: Any, units: UnitSystem) -> Any:
+        raise NotImplementedError
+
+    def json_schema(self) -> JsonSchemaValue:
+        raise NotImplementedError
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: Callable[[Any], core_schema.CoreSchema]
+    ) -> core_schema.CoreSchema:
+        def validate(value: Any, info: ValidationInfo) -> Any:
+            try:
+                return self.read(value, _units(info))
+            except QuantityError as error:
+                refuse(
+                    error.code,
+                    error.message,
+                    found=error.found,
+                    expected=error.expected,
+                    hint=error.hint,
+                )
+
+        return core_schema.with_info_plain_validator_function(validate)
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        return self.json_schema()
+
+
+@dataclass(frozen=True)
+class _Quantity(_FileType):
+    sign: Sign = "any"
+
+    def read(self, value: Any, units: UnitSystem) -> float:
+        result = units.read(value, self.dimension)
+        phrase = DIMENSIONS[self.dimension].phrase
+        if self.sign == "positive" and result <= 0.0:
+            zero = "absolute zero" if self.dimension == "temperature" else "zero"
+            raise QuantityError(
+                "not-positive",
+                f"expected {phrase} above {zero}, found {shown_value(value)}",
+                found=shown_value(value),
+                expected=f"{phrase} above {zero}",
+            )
+        if self.sign == "not negative" and result < 0.0:
+            raise QuantityError(
+                "negative",
+                f"expected {phrase} of zero or more, found {shown_value(value)}",
+                found=shown_value(value),
+                expected=f"{phrase} of zero or more",
+            )
+        return result
+
+    def json_schema(self) -> JsonSchemaValue:
+        number: JsonSchemaValue = {"type": "number"}
+        # Zero of a unit is zero in SI, except on a temperature scale.
+        if self.dimension != "temperature" and self.sign == "positive":
+            number["exclusiveMinimum"] = 0
+        elif self.sign == "not negative":
+            number["minimum"] = 0
+        return {"anyOf": [number, {"type": "string"}], "x-dimension": self.dimension}
+
+
+@dataclass(frozen=True)
+class _Tolerance(_FileType):
+    def read(self, value: Any, units: UnitSystem) -> Tolerance:
+        return read_tolerance(value, self.dimension, units)
+
+    def json_schema(self) -> JsonSchemaValue:
+        quantity = _Quantity(self.dimension).json_schema()["anyOf"]
+        limits = {
+            "type": "array",
+            "items": {"anyOf": quantity},
+            "minItems": 2,
+            "maxItems": 2,
+        }
+        return {
+            "anyOf": [limits, *quantity],
+            "x-dimension": self.dimension,
+            "x-tolerance": list(designations("length")) if self.dimension == "length" else [],
+        }
+
+
+@dataclass(frozen=True)
+class _Unitise(_FileType):
+    """A direction: three plain numbers that are not all zero, made of length one."""
+
+    def read(self, value: Any, units: UnitSystem) -> tuple[float, float, float]:
+        if not isinstance(value, (list, tuple)) or len(value) != 3:
+            raise QuantityError(
+                "wrong-type",
+                "expected a direction: a list of 3 plain numbers",
+                found=shown_value(value),
+                expected="a list of 3 plain numbers, such as [0, 0, 1]",
+            )
+        x, y, z = (units.read(component, "ratio") for component in value)
+        # Largest component first, so that neither tiny nor huge ones under- or overflow.
+        largest = max(abs(x), abs(y), abs(z))
+        if largest == 0.0:
+            raise QuantityError(
+                "zero-direction",
+                "a direction has a length above zero",
+                found=shown_value(value),
+                expected="at least one component that is not zero",
+            )
+        norm = math.hypot(x / largest, y / largest, z / largest)
+        return (x / largest / norm, y / largest / norm, z / largest / norm)
+
+    def json_schema(self) -> JsonSchemaValue:
+        return {
+            "type": "array",
+            "items": {"type": "number"},
+            "minItems": 3,
+            "maxItems": 3,
+            "x-dimension": "direction",
+        }
+
+
+def list_of(count: int) -> BeforeValidator:
+    """A list of so many entries, as the tuple that a strict model takes."""
+
+    def read(value: Any) -> Any:
+        if not isinstance(value, list) or len(value) != count:
+            found = f"a list of {len(value)}" if isinstance(value, list) else type_phrase(value)
+            refuse(
+                "wrong-type",
+                f"expected a list of {count}, found {found}",
+                found=shown_value(value),
+                expected=f"a list of {count}",
+            )
+        return tuple(value)
+
+    return BeforeValidator(read)
+
+
+def quantity(dimension: str, *, sign: Sign = "any") -> Any:
+    """The type of a field that holds one quantity of `dimension`, SI once validated."""
+    return Annotated[float, _Quantity(dimension, sign)]
+
+
+Length = Annotated[float, _Quantity("length")]
+PositiveLength = Annotated[float, _Quantity("length", "positive")]
+NonNegativeLength = Annotated[float, _Quantity("length", "not negative")]
+Angle = Annotated[float, _Quantity("angle")]
+PositiveAngle = Annotated[float, _Quantity("angle", "positive")]
+Force = Annotated[float, _Quantity("force")]
+Moment = Annotated[float, _Quantity("moment")]
+Temperature = Annotated[float, _Quantity("temperature", "positive")]
+TemperatureDifference = Annotated[float, _Quantity("temperature_difference")]
+Area = Annotated[float, _Quantity("area", "positive")]
+Modulus = Annotated[float, _Quantity("stress", "positive")]
+Stiffness = Annotated[float, _Quantity("stiffness", "positive")]
+Expansion = Annotated[float, _Quantity("expansion")]
+Ratio = Annotated[float, _Quantity("ratio")]
+Scale = Annotated[float, _Quantity("ratio", "positive")]
+Point = Annotated[tuple[Length, Length, Length], list_of(3)]
+Direction = Annotated[tuple[float, float, float], _Unitise("ratio")]
+LengthTolerance = Annotated[Tolerance, _Tolerance("length")]
+AngleTolerance = Annotated[Tolerance, _Tolerance("angle")]

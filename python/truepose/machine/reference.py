@@ -1,0 +1,276 @@
+"""The machine file's JSON schema and its page of documentation, made from the models.
+
+Nothing here is written twice: keys, types, defaults and descriptions are those of the tables'
+models, of the kernel's table of elements and of the registered sources.
+`docs/generate_machine_file.py` writes both files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel
+
+from truepose.machine.dimensions import DIMENSIONS
+from truepose.machine.document import ARRAY_TABLES
+from truepose.machine.elements import drive_kinds
+from truepose.machine.file_parts import SourceType
+from truepose.machine.materials import MATERIALS
+from truepose.machine.tables import REQUIRED, SCHEMA, owners, takes_every_key
+from truepose.machine.tables.drive import DriveTable
+from truepose.machine.tolerance_standards import STANDARDS, designations_of
+
+Json = dict[str, Any]
+
+
+def json_schema(registry: Sequence[SourceType]) -> Json:
+    """JSON schema (2020-12) of a machine file that the sources of `registry` may read from."""
+    by_table = owners(source.tables for source in registry).by_table
+    properties: Json = {"schema": {"const": SCHEMA, "description": "Version of the machine file."}}
+    for table, models in by_table.items():
+        properties[table] = (
+            {"type": "array", "minItems": 1, "items": _row_schema(table, models)}
+            if table in ARRAY_TABLES
+            else _merged(models)
+        )
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "truepose machine file",
+        "type": "object",
+        "properties": properties,
+        "required": ["schema", *REQUIRED],
+        "additionalProperties": False,
+    }
+
+
+def _row_schema(table: str, models: tuple[type[BaseModel], ...]) -> Json:
+    if table != "drive":
+        return _merged(models)
+    choices = []
+    for kind in drive_kinds().values():
+        choice = _merged((*models, kind.model))
+        choice["properties"]["kind"] = {"const": kind.kind, "description": kind.doc}
+        choices.append(choice)
+    return {"oneOf": choices}
+
+
+def _merged(models: Iterable[type[BaseModel]]) -> Json:
+    """One object schema for the keys of several models."""
+    merged: Json = {"type": "object", "properties": {}, "required": []}
+    free = False
+    for model in models:
+        one = _inlined(model.model_json_schema())
+        merged["properties"] |= one.get("properties", {})
+        merged["required"] += one.get("required", [])
+        free = free or takes_every_key(model)
+    if not merged["required"]:
+        del merged["required"]
+    merged["additionalProperties"] = free
+    return merged
+
+
+def _inlined(schema: Json) -> Json:
+    """A schema with its definitions in place, and without what only programs made of it."""
+    definitions = schema.pop("$defs", {})
+
+    def clean(value: Any) -> Any:
+        if isinstance(value, list):
+            return [clean(each) for each in value]
+        if not isinstance(value, dict):
+            return value
+        if "$ref" in value:
+            name = value["$ref"].rpartition("/")[2]
+            return clean(definitions[name] | {k: v for k, v in value.items() if k != "$ref"})
+        cleaned = {
+            key: clean(entry)
+            for key, entry in value.items()
+            if not (key == "title" and isinstance(entry, str)) and not _is_no_default(key, entry)
+        }
+        choices = [each for each in cleaned.get("anyOf", ()) if each != {"type": "null"}]
+        # TOML has no null: a key that may be left out takes only its other choice.
+        if len(choices) == 1:
+            del cleaned["anyOf"]
+            return choices[0] | cleaned
+        return cleaned
+
+    result: Json = clean(schema)
+    return result
+
+
+def _is_no_default(key: str, entry: Any) -> bool:
+    return key == "default" and entry is None
+
+
+def page(registry: Sequence[SourceType]) -> str:
+    """The page of documentation, Markdown."""
+    by_table = owners(source.tables for source in registry).by_table
+    reader = {
+        key: source.name
+        for source in registry
+        for model in source.tables.values()
+        for key in model.model_fields
+    }
+    parts = [_INTRODUCTION]
+    for table, models in by_table.items():
+        parts.append(_section(table, models, registry, reader))
+    parts += [_materials(), _classes()]
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def _section(
+    table: str,
+    models: tuple[type[BaseModel], ...],
+    registry: Sequence[SourceType],
+    reader: Mapping[str, str],
+) -> str:
+    title = f"[[{table}]]" if table in ARRAY_TABLES else f"[{table}]"
+    lines = [f"## `{title}`", "", _first_line(models[0]), ""]
+    schema = _merged(models)
+    if schema["properties"]:
+        lines += _rows(schema, reader)
+    for source in registry:
+        model = source.tables.get(table)
+        if model is not None and takes_every_key(model):
+            lines += [f"Any key; read by the source `{source.name}`: {source.doc}.", ""]
+    for key, below in schema["properties"].items():
+        if "properties" in below and below["properties"].keys():
+            lines += [f"### `{table}.{key}`", "", _sentence(below.get("description", "")), ""]
+            lines += _rows(below, {})
+    if models[0] is DriveTable:
+        for kind in drive_kinds().values():
+            lines += [f'### `kind = "{kind.kind}"`', "", kind.doc, ""]
+            lines += _rows(_merged((kind.model,)), {})
+    return "\n".join(lines)
+
+
+def _first_line(model: type[BaseModel]) -> str:
+    return (model.__doc__ or "").strip()
+
+
+def _rows(schema: Json, reader: Mapping[str, str]) -> list[str]:
+    required = schema.get("required", ())
+    lines = ["| key | takes | meaning |", "|---|---|---|"]
+    for key, value in schema["properties"].items():
+        meaning = _sentence(value.get("description", ""))
+        if key in required:
+            meaning = f"**Required.** {meaning}"
+        elif "default" in value and value["default"] not in ("", None):
+            meaning += f" Default: {_shown(value['default'])}."
+        if key in reader:
+            meaning += f" Read by the source `{reader[key]}`."
+        lines.append(f"| `{key}` | {_takes(value)} | {meaning.strip()} |".replace("\n", " "))
+    return [*lines, ""]
+
+
+def _sentence(text: str) -> str:
+    text = text.strip()
+    if not text:
+        return ""
+    return text[0].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list | tuple):
+        return "`[" + ", ".join(f"{each:g}" for each in value) + "]`"
+    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+
+
+def _takes(schema: Json) -> str:
+    """What a key takes, in words."""
+    if "x-dimension" in schema:
+        return _takes_quantity(schema, schema["x-dimension"])
+    if "enum" in schema:
+        return " or ".join(f'`"{word}"`' for word in schema["enum"])
+    if "properties" in schema:
+        return "table, see below"
+    if schema.get("type") == "array":
+        return _takes_list(schema)
+    return {"string": "text", "integer": "whole number"}.get(schema.get("type", ""), "value")
+
+
+def _takes_quantity(schema: Json, name: str) -> str:
+    if name == "direction":
+        return "direction: 3 plain numbers"
+    dimension = DIMENSIONS[name]
+    if "x-tolerance" in schema:
+        a_class = ", or a class" if schema["x-tolerance"] else ""
+        return f"tolerance ({dimension.phrase}): `[lower, upper]`, ± one value{a_class}"
+    if schema.get("x-grid"):
+        return f"`[from, to, count]`, {dimension.plural}"
+    if schema.get("x-per-part"):
+        return f"{dimension.phrase}, or a table of them per part"
+    return dimension.name.replace("_", " ")
+
+
+def _takes_list(schema: Json) -> str:
+    members = schema.get("prefixItems")
+    if members:
+        dimension = DIMENSIONS[members[0]["x-dimension"]]
+        return f"list of {len(members)} {dimension.plural}"
+    item = schema.get("items", {})
+    return "list of " + (_takes(item) if "enum" in item else "lists, one per pose")
+
+
+def _materials() -> str:
+    lines = [
+        "## Materials",
+        "",
+        "Typical values at room temperature, for a first budget: write `modulus` and `expansion`",
+        "outright where the result depends on them.",
+        "",
+        "| `material` | modulus, GPa | expansion, 1e-6 1/K | source |",
+        "|---|---|---|---|",
+    ]
+    lines += [
+        f"| `{material.name}` | {material.modulus / 1e9:g} | {material.expansion * 1e6:g} "
+        f"| {material.source} |"
+        for material in MATERIALS.values()
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _classes() -> str:
+    lines = [
+        "## Tolerance classes",
+        "",
+        "A class takes its limits from the nominal size; see",
+        "[tolerance_standards.md](tolerance_standards.md).",
+        "",
+        "| standard | for | classes |",
+        "|---|---|---|",
+    ]
+    lines += [
+        f"| {standard.title} | {DIMENSIONS[standard.dimension].phrase} "
+        f"| {', '.join(f'`{name}`' for name in designations_of(standard))} |"
+        for standard in STANDARDS
+        if standard.dimension == "length"
+    ]
+    return "\n".join([*lines, ""])
+
+
+_INTRODUCTION = """\
+# The machine file
+
+<!-- Written by `python docs/generate_machine_file.py`. Do not edit. -->
+
+A machine is described in one TOML file; `machines/` has examples. The same as a JSON schema, for
+editors: [machine_file.schema.json](machine_file.schema.json).
+
+The file begins with `schema = 1`, above the first table.
+
+**Units.** A bare number has the unit that `[units]` declares for its dimension, or, where it
+declares none, is an error. Text carries its own unit: `"28.27 mm^2"`, `"210 GPa"`, `"1.1e-5 1/K"`,
+`"0.02 in"`. Dimensions are checked, and a temperature is not a temperature difference.
+
+**Problems.** All of a file's problems are reported at once, each with its code, file and line. A
+key that nothing reads is one.
+
+**Names.** Drives and struts are told apart by `name`. Parameters are named after them:
+`strut.1.length`, `strut.1.base.x`, `drive.d1.offset`, `tool.z`.
+
+**Trying a change.** `--set key=value` on the command line changes a value before the file is
+checked: `--set accuracy.target="0.2 mm"`, `--set strut.1.length=501`,
+`--set strut.*.material=invar`, `--set strut.1.base.x=3`, `--set condition.temperature=40`. A value
+is a TOML value; what is none is taken as text.
+"""

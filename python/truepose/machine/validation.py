@@ -1,0 +1,386 @@
+"""A document against the models that own its tables; every problem of it at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar, cast, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from truepose.errors import CATALOGUE, Problem
+from truepose.machine.document import ARRAY_TABLES, Document, Key
+from truepose.machine.elements import drive_kinds
+from truepose.machine.file_table import FileTable
+from truepose.machine.suggestion import did_you_mean, nearest, one_of
+from truepose.machine.tables import REQUIRED, Owners, takes_every_key
+from truepose.machine.tables.units import UnitsTable
+from truepose.machine.units import FileUnit, UnitSystem, shown_value, type_phrase
+
+Model = TypeVar("Model", bound=BaseModel)
+
+_TYPES = {
+    "string_type": "text",
+    "int_type": "a whole number",
+    "float_type": "a number",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+}
+"""pydantic's word for a wrong type -> what was expected."""
+
+
+@dataclass
+class Validated:
+    """The models that a document filled, by their class; what failed is missing (or None)."""
+
+    units: UnitSystem
+    tables: dict[type[BaseModel], BaseModel] = field(default_factory=dict)
+    every_row: dict[type[BaseModel], list[BaseModel | None]] = field(default_factory=dict)
+    geometry: list[FileTable | None] = field(default_factory=list)
+    """Per drive: the model of its kind."""
+    misspelt: set[Key] = field(default_factory=set)
+    """Keys that an unknown key was most likely meant to be: they are not missing as well."""
+
+    def table(self, model: type[Model]) -> Model | None:
+        """The one instance of `model`, or None."""
+        return cast("Model | None", self.tables.get(model))
+
+    def rows(self, model: type[Model]) -> tuple[Model, ...]:
+        """The instances of `model`, one per row; only for a document without problems."""
+        return cast("tuple[Model, ...]", tuple(self.every_row.get(model, ())))
+
+
+def validate(document: Document, owners: Owners) -> tuple[Validated, list[Problem]]:
+    """Fill the models of every table. The problems are in no particular order."""
+    problems: list[Problem] = []
+    data = document.data
+    for table in REQUIRED:
+        if table not in data:
+            problems.append(_missing_table(document, table))
+    known = {"schema", *owners.by_table}
+    problems += [_unknown_key(document, (key,), known) for key in data if key not in known]
+    units = _units(document, problems)
+    validated = Validated(units)
+    for table, models in owners.by_table.items():
+        if table in data and table != "units":
+            if table in ARRAY_TABLES:
+                _array(document, table, models, validated, problems)
+            else:
+                _single(document, table, models, validated, problems)
+    return validated, _one_per_unit(problems)
+
+
+def _one_per_unit(problems: list[Problem]) -> list[Problem]:
+    """One missing unit is one problem, however many numbers want it: that of the first."""
+    by_dimension: dict[str | None, list[Problem]] = {}
+    others = []
+    for problem in problems:
+        if problem.code == "no-unit":
+            by_dimension.setdefault(problem.expected, []).append(problem)
+        else:
+            others.append(problem)
+    for same in by_dimension.values():
+        first = min(same, key=lambda problem: problem.line or 0)
+        if len(same) > 1:
+            more = f", as for {len(same) - 1} more in the file"
+            first = replace(first, message=first.message + more)
+        others.append(first)
+    return others
+
+
+def _missing_table(document: Document, table: str) -> Problem:
+    written = f"[[{table}]]" if table in ARRAY_TABLES else f"[{table}]"
+    plural = nearest(table, [key for key in document.data if key != table])
+    return Problem(
+        "missing-key",
+        f"there is no {written}",
+        document.file,
+        path=table,
+        found="nothing",
+        expected=written,
+        hint=f"is [{plural}] meant to be it?" if plural else None,
+    )
+
+
+def _units(document: Document, problems: list[Problem]) -> UnitSystem:
+    table = document.data.get("units", {})
+    if not isinstance(table, dict):
+        problems.append(_not_a_table(document, ("units",), table))
+        return UnitSystem({})
+    filled, found = _fill(document, ("units",), UnitsTable, table, None)
+    broken = {str(key[1]) for key, _ in found if len(key) > 1}
+    if found:
+        # The good ones stay in force, so that each bare number is not reported as well.
+        good = {key: value for key, value in table.items() if key not in broken}
+        filled, _ = _fill(document, ("units",), UnitsTable, good, None)
+    problems += [problem for _, problem in found]
+    declared: dict[str, FileUnit] = {} if filled is None else filled.model_dump(exclude_unset=True)
+    if filled is not None:
+        declared = {name: getattr(filled, name) for name in filled.model_fields_set}
+    return UnitSystem(declared, frozenset(broken))
+
+
+def _single(
+    document: Document,
+    table: str,
+    models: tuple[type[BaseModel], ...],
+    validated: Validated,
+    problems: list[Problem],
+) -> None:
+    value = document.data[table]
+    if not isinstance(value, dict):
+        problems.append(_not_a_table(document, (table,), value))
+        return
+    filled, found = _share_out(document, (table,), models, value, validated)
+    problems += found
+    validated.tables |= {model: one for model, one in filled.items() if one is not None}
+
+
+def _array(
+    document: Document,
+    table: str,
+    models: tuple[type[BaseModel], ...],
+    validated: Validated,
+    problems: list[Problem],
+) -> None:
+    rows = document.data[table]
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        problems.append(_not_an_array(document, table, rows))
+        return
+    for index, row in enumerate(rows):
+        key: Key = (table, index)
+        of_row = models
+        if table == "drive":
+            kind = drive_kinds().get(row["kind"]) if isinstance(row.get("kind"), str) else None
+            if kind is not None:
+                of_row = (*models, kind.model)
+            else:
+                problems += _unknown_kind(document, key, row)
+                # Which keys it may have is not known without its kind: check only the common ones.
+                common = {name for model in models for name in model.model_fields}
+                row = {name: value for name, value in row.items() if name in common}
+        filled, found = _share_out(document, key, of_row, row, validated)
+        problems += found
+        for model in models:
+            validated.every_row.setdefault(model, []).append(filled[model])
+        if table == "drive":
+            one = filled[of_row[-1]] if of_row is not models else None
+            validated.geometry.append(cast("FileTable | None", one))
+
+
+def _unknown_kind(document: Document, key: Key, row: Mapping[str, Any]) -> list[Problem]:
+    if not isinstance(row.get("kind"), str):
+        return []  # missing, or of a wrong type: the drive's own model says so
+    kinds = drive_kinds()
+    return [
+        document.problem(
+            "unknown-choice",
+            f"there is no drive of kind {shown_value(row['kind'])}",
+            (*key, "kind"),
+            found=shown_value(row["kind"]),
+            expected=one_of(f'"{kind}"' for kind in kinds),
+            hint=did_you_mean(row["kind"], kinds),
+        )
+    ]
+
+
+def _share_out(
+    document: Document,
+    key: Key,
+    models: tuple[type[BaseModel], ...],
+    value: Mapping[str, Any],
+    validated: Validated,
+) -> tuple[dict[type[BaseModel], BaseModel | None], list[Problem]]:
+    """Give every model its keys of one table, and refuse the keys that are nobody's."""
+    named = {name for model in models for name in model.model_fields}
+    filled: dict[type[BaseModel], BaseModel | None] = {}
+    found: list[tuple[Key, Problem]] = []
+    for model in models:
+        free = takes_every_key(model)
+        share = {
+            name: entry
+            for name, entry in value.items()
+            if name in model.model_fields or (free and name not in named)
+        }
+        filled[model], of_model = _fill(document, key, model, share, validated.units)
+        found += of_model
+    problems = []
+    if not any(takes_every_key(model) for model in models):
+        unknown = [name for name in value if name not in named]
+        problems = [_unknown_key(document, (*key, name), named) for name in unknown]
+        # "lenght" is one mistake: not also a missing "length".
+        meant = {nearest(name, named - value.keys()) for name in unknown}
+        validated.misspelt |= {(*key, name) for name in meant if name is not None}
+        found = [
+            (where, problem)
+            for where, problem in found
+            if not (problem.code == "missing-key" and where in validated.misspelt)
+        ]
+    return filled, problems + [problem for _, problem in found]
+
+
+def _fill(
+    document: Document,
+    key: Key,
+    model: type[BaseModel],
+    value: Mapping[str, Any],
+    units: UnitSystem | None,
+) -> tuple[BaseModel | None, list[tuple[Key, Problem]]]:
+    """One model from its keys; or None and what is wrong, each with where."""
+    try:
+        return model.model_validate(dict(value), context={"units": units}), []
+    except ValidationError as error:
+        found = []
+        for entry in error.errors(include_url=False):
+            where = _where(document, key, entry["loc"])
+            problem = _problem(document, where, model, cast("dict[str, Any]", entry))
+            found.append((where, problem))
+        return None, found
+
+
+def _where(document: Document, key: Key, loc: Iterable[str | int]) -> Key:
+    """pydantic's place inside a model -> a key of the document.
+
+    A validator may have put a value into a table that the file does not have (one temperature for
+    all parts), or joined nested keys: the key goes only as far as the document does, but keeps the
+    last word where a key is missing from a table.
+    """
+    value: Any = document.data
+    for part in key:
+        value = value[part]
+    where = list(key)
+    for part in loc:
+        if isinstance(value, dict):
+            words = [part] if part in value else str(part).split(".")
+            for word in words:
+                where.append(word)
+                value = value.get(word) if isinstance(value, dict) else None
+        elif isinstance(value, list) and isinstance(part, int) and part < len(value):
+            where.append(part)
+            value = value[part]
+        else:
+            break
+    return tuple(where)
+
+
+def _problem(
+    document: Document, key: Key, model: type[BaseModel], entry: Mapping[str, Any]
+) -> Problem:
+    kind, value, context = entry["type"], entry["input"], entry.get("ctx", {})
+    if kind in CATALOGUE:
+        return document.problem(
+            kind,
+            context["message"],
+            key,
+            found=context["found"],
+            expected=context["expected"],
+            hint=context["hint"],
+        )
+    if kind == "missing" and isinstance(entry["loc"][-1], str):
+        return document.problem(
+            "missing-key",
+            "missing",
+            key,
+            found="nothing",
+            expected=f"the key {key[-1]}{_described(model, entry['loc'])}",
+        )
+    if kind == "extra_forbidden":
+        return _unknown_key(document, key, _keys_beside(model, entry["loc"]))
+    if kind == "literal_error":
+        return document.problem(
+            "unknown-choice",
+            f"{shown_value(value)} is none of the words that it takes",
+            key,
+            found=shown_value(value),
+            expected=context["expected"],
+        )
+    if kind in ("missing", "too_short", "too_long"):
+        return _wrong_count(document, key, value, context)
+    expected = _TYPES.get(kind, entry["msg"])
+    return document.problem(
+        "wrong-type",
+        f"expected {expected}, found {type_phrase(value)}",
+        key,
+        found=shown_value(value),
+        expected=expected,
+    )
+
+
+def _wrong_count(document: Document, key: Key, value: Any, context: Mapping[str, Any]) -> Problem:
+    wanted = context.get("max_length", context.get("min_length"))
+    return document.problem(
+        "wrong-type",
+        f"a list of {len(value)}" if isinstance(value, list | tuple) else "a list of another size",
+        key,
+        found=shown_value(value),
+        expected="a list of more entries" if wanted is None else f"a list of {wanted}",
+    )
+
+
+def _described(model: type[BaseModel], loc: tuple[str | int, ...]) -> str:
+    owner = _model_at(model, loc[:-1])
+    name = str(loc[-1])
+    if owner is None or name not in owner.model_fields:
+        return ""
+    return f": {owner.model_fields[name].description}"
+
+
+def _keys_beside(model: type[BaseModel], loc: tuple[str | int, ...]) -> Iterable[str]:
+    owner = _model_at(model, loc[:-1])
+    return () if owner is None else owner.model_fields
+
+
+def _model_at(model: type[BaseModel], loc: Iterable[str | int]) -> type[BaseModel] | None:
+    """The model that a place inside `model` belongs to."""
+    current: type[BaseModel] | None = model
+    for part in loc:
+        if current is None or part not in current.model_fields:
+            return None
+        annotation = current.model_fields[str(part)].annotation
+        choices = (annotation, *get_args(annotation))
+        current = next(
+            (each for each in choices if isinstance(each, type) and issubclass(each, BaseModel)),
+            None,
+        )
+    return current
+
+
+def _unknown_key(document: Document, key: Key, known: Iterable[str]) -> Problem:
+    word, known = str(key[-1]), sorted(known)
+    return document.problem(
+        "unknown-key",
+        "unknown key",
+        key,
+        found=word,
+        expected=one_of(known),
+        hint=did_you_mean(word, known),
+    )
+
+
+def _not_a_table(document: Document, key: Key, value: Any) -> Problem:
+    name = key[-1]
+    return document.problem(
+        "wrong-type",
+        f"expected a table, found {type_phrase(value)}",
+        key,
+        found=shown_value(value),
+        expected=f"[{name}]",
+        hint=f"[[{name}]] begins one of several; there is only one [{name}]"
+        if isinstance(value, list)
+        else None,
+    )
+
+
+def _not_an_array(document: Document, table: str, value: Any) -> Problem:
+    return document.problem(
+        "wrong-type",
+        f"expected one table per {table}, found {type_phrase(value)}",
+        (table,),
+        found=shown_value(value),
+        expected=f"[[{table}]]",
+        hint=f"write [[{table}]], with two brackets" if isinstance(value, dict) else None,
+    )

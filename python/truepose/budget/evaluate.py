@@ -1,0 +1,244 @@
+"""The budget: every source alone and all together, at every pose, and how they compare."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from truepose.budget import comparison, exact, percent, uncertainty, worst
+from truepose.budget.dataset import (
+    QUANTITY_UNITS,
+    Rows,
+    Schema,
+    Variable,
+    assemble,
+    label,
+    sizes,
+)
+from truepose.budget.poses import OK, Progress, Walk, no_pose_left, requested_poses
+from truepose.errors import Problem, RequestError
+from truepose.machine import Condition, Machine
+from truepose.sources import Block, Deviation, Source, acting
+
+_EACH = ("pose", "source", "component")
+_ALL = ("pose", "component")
+_OVER = ("source", "component")
+
+SCHEMA: Schema = {
+    "error": Variable(_EACH, "component", "error from the source alone, at its shift"),
+    "error_lower": Variable(
+        _EACH, "component", "error from the source alone, lengths and offsets at the lower edge"
+    ),
+    "error_upper": Variable(
+        _EACH, "component", "error from the source alone, lengths and offsets at the upper edge"
+    ),
+    "worst": Variable(_EACH, "component", "most that the source alone can do"),
+    "uncertainty": Variable(_EACH, "component", "standard uncertainty from the source's band"),
+    "percent_lower": Variable(_EACH, "%", "error_lower in % of the coordinate"),
+    "percent_upper": Variable(_EACH, "%", "error_upper in % of the coordinate"),
+    "overall_error": Variable(_ALL, "component", "error from all sources at their shifts"),
+    "overall_error_lower": Variable(
+        _ALL, "component", "error from all sources, the tolerance at its lower edge"
+    ),
+    "overall_error_upper": Variable(
+        _ALL, "component", "error from all sources, the tolerance at its upper edge"
+    ),
+    "overall_percent_lower": Variable(
+        _ALL, "%", "overall_error_lower in percent of the coordinate"
+    ),
+    "overall_percent_upper": Variable(
+        _ALL, "%", "overall_error_upper in percent of the coordinate"
+    ),
+    "percent_defined": Variable(
+        _ALL, "1", "whether the coordinate is large enough for a percent of it", np.bool_
+    ),
+    "joint_nominal": Variable(("pose", "joint"), "joint", "joint coordinate, nominal command"),
+    "force": Variable(("pose", "closure"), "N", "strut force, tension positive"),
+    "highest_lower": Variable(_OVER, "component", "highest |error_lower| over poses"),
+    "highest_upper": Variable(_OVER, "component", "highest |error_upper| over poses"),
+    "highest_percent_lower": Variable(_OVER, "%", "highest percent_lower over poses"),
+    "highest_percent_upper": Variable(_OVER, "%", "highest percent_upper over poses"),
+    "overall_highest_lower": Variable(
+        ("component",), "component", "highest |overall_error_lower| over poses"
+    ),
+    "overall_highest_upper": Variable(
+        ("component",), "component", "highest |overall_error_upper| over poses"
+    ),
+    "overall_highest_percent_lower": Variable(
+        ("component",), "%", "highest overall_percent_lower over poses"
+    ),
+    "overall_highest_percent_upper": Variable(
+        ("component",), "%", "highest overall_percent_upper over poses"
+    ),
+    "highest": Variable(("source", "quantity"), "quantity", "highest norm of worst over poses"),
+    "rms": Variable(
+        ("source", "quantity"), "quantity", "root mean square of the norm of worst over poses"
+    ),
+    "share": Variable(("source",), "1", "highest position worst over the sum of all sources'"),
+    "rank": Variable(("source",), "1", "place of the source by its share, 1 the largest", np.intp),
+    "verdict": Variable(("source",), "1", "negligible, relevant or dominant", str),
+}
+
+# What is highest over poses, and of which variable.
+_HIGHEST = {
+    "highest_lower": "error_lower",
+    "highest_upper": "error_upper",
+    "highest_percent_lower": "percent_lower",
+    "highest_percent_upper": "percent_upper",
+    "overall_highest_lower": "overall_error_lower",
+    "overall_highest_upper": "overall_error_upper",
+    "overall_highest_percent_lower": "overall_percent_lower",
+    "overall_highest_percent_upper": "overall_percent_upper",
+}
+
+
+def budget(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The tool's error from each source alone and from all together, and their comparison.
+
+    `poses` (..., n_commanded), SI, default the file's workspace; `condition`, default the file's;
+    `progress` is called with (poses done, poses in all). Loads and temperatures are evaluated at
+    nominal parameters and the commanded pose. The Dataset, SI, is described in docs/results.md;
+    errors are actual minus commanded, base frame (Gojtan & Hess-Coelho 2005, equations 3-9).
+
+    Raises `RequestError`: bad-poses, no-workspace, no-source, no-pose-left; `TrueposeError` where
+    the condition asks for what the machine does not say (no-stiffness, no-expansion).
+    """
+    given = machine.condition if condition is None else condition
+    table = requested_poses(machine, poses)
+    sources = required_sources(machine, given)
+    kinds = comparison.quantities(machine.components)
+    lengths = sizes(machine, len(table), source=len(sources), quantity=len(kinds))
+    rows = Rows(machine, SCHEMA, lengths)
+    highest = {
+        name: comparison.Highest(tuple(lengths[dim] for dim in SCHEMA[name].dims))
+        for name in _HIGHEST
+    }
+    statistics = comparison.NormStatistics(len(sources), kinds)
+    distributions: list[dict[str, None]] = [{} for _ in sources]
+
+    walk = Walk(machine, table, given, progress)
+    for block in walk:
+        deviations = [source.deviation(machine, given, block) for source in sources]
+        for found, deviation in zip(distributions, deviations, strict=True):
+            found.update((str(deviation.distribution[k]), None) for k in deviation.banded)
+        values, statuses = _evaluate(machine, block, sources, deviations)
+        usable = walk.keep(block.indices, *statuses)
+        rows.append(block, values, usable)
+        if usable.any():
+            for name, running in highest.items():
+                running.add(values[_HIGHEST[name]][usable])
+            statistics.add(values["worst"][usable])
+    if rows.count == 0:
+        raise no_pose_left(machine, table, walk.left_out)
+
+    shares = comparison.share(statistics.highest[:, 0])
+    over_all: dict[str, Any] = {name: running.value for name, running in highest.items()}
+    over_all |= {
+        "highest": statistics.highest,
+        "rms": statistics.rms,
+        "share": shares,
+        "rank": comparison.rank(shares),
+        "verdict": comparison.verdict(statistics.highest, kinds, machine.accuracy),
+    }
+    coords = {
+        "source": label("source", [source.name for source in sources], "error source"),
+        "distribution": label(
+            "source",
+            [" / ".join(found) or "none" for found in distributions],
+            "distribution inside the band",
+        ),
+        "quantity": label("quantity", list(kinds), "what is compared"),
+        "quantity_units": label(
+            "quantity", [QUANTITY_UNITS[kind] for kind in kinds], "unit of the quantity"
+        ),
+    }
+    return assemble(
+        machine, given, SCHEMA, rows, table, walk.left_out, over_all=over_all, coords=coords
+    )
+
+
+def required_sources(machine: Machine, condition: Condition) -> tuple[Source, ...]:
+    """The sources that act, at least one. Raises `RequestError` (no-source)."""
+    sources = acting(machine, condition)
+    if sources:
+        return sources
+    raise RequestError(
+        Problem(
+            code="no-source",
+            message="nothing moves the machine off its nominal parameters",
+            file=machine.file,
+            found="no error source in the machine file or the condition",
+            expected="a tolerance, a temperature or a force",
+            hint="give a strut length_tolerance, or [condition] temperature or force",
+        )
+    )
+
+
+def _evaluate(
+    machine: Machine, block: Block, sources: Sequence[Source], deviations: Sequence[Deviation]
+) -> tuple[dict[str, np.ndarray], list[np.ndarray]]:
+    """Every variable over poses for one block, and all statuses (n,) met on the way."""
+    n_pose, n_component = block.indices.size, len(machine.components)
+    coordinate, defined = percent.coordinates(machine, block.placements)
+    values: dict[str, np.ndarray] = {
+        name: np.empty((n_pose, len(sources), n_component))
+        for name, variable in SCHEMA.items()
+        if variable.dims == _EACH
+    }
+    statuses: list[np.ndarray] = []
+    for at, deviation in enumerate(deviations):
+        edges = exact.source_edges(machine, block, deviation)
+        half, spread, status = _band(machine, block, deviation)
+        values["error"][:, at] = edges.error
+        values["error_lower"][:, at] = edges.lower
+        values["error_upper"][:, at] = edges.upper
+        values["worst"][:, at] = worst.worst(edges.error, half)
+        values["uncertainty"][:, at] = spread
+        values["percent_lower"][:, at] = percent.percent(edges.lower, coordinate, defined)
+        values["percent_upper"][:, at] = percent.percent(edges.upper, coordinate, defined)
+        statuses += [*edges.status, status]
+    overall = exact.overall_edges(
+        machine,
+        block,
+        [(d, source.sets_overall_edges) for d, source in zip(deviations, sources, strict=True)],
+    )
+    statuses += overall.status
+    values |= {
+        "overall_error": overall.error,
+        "overall_error_lower": overall.lower,
+        "overall_error_upper": overall.upper,
+        "overall_percent_lower": percent.percent(overall.lower, coordinate, defined),
+        "overall_percent_upper": percent.percent(overall.upper, coordinate, defined),
+        "percent_defined": defined,
+        "joint_nominal": block.joints,
+        "force": block.tension,
+    }
+    return values, statuses
+
+
+def _band(
+    machine: Machine, block: Block, deviation: Deviation
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Half width and standard uncertainty (n, n_component) of a source, and a status (n,)."""
+    if not deviation.banded.size:
+        nothing = np.zeros((block.indices.size, len(machine.components)))
+        return nothing, nothing, np.full(block.indices.size, OK, np.uint8)
+    effects, sigmas, status = worst.variable_effects(machine, block, deviation)
+    return (
+        worst.linear_half(effects),
+        uncertainty.standard_uncertainty(effects, sigmas),
+        status,
+    )
+
+
+__all__ = ["SCHEMA", "budget", "required_sources"]

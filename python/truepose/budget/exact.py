@@ -1,0 +1,113 @@
+"""Exact: drive the nominal command through the machine as it is (equations 3-7 of the paper).
+
+    error = forward(q, nominal + deviation) - X,    q = inverse(X, nominal)
+
+as a small displacement of the tool point and a rotation vector, base frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.budget.poses import OK
+from truepose.machine import Machine
+from truepose.sources import Block, Deviation
+from truepose.sources._base import Floats, Indices
+
+Moved = tuple[Indices, Floats]
+"""Parameters (k,), each once, and their deviations (n or 1, k), SI."""
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Errors (n, n_component) at the shift and at both edges, and a status (n,) for each."""
+
+    error: Floats
+    lower: Floats
+    upper: Floats
+    status: tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+def together(parts: Iterable[Moved]) -> Moved:
+    """Deviations of several causes as one: each parameter once, with the sum of its deviations."""
+    listed = list(parts)
+    if not listed:
+        return np.empty(0, np.intp), np.empty((1, 0))
+    columns, place = np.unique(np.concatenate([c for c, _ in listed]), return_inverse=True)
+    if len(listed) == 1 and columns.size == place.size:
+        return listed[0]
+    rows = max(len(values) for _, values in listed)
+    total = np.zeros((rows, columns.size))
+    at = 0
+    for given, values in listed:
+        for column in range(given.size):
+            total[:, place[at + column]] += values[:, column]
+        at += given.size
+    return np.asarray(columns, np.intp), total
+
+
+def displacement(
+    machine: Machine, joints: Floats, placements: Floats, moved: Moved
+) -> tuple[Floats, np.ndarray]:
+    """Where `joints` (n, n_joint) take the tool of the moved machine, less `placements` (n, 7).
+
+    Returns (n, n_component) errors, m and rad, and (n,) kernel status.
+    """
+    columns, values = moved
+    return machine.kernel.displacement(joints, placements, columns, np.ascontiguousarray(values))
+
+
+def edges(machine: Machine, block: Block, centre: Moved, lower: Moved, upper: Moved) -> Edges:
+    """Errors of the nominal command with the parameters moved to a centre and two edges.
+
+    A machine that is not moved has no error, and where an edge is the centre, so is its error:
+    neither is computed.
+    """
+    error, centred = _error(machine, block, centre)
+    if _same(centre, lower) and _same(centre, upper):
+        return Edges(error, error, error, (centred, centred, centred))
+    low, at_low = _error(machine, block, lower)
+    high, at_high = _error(machine, block, upper)
+    return Edges(error, low, high, (centred, at_low, at_high))
+
+
+def source_edges(machine: Machine, block: Block, deviation: Deviation) -> Edges:
+    """Errors of one source alone: at its shift and at the edges of its lengths and offsets."""
+    columns = deviation.parameters
+    return edges(
+        machine,
+        block,
+        together([(columns, deviation.shift)]),
+        together([(columns, deviation.at_edge(-1.0))]),
+        together([(columns, deviation.at_edge(+1.0))]),
+    )
+
+
+def overall_edges(machine: Machine, block: Block, parts: Iterable[tuple[Deviation, bool]]) -> Edges:
+    """Errors of all sources together (equations 3-6).
+
+    `parts` are the sources' deviations, each with whether it goes to its edges at the overall
+    minimum and maximum (the tolerance does); all others stay at their shift.
+    """
+    listed = list(parts)
+    return edges(
+        machine,
+        block,
+        together([(d.parameters, d.shift) for d, _ in listed]),
+        together([(d.parameters, d.at_edge(-1.0) if moves else d.shift) for d, moves in listed]),
+        together([(d.parameters, d.at_edge(+1.0) if moves else d.shift) for d, moves in listed]),
+    )
+
+
+def _error(machine: Machine, block: Block, moved: Moved) -> tuple[Floats, np.ndarray]:
+    if not moved[1].any():
+        shape = (block.indices.size, len(machine.components))
+        return np.zeros(shape), np.full(shape[0], OK, np.uint8)
+    return displacement(machine, block.joints, block.placements, moved)
+
+
+def _same(one: Moved, other: Moved) -> bool:
+    return np.array_equal(one[1], other[1])

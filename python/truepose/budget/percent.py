@@ -1,0 +1,37 @@
+"""Percent: an error against the tool's coordinate at the same pose (equations 8 and 9).
+
+    percent = 100 |error| / |coordinate|
+
+It has no meaning for a rotation, nor where the coordinate is about zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truepose.machine import Machine
+from truepose.sources._base import Flags, Floats
+
+SMALLEST = 1e-6
+"""Coordinate, in characteristic lengths of the machine, below which a percentage says nothing."""
+
+POSITIONS = ("x", "y", "z")
+
+
+def coordinates(machine: Machine, placements: Floats) -> tuple[Floats, Flags]:
+    """The tool point's coordinates, base frame, m, and where a percent of them is defined.
+
+    Both (n, n_component); a rotation has no coordinate (NaN).
+    """
+    values = np.full((len(placements), len(machine.components)), np.nan)
+    for index, component in enumerate(machine.components):
+        if component in POSITIONS:
+            values[:, index] = placements[:, POSITIONS.index(component)]
+    return values, np.abs(values) >= SMALLEST * machine.characteristic_length
+
+
+def percent(error: Floats, coordinate: Floats, defined: Flags) -> Floats:
+    """(n, n_component) percent of `coordinate`; NaN where it is not `defined`."""
+    result = np.full(error.shape, np.nan)
+    np.divide(100.0 * np.abs(error), np.abs(coordinate), out=result, where=defined)
+    return result

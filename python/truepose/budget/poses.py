@@ -1,0 +1,206 @@
+"""The walk over the poses of a run: in blocks, what cannot be used set aside and counted.
+
+A block bounds the memory of everything that is kept a pose only while it is worked on, lets
+Ctrl-C and progress in between two blocks, and is long enough for the kernel's lanes and threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truepose import _kernel
+from truepose.errors import Problem, RequestError
+from truepose.machine import Condition, Machine
+from truepose.sources import Block
+from truepose.sources._base import Flags, Floats, Indices
+
+BLOCK = 8192
+"""Poses in a block."""
+
+EXPLAINED = 200
+"""Poses that are looked into when none can be used, evenly spaced over all of them."""
+
+Progress = Callable[[int, int], None]
+"""Called with (poses done, poses in all), between blocks."""
+
+OK = _kernel.STATUS.index("ok")
+
+
+def requested_poses(machine: Machine, poses: ArrayLike | None) -> Floats:
+    """(n, n_commanded) poses of a run, SI: those given, in any leading shape, or the file's.
+
+    Raises `RequestError` (bad-poses, no-workspace).
+    """
+    if poses is None:
+        return machine.poses()
+    count = len(machine.commanded)
+    try:
+        given = np.asarray(poses, np.float64)
+    except (TypeError, ValueError):
+        raise _bad_poses(machine, "something that is not an array of numbers") from None
+    if given.ndim == 0 or given.shape[-1] != count:
+        raise _bad_poses(machine, f"shape {given.shape}")
+    table = np.ascontiguousarray(given.reshape(-1, count))
+    if len(table) == 0:
+        raise _bad_poses(machine, "no pose")
+    unfit = np.flatnonzero(~np.isfinite(table).all(axis=1))
+    if unfit.size:
+        raise _bad_poses(machine, f"{unfit.size} poses with a value not finite, first {unfit[0]}")
+    return table
+
+
+def _bad_poses(machine: Machine, found: str) -> RequestError:
+    expected = f"(..., {len(machine.commanded)}) numbers: {', '.join(machine.commanded)} in m, rad"
+    return RequestError(
+        Problem("bad-poses", "these are no poses of the machine", found=found, expected=expected)
+    )
+
+
+@dataclass
+class LeftOut:
+    """Poses that cannot be used: their numbers in the poses asked for, and why (kernel status)."""
+
+    indices: list[Indices] = field(default_factory=list)
+    status: list[np.ndarray] = field(default_factory=list)
+
+    def add(self, indices: Indices, status: np.ndarray) -> None:
+        """Set aside the poses numbered `indices` (m,), of kernel status code `status` (m,)."""
+        if indices.size:
+            self.indices.append(indices)
+            self.status.append(status)
+
+    def sorted(self) -> tuple[Indices, np.ndarray]:
+        """Numbers, ascending, and names of the status, both (n_left_out,)."""
+        if not self.indices:
+            return np.empty(0, np.intp), np.empty(0, dtype="<U16")
+        indices = np.concatenate(self.indices)
+        names = np.array(_kernel.STATUS)[np.concatenate(self.status)]
+        order = np.argsort(indices)
+        return indices[order], names[order]
+
+
+class Walk:
+    """Iterates over blocks of usable poses; keeps account of those left out.
+
+    A pose is usable when the inverse finds it within travel and the closures are not singular
+    there; whoever works on a block may set further poses of it aside with `keep`.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        poses: Floats,
+        condition: Condition,
+        progress: Progress | None = None,
+    ) -> None:
+        self.machine = machine
+        self.poses = poses
+        self.left_out = LeftOut()
+        self._wrench = np.asarray(condition.wrench, np.float64)[np.newaxis, :]
+        self._progress = progress
+
+    def __iter__(self) -> Iterator[Block]:
+        total = len(self.poses)
+        for start in range(0, total, BLOCK):
+            block = self._block(start, self.poses[start : start + BLOCK])
+            if block.indices.size:
+                yield block
+            if self._progress is not None:
+                self._progress(min(start + BLOCK, total), total)
+
+    def _block(self, start: int, poses: Floats) -> Block:
+        kernel = self.machine.kernel
+        joints, placements, status = kernel.place(poses)
+        indices = np.arange(start, start + len(poses), dtype=np.intp)
+        usable = self.keep(indices, status)
+        indices, joints, placements = indices[usable], joints[usable], placements[usable]
+        if not indices.size:
+            empty = np.empty((0, len(kernel.closures)))
+            return Block(self.poses, indices, joints, placements, empty, empty)
+        tension, status = kernel.loads_at(
+            joints, placements, self._wrench, kernel.length_parameters
+        )
+        lengths = kernel.lengths_at(joints, placements)
+        usable = self.keep(indices, status)
+        return select(Block(self.poses, indices, joints, placements, lengths, tension), usable)
+
+    def keep(self, indices: Indices, *statuses: np.ndarray) -> Flags:
+        """(n,) whether every status of a pose is ok; the first that is not says why it is out."""
+        usable = np.ones(indices.size, np.bool_)
+        for status in statuses:
+            failed = usable & (status != OK)
+            self.left_out.add(indices[failed], status[failed])
+            usable &= ~failed
+        return usable
+
+
+def select(block: Block, usable: Flags) -> Block:
+    """The poses of `block` where `usable` (n,); the block itself where all are."""
+    if usable.all():
+        return block
+    return Block(
+        block.requested,
+        block.indices[usable],
+        block.joints[usable],
+        block.placements[usable],
+        block.lengths[usable],
+        block.tension[usable],
+    )
+
+
+def no_pose_left(machine: Machine, poses: Floats, left_out: LeftOut) -> RequestError:
+    """The error where no pose can be used: what fails, by how much, where it fails least."""
+    _, status = left_out.sorted()
+    names, counts = np.unique(status, return_counts=True)
+    found = ", ".join(f"{count} {name}" for name, count in zip(names, counts, strict=True))
+    looked_at = np.unique(np.linspace(0, len(poses) - 1, EXPLAINED).astype(np.intp))
+    nearest: tuple[float, str] | None = None
+    for pose in poses[looked_at]:
+        faults = machine.kernel.explain(pose)
+        if not faults:
+            continue
+        excess = max(abs(float(fault["amount"])) for fault in faults)
+        if nearest is None or excess < nearest[0]:
+            where = ", ".join(
+                f"{name} = {_in_file_units(machine, value, _dimension_of(name))}"
+                for name, value in zip(machine.commanded, pose, strict=True)
+            )
+            what = "; ".join(_fault(machine, fault) for fault in faults)
+            nearest = (excess, f"nearest at {where}: {what}")
+    return RequestError(
+        Problem(
+            code="no-pose-left",
+            message=f"none of the {len(poses)} poses can be used",
+            file=machine.file,
+            path="workspace",
+            found=found + (f"; {nearest[1]}" if nearest else ""),
+            expected="poses that the machine can reach, within travel and off singularities",
+            hint="move the workspace, or check lengths, travel and working_mode",
+        )
+    )
+
+
+def _fault(machine: Machine, fault: dict[str, object]) -> str:
+    what, name, amount = fault["what"], fault["name"], fault["amount"]
+    assert isinstance(amount, float | int)
+    if what == "singular":
+        return f"singular, {amount:.3g} of the limit"
+    if what == "travel":
+        coordinate = next((d.coordinate for d in machine.drives if d.name == name), "length")
+        return f"drive {name} is {_in_file_units(machine, abs(amount), coordinate)} out of travel"
+    return f"strut {name} misses by {_in_file_units(machine, abs(amount), 'length')}"
+
+
+def _dimension_of(freedom: str) -> str:
+    return "length" if freedom in ("x", "y", "z") else "angle"
+
+
+def _in_file_units(machine: Machine, value: float, dimension: str) -> str:
+    unit = machine.file_units.get(dimension)
+    if unit is None:
+        return f"{value:.6g} {'m' if dimension == 'length' else 'rad'}"
+    return f"{float(unit.to_file(np.float64(value))):.6g} {unit.label}"

@@ -1,0 +1,237 @@
+"""The one form in which every error source says what it does: a `Deviation` of parameters.
+
+A cause of error, whatever it is, moves parameters of the machine: `actual = nominal + deviation`.
+A source returns, for one block of poses, only the parameters that it touches: the centre of the
+deviation that is known (`shift`), the band about it that is not (`half`), and what correlates.
+Budget, compensation and everything after them read this form and know no source.
+
+All values are SI (m, rad, dimensionless), as the kernel's parameter vector has them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+    from truepose.errors import Problem
+    from truepose.machine import Condition, FileParts, Machine
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+
+OWN_GROUP = -1
+"""Group of a column that moves by itself, correlated with no other."""
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """How a deviation spreads inside its band.
+
+    `sigmas` is the half band in standard deviations: sqrt(3) for a uniform one, k for a normal
+    one that was given by its standard deviation (the band is then k sigma, and values outside
+    it, though rare, exist).
+    """
+
+    name: str
+    sigmas: float
+
+    def __str__(self) -> str:
+        return self.name if self.name == "uniform" else f"{self.name}, {self.sigmas:g} sigma"
+
+
+UNIFORM = Distribution("uniform", math.sqrt(3.0))
+
+
+def normal(sigmas: float = 3.0) -> Distribution:
+    """Normal distribution whose half band is taken as `sigmas` standard deviations."""
+    if not (math.isfinite(sigmas) and sigmas > 0.0):
+        raise ValueError(f"a band of {sigmas} standard deviations is no band")
+    return Distribution("normal", sigmas)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """What one source does to the k columns of parameters it touches, for n poses.
+
+    `parameters` (k,): kernel parameter of each column. A parameter may stand in several columns
+    (an own and a common cause, say); its deviation is then their sum.
+    `shift` (n or 1, k): the known centre, which can be compensated.
+    `half` (n or 1, k), at least 0: the half band about the shift, which remains.
+    `groups` (k,): columns of one non-negative id share one variable t in [-1, 1] and deviate by
+    `shift + sign * half * t`; `OWN_GROUP` columns each have a variable of their own.
+    `sign` (n or 1, k): signed coefficient (+1 or -1) in the common variable; of no effect in an
+    own group.
+    `distribution`: of each column's variable; one for all, or k of them, equal within a group.
+    `edge` (k,): lengths and offsets, which `error_lower` and `error_upper` move to the ends of
+    their bands; coordinates and directions are not moved there.
+
+    Raises `ValueError` where shapes or values contradict this.
+    """
+
+    parameters: Indices
+    shift: Floats
+    half: Floats
+    groups: Indices
+    sign: Floats
+    edge: Flags
+    distribution: tuple[Distribution, ...] = field(default=())
+
+    @classmethod
+    def of(
+        cls,
+        parameters: ArrayLike,
+        shift: ArrayLike = 0.0,
+        half: ArrayLike = 0.0,
+        *,
+        groups: ArrayLike = OWN_GROUP,
+        sign: ArrayLike = 1.0,
+        edge: ArrayLike = True,
+        distribution: Distribution | Sequence[Distribution] = UNIFORM,
+    ) -> Self:
+        """A deviation from plain values: a number or a (k,) array stands for every pose."""
+        columns = np.atleast_1d(np.asarray(parameters, np.intp))
+        count = columns.size
+        each = (distribution,) * count if isinstance(distribution, Distribution) else distribution
+        return cls(
+            columns,
+            _table(shift, count),
+            _table(half, count),
+            np.broadcast_to(np.asarray(groups, np.intp), (count,)).copy(),
+            _table(sign, count),
+            np.broadcast_to(np.asarray(edge, np.bool_), (count,)).copy(),
+            tuple(each),
+        )
+
+    def __post_init__(self) -> None:
+        count = self.parameters.size
+        tables = {"shift": self.shift, "half": self.half, "sign": self.sign}
+        for name, table in tables.items():
+            if table.ndim != 2 or table.shape[1] != count:
+                raise ValueError(f"{name} has shape {table.shape}, expected (n or 1, {count})")
+            if not np.isfinite(table).all():
+                raise ValueError(f"{name} has a value that is not finite")
+        for name, size in (("groups", self.groups.size), ("edge", self.edge.size)):
+            if size != count:
+                raise ValueError(f"{name} has {size} entries, expected {count}")
+        if len(self.distribution) != count:
+            raise ValueError(f"{len(self.distribution)} distributions, expected {count}")
+        if (self.half < 0.0).any():
+            raise ValueError("a half band is negative")
+        if not np.isin(self.sign, (-1.0, 1.0)).all():
+            raise ValueError("a sign is neither +1 nor -1")
+        shared: dict[int, Distribution] = {}
+        for group, each in zip(self.groups.tolist(), self.distribution, strict=True):
+            if group != OWN_GROUP and shared.setdefault(group, each) != each:
+                raise ValueError(f"group {group} has one variable but two distributions")
+
+    @cached_property
+    def signed_half(self) -> Floats:
+        """(n or 1, k) deviation of each column when its variable is at +1, about the shift."""
+        signed: Floats = np.where(self.groups == OWN_GROUP, 1.0, self.sign) * self.half
+        return signed
+
+    @cached_property
+    def variables(self) -> Indices:
+        """(k,) number of the variable that moves each column, 0 .. n_variable - 1."""
+        own = self.groups == OWN_GROUP
+        above = int(self.groups.max(initial=-1)) + 1
+        named = np.where(own, above + np.arange(self.groups.size), self.groups)
+        return np.asarray(np.unique(named, return_inverse=True)[1], np.intp)
+
+    @property
+    def banded(self) -> Indices:
+        """Columns whose band is not empty at some pose."""
+        return np.flatnonzero((self.half > 0.0).any(axis=0))
+
+    def at_edge(self, side: float) -> Floats:
+        """(n or 1, k) deviations with lengths and offsets at an end of their bands.
+
+        `side` -1 is `shift - half`, +1 is `shift + half`; all other columns stay at their shift.
+        Members of a group go to the ends of their common variable, so that one with a negative
+        sign moves the other way: other corners of the band cannot happen.
+        """
+        return self.shift + side * np.where(self.edge, self.signed_half, 0.0)
+
+
+def _table(values: ArrayLike, count: int) -> Floats:
+    table = np.asarray(values, np.float64)
+    if table.ndim < 2:
+        table = np.broadcast_to(table, (1, count))
+    return np.ascontiguousarray(table)
+
+
+@dataclass(frozen=True)
+class Block:
+    """Some usable poses of a run, at nominal parameters: where a source looks.
+
+    `requested` (n_requested, n_commanded): all poses of the run, m or rad, usable or not, and
+    `indices` (n,): which of them these are, so that a source can find what belongs to a pose (its
+    neighbour on a path, its moment in a log).
+    `joints` (n, n_joint): commanded joint coordinates, m or rad.
+    `placements` (n, 7): tool point, m, and platform's unit quaternion w x y z, base frame.
+    `lengths` (n, n_closure): present length of each strut, m.
+    `tension` (n, n_closure): strut force under the condition's wrench, N, tension positive.
+    """
+
+    requested: Floats
+    indices: Indices
+    joints: Floats
+    placements: Floats
+    lengths: Floats
+    tension: Floats
+
+
+class Source(Protocol):
+    """An error source, built from what the machine file says about it.
+
+    `tables` names the keys that it reads of each table of the file, as one pydantic model a
+    table. `sets_overall_edges`: the overall error's minimum and maximum are taken with this
+    source at its band edges (equations 3-6 of the paper); other sources stay at their shift.
+    """
+
+    name: ClassVar[str]
+    doc: ClassVar[str]
+    tables: ClassVar[Mapping[str, type[BaseModel]]]
+    sets_overall_edges: ClassVar[bool]
+
+    @classmethod
+    def build(cls, parts: FileParts) -> Self | None:
+        """The source, or None when the file says nothing about it.
+
+        Wrong or missing data are recorded with `parts.refuse`: the load fails once every source
+        was asked.
+        """
+        ...
+
+    def acts(self, condition: Condition) -> bool:
+        """Whether a budget in this condition has a row for the source."""
+        ...
+
+    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+        """What the source does to the parameters at the poses of `block`.
+
+        Raises `TrueposeError` where the condition asks for what the machine does not say.
+        """
+        ...
+
+
+def refuse(parts: FileParts, problem: Problem) -> None:
+    """Record a problem that a source also raises when a condition given later brings it up."""
+    parts.refuse(
+        problem.code,
+        problem.message,
+        problem.path or "",
+        found=problem.found,
+        expected=problem.expected,
+        hint=problem.hint,
+    )

@@ -1,0 +1,97 @@
+"""docs/results.md and the Datasets say the same: every name, its dims and its units."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+import truepose as tp
+from build_machine import MACHINES
+from truepose.budget import SCHEMA as BUDGET
+from truepose.compensation import SCHEMA as COMPENSATION
+
+PAGE = (Path(__file__).parents[3] / "docs" / "results.md").read_text(encoding="utf-8")
+ROW = re.compile(r"^\| (?P<name>[^|]+) \| (?P<dims>[^|]+) \| (?P<units>[^|]+) \| (?P<text>.+) \|$")
+
+HEADER = ("variable", "coordinate", "---")
+
+
+def section(title: str) -> dict[str, tuple[str, str]]:
+    """Name -> (dims, units) of the table in a section of the page."""
+    text = PAGE.split(f"\n## {title}\n")[1].split("\n## ")[0]
+    rows = (ROW.match(line) for line in text.splitlines())
+    found = {row["name"]: (row["dims"], row["units"]) for row in rows if row}
+    assert found
+    return {name: cells for name, cells in found.items() if name not in HEADER}
+
+
+@cache
+def datasets(name: str) -> dict[str, xr.Dataset]:
+    """Both results of a machine whose platform turns and one whose platform does not."""
+    machine = tp.load(MACHINES / f"{name}.toml")
+    poses = machine.poses()[:3]
+    return {"Budget": tp.budget(machine, poses), "Compensation": tp.compensate(machine, poses)}
+
+
+@pytest.mark.parametrize(("title", "schema"), [("Budget", BUDGET), ("Compensation", COMPENSATION)])
+def test_the_page_has_the_schema(title: str, schema: dict[str, object]) -> None:
+    assert section(title) == {
+        name: (", ".join(variable.dims), variable.units) for name, variable in schema.items()
+    }
+
+
+@pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "linear_delta"])
+@pytest.mark.parametrize("title", ["Budget", "Compensation"])
+def test_the_dataset_has_what_the_page_says(title: str, name: str) -> None:
+    dataset = datasets(name)[title]
+    variables = section(title)
+    # xarray makes a coordinate of a variable that is named as one of its dims.
+    found = {key for key in variables if key in dataset.data_vars or key in dataset.coords}
+    assert found == set(variables)
+    assert set(dataset.data_vars) <= set(variables)
+    for key, (dims, _) in variables.items():
+        assert ", ".join(dataset[key].dims) == dims
+    named = section("Coordinates")
+    for key in set(dataset.coords) - set(variables):
+        generic = re.sub(r"^(pose|left_out)_(x|y|z|a|b|c)$", r"\1_F", str(key))
+        generic = "joint" if generic == "joint_name" else generic
+        assert ", ".join(dataset[key].dims) == named[generic][0]
+
+
+@pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "linear_delta"])
+@pytest.mark.parametrize("title", ["Budget", "Compensation"])
+def test_everything_carries_its_unit_and_name(title: str, name: str) -> None:
+    dataset = datasets(name)[title]
+    for variable in {**dataset.data_vars, **dataset.coords}.values():
+        assert variable.attrs["long_name"]
+        units = variable.attrs["units"].split(", ")
+        assert set(units) <= {"m", "rad", "N", "%", "1"}
+        if len(units) > 1:
+            by = dataset[variable.attrs["units_by"]]
+            assert set(by.values) == set(units)
+            assert by.dims[0] in variable.dims
+
+
+@pytest.mark.parametrize("title", ["Budget", "Compensation"])
+def test_provenance(title: str) -> None:
+    attributes = datasets("hexapod")[title].attrs
+    page = PAGE.split("\n## Attributes\n")[1]
+    assert all(re.search(rf"\b{name}\b", page) for name in attributes)
+    assert attributes["machine_file"] == "hexapod.toml"
+    assert re.fullmatch("[0-9a-f]{64}", attributes["machine_hash"])
+    assert attributes["truepose_version"] == tp.__version__
+    assert attributes["seed"] == "none"
+
+
+@pytest.mark.parametrize("title", ["Budget", "Compensation"])
+def test_a_dataset_is_written_and_read_again(title: str, tmp_path: Path) -> None:
+    dataset = datasets("linear_delta")[title]
+    dataset.to_netcdf(tmp_path / "result.nc", engine="h5netcdf")
+    with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as read:
+        for name in dataset.variables:
+            assert (read[name].values == dataset[name].values).all() or read[name].isnull().any()
+        assert read.attrs == dataset.attrs

@@ -1,0 +1,58 @@
+"""Write docs/command_line.md from the commands themselves.
+
+Run `python docs/generate_command_line.py` after a change of a command or an option; a test refuses
+a page that is not what this writes.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from truepose.cli import cli
+
+HEAD = """# Command line
+
+Written by `python docs/generate_command_line.py` from the commands; do not edit.
+
+`truepose COMMAND MACHINE.toml` reads one machine file ([machine_file.md](machine_file.md)) and
+computes everything from it.
+
+| exit code | meaning |
+|---|---|
+| 0 | done |
+| 1 | the command is a question and the answer is no: `check`, or any with `--require-accuracy` |
+| 2 | bad input; every problem is on stderr, with `--format json` on stdout too |
+| 130 | interrupted (Ctrl-C); no file was changed |
+| 141 | the reader of the output went away |
+
+Tables show mm, µm and µrad. `json` and `csv` have full precision (digits that give the same double
+back) in the units that the machine file declares, and name the unit of every value; a missing
+number is `null` or an empty cell. The variables are those of [results.md](results.md). `json` has
+every variable; `csv` has one row for each pose and source and one for all sources together
+(`overall`). A pose that cannot be used is left out, counted, and listed with its status: in
+`json` under `left_out`, in `csv` as a row of its own. `.nc` files are the Dataset as it is, in SI.
+
+A file is written under a temporary name beside its place and then renamed, so it is whole or it
+is not there. Progress shows on stderr, on a terminal, when the work takes more than two seconds.
+"""
+
+
+def page() -> str:
+    """The text of docs/command_line.md."""
+    parts = [HEAD]
+    width = {"max_content_width": 98, "terminal_width": 98}
+    context = click.Context(cli, info_name="truepose", **(cli.context_settings | width))
+    parts.append(f"```text\n{cli.get_help(context)}\n```\n")
+    for name in cli.list_commands(context):
+        command = cli.get_command(context, name)
+        assert command is not None
+        own = click.Context(command, info_name=name, parent=context, **width)
+        parts.append(f"## {name}\n\n```text\n{command.get_help(own)}\n```\n")
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    (Path(__file__).parent / "command_line.md").write_text(page(), encoding="utf-8")
+    print("docs/command_line.md")

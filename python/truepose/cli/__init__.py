@@ -1,0 +1,72 @@
+"""The command line: `truepose COMMAND MACHINE.toml`.
+
+One command is one file. `COMMANDS` names them and is read lazily: `truepose --help` imports
+click and the thin command files, never numpy, the kernel or the report.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+import click
+
+from truepose.cli._guard import INTERRUPTED, GuardedGroup
+
+COMMANDS: dict[str, str] = {
+    "check": "truepose.cli.check",
+    "budget": "truepose.cli.budget",
+    "compensate": "truepose.cli.compensate",
+    "report": "truepose.cli.report",
+}
+"""Command name -> module that holds it, in the order of `truepose --help`."""
+
+
+def _print_version(context: click.Context, _: click.Parameter, asked: bool) -> None:
+    if asked and not context.resilient_parsing:
+        from truepose import __version__
+
+        click.echo(f"truepose {__version__}")
+        context.exit()
+
+
+@click.command(
+    cls=GuardedGroup,
+    modules=COMMANDS,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_version,
+    help="Print the version and exit.",
+)
+def cli() -> None:
+    """Where the tool of a parallel kinematic machine really is, why, and what to command.
+
+    Every command reads one machine file (TOML) and computes everything from it.
+
+    Exit code 0: done. 1: the command is a question and the answer is no. 2: bad input.
+    """
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line on `arguments` (default: those of the process) -> exit code."""
+    try:
+        result = cli.main(args=arguments, prog_name="truepose", standalone_mode=False)
+    except click.ClickException as problem:
+        problem.show()
+        return 2  # click gives some of its own problems the code 1, which here means "no"
+    except click.Abort:
+        return INTERRUPTED
+    return result if isinstance(result, int) else 0
+
+
+def main() -> None:
+    """Entry point of the `truepose` program."""
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that has no µ shows a question mark, not a traceback.
+        stream.reconfigure(errors="replace")  # type: ignore[union-attr]
+    sys.exit(run())

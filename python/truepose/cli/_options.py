@@ -1,0 +1,91 @@
+"""Options that several commands share, and the settings they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from truepose.cli._guard import JSON_ASKED
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Request:
+    """What was asked of a command, as parsed from its options."""
+
+    machine_file: Path
+    settings: tuple[str, ...] = ()
+    format: str = "table"
+    output: Path | None = None
+    strict: bool = False
+    require_accuracy: bool = False
+
+
+def _note_format(context: click.Context, _: click.Parameter, value: str) -> str:
+    context.meta[JSON_ASKED] = value == "json"
+    return value
+
+
+machine_argument = click.argument(
+    "machine_file", metavar="MACHINE.toml", type=click.Path(path_type=Path)
+)
+set_option = click.option(
+    "--set",
+    "settings",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Try a change without editing the file, for example --set condition.temperature=28. "
+    "May be repeated.",
+)
+format_option = click.option(
+    "--format",
+    "format",
+    type=click.Choice(["table", "json", "csv"]),
+    default="table",
+    show_default=True,
+    callback=_note_format,
+    is_eager=True,
+    help="What is printed: a table for people (mm, µm, µrad), or json or csv for programs "
+    "(full precision, in the units of the machine file).",
+)
+
+
+def output_option_of(endings: str) -> Callable[[Command], Command]:
+    """The option `--output FILE` of a command that writes the `endings` named."""
+    return click.option(
+        "--output",
+        "-o",
+        "output",
+        metavar="FILE",
+        type=click.Path(path_type=Path),
+        help=f"Also write the result to FILE; its ending chooses the form: {endings}.",
+    )
+
+
+output_option = output_option_of(".nc (NetCDF, SI), .json or .csv")
+strict_option = click.option(
+    "--strict",
+    is_flag=True,
+    help="Take poses that cannot be used for an error (exit code 2) instead of leaving them out.",
+)
+accuracy_option = click.option(
+    "--require-accuracy",
+    is_flag=True,
+    help="Exit with code 1 when the accuracy asked in the machine file is not met.",
+)
+
+
+def takes(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
+    """Apply several click options to a command, listed in the order of its help."""
+
+    def decorate(command: Command) -> Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate

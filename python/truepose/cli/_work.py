@@ -1,0 +1,145 @@
+"""The steps that commands share: read the machine, evaluate, hand the result over."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+from numpy.typing import ArrayLike
+
+import truepose
+from truepose.cli._options import Request
+from truepose.cli._progress import progress
+from truepose.cli._show import show_tables
+from truepose.errors import Problem, RequestError
+from truepose.report import formats
+from truepose.report.display import pose_text
+from truepose.report.result import Result
+from truepose.report.study import Study
+from truepose.report.tables import Table
+from truepose.report.writing import require_writable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+
+MOST_PROBLEMS = 20
+"""Poses named one by one when `--strict` refuses them."""
+
+
+def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMATS)) -> Machine:
+    """Refuse an output that cannot be written, then read the machine file."""
+    if request.output is not None:
+        require_writable(request.output, endings, [request.machine_file])
+    return truepose.load(request.machine_file, settings=request.settings)
+
+
+def evaluate(request: Request, machine: Machine) -> xr.Dataset:
+    """The error budget over the file's workspace."""
+    with progress("error budget") as report:
+        found = truepose.budget(machine, progress=report)
+    _refuse_left_out_of(request, machine, found)
+    return found
+
+
+def correct(request: Request, machine: Machine) -> xr.Dataset:
+    """The compensation over the file's workspace."""
+    with progress("compensation") as report:
+        found = truepose.compensate(machine, progress=report)
+    _refuse_left_out_of(request, machine, found)
+    return found
+
+
+def study_of(request: Request, machine: Machine) -> Study:
+    """The machine with both results."""
+    return Study(machine, evaluate(request, machine), correct(request, machine))
+
+
+def deliver(request: Request, result: Result, tables: Iterable[Table | None]) -> None:
+    """Write the output file if one is asked for, and print the result in the format asked."""
+    if request.output is not None:
+        formats.write(result, request.output)
+    if request.format == "table":
+        show_tables(table for table in tables if table is not None)
+    else:
+        sys.stdout.writelines(formats.text(result, f".{request.format}"))
+    if request.output is not None:
+        note_written(request.output)
+
+
+def exit_code(request: Request, met: bool | None) -> int:
+    """1 where the accuracy asked is required and not met, else 0."""
+    return int(request.require_accuracy and met is False)
+
+
+def report_page() -> ModuleType:
+    """The module that draws the page. Raises `RequestError` (extra-missing) without plotly."""
+    try:
+        from truepose.report import page
+    except ImportError as failure:
+        if failure.name is None or failure.name.startswith("truepose"):
+            raise
+        raise RequestError(
+            Problem(
+                "extra-missing",
+                "the report needs packages that are not installed",
+                found=f"no {failure.name}",
+                expected="jinja2 and plotly",
+                hint="pip install 'truepose[report]'",
+            )
+        ) from failure
+    return page
+
+
+def note_written(path: Path) -> None:
+    """Say on stderr which file was written, so that stdout stays what was asked for."""
+    click.echo(f"wrote {path}", err=True)
+
+
+def refuse_left_out(
+    request: Request, machine: Machine, numbers: ArrayLike, poses: ArrayLike, statuses: ArrayLike
+) -> None:
+    """With `--strict`, raise `RequestError` (unusable-pose) where poses were left out.
+
+    `numbers` (n,) in the poses asked for, `poses` (n, n_commanded) SI, `statuses` (n,) by name.
+    """
+    left_out = list(zip(np.asarray(numbers), np.asarray(poses), np.asarray(statuses), strict=True))
+    if not (request.strict and left_out):
+        return
+    problems = [
+        Problem(
+            "unusable-pose",
+            f"pose {number} cannot be used: {pose_text(pose, machine.commanded)}",
+            file=machine.file,
+            found=str(status).replace("_", " "),
+            expected="a pose within reach",
+        )
+        for number, pose, status in left_out[:MOST_PROBLEMS]
+    ]
+    if len(left_out) > MOST_PROBLEMS:
+        problems.append(
+            Problem(
+                "unusable-pose",
+                f"{len(left_out) - MOST_PROBLEMS} more poses cannot be used",
+                file=machine.file,
+                hint="`truepose check` counts them and says why",
+            )
+        )
+    raise RequestError(*problems)
+
+
+def _refuse_left_out_of(request: Request, machine: Machine, dataset: xr.Dataset) -> None:
+    poses = [dataset[f"left_out_{name}"].values for name in machine.commanded]
+    refuse_left_out(
+        request,
+        machine,
+        dataset["left_out_index"].values,
+        np.stack(poses, axis=-1),
+        dataset["left_out_status"].values,
+    )

@@ -1,0 +1,50 @@
+"""`truepose budget`: the error of each source and of all together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from truepose.cli._options import (
+    Request,
+    accuracy_option,
+    format_option,
+    machine_argument,
+    output_option,
+    set_option,
+    strict_option,
+    takes,
+)
+
+
+@click.command("budget")
+@takes(machine_argument, set_option, format_option, output_option, strict_option, accuracy_option)
+def command(**options: Any) -> int:
+    """Predict the error from each source, and compare them.
+
+    Every pose of the workspace is evaluated exactly: the nominal command driven through the
+    machine as each source makes it, and as all together make it. With --require-accuracy the
+    exit code is 1 when the most that all sources can do exceeds the accuracy asked.
+    """
+    from truepose.cli import _work
+    from truepose.report import accuracy, tables
+    from truepose.report.result import Result
+    from truepose.report.study import Study
+
+    request = Request(**options)
+    machine = _work.read_machine(request)
+    study = Study(machine, _work.evaluate(request, machine))
+    answers = accuracy.answers(study)
+    _work.deliver(
+        request,
+        Result("budget", machine, study.budget),
+        [
+            tables.ranking(study),
+            tables.highest_absolute(study),
+            tables.highest_percent(study),
+            tables.answers(answers),
+            tables.poses_left_out(study),
+        ],
+    )
+    return _work.exit_code(request, accuracy.met(answers, accuracy.BEFORE))

@@ -1,0 +1,43 @@
+"""`truepose compensate`: the corrected command, and what remains."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from truepose.cli._options import (
+    Request,
+    accuracy_option,
+    format_option,
+    machine_argument,
+    output_option,
+    set_option,
+    strict_option,
+    takes,
+)
+
+
+@click.command("compensate")
+@takes(machine_argument, set_option, format_option, output_option, strict_option, accuracy_option)
+def command(**options: Any) -> int:
+    """Correct the command for what is known, and show what remains.
+
+    The corrected joint coordinates of every pose are driven through the machine at both edges
+    and at the middle of the bands. With --require-accuracy the exit code is 1 when the most
+    that remains exceeds the accuracy asked.
+    """
+    from truepose.cli import _work
+    from truepose.report import accuracy, tables
+    from truepose.report.result import Result
+
+    request = Request(**options)
+    study = _work.study_of(request, _work.read_machine(request))
+    assert study.compensation is not None
+    answers = accuracy.answers(study)
+    _work.deliver(
+        request,
+        Result("compensate", study.machine, study.compensation),
+        [tables.compensation(study), tables.answers(answers), tables.poses_left_out(study)],
+    )
+    return _work.exit_code(request, accuracy.met(answers, accuracy.AFTER))

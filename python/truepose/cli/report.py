@@ -1,0 +1,66 @@
+"""`truepose report`: everything on one page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from truepose.cli._options import (
+    Request,
+    accuracy_option,
+    machine_argument,
+    set_option,
+    strict_option,
+    takes,
+)
+
+
+@click.command("report")
+@takes(
+    machine_argument,
+    set_option,
+    click.option(
+        "--output",
+        "-o",
+        "output",
+        metavar="FILE.html",
+        type=click.Path(path_type=Path),
+        help="Where the page goes; by default beside you, named after the machine file.",
+    ),
+    strict_option,
+    accuracy_option,
+)
+def command(**options: Any) -> int:
+    """Do all of it, and write one HTML page.
+
+    Evaluates, compares and compensates, prints the tables, and writes the page, which opens from
+    disk without a network. With --require-accuracy the exit code is 1 when the most that remains
+    after compensation exceeds the accuracy asked.
+    """
+    from truepose.cli import _work
+    from truepose.cli._show import show_tables
+    from truepose.report import accuracy, tables
+
+    if options["output"] is None:
+        options["output"] = Path(options["machine_file"].stem + ".html")
+    request = Request(**options)
+    assert request.output is not None
+    page = _work.report_page()
+    machine = _work.read_machine(request, [".html"])
+    study = _work.study_of(request, machine)
+    text = request.machine_file.read_text(encoding="utf-8")
+    page.write(study, request.output, text)
+    answers = accuracy.answers(study)
+    shown = [
+        tables.ranking(study),
+        tables.highest_absolute(study),
+        tables.highest_percent(study),
+        tables.compensation(study),
+        tables.answers(answers),
+        tables.poses_left_out(study),
+    ]
+    show_tables(table for table in shown if table is not None)
+    _work.note_written(request.output)
+    return _work.exit_code(request, accuracy.met(answers, accuracy.AFTER))

@@ -1,0 +1,82 @@
+"""The accuracy asked in the machine file against what the machine can do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from truepose.report.display import Array, pose_text, where_highest
+from truepose.report.result import in_file_units
+from truepose.report.study import Study
+
+if TYPE_CHECKING:
+    from truepose.machine import Machine
+
+BEFORE, AFTER = "before compensation", "after compensation"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One quantity against what was asked of it, SI. `asked` is None where nothing is asked."""
+
+    quantity: str
+    state: str
+    highest: float
+    asked: float | None
+    at: str
+
+    def as_data(self, machine: Machine) -> dict[str, object]:
+        """The answer for programs, in the units of the machine's file."""
+        si = "m" if self.quantity == "position" else "rad"
+        highest, units = in_file_units(machine, self.highest, si)
+        asked = None if self.asked is None else in_file_units(machine, self.asked, si)[0]
+        return {
+            "quantity": self.quantity,
+            "state": self.state,
+            "highest": highest,
+            "asked": asked,
+            "units": units,
+            "at": self.at,
+            "met": self.met,
+        }
+
+    @property
+    def met(self) -> bool | None:
+        """Whether the accuracy asked is kept; None where none is asked."""
+        return None if self.asked is None else bool(self.highest <= self.asked)
+
+    @property
+    def unit(self) -> str:
+        """Unit in which people read the quantity."""
+        return "µm" if self.quantity == "position" else "µrad"
+
+
+def answers(study: Study) -> tuple[Answer, ...]:
+    """Position, and orientation where the platform turns: before and after compensation.
+
+    The highest is over all poses, of the length of the error vector whose components are each at
+    the most that all sources together can do.
+    """
+    states = [(BEFORE, study.overall_worst)]
+    if study.compensation is not None:
+        states.append((AFTER, study.remaining_worst))
+    accuracy = study.machine.accuracy
+    found = []
+    for state, worst in states:
+        found.append(_answer(study, "position", state, study.position_norm(worst), accuracy.target))
+        if study.rotations:
+            size = study.rotation_norm(worst)
+            found.append(_answer(study, "orientation", state, size, accuracy.angle_target))
+    return tuple(found)
+
+
+def _answer(study: Study, quantity: str, state: str, size: Array, asked: float | None) -> Answer:
+    worst = where_highest(size)
+    pose = pose_text(study.poses[worst], study.machine.commanded)
+    return Answer(quantity, state, float(size[worst]), asked, pose)
+
+
+def met(found: tuple[Answer, ...], state: str) -> bool | None:
+    """Whether everything asked is kept in one state; None where nothing is asked."""
+    verdicts = [answer.met for answer in found if answer.state == state and answer.met is not None]
+    return all(verdicts) if verdicts else None

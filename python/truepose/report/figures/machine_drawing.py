@@ -1,0 +1,137 @@
+"""The machine drawn to scale in its workspace: guideways, struts, joints, platform."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from truepose.report.display import MILLI, nearest_middle, pose_text
+from truepose.report.figures._outline import Outline, is_planar, outline
+from truepose.report.figures._style import INK, drawn_poses, finish, small
+from truepose.report.study import Study
+
+TITLE = "The machine in its workspace"
+
+Array = NDArray[np.float64]
+GUIDEWAY, STRUT, PLATFORM, WORKSPACE = "#A8B1C0", "#0072B2", "#D55E00", "#009E73"
+
+
+def caption(study: Study) -> str:
+    """Which pose is drawn."""
+    pose = pose_text(study.poses[_shown(study)], study.machine.commanded)
+    return f"Drawn to scale at {pose}, the pose of the workspace nearest its middle."
+
+
+def figure(study: Study) -> go.Figure:
+    """Guideways, struts, joints, platform and the poses evaluated, mm, equal scale on all axes."""
+    machine = study.machine
+    shape = outline(machine, study.poses[_shown(study)])
+    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    workspace = machine.kernel.placement_of(study.poses[drawn])[:, :3]
+    planar = is_planar(machine)
+    figure = go.Figure()
+    for line in _lines(shape, workspace):
+        figure.add_trace(_trace(planar, **line))
+    if planar:
+        finish(figure, 520)
+        figure.update_xaxes(title_text="x, mm", constrain="domain")
+        figure.update_yaxes(title_text="y, mm", scaleanchor="x", scaleratio=1)
+        return figure
+    axis = {"gridcolor": "#D5DBE5", "backgroundcolor": "#F6F8FB", "showbackground": True}
+    return finish(
+        figure,
+        620,
+        margin={"l": 0, "r": 0, "t": 30, "b": 0},
+        scene={
+            "aspectmode": "data",
+            "xaxis": {"title": {"text": "x, mm"}, **axis},
+            "yaxis": {"title": {"text": "y, mm"}, **axis},
+            "zaxis": {"title": {"text": "z, mm"}, **axis},
+            "camera": {
+                "eye": {"x": 1.4, "y": -1.9, "z": 0.75},
+                "center": {"x": 0, "y": 0, "z": -0.12},
+            },
+        },
+    )
+
+
+def _shown(study: Study) -> int:
+    """Index of the pose nearest the middle of those evaluated."""
+    return int(nearest_middle(study.poses)[0])
+
+
+def _lines(shape: Outline, workspace: Array) -> Iterable[dict[str, Any]]:
+    """Every part of the drawing: its points, m, and how it looks, from back to front."""
+    yield {
+        "points": workspace,
+        "name": "poses evaluated",
+        "mode": "markers",
+        "marker": {"color": WORKSPACE, "size": 6, "opacity": 0.7},
+    }
+    if len(shape.frame):
+        yield {
+            "points": shape.frame,
+            "name": "frame",
+            "mode": "lines",
+            "line": {"color": GUIDEWAY, "width": 5},
+        }
+    if shape.paths:
+        yield {
+            "points": _joined(shape.paths),
+            "name": "travel of the drives",
+            "mode": "lines",
+            "line": {"color": GUIDEWAY, "width": 7},
+        }
+    if shape.arms:
+        yield {
+            "points": _joined(shape.arms),
+            "name": "arms and carriages",
+            "mode": "lines",
+            "line": {"color": INK, "width": 5},
+        }
+    yield {
+        "points": _joined(shape.struts),
+        "name": "struts",
+        "mode": "lines",
+        "line": {"color": STRUT, "width": 4},
+    }
+    if len(shape.platform):
+        yield {
+            "points": shape.platform,
+            "name": "platform",
+            "mode": "lines",
+            "line": {"color": PLATFORM, "width": 5},
+        }
+    yield {
+        "points": shape.struts.reshape(-1, 3),
+        "name": "joint centres",
+        "mode": "markers",
+        "marker": {"color": "white", "size": 7, "line": {"color": INK, "width": 2}},
+    }
+    yield {
+        "points": shape.tool[None],
+        "name": "tool point",
+        "mode": "markers",
+        "marker": {"color": PLATFORM, "size": 8, "symbol": "diamond"},
+    }
+
+
+def _joined(polylines: Iterable[Array]) -> Array:
+    """Polylines (n, 3) in one array, a gap of NaN between them."""
+    gap = np.full((1, 3), np.nan)
+    return np.concatenate([part for line in polylines for part in (np.asarray(line), gap)])
+
+
+def _trace(planar: bool, points: Array, **look: Any) -> go.Scatter | go.Scatter3d:
+    x, y, z = small(points * MILLI).T
+    if planar:
+        return go.Scatter(x=x, y=y, hovertemplate="x %{x:.2f} mm, y %{y:.2f} mm", **look)
+    if "marker" in look:  # markers look larger in three dimensions
+        look["marker"] = look["marker"] | {"size": max(2, look["marker"]["size"] - 3)}
+    return go.Scatter3d(
+        x=x, y=y, z=z, hovertemplate="x %{x:.2f} mm, y %{y:.2f} mm, z %{z:.2f} mm", **look
+    )

@@ -1,0 +1,59 @@
+"""The overall error at each pose, per axis (figure 4 of the founding paper, in form)."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+from truepose.report.display import MICRO
+from truepose.report.figures._over_poses import (
+    add_pose_labels,
+    finish_panels,
+    line_mode,
+    panels,
+    place,
+)
+from truepose.report.figures._style import BEFORE, OVERALL, drawn_poses, small, thinning_note
+from truepose.report.study import Study
+
+TITLE = "Overall error at each pose"
+
+LINES = (
+    ("overall_error_upper", "upper edges", BEFORE, "solid"),
+    ("overall_error", "with shifts only", OVERALL, "dot"),
+    ("overall_error_lower", "lower edges", "#0072B2", "dash"),
+)
+
+
+def caption(study: Study) -> str:
+    """What the lines are."""
+    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    return (
+        "Exact error with all sources acting together: every source at its known shift, and the "
+        "toleranced lengths all at their lower and all at their upper edge."
+        + thinning_note(len(drawn), study.n_pose)
+    )
+
+
+def figure(study: Study) -> go.Figure:
+    """One panel for each component: lower edge, shifts, upper edge, µm and µrad."""
+    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    figure = panels(study)
+    for variable, name, colour, dash in LINES:
+        errors = study.values(variable)[drawn] * MICRO
+        for component in range(len(study.components)):
+            figure.add_trace(
+                go.Scatter(
+                    x=drawn + 1,
+                    y=small(errors[:, component]),
+                    name=name,
+                    legendgroup=variable,
+                    showlegend=component == 0,
+                    mode=line_mode(drawn),
+                    line={"color": colour, "dash": dash, "width": 1.8},
+                    marker={"size": 4},
+                    hovertemplate="%{y:.3f}",
+                ),
+                **place(study, component),
+            )
+    add_pose_labels(figure, study, drawn)
+    return finish_panels(figure, study)

@@ -1,0 +1,58 @@
+"""Each source's error at each pose, per axis (figure 3 of the founding paper, in form)."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+from truepose.report.display import MICRO
+from truepose.report.figures._over_poses import (
+    add_pose_labels,
+    finish_panels,
+    line_mode,
+    panels,
+    place,
+)
+from truepose.report.figures._style import drawn_poses, small, source_colour, thinning_note
+from truepose.report.study import Study
+
+TITLE = "Error of each source at each pose"
+
+
+def caption(study: Study) -> str:
+    """What the lines are."""
+    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    return (
+        "Exact error of each source alone, actual minus commanded, in the base frame. Where a "
+        "source has a band, the solid line is its upper edge and the dashed line its lower edge."
+        + thinning_note(len(drawn), study.n_pose)
+    )
+
+
+def figure(study: Study) -> go.Figure:
+    """One panel for each component, one line for each source and edge, µm and µrad."""
+    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    figure = panels(study)
+    for index, source in enumerate(study.sources):
+        edges = (
+            (("upper", "solid"), ("lower", "dash")) if study.has_band[index] else (("", "solid"),)
+        )
+        for edge, dash in edges:
+            name = f"error_{edge}" if edge else "error"
+            errors = study.values(name)[drawn, index] * MICRO
+            for component in range(len(study.components)):
+                figure.add_trace(
+                    go.Scatter(
+                        x=drawn + 1,
+                        y=small(errors[:, component]),
+                        name=f"{source}, {edge}" if edge else source,
+                        legendgroup=f"{source} {edge}",
+                        showlegend=component == 0,
+                        mode=line_mode(drawn),
+                        line={"color": source_colour(index), "dash": dash, "width": 1.6},
+                        marker={"size": 4},
+                        hovertemplate="%{y:.3f}",
+                    ),
+                    **place(study, component),
+                )
+    add_pose_labels(figure, study, drawn)
+    return finish_panels(figure, study)

@@ -1,0 +1,190 @@
+"""What went into a result, as tables: machine, condition, sources and parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from truepose.report.display import MICRO, MILLI, MISSING, nearest_middle, number, pose_text
+from truepose.report.result import in_file_units
+from truepose.report.tables import Table
+
+if TYPE_CHECKING:
+    from truepose.machine import Machine
+    from truepose.sources._base import Deviation, Source
+
+KELVIN = 273.15
+SHOWN_UNIT = {"m": (MILLI, "mm"), "rad": (180.0 / np.pi, "°"), "1": (1.0, "")}
+"""SI unit of a parameter -> factor and unit for people."""
+DEVIATION_UNIT = {"m": (MICRO, "µm"), "rad": (MICRO, "µrad"), "1": (MICRO, "ppm")}
+MOST_DEVIATIONS = 60
+TRIED = 1000
+"""Poses tried, from the middle outwards, for one that the machine can reach."""
+
+
+def machine(it: Machine) -> Table:
+    """What the machine is: freedoms, closures, parameters, size."""
+    rows = [
+        ("name", it.name),
+        ("freedoms of the platform", " ".join(it.dof)),
+        ("commanded", " ".join(it.commanded)),
+        ("drives", ", ".join(f"{drive.name} ({drive.kind})" for drive in it.drives)),
+        ("struts (closures)", f"{len(it.struts)}: " + ", ".join(strut.name for strut in it.struts)),
+        ("parameters", str(len(it.parameters))),
+        ("characteristic length", f"{it.characteristic_length * MILLI:.6g} mm"),
+        ("home", pose_text(it.home, it.dof)),
+    ]
+    return Table("machine", "Machine", ("", ""), tuple(rows), words=2)
+
+
+def condition(of: Machine) -> Table:
+    """Temperatures, the force on the tool, the accuracy asked and what `--set` changed."""
+    it, asked = of.condition, of.accuracy
+    rows = [
+        ("reference temperature", f"{_celsius(it.reference_temperature)} °C"),
+        ("temperature", f"{_celsius(it.default_temperature)} °C"),
+        *(
+            (f"temperature of {part}", f"{_celsius(value)} °C")
+            for part, value in it.part_temperatures.items()
+        ),
+        ("force on the tool", _vector(it.force, "N")),
+    ]
+    if any(it.moment):
+        rows.append(("moment on the tool", _vector(it.moment, "N m")))
+    if asked.target is not None:
+        rows.append(("accuracy asked", f"{asked.target * MICRO:.6g} µm"))
+    if asked.angle_target is not None:
+        rows.append(("accuracy of angle asked", f"{asked.angle_target * MICRO:.6g} µrad"))
+    rows += [(f"--set {key}", value) for key, value in of.settings.items()]
+    return Table("condition", "Condition", ("", ""), tuple(rows), words=2)
+
+
+def sources(it: Machine) -> Table:
+    """The error sources of the file, and whether they act under this condition."""
+    rows = [
+        (source.name, source.doc, "yes" if source.acts(it.condition) else "no")
+        for source in _sources(it)
+    ]
+    return Table(
+        "sources",
+        "Error sources found",
+        ("source", "what it is", "acts here"),
+        tuple(rows),
+        words=3,
+        note="A source of the file that does nothing under this condition is left out.",
+    )
+
+
+def acting(it: Machine) -> list[Source]:
+    """The sources of the file that do something under its condition."""
+    return [source for source in _sources(it) if source.acts(it.condition)]
+
+
+def machine_data(it: Machine) -> dict[str, object]:
+    """What the machine is, for programs, in file units."""
+    length, unit = in_file_units(it, it.characteristic_length, "m")
+    return {
+        "name": it.name,
+        "file": it.file,
+        "hash": it.file_hash,
+        "settings": dict(it.settings),
+        "dof": list(it.dof),
+        "commanded": list(it.commanded),
+        "components": list(it.components),
+        "joints": list(it.joints),
+        "closures": list(it.closures),
+        "parameters": len(it.parameters),
+        "characteristic_length": {"value": length, "units": unit},
+    }
+
+
+def source_data(it: Machine) -> list[dict[str, object]]:
+    """The sources and what they do at the usable pose nearest the middle, for programs."""
+    found = {source.name: deviation for source, deviation in _deviations_at_middle(it)}
+    listed: list[dict[str, object]] = []
+    for source in _sources(it):
+        entry: dict[str, object] = {
+            "name": source.name,
+            "doc": source.doc,
+            "acts": source.acts(it.condition),
+            "deviations": [],
+        }
+        if source.name in found:
+            deviation = found[source.name]
+            entry["deviations"] = [
+                {
+                    "parameter": it.parameters[parameter],
+                    "units": in_file_units(it, 0.0, it.units[parameter])[1],
+                    "shift": in_file_units(it, deviation.shift[0, at], it.units[parameter])[0],
+                    "half": in_file_units(it, deviation.half[0, at], it.units[parameter])[0],
+                }
+                for at, parameter in enumerate(deviation.parameters)
+            ]
+        listed.append(entry)
+    return listed
+
+
+def _sources(it: Machine) -> tuple[Source, ...]:
+    return cast("tuple[Source, ...]", it.sources)
+
+
+def deviations(it: Machine) -> Table:
+    """What each source does to which parameter, at the usable pose nearest the middle.
+
+    The known shift and the unknown half band about it; parameters that move alike share a row.
+    """
+    alike: dict[tuple[str, str, str, str], list[str]] = {}
+    for source, deviation in _deviations_at_middle(it):
+        for at, parameter in enumerate(deviation.parameters):
+            factor, unit = DEVIATION_UNIT[it.units[parameter]]
+            shift, half = float(deviation.shift[0, at]), float(deviation.half[0, at])
+            band = f"\N{PLUS-MINUS SIGN}{number(half * factor, 3)}" if half else MISSING
+            key = (source.name, number(shift * factor, 3), band, unit)
+            alike.setdefault(key, []).append(it.parameters[parameter])
+    rows = [(name, _listed(parameters), *others) for (name, *others), parameters in alike.items()]
+    more = f" The first {MOST_DEVIATIONS} of {len(rows)}." if len(rows) > MOST_DEVIATIONS else ""
+    return Table(
+        "deviations",
+        "What the sources do to the parameters",
+        ("source", "parameters", "known shift", "unknown band", "unit"),
+        tuple(rows[:MOST_DEVIATIONS]),
+        words=2,
+        note="Actual minus nominal, at the usable pose nearest the middle of the workspace." + more,
+    )
+
+
+def _listed(names: list[str]) -> str:
+    """Names in words: all of a few, the first and the last of many."""
+    if len(names) <= 3:
+        return ", ".join(names)
+    return f"{names[0]} … {names[-1]} ({len(names)} parameters)"
+
+
+def _deviations_at_middle(it: Machine) -> list[tuple[Source, Deviation]]:
+    from truepose.budget.poses import Walk
+
+    sources = acting(it)
+    poses = it.poses() if sources else np.empty((0, len(it.commanded)))
+    for index in nearest_middle(poses)[:TRIED]:
+        for block in Walk(it, poses[[index]], it.condition):
+            return [(source, source.deviation(it, it.condition, block)) for source in sources]
+    return []
+
+
+def parameters(it: Machine) -> Table:
+    """Every parameter with its nominal value."""
+    rows = []
+    for name, value, unit in zip(it.parameters, it.nominal, it.units, strict=True):
+        factor, shown = SHOWN_UNIT[unit]
+        rows.append((name, f"{number(float(value) * factor, 6)}", shown))
+    return Table("parameters", "Parameters", ("parameter", "nominal value", "unit"), tuple(rows))
+
+
+def _celsius(kelvin: float) -> str:
+    return f"{kelvin - KELVIN:.6g}"
+
+
+def _vector(values: tuple[float, ...], unit: str) -> str:
+    parts = [f"{axis} {value:.6g}" for axis, value in zip("xyz", values, strict=True)]
+    return ", ".join(parts).replace("-", "\N{MINUS SIGN}") + f" {unit}"

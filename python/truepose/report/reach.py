@@ -1,0 +1,147 @@
+"""Which poses of the workspace the machine can use, and why not the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truepose.budget.poses import OK
+from truepose.report.display import MILLI, is_position, number, pose_text, where_highest
+from truepose.report.result import in_file_units
+from truepose.report.tables import MOST_LISTED, Table
+
+if TYPE_CHECKING:
+    from truepose.machine import Machine
+
+EXPLAINED = 2000
+"""Poses left out that are looked into; where more are, evenly spaced ones."""
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One cause for leaving poses out: which part, in how many poses, at most by how much.
+
+    `amount` and `limit` in m for a strut, m or rad for a travel, a ratio for a singularity.
+    """
+
+    what: str
+    name: str
+    count: int
+    amount: float
+    unit: str
+
+    def __str__(self) -> str:
+        if self.what == "singular":
+            return f"singular: conditioning down to {self.amount:.2g}"
+        factor, unit = (MILLI, "mm") if self.unit == "m" else (180.0 / np.pi, "°")
+        by = f"{number(self.amount * factor, 3)} {unit}"
+        if self.what == "travel":
+            return f"drive {self.name}: up to {by} outside its travel"
+        return f"strut {self.name}: up to {by} too far to reach"
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What became of the poses of a workspace.
+
+    `status` (n_pose,): kernel status by name. `worst_conditioning` of the usable poses (smallest
+    over largest scaled singular value: 1 best, 0 singular) and the pose where it is, SI; NaN
+    where no pose is usable.
+    """
+
+    poses: NDArray[np.float64]
+    status: NDArray[np.str_]
+    reasons: tuple[Reason, ...]
+    worst_conditioning: float
+    worst_pose: NDArray[np.float64]
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """(n_pose,) whether a pose can be used."""
+        return np.asarray(self.status == "ok")
+
+
+def reach(machine: Machine) -> Reach:
+    """Try every pose of the machine's workspace."""
+    from truepose import _kernel
+
+    poses = machine.poses()
+    _, codes = machine.inverse(poses, status=True)
+    conditioning, solved = machine.conditioning(poses, status=True)
+    codes = np.where(codes == OK, solved, codes)
+    usable = codes == OK
+    worst = where_highest(-np.where(usable, conditioning, np.inf)) if usable.any() else 0
+    return Reach(
+        poses,
+        np.array(_kernel.STATUS)[codes],
+        _reasons(machine, poses[~usable]),
+        float(conditioning[worst]) if usable.any() else float("nan"),
+        poses[worst],
+    )
+
+
+def _reasons(machine: Machine, poses: NDArray[np.float64]) -> tuple[Reason, ...]:
+    """Causes by part, the one that stops most poses first."""
+    found: dict[tuple[str, str], list[float]] = {}
+    for pose in poses[:: max(1, -(-len(poses) // EXPLAINED))]:
+        for cause in machine.kernel.explain(pose):
+            key = (str(cause["what"]), str(cause["name"]))
+            found.setdefault(key, []).append(float(cause["amount"]))
+    angles = {drive.name for drive in machine.drives if drive.coordinate == "angle"}
+    reasons = [
+        Reason(
+            what,
+            name,
+            len(amounts),
+            min(amounts) if what == "singular" else max(amounts),
+            {"singular": "1", "strut": "m"}.get(what, "rad" if name in angles else "m"),
+        )
+        for (what, name), amounts in found.items()
+    ]
+    return tuple(sorted(reasons, key=lambda reason: -reason.count))
+
+
+def table(machine: Machine, found: Reach) -> Table:
+    """The workspace for people."""
+    usable = int(found.usable.sum())
+    rows = [("poses", f"{len(found.poses):,}"), ("usable", f"{usable:,}")]
+    names, counts = np.unique(found.status[~found.usable], return_counts=True)
+    rows += [
+        (str(name).replace("_", " "), f"{count:,}")
+        for name, count in zip(names, counts, strict=True)
+    ]
+    rows += [("because", str(reason)) for reason in found.reasons[:MOST_LISTED]]
+    if usable:
+        where = pose_text(found.worst_pose, machine.commanded)
+        rows.append(("worst conditioning", f"{found.worst_conditioning:.3g} at {where}"))
+    return Table(
+        "workspace",
+        "Workspace",
+        ("", ""),
+        tuple(rows),
+        words=2,
+        note="Conditioning: smallest over largest scaled singular value, 1 is best, 0 is singular.",
+    )
+
+
+def as_data(machine: Machine, found: Reach) -> dict[str, Any]:
+    """The workspace for programs, in the units of the machine's file."""
+    names, counts = np.unique(found.status, return_counts=True)
+    reasons = []
+    for reason in found.reasons:
+        amount, units = in_file_units(machine, reason.amount, reason.unit)
+        reasons.append({**vars(reason), "amount": amount, "unit": units})
+    pose = {
+        name: in_file_units(machine, float(value), "m" if is_position(name) else "rad")[0]
+        for name, value in zip(machine.commanded, found.worst_pose, strict=True)
+    }
+    return {
+        "poses": len(found.poses),
+        "status": dict(zip(map(str, names), map(int, counts), strict=True)),
+        "reasons": reasons,
+        "worst_conditioning": found.worst_conditioning if found.usable.any() else None,
+        "worst_pose": pose if found.usable.any() else None,
+    }

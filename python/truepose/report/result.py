@@ -1,0 +1,137 @@
+"""A Dataset on its way into a file for programs: full precision, in the machine file's units."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+
+DIMENSION_OF = {"m": "length", "rad": "angle", "N": "force"}
+"""SI unit of a result -> dimension of the unit that the machine file declares for it."""
+
+
+def in_file_units(machine: Machine, value: float, unit: str) -> tuple[float, str]:
+    """An SI value of `unit` in the file's unit, with that; other units stay as they are."""
+    dimension = DIMENSION_OF.get(unit)
+    if dimension is None:
+        return value, unit
+    to = machine.file_units[dimension]
+    return float(to.to_file(value)), to.label
+
+
+@dataclass(frozen=True)
+class Values:
+    """One variable in file units.
+
+    `units` is one unit, or one for each index along the axis `mixed`.
+    """
+
+    dims: tuple[str, ...]
+    array: NDArray[np.generic]
+    units: tuple[str, ...]
+    mixed: int | None
+    long_name: str
+
+    def unit(self, along: int = 0) -> str:
+        """The unit at an index of the mixed axis, or the only one."""
+        return self.units[along] if self.mixed is not None else self.units[0]
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a command found: a Dataset (SI) and the machine whose file's units it is written in."""
+
+    command: str
+    machine: Machine
+    dataset: xr.Dataset
+
+    def units(self) -> dict[str, str]:
+        """Unit of every dimension that appears in results: {"length": "mm", ...}."""
+        return {name: self.machine.file_units[name].label for name in DIMENSION_OF.values()}
+
+    def values(self, name: str) -> Values:
+        """One variable or coordinate in the units of the machine file."""
+        variable = self.dataset[name].variable
+        dims = tuple(str(dim) for dim in variable.dims)
+        array = np.asarray(variable.values)
+        long_name = str(variable.attrs.get("long_name", ""))
+        by = variable.attrs.get("units_by")
+        if by is None:
+            array, unit = self._converted(array, str(variable.attrs.get("units", "1")))
+            return Values(dims, array, (unit,), None, long_name)
+        si = [str(unit) for unit in self.dataset[by].values]
+        axis = dims.index(str(self.dataset[by].dims[0]))
+        parts, units = zip(
+            *(self._converted(np.take(array, i, axis=axis), unit) for i, unit in enumerate(si)),
+            strict=True,
+        )
+        return Values(dims, np.stack(parts, axis=axis), units, axis, long_name)
+
+    def variables(self) -> list[str]:
+        """Names of what was computed, also what xarray takes for a coordinate by its name."""
+        coordinates = [str(name) for name, each in self.dataset.coords.items() if each.ndim > 1]
+        return [*coordinates, *map(str, self.dataset.data_vars)]
+
+    def coordinates(self) -> list[str]:
+        """Names of what labels the variables, without the poses left out."""
+        names = [str(name) for name, each in self.dataset.coords.items() if each.ndim <= 1]
+        return [name for name in names if not name.startswith("left_out") and not _is_units(name)]
+
+    def accuracy(self) -> dict[str, dict[str, object]]:
+        """The accuracy asked of position and orientation, those that are asked."""
+        asked = self.machine.accuracy
+        found = {}
+        for name, value, si in (
+            ("position", asked.target, "m"),
+            ("orientation", asked.angle_target, "rad"),
+        ):
+            if value is not None:
+                converted, unit = in_file_units(self.machine, value, si)
+                found[name] = {"target": converted, "units": unit}
+        return found
+
+    def labels(self, dim: str) -> list[str]:
+        """Names along a dimension, or its numbers as text where it has no names.
+
+        A dimension that shares its name with a result has its names in `<dim>_name`.
+        """
+        for name in (dim, f"{dim}_name"):
+            if name in self.dataset.variables and self.dataset[name].ndim == 1:
+                return [str(value) for value in self.dataset[name].values]
+        return [str(index) for index in range(self.dataset.sizes[dim])]
+
+    def left_out(self) -> list[dict[str, object]]:
+        """Every pose that cannot be used: its number, coordinates in file units, and why."""
+        poses = [self.values(f"left_out_{name}").array.tolist() for name in self.machine.commanded]
+        return [
+            {
+                "pose": int(number),
+                "status": str(status),
+                **dict(zip(self.machine.commanded, coordinates, strict=True)),
+            }
+            for number, status, *coordinates in zip(
+                self.dataset["left_out_index"].values,
+                self.dataset["left_out_status"].values,
+                *poses,
+                strict=True,
+            )
+        ]
+
+    def _converted(self, array: NDArray[np.generic], unit: str) -> tuple[NDArray[np.generic], str]:
+        dimension = DIMENSION_OF.get(unit)
+        if dimension is None:
+            return array, unit
+        to = self.machine.file_units[dimension]
+        return to.to_file(array), to.label
+
+
+def _is_units(name: str) -> bool:
+    """Whether a coordinate holds SI units, which every variable names itself in a file."""
+    return name.endswith("_units")

@@ -1,0 +1,136 @@
+"""One machine with its results, and what every table and figure reads from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truepose.report.display import is_position
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A machine, its error budget and, where it was asked for, its compensation.
+
+    `budget` and `compensation` are the Datasets of `truepose.budget` and `truepose.compensate`
+    over the same poses. All values here are SI.
+    """
+
+    machine: Machine
+    budget: xr.Dataset
+    compensation: xr.Dataset | None = None
+
+    @cached_property
+    def components(self) -> tuple[str, ...]:
+        """Names of the error components: x y z (m), rx ry rz (rad), those the platform has."""
+        return tuple(str(name) for name in self.budget["component"].values)
+
+    @cached_property
+    def positions(self) -> list[int]:
+        """Indices of the components that are lengths."""
+        return [index for index, name in enumerate(self.components) if is_position(name)]
+
+    @cached_property
+    def rotations(self) -> list[int]:
+        """Indices of the components that are angles."""
+        return [index for index, name in enumerate(self.components) if not is_position(name)]
+
+    @cached_property
+    def sources(self) -> tuple[str, ...]:
+        """Names of the error sources, in the order of the registry."""
+        return tuple(str(name) for name in self.budget["source"].values)
+
+    @cached_property
+    def by_rank(self) -> list[int]:
+        """Indices of the sources, the largest first."""
+        return [int(index) for index in np.argsort(self.values("rank"), kind="stable")]
+
+    @cached_property
+    def has_band(self) -> tuple[bool, ...]:
+        """Per source: whether its lower and upper edge differ anywhere."""
+        lower, upper = self.values("error_lower"), self.values("error_upper")
+        return tuple(
+            bool(np.any(lower[:, index] != upper[:, index])) for index in range(len(self.sources))
+        )
+
+    @cached_property
+    def n_pose(self) -> int:
+        """Number of poses that were evaluated."""
+        return int(self.budget.sizes["pose"])
+
+    @cached_property
+    def poses(self) -> Array:
+        """(n_pose, n_commanded) commanded poses, m and rad."""
+        return self._stacked("pose_", self.machine.commanded)
+
+    @cached_property
+    def left_out(self) -> Array:
+        """(n_left_out, n_commanded) poses that cannot be used, m and rad."""
+        return self._stacked("left_out_", self.machine.commanded)
+
+    @cached_property
+    def left_out_statuses(self) -> tuple[str, ...]:
+        """Why each pose of `left_out` cannot be used."""
+        return tuple(str(status) for status in self.values("left_out_status"))
+
+    def values(self, name: str) -> Array:
+        """One variable of the budget as an array, in the axis order of the schema."""
+        return np.asarray(self.budget[name].values)
+
+    def _stacked(self, prefix: str, names: tuple[str, ...]) -> Array:
+        return np.stack([self.values(prefix + name) for name in names], axis=-1)
+
+    def compensated(self, name: str) -> Array:
+        """One variable of the compensation at the poses of the budget.
+
+        Missing (NaN) at a pose whose corrected command the machine cannot follow.
+        """
+        assert self.compensation is not None
+        values = np.asarray(self.compensation[name].values)
+        here, there = self.values("pose"), np.asarray(self.compensation["pose"].values)
+        if np.array_equal(here, there):
+            return values
+        aligned = np.full((len(here), *values.shape[1:]), np.nan)
+        _, at, of = np.intersect1d(here, there, return_indices=True)
+        aligned[at] = values[of]
+        return aligned
+
+    def position_norm(self, errors: Array) -> Array:
+        """Length of the position part of errors (..., component) -> (...), m."""
+        return np.asarray(np.linalg.norm(errors[..., self.positions], axis=-1))
+
+    def rotation_norm(self, errors: Array) -> Array:
+        """Angle of the rotation part of errors (..., component) -> (...), rad."""
+        return np.asarray(np.linalg.norm(errors[..., self.rotations], axis=-1))
+
+    @cached_property
+    def overall_worst(self) -> Array:
+        """(n_pose, n_component) the most that all sources together can do, linear in the bands.
+
+        |overall error with every source at its shift| + each source's band, the bands added
+        because sources do not know of each other.
+        """
+        bands = self.values("worst") - np.abs(self.values("error"))
+        return np.asarray(np.abs(self.values("overall_error")) + bands.sum(axis=1))
+
+    @cached_property
+    def remaining_worst(self) -> Array:
+        """(n_pose, n_component) the most that remains after compensation.
+
+        The linear bound, or what the re-simulation found where that is larger.
+        """
+        simulated = [
+            np.abs(self.compensated(f"residual_{edge}")) for edge in ("lower", "middle", "upper")
+        ]
+        return np.asarray(np.maximum.reduce([self.compensated("bound"), *simulated]))

@@ -1,0 +1,201 @@
+"""The tables of the command line and of the report: the same text in both.
+
+Lengths of errors in µm, angles in µrad, percentages of the commanded coordinate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.report.accuracy import Answer
+from truepose.report.display import (
+    MICRO,
+    MISSING,
+    Array,
+    column,
+    decimals_for,
+    error_unit,
+    number,
+    pose_text,
+    where_highest,
+)
+from truepose.report.study import Study
+
+MOST_LISTED = 20
+"""Rows of a list of poses shown to people; files for programs hold them all."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table ready to be shown: every cell is text, `words` leading columns are words.
+
+    The other columns are numbers and stand to the right.
+    """
+
+    name: str
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: int = 1
+    note: str = ""
+
+
+def ranking(study: Study) -> Table:
+    """The sources by rank: what each alone can do at most, its share and the verdict."""
+    order = study.by_rank
+    parts = [str(name) for name in study.budget["quantity"].values]
+    header = ["source", "verdict", "rank"]
+    columns: list[Sequence[str]] = [
+        [study.sources[index] for index in order],
+        [str(study.values("verdict")[index]) for index in order],
+        [str(int(study.values("rank")[index])) for index in order],
+    ]
+    for part, name in enumerate(parts):
+        unit = "µm" if name == "position" else "µrad"
+        header += [f"highest {name}, {unit}", f"rms {name}, {unit}"]
+        columns += [column(study.values(kind)[order, part] * MICRO) for kind in ("highest", "rms")]
+    header.append("share, %")
+    columns.append(column(study.values("share")[order] * 100, 1))
+    return Table(
+        "ranking",
+        "The sources compared",
+        tuple(header),
+        tuple(zip(*columns, strict=True)),
+        words=2,
+        note="Highest: the most this source alone can do at its worst pose.",
+    )
+
+
+def highest_absolute(study: Study) -> Table:
+    """Highest absolute error over the poses, per source and component (table 5, in form)."""
+    cells = [column(values * MICRO) for values in _highest(study, "highest", "overall_highest").T]
+    return Table(
+        "highest_absolute",
+        "Highest absolute error",
+        ("source", *(f"{name}, {error_unit(name)}" for name in study.components)),
+        tuple(zip(_edge_labels(study), *cells, strict=True)),
+        note="Over all poses, per axis of the base frame.",
+    )
+
+
+def highest_percent(study: Study) -> Table:
+    """Highest error as a percentage of the coordinate, per source (table 6, in form)."""
+    highest = _highest(study, "highest_percent", "overall_highest_percent")
+    shown = [index for index in study.positions if np.isfinite(highest[:, index]).any()]
+    cells = [column(highest[:, index], 4) for index in shown]
+    return Table(
+        "highest_percent",
+        "Highest error as a percentage of the coordinate",
+        ("source", *(f"{study.components[index]}, %" for index in shown)),
+        tuple(zip(_edge_labels(study), *cells, strict=True)),
+        note="Of the commanded coordinate at the same pose, where that is not near zero.",
+    )
+
+
+def compensation(study: Study) -> Table:
+    """Highest absolute error per component and of the position, before and after."""
+    components = study.components
+    rows: list[tuple[str, Array]] = [
+        ("before, lower edges", study.values("overall_error_lower")),
+        ("before, shifts only", study.values("overall_error")),
+        ("before, upper edges", study.values("overall_error_upper")),
+        ("after, lower edges", study.compensated("residual_lower")),
+        ("after, shifts only", study.compensated("residual_middle")),
+        ("after, upper edges", study.compensated("residual_upper")),
+        ("after, bound", study.compensated("bound")),
+    ]
+    highest = np.stack(
+        [
+            np.append(np.nanmax(np.abs(errors), axis=0), np.nanmax(study.position_norm(errors)))
+            for _, errors in rows
+        ]
+    )
+    # The middle is at rounding level; the decimals of the other rows show it as zero.
+    cells = [column(values * MICRO, decimals_for(values * MICRO)) for values in highest.T]
+    return Table(
+        "compensation",
+        "Before and after compensation",
+        (
+            "highest over all poses",
+            *(f"{name}, {error_unit(name)}" for name in components),
+            "position, µm",
+        ),
+        tuple(zip([name for name, _ in rows], *cells, strict=True)),
+        note="After: the corrected command driven through the actual machine. The bound is "
+        "linear in the deviations and holds up to a term of second order in them.",
+    )
+
+
+def answers(found: Sequence[Answer]) -> Table:
+    """What the machine can do at its worst pose against the accuracy asked."""
+    rows = [
+        (
+            f"{answer.quantity} {answer.state}",
+            {None: "no accuracy asked", True: "met", False: "NOT met"}[answer.met],
+            f"{number(answer.highest * MICRO, 1)} {answer.unit}",
+            MISSING if answer.asked is None else f"{number(answer.asked * MICRO, 1)} {answer.unit}",
+            answer.at,
+        )
+        for answer in found
+    ]
+    return Table(
+        "answers",
+        "Against the accuracy asked",
+        ("", "answer", "at most", "asked", "at"),
+        tuple(rows),
+        words=5,
+        note="At most: all sources at their shifts, and their bands added linearly.",
+    )
+
+
+def poses_left_out(study: Study) -> Table | None:
+    """Poses that cannot be used and why, the first of them; None where all can be used."""
+    count = len(study.left_out)
+    if count == 0:
+        return None
+    rows = [
+        (pose_text(pose, study.machine.commanded), status.replace("_", " "))
+        for pose, status in zip(
+            study.left_out[:MOST_LISTED], study.left_out_statuses[:MOST_LISTED], strict=True
+        )
+    ]
+    more = f" The first {MOST_LISTED} are listed." if count > MOST_LISTED else ""
+    return Table(
+        "left_out",
+        f"Poses left out: {count:,} of {count + study.n_pose:,}",
+        ("pose", "status"),
+        tuple(rows),
+        words=2,
+        note="No result includes them." + more,
+    )
+
+
+def _edge_labels(study: Study) -> list[str]:
+    """Rows of the paper's tables: both edges of a source with a band, one row otherwise."""
+    labels = []
+    for source, band in zip(study.sources, study.has_band, strict=True):
+        labels += [f"{source}, lower", f"{source}, upper"] if band else [source]
+    return [*labels, "overall, lower", "overall, upper"]
+
+
+def _highest(study: Study, of_source: str, overall: str) -> Array:
+    """(row, component) the values for `_edge_labels`, SI or percent."""
+    lower, upper = study.values(f"{of_source}_lower"), study.values(f"{of_source}_upper")
+    rows: list[Array] = []
+    for index, band in enumerate(study.has_band):
+        rows += [lower[index], upper[index]] if band else [upper[index]]
+    rows += [study.values(f"{overall}_lower"), study.values(f"{overall}_upper")]
+    return np.stack(rows)
+
+
+def total(study: Study) -> str:
+    """One line: the most that all sources together can do to the position, and where."""
+    size = study.position_norm(study.overall_worst)
+    worst = where_highest(size)
+    return (
+        f"All sources together: at most {number(float(size[worst]) * MICRO, 1)} µm, "
+        f"at {pose_text(study.poses[worst], study.machine.commanded)}."
+    )

@@ -1,0 +1,185 @@
+"""The report in a real browser, from disk: no network, no error, and figures that show something.
+
+Text that is right says nothing about pixels (a map can be one colour from edge to edge), so each
+figure is photographed and the colours that carry its meaning are looked for.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from command_line import MACHINES
+from truepose.cli import run
+from truepose.report.figures import FIGURES, _style, machine_drawing
+
+CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
+# The browser looks for no updates and asks no service; WebGL is drawn by the processor.
+FLAGS = [
+    "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+]  # fmt: skip
+FIGURE_NAMES = [module.__name__.rpartition(".")[2] for module in FIGURES]
+# What must be seen in each figure; a figure that is not named here must only not be blank.
+COLOURS = {
+    "machine_drawing": [machine_drawing.STRUT, machine_drawing.PLATFORM],
+    "ranking": [_style.VERDICT_COLOURS["dominant"]],
+    "source_errors": list(_style.SOURCE_COLOURS[:3]),
+    "overall_error": [_style.BEFORE, _style.OVERALL],
+    "before_after": [_style.BEFORE, _style.AFTER],
+}
+MACHINES_SHOWN = ["planar_two_slider", "hexapod", "rotary_delta"]
+
+# In the page, so that no image library is needed: a picture -> how many pixels of which colour.
+COUNT = """async ([data, colours]) => {
+  const image = new Image();
+  image.src = "data:image/png;base64," + data;
+  await image.decode();
+  const canvas = new OffscreenCanvas(image.width, image.height);
+  const context = canvas.getContext("2d", {willReadFrequently: true});
+  context.drawImage(image, 0, 0);
+  const pixels = context.getImageData(0, 0, image.width, image.height).data;
+  const wanted = colours.map(c => [1, 3, 5].map(i => parseInt(c.slice(i, i + 2), 16)));
+  const near = wanted.map(() => 0), seen = new Set();
+  let marked = 0;
+  for (let i = 0; i < pixels.length; i += 4) {
+    const [r, g, b] = [pixels[i], pixels[i + 1], pixels[i + 2]];
+    if (Math.min(r, g, b) < 235) marked++;
+    seen.add((r >> 3 << 10) | (g >> 3 << 5) | b >> 3);
+    wanted.forEach((w, k) => {
+      if (Math.abs(r - w[0]) + Math.abs(g - w[1]) + Math.abs(b - w[2]) < 45) near[k]++;
+    });
+  }
+  return {marked: 4 * marked / pixels.length, colours: seen.size, near};
+}"""
+
+
+@dataclass
+class Visit:
+    """A page opened in the browser, and all that it asked for and complained of."""
+
+    page: Any
+    requests: list[str] = field(default_factory=list)
+    complaints: list[str] = field(default_factory=list)
+
+    def look(self, selector: str, colours: list[str]) -> dict[str, Any]:
+        """Photograph one element: share of marked pixels, number of colours, pixels near each."""
+        place = self.page.locator(selector)
+        place.scroll_into_view_if_needed()
+        # Two frames: the browser has drawn what came into view.
+        self.page.evaluate("() => new Promise(r => requestAnimationFrame(() => "
+                           "requestAnimationFrame(r)))")  # fmt: skip
+        picture = base64.b64encode(place.screenshot()).decode()
+        found: dict[str, Any] = self.page.evaluate(COUNT, [picture, colours])
+        return found
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        missing("playwright is not installed: pip install 'truepose[dev]'")
+    if not Path(CHROMIUM).exists():
+        missing("chromium is not installed: apt-get install chromium")
+    with sync_playwright() as playwright:
+        context = playwright.chromium.launch_persistent_context(
+            tmp_path_factory.mktemp("profile"),
+            executable_path=CHROMIUM,
+            headless=True,
+            viewport={"width": 1200, "height": 900},
+            args=FLAGS,
+        )
+        yield context
+        context.close()
+
+
+def missing(what: str) -> None:
+    if os.environ.get("TRUEPOSE_CI"):
+        pytest.fail(what)
+    pytest.skip(what)
+
+
+def visit(browser: Any, file: Path) -> Visit:
+    page = browser.new_page()
+    seen = Visit(page)
+    page.on("request", lambda request: seen.requests.append(request.url))
+    page.on("pageerror", lambda error: seen.complaints.append(str(error)))
+    page.on(
+        "console",
+        lambda message: seen.complaints.append(message.text) if message.type == "error" else None,
+    )
+    page.goto(file.as_uri(), wait_until="load")
+    # Plotly draws in steps; a finished plot has its axes or its canvas.
+    page.wait_for_function(
+        "n => document.querySelectorAll('.plotly-graph-div .main-svg').length >= n",
+        arg=len(FIGURE_NAMES),
+    )
+    page.wait_for_timeout(1500)
+    return seen
+
+
+@pytest.fixture(scope="module", params=MACHINES_SHOWN)
+def report(
+    request: pytest.FixtureRequest, browser: Any, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Visit]:
+    file = tmp_path_factory.mktemp("report") / f"{request.param}.html"
+    assert run(["report", str(MACHINES / f"{request.param}.toml"), "--output", str(file)]) == 0
+    seen = visit(browser, file)
+    yield seen
+    seen.page.close()
+
+
+@pytest.mark.parametrize("name", FIGURE_NAMES)
+def test_a_figure_is_not_blank(name: str, report: Visit) -> None:
+    found = report.look(f"#figure-{name}", COLOURS.get(name, []))
+    assert found["marked"] > 0.005, found
+    assert found["colours"] >= 12, found
+    assert all(count > 60 for count in found["near"]), found
+
+
+def test_the_maps_differ_from_place_to_place(report: Visit) -> None:
+    found = report.look("#figure-workspace_maps", [])
+    assert found["colours"] > 100, "one colour from edge to edge"
+
+
+def test_nothing_was_asked_from_the_network_and_nothing_went_wrong(report: Visit) -> None:
+    outside = [url for url in report.requests if not url.startswith(("file:", "data:", "blob:"))]
+    assert outside == []
+    assert len([url for url in report.requests if url.startswith("file:")]) == 1
+    assert report.complaints == []
+
+
+def test_nothing_is_wider_than_the_page(report: Visit) -> None:
+    widths = report.page.evaluate(
+        "() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+    )
+    assert widths[0] <= widths[1]
+
+
+def test_a_blank_figure_would_be_seen(browser: Any, tmp_path: Path) -> None:
+    file = tmp_path / "blank.html"
+    file.write_text(
+        "<div id='blank' style='width:600px;height:300px;background:white'></div>"
+        "<div id='plain' style='width:600px;height:300px;background:#440154'></div>"
+        "<script src='https://example.invalid/a.js'></script><script>nothing()</script>"
+    )
+    page = browser.new_page()
+    seen = Visit(page)
+    page.on("request", lambda request: seen.requests.append(request.url))
+    page.on("pageerror", lambda error: seen.complaints.append(str(error)))
+    page.goto(file.as_uri())
+    assert seen.look("#blank", ["#0072B2"]) == {"marked": 0, "colours": 1, "near": [0]}
+    plain = seen.look("#plain", [])
+    assert (plain["marked"], plain["colours"]) == (1, 1)
+    assert "https://example.invalid/a.js" in seen.requests
+    assert any("nothing" in complaint for complaint in seen.complaints)
+    page.close()

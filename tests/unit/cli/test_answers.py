@@ -1,0 +1,98 @@
+"""Exit codes of the commands that answer, and what `check` says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truepose
+from command_line import MACHINES, PLANAR, call
+
+
+def overall_worst() -> float:
+    """What all sources can do to the planar machine's position, mm, from the results alone."""
+    found = truepose.budget(truepose.load(PLANAR))
+    bands = (found["worst"] - np.abs(found["error"])).sum("source")
+    worst = np.abs(found["overall_error"]) + bands
+    return float(np.sqrt((worst**2).sum("component")).max() * 1e3)
+
+
+def remaining() -> float:
+    """What compensation leaves of it, mm."""
+    found = truepose.compensate(truepose.load(PLANAR))
+    worst = np.maximum(found["bound"], np.abs(found["residual_lower"]))
+    worst = np.maximum(worst, np.abs(found["residual_upper"]))
+    return float(np.sqrt((worst**2).sum("component")).max() * 1e3)
+
+
+@pytest.mark.parametrize("command", ["check", "budget", "compensate"])
+@pytest.mark.parametrize("factor", [0.999, 1.001])
+def test_the_exit_code_turns_at_the_accuracy_asked(
+    command: str, factor: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    limit = remaining() if command == "compensate" else overall_worst()
+    asked = ["--set", f"accuracy.target={limit * factor!r} mm"]
+    required = [] if command == "check" else ["--require-accuracy"]
+    assert call(capsys, command, PLANAR, *asked, *required).code == int(factor < 1)
+    if required:
+        assert call(capsys, command, PLANAR, *asked).code == 0
+
+
+def test_check_answers_in_the_units_of_the_file(capsys: pytest.CaptureFixture[str]) -> None:
+    document = json.loads(call(capsys, "check", PLANAR, "--format", "json").out)
+    before, after = document["answers"]
+    assert before["highest"] == pytest.approx(overall_worst(), rel=1e-12)
+    assert after["highest"] == pytest.approx(remaining(), rel=1e-12)
+    assert (before["asked"], before["units"], before["met"]) == (0.5, "mm", False)
+    assert document["machine"]["characteristic_length"] == {
+        "value": pytest.approx(500),
+        "units": "mm",
+    }
+    thermal = next(source for source in document["sources"] if source["name"] == "thermal")
+    # 500 mm x 1.1e-5 1/K x 15 K
+    assert [each["shift"] for each in thermal["deviations"]] == pytest.approx([0.0825, 0.0825])
+
+
+def test_check_says_why_poses_are_left_out(capsys: pytest.CaptureFixture[str]) -> None:
+    setting = ["--set", "workspace.grid.x=[-100, 200, 3]"]
+    document = json.loads(call(capsys, "check", PLANAR, *setting, "--format", "json").out)
+    assert document["workspace"]["status"] == {"ok": 5, "unreachable": 10}
+    # The second guideway is at x = 600 mm and its strut 500 mm long: x = -100 is 200 mm too far.
+    (reason,) = document["workspace"]["reasons"]
+    assert (reason["what"], reason["name"], reason["count"]) == ("strut", "2", 10)
+    assert (reason["amount"], reason["unit"]) == (pytest.approx(200), "mm")
+    shown = call(capsys, "check", PLANAR, *setting).out
+    assert "strut 2: up to 200.000 mm too far to reach" in shown
+
+
+def test_check_of_poses_out_of_travel(capsys: pytest.CaptureFixture[str]) -> None:
+    setting = ["--set", "drive.d1.travel=[0, 700]"]
+    document = json.loads(call(capsys, "check", PLANAR, *setting, "--format", "json").out)
+    (reason,) = document["workspace"]["reasons"]
+    assert (reason["what"], reason["name"]) == ("travel", "d1")
+    # Carriage 1 stands highest at x = 200, y = 300: 300 + sqrt(500^2 - 200^2).
+    assert reason["amount"] == pytest.approx(300 + 210000**0.5 - 700)
+
+
+def test_every_machine_shipped_can_be_checked(capsys: pytest.CaptureFixture[str]) -> None:
+    for file in sorted(MACHINES.glob("*.toml")):
+        outcome = call(capsys, "check", file)
+        assert outcome.code in (0, 1), (file, outcome.err)
+        assert "worst conditioning" in outcome.out
+
+
+def test_no_accuracy_asked_is_no_failure(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    text = PLANAR.read_text()
+    head, _, tail = text.partition("[accuracy]")
+    assert tail.count("\n[") == 0
+    file = tmp_path / "machine.toml"
+    file.write_text(head)
+    for command in (["check"], ["budget", "--require-accuracy"]):
+        outcome = call(capsys, *command, file)
+        assert outcome.code == 0
+        assert "no accuracy asked" in outcome.out

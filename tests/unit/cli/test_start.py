@@ -1,0 +1,59 @@
+"""The registry of commands, and that nothing heavy is imported before it is needed."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from command_line import call
+from truepose.cli import COMMANDS
+
+HEAVY = ("numpy", "xarray", "pydantic", "pint", "plotly", "jinja2", "rich", "truepose._kernel")
+
+
+@pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in COMMANDS)])
+def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
+    program = (
+        "import sys; from truepose.cli import run; code = run(sys.argv[1:]); "
+        f"sys.exit(code or ','.join(name for name in {HEAVY} if name in sys.modules) or 0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Usage: truepose" in done.stdout
+
+
+def test_help_names_every_command_in_the_order_of_work(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = call(capsys, "--help").out
+    places = [shown.index(f"\n  {name} ") for name in COMMANDS]
+    assert places == sorted(places)
+    commands = shown.partition("Commands:")[2]
+    assert "..." not in commands, "a first sentence too long for the list of commands"
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    from truepose import __version__
+
+    assert call(capsys, "--version").out == f"truepose {__version__}\n"
+
+
+def test_a_command_that_is_not_there_is_told_with_the_nearest(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    outcome = call(capsys, "bugdet", "machine.toml")
+    assert outcome.code == 2
+    assert "No such command 'bugdet'. Did you mean 'budget'?" in outcome.err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["budget"], ["budget", "m.toml", "--format", "xml"], ["check", "m.toml", "--fromat", "json"]],
+)
+def test_wrong_usage_is_bad_input(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    outcome = call(capsys, *arguments)
+    assert outcome.code == 2
+    assert "Usage: truepose" in outcome.err
+    assert outcome.out == ""

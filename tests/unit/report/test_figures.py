@@ -1,0 +1,153 @@
+"""Every registered figure on every kind of machine: what is drawn is what the Datasets say."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from made_study import hexapod_study, planar_study
+from truepose.report import figures
+from truepose.report.figures import (
+    FIGURES,
+    _style,
+    draw,
+    machine_drawing,
+    overall_error,
+    ranking,
+    source_errors,
+    workspace_maps,
+)
+from truepose.report.study import Study
+
+STUDIES = {"planar": planar_study(), "hexapod": hexapod_study(3), "one pose": planar_study(1)}
+
+
+@pytest.fixture(params=STUDIES)
+def study(request: pytest.FixtureRequest) -> Study:
+    return STUDIES[request.param]
+
+
+def test_the_registry_holds_every_module_of_the_folder() -> None:
+    from importlib.resources import files
+
+    folder = files("truepose.report.figures")
+    modules = {
+        path.name.removesuffix(".py")
+        for path in folder.iterdir()
+        if path.name.endswith(".py") and not path.name.startswith("_")
+    }
+    assert {module.__name__.rpartition(".")[2] for module in FIGURES} == modules
+
+
+def test_every_figure_has_traces_a_title_and_a_caption(study: Study) -> None:
+    drawn = list(draw(study))
+    assert len(drawn) == len(FIGURES)
+    for each in drawn:
+        assert each.figure.data, each.name
+        assert each.title
+        assert each.caption.endswith(".")
+        assert each.figure.layout.height > 100
+
+
+def test_figures_of_the_compensation_need_one(study: Study) -> None:
+    names = {each.name for each in draw(Study(study.machine, study.budget))}
+    assert names == {module.__name__.rpartition(".")[2] for module in FIGURES} - {"before_after"}
+
+
+def trace(figure: go.Figure, name: str, nth: int = 0) -> go.Scatter:
+    return [each for each in figure.data if each.name == name][nth]
+
+
+def test_lines_are_the_errors_in_micrometres(study: Study) -> None:
+    for nth in range(len(study.components)):
+        upper = trace(source_errors.figure(study), "tolerance, upper", nth)
+        expected = study.budget["error_upper"].sel(source="tolerance").values[:, nth] * 1e6
+        np.testing.assert_allclose(upper.y, expected, rtol=1e-6)
+        lower = trace(overall_error.figure(study), "lower edges", nth)
+        expected = study.budget["overall_error_lower"].values[:, nth] * 1e6
+        np.testing.assert_allclose(lower.y, expected, rtol=1e-6)
+
+
+def test_bars_are_the_highest_with_the_largest_on_top(study: Study) -> None:
+    bars = ranking.figure(study).data[0]
+    assert list(bars.y) == ["elastic", "thermal", "tolerance"]
+    expected = study.budget["highest"].sel(quantity="position", source=list(bars.y)).values
+    np.testing.assert_allclose(bars.x, expected * 1e6, rtol=1e-6)
+
+
+def test_maps_share_one_colour_scale(study: Study) -> None:
+    figure = workspace_maps.figure(study)
+    size = np.linalg.norm(study.overall_worst[:, study.positions], axis=1).max() * 1e6
+    assert figure.layout.coloraxis.cmin == 0
+    assert figure.layout.coloraxis.cmax == pytest.approx(size)
+    for each in figure.data:
+        colours = each.coloraxis if each.type == "heatmap" else each.marker.coloraxis
+        assert colours == "coloraxis"
+    titles = [note.text for note in figure.layout.annotations]
+    assert titles == ["all sources", "after compensation", "tolerance", "thermal", "elastic"]
+
+
+def test_a_heat_map_has_each_value_at_its_place() -> None:
+    study = planar_study()
+    first = workspace_maps.figure(study).data[0]
+    size = np.linalg.norm(study.overall_worst, axis=1) * 1e6
+    for pose, expected in zip(study.poses, size, strict=True):
+        column = int(np.argmin(np.abs(first.x - pose[0] * 1e3)))
+        row = int(np.argmin(np.abs(first.y - pose[1] * 1e3)))
+        assert first.z[row, column] == pytest.approx(expected, rel=1e-6)
+
+
+def test_poses_that_differ_in_what_is_not_shown_give_the_largest() -> None:
+    study = hexapod_study(3)
+    twice = Study(study.machine, study.budget.isel(pose=np.repeat(np.arange(27), 2)))
+    turned = twice.budget["pose_a"].values.copy()
+    turned[1::2] = 0.1
+    twice.budget["pose_a"] = ("pose", turned)
+    figure = workspace_maps.figure(twice)
+    assert len(figure.data[0].x) == 27
+    assert "Over a the largest is shown." in workspace_maps.caption(twice)
+
+
+def test_the_drawing_joins_carriages_and_tool() -> None:
+    study = planar_study()
+    figure = machine_drawing.figure(study)
+    struts = trace(figure, "struts")
+    height = 200 + np.sqrt(500**2 - 300**2)
+    np.testing.assert_allclose(struts.x[[0, 1, 3, 4]], [0, 300, 600, 300], atol=1e-3)
+    np.testing.assert_allclose(struts.y[[0, 1, 3, 4]], [height, 200, height, 200], rtol=1e-6)
+    assert figure.layout.yaxis.scaleanchor == "x", "drawn to scale"
+    guideways = trace(figure, "travel of the drives")
+    assert (np.nanmin(guideways.y), np.nanmax(guideways.y)) == (0, 900)
+
+
+def test_the_drawing_of_a_body_has_its_platform_and_frame() -> None:
+    study = hexapod_study(3)
+    figure = machine_drawing.figure(study)
+    for name in ("platform", "frame"):
+        outline = trace(figure, name)
+        assert len(outline.x) == 7, "six corners, closed"
+        radius = np.hypot(outline.x, outline.y)
+        assert np.allclose(radius, radius[0])
+        turn = np.unwrap(np.arctan2(outline.y, outline.x))
+        assert abs(turn[-1] - turn[0]) == pytest.approx(2 * np.pi), "once round, no crossing"
+    assert figure.layout.scene.aspectmode == "data"
+
+
+def test_many_poses_are_thinned_and_the_largest_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_style, "MOST_DRAWN", 100)
+    study = planar_study(32)
+    worst = int(np.argmax(np.linalg.norm(study.overall_worst, axis=1)))
+    line = trace(source_errors.figure(study), "thermal")
+    assert len(line.x) <= 101
+    assert worst + 1 in line.x
+    assert "one in 11 of the 1,024 poses" in source_errors.caption(study)
+    assert "one in" not in source_errors.caption(planar_study())
+
+
+def test_values_are_kept_in_single_precision(study: Study) -> None:
+    for each in figures.draw(study):
+        for one in each.figure.data:
+            for values in (one.y, getattr(one, "z", None)):
+                if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+                    assert values.dtype == np.float32, (each.name, one.name)

@@ -1,0 +1,119 @@
+"""Tables and answers against the Datasets that they are made from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from made_study import hexapod_study, planar_study
+from truepose.report import accuracy, tables
+from truepose.report.display import column, number, pose_text, where_highest
+from truepose.report.study import Study
+
+STUDIES = {"planar": planar_study(), "hexapod": hexapod_study(3)}
+
+
+@pytest.fixture(params=STUDIES)
+def study(request: pytest.FixtureRequest) -> Study:
+    return STUDIES[request.param]
+
+
+def cell(text: str) -> float:
+    return float(text.replace("\N{MINUS SIGN}", "-"))
+
+
+def test_every_table_is_rectangular(study: Study) -> None:
+    found = [
+        tables.ranking(study),
+        tables.highest_absolute(study),
+        tables.highest_percent(study),
+        tables.compensation(study),
+        tables.poses_left_out(study),
+        tables.answers(accuracy.answers(study)),
+    ]
+    for table in found:
+        assert table is not None
+        assert table.rows
+        assert {len(row) for row in table.rows} == {len(table.header)}
+
+
+def test_the_ranking_is_by_rank_and_in_micrometres(study: Study) -> None:
+    table = tables.ranking(study)
+    assert [row[2] for row in table.rows] == ["1", "2", "3"]
+    at = table.header.index("highest position, µm")
+    for row in table.rows:
+        highest = float(study.budget["highest"].sel(source=row[0], quantity="position"))
+        assert cell(row[at]) == pytest.approx(highest * 1e6, abs=0.01)
+    shares = [cell(row[table.header.index("share, %")]) for row in table.rows]
+    assert sum(shares) == pytest.approx(100, abs=0.2)
+
+
+def test_a_source_with_a_band_has_two_rows_and_one_without_has_one(study: Study) -> None:
+    table = tables.highest_absolute(study)
+    assert [row[0] for row in table.rows] == [
+        "tolerance, lower", "tolerance, upper", "thermal", "elastic",
+        "overall, lower", "overall, upper",
+    ]  # fmt: skip
+    upper = study.budget["highest_upper"].sel(source="tolerance")
+    for name, text in zip(study.components, table.rows[1][1:], strict=True):
+        assert cell(text) == pytest.approx(float(upper.sel(component=name)) * 1e6, abs=0.01)
+
+
+def test_percentages_are_of_coordinates_only(study: Study) -> None:
+    names = [name.partition(",")[0] for name in tables.highest_percent(study).header[1:]]
+    assert names == [name for name in study.components if name in "xyz"]
+
+
+def test_the_compensation_has_before_and_after(study: Study) -> None:
+    rows = {row[0]: row[1:] for row in tables.compensation(study).rows}
+    residual = np.abs(study.compensated("residual_upper")).max(axis=0)
+    assert [cell(text) for text in rows["after, upper edges"][:-1]] == pytest.approx(
+        residual * 1e6, abs=0.01
+    )
+    assert {cell(text) for text in rows["after, shifts only"]} == {0.0}
+
+
+def test_all_sources_together_add_their_bands_and_not_their_shifts(study: Study) -> None:
+    # The made-up tolerance has no shift, the other two no band.
+    shift = study.values("error")[:, 1:].sum(axis=1)
+    band = study.values("worst")[:, 0]
+    np.testing.assert_allclose(study.overall_worst, np.abs(shift) + band, rtol=1e-12)
+
+
+def test_answers(study: Study) -> None:
+    position, *_ = found = accuracy.answers(study)
+    size = np.linalg.norm(study.overall_worst[:, study.positions], axis=1)
+    assert position.highest == size.max()
+    assert position.met is False
+    assert position.at == pose_text(study.poses[size.argmax()], study.machine.commanded)
+    assert accuracy.met(found, accuracy.BEFORE) is False
+    turning = [answer for answer in found if answer.quantity == "orientation"]
+    assert bool(turning) == bool(study.rotations)
+    assert all(answer.met is None for answer in turning), "no angle was asked for"
+
+
+def test_a_pose_that_cannot_be_compensated_is_missing_and_does_not_count() -> None:
+    study = planar_study()
+    assert study.compensation is not None
+    short = Study(study.machine, study.budget, study.compensation.isel(pose=slice(3, None)))
+    assert np.isnan(short.compensated("bound")[:3]).all()
+    np.testing.assert_array_equal(short.compensated("bound")[3:], study.compensated("bound")[3:])
+    answer = next(a for a in accuracy.answers(short) if a.state == accuracy.AFTER)
+    assert answer.highest == np.linalg.norm(study.compensated("bound")[3:], axis=1).max()
+    assert all("nan" not in text for row in tables.compensation(short).rows for text in row)
+
+
+def test_numbers() -> None:
+    assert number(-0.5, 2) == "\N{MINUS SIGN}0.50"
+    assert number(-0.0001, 2) == "0.00"
+    assert number(float("nan"), 2) == "–"
+    assert column([1234.5678, 0.001]) == ("1234.6", "0.0")
+    assert column([0.0]) == ("0.0",)
+    assert (
+        pose_text([-0.1, 0.2, -0.0], ["x", "z", "c"]) == "x \N{MINUS SIGN}100 mm, z 200 mm, c 0 °"
+    )
+
+
+def test_the_highest_is_the_first_of_equals() -> None:
+    assert where_highest([1.0, 2.0 * (1 - 1e-13), 2.0, np.nan]) == 1
+    assert where_highest([-3.0, -1.0, -1.0 + 1e-15]) == 1

@@ -1,0 +1,28 @@
+"""Every law runs for every machine file shipped, and for the awkward ones of the tests.
+
+A new file in machines/ or tests/machines/ is tested as it stands.
+"""
+
+from __future__ import annotations
+
+import pytest
+
+from build_machine import awkward_files, machine_files
+from machine_under_test import MachineUnderTest
+
+SHIPPED = [MachineUnderTest(path) for path in machine_files()]
+AWKWARD = [MachineUnderTest(path) for path in awkward_files()]
+
+
+@pytest.fixture(params=[*SHIPPED, *AWKWARD], ids=lambda machine: machine.path.stem)
+def machine(request: pytest.FixtureRequest) -> MachineUnderTest:
+    """One of the machines shipped, or an awkward one."""
+    found: MachineUnderTest = request.param
+    return found
+
+
+@pytest.fixture(params=SHIPPED, ids=lambda machine: machine.path.stem)
+def shipped(request: pytest.FixtureRequest) -> MachineUnderTest:
+    """One of the machines shipped."""
+    found: MachineUnderTest = request.param
+    return found

@@ -1,0 +1,30 @@
+"""Reading the validation cases and turning their conventions into the kernel's."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from reference_kinematics import angles_of, rotation_in_order
+
+CASES = Path(__file__).parent / "oracles" / "cases"
+
+
+def case(name: str) -> dict[str, Any]:
+    """The validation case in the file oracles/cases/<name>.json."""
+    found: dict[str, Any] = json.loads((CASES / f"{name}.json").read_text(encoding="utf-8"))
+    return found
+
+
+def pose(position: ArrayLike, rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(6,) pose x y z a b c, R = Rz(c) Ry(b) Rx(a), of a position and a rotation matrix."""
+    return np.concatenate([np.asarray(position, float), angles_of(rotation)])
+
+
+def pose_in_order(order: str, position: ArrayLike, angles: ArrayLike) -> NDArray[np.float64]:
+    """(6,) pose from angles (a, b, c), rad, that a source multiplies in another order ("xyz")."""
+    return pose(position, rotation_in_order(order, angles))

@@ -1,0 +1,119 @@
+"""D09, a 6-PSU walking machine tool: nominal against identified geometry, five commands (mm, rad).
+
+The references are an independent computation, and differences of Euler angles, R = Rx Ry Rz: they
+are turned into poses here, and into a small displacement where the kernel gives one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from build_machine import MACHINES, SPATIAL, Description, described, description_of
+from oracle_cases import case, pose_in_order
+from reference_kinematics import rotation_in_order, rotation_of, vector_of
+from truepose import _kernel
+
+CASE = case("d09_6psu_nominal_identified")
+COMMANDS = CASE["computed_reference"]["cases"]
+MM = 1e-3
+AGREES = 1e-9 * MM, 1e-11  # m, rad: the reference is printed in full
+
+
+def machine_description(data: dict[str, Any]) -> Description:
+    """The model |p + R a - b - q e| = l, with e made a unit vector as the reference does."""
+    drives = [
+        {
+            "kind": "slider",
+            "origin": (np.array(b) * MM).tolist(),
+            "axis": e,
+            "working_mode": "-",
+        }
+        for b, e in zip(data["b"], data["e"], strict=True)
+    ]
+    struts = [
+        {
+            "drive": f"d{i}",
+            "base": [0.0, 0.0, 0.0],
+            "platform": (np.array(a) * MM).tolist(),
+            "length": length * MM,
+        }
+        for i, (a, length) in enumerate(zip(data["a"], data["l"], strict=True), start=1)
+    ]
+    return described(SPATIAL, drives, struts)
+
+
+NOMINAL = _kernel.Machine(machine_description(CASE["nominal"]))
+IDENTIFIED = _kernel.Machine(machine_description(CASE["identified"]))
+
+
+def pose_of(values: list[float]) -> np.ndarray:
+    return pose_in_order("xyz", np.array(values[:3]) * MM, values[3:])
+
+
+def test_nominal_zero_pose_is_at_slide_zero() -> None:
+    assert np.abs(NOMINAL.inverse(np.zeros(6))).max() < 1e-3 * MM
+
+
+@pytest.mark.parametrize("one", COMMANDS, ids=lambda one: str(one["command_mm_rad"]))
+def test_actual_pose(one: dict[str, list[float]]) -> None:
+    command = pose_of(one["command_mm_rad"])
+    joints = NOMINAL.inverse(command)
+    assert np.abs(joints - np.array(one["q_nominal"]) * MM).max() < AGREES[0]
+
+    actual = IDENTIFIED.forward(joints, command)
+    expected = pose_of(one["actual_mm_rad"])
+    assert np.abs(actual[:3] - expected[:3]).max() < AGREES[0]
+    assert np.abs(rotation_of(actual[3:]) - rotation_of(expected[3:])).max() < AGREES[1]
+    # And the case's own way of writing the error, to the six digits it gives.
+    difference = (np.array(one["actual_mm_rad"]) - one["command_mm_rad"]) * [1, 1, 1, 1e3, 1e3, 1e3]
+    assert np.abs(difference - one["error_mm_mrad"]).max() < 1e-6
+
+
+def deviations() -> dict[str, float]:
+    """Identified minus nominal in the kernel's parameters.
+
+    The nominal axis is z, whose two tangents are x and y; e = (ex, ey, 1) tilts by ex and ey.
+    """
+    nominal, identified = CASE["nominal"], CASE["identified"]
+    moved: dict[str, float] = {}
+    for i in range(6):
+        for k, name in enumerate("xyz"):
+            moved[f"strut.{i + 1}.platform.{name}"] = (
+                identified["a"][i][k] - nominal["a"][i][k]
+            ) * MM
+            moved[f"drive.d{i + 1}.origin.{name}"] = (
+                identified["b"][i][k] - nominal["b"][i][k]
+            ) * MM
+        moved[f"strut.{i + 1}.length"] = (identified["l"][i] - nominal["l"][i]) * MM
+        moved[f"drive.d{i + 1}.axis.u"] = identified["e"][i][0]
+        moved[f"drive.d{i + 1}.axis.v"] = identified["e"][i][1]
+    return moved
+
+
+def test_displacement_by_the_deviations() -> None:
+    moved = deviations()
+    columns = np.array([NOMINAL.parameters.index(name) for name in moved])
+    commands = np.array([pose_of(one["command_mm_rad"]) for one in COMMANDS])
+    joints, placements, _ = NOMINAL.place(commands)
+
+    errors, status = NOMINAL.displacement(
+        joints, placements, columns, np.array([[*moved.values()]])
+    )
+
+    assert [_kernel.STATUS[code] for code in status] == ["ok"] * len(COMMANDS)
+    for found, one in zip(errors, COMMANDS, strict=True):
+        command, actual = np.array(one["command_mm_rad"]), np.array(one["actual_mm_rad"])
+        turned = rotation_in_order("xyz", actual[3:]) @ rotation_in_order("xyz", command[3:]).T
+        assert np.abs(found[:3] - (actual[:3] - command[:3]) * MM).max() < AGREES[0]
+        assert np.abs(found[3:] - vector_of(turned)).max() < AGREES[1]
+
+
+def test_the_shipped_machine_is_this_one() -> None:
+    shipped = _kernel.Machine(description_of(MACHINES / "walking_6psu.toml"))
+    assert shipped.parameters == NOMINAL.parameters
+    assert np.abs(shipped.nominal - NOMINAL.nominal).max() < 1e-15
+    command = pose_of(COMMANDS[1]["command_mm_rad"])
+    assert np.abs(shipped.inverse(command) - NOMINAL.inverse(command)).max() < 1e-15

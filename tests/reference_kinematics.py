@@ -1,0 +1,238 @@
+"""A machine's kinematics in plain NumPy and SciPy: the second road of the tests.
+
+Nothing here is shared with the kernel. It takes the same description (tests/build_machine.py),
+writes the strut's closure by its formula, finds the inverse in closed form, or by MINPACK where the
+platform has parasitic freedoms, and the forward solution by MINPACK with a numerical Jacobian. Slow
+and plain. All in SI and the base frame, R = Rz(c) Ry(b) Rx(a).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import fsolve  # type: ignore[import-untyped]
+
+Vector = NDArray[np.float64]
+
+POSITION = ("x", "y", "z")
+ANGLES = ("a", "b", "c")
+# Far below every tolerance asked of the kernel, well above what rounding leaves of a metre.
+CLOSED = 1e-11
+
+
+def rotation_of(angles: ArrayLike) -> Vector:
+    """(3, 3) rotation Rz(c) Ry(b) Rx(a) of angles (a, b, c), rad."""
+    (a, b, c) = np.asarray(angles, float)
+    ca, sa, cb, sb, cc, sc = np.cos(a), np.sin(a), np.cos(b), np.sin(b), np.cos(c), np.sin(c)
+    about_x = np.array([[1, 0, 0], [0, ca, -sa], [0, sa, ca]])
+    about_y = np.array([[cb, 0, sb], [0, 1, 0], [-sb, 0, cb]])
+    about_z = np.array([[cc, -sc, 0], [sc, cc, 0], [0, 0, 1]])
+    return about_z @ about_y @ about_x
+
+
+def rotation_in_order(order: str, angles: ArrayLike) -> Vector:
+    """(3, 3) product of turns about the axes named, left to right: "xyz" is Rx(a) Ry(b) Rz(c).
+
+    `angles` is always (a, b, c), rad: about x, about y, about z.
+    """
+    unit = np.eye(3)
+    given = dict(zip("xyz", np.asarray(angles, float), strict=True))
+    result = np.eye(3)
+    for name in order:
+        result = result @ turned_about(unit["xyz".index(name)], given[name])
+    return result
+
+
+def angles_of(rotation: Vector) -> Vector:
+    """(3,) angles (a, b, c), rad, with rotation = Rz(c) Ry(b) Rx(a) and b within a quarter turn."""
+    return np.array(
+        [
+            math.atan2(rotation[2, 1], rotation[2, 2]),
+            math.atan2(-rotation[2, 0], math.hypot(rotation[0, 0], rotation[1, 0])),
+            math.atan2(rotation[1, 0], rotation[0, 0]),
+        ]
+    )
+
+
+def rotation_of_quaternion(quaternion: ArrayLike) -> NDArray[np.float64]:
+    """(3, 3) rotation of the unit quaternion w x y z."""
+    (w, x, y, z) = np.asarray(quaternion, float)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def turned_about(axis: ArrayLike, angle: float) -> Vector:
+    """(3, 3) rotation by `angle`, rad, about the unit vector `axis` (Rodrigues)."""
+    (x, y, z) = np.asarray(axis, float)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * (cross @ cross)
+
+
+def rotation_by_vector(vector: ArrayLike) -> Vector:
+    """(3, 3) rotation of the rotation vector (3,), rad."""
+    turn = np.asarray(vector, float)
+    angle = float(np.linalg.norm(turn))
+    return turned_about(turn / angle, angle) if angle > 0 else np.eye(3)
+
+
+def vector_of(rotation: Vector) -> Vector:
+    """(3,) rotation vector, rad, of a rotation matrix that turns by less than half a turn."""
+    twice_sine = np.array(
+        [
+            rotation[2, 1] - rotation[1, 2],
+            rotation[0, 2] - rotation[2, 0],
+            rotation[1, 0] - rotation[0, 1],
+        ]
+    )
+    sine = float(np.linalg.norm(twice_sine)) / 2
+    angle = math.atan2(sine, (float(np.trace(rotation)) - 1) / 2)
+    return twice_sine / 2 * (angle / sine if sine > 0 else 1.0)
+
+
+class Reference:
+    """The machine of a description, with its struts' closures written out."""
+
+    def __init__(self, description: Mapping[str, Any]) -> None:
+        self.dof: list[str] = list(description["dof"])
+        self.commanded: list[str] = list(description["commanded"])
+        self.parasitic = [name for name in self.dof if name not in self.commanded]
+        self.home = dict.fromkeys((*POSITION, *ANGLES), 0.0) | dict(description["home"])
+        self.tool = np.array(description["tool"], float)
+        self.drives: list[dict[str, Any]] = list(description["drives"])
+        self.struts: list[dict[str, Any]] = list(description["struts"])
+        self.index = {drive["name"]: i for i, drive in enumerate(self.drives)}
+
+    def placement(self, names: Sequence[str], values: ArrayLike) -> tuple[Vector, Vector]:
+        """Tool point (3,) and rotation (3, 3); freedoms not named in `names` are at home."""
+        pose = self.home | dict(zip(names, np.asarray(values, float), strict=True))
+        return np.array([pose[n] for n in POSITION]), rotation_of([pose[n] for n in ANGLES])
+
+    def base_joint(self, strut: Mapping[str, Any], joints: Vector) -> Vector:
+        """Base-side joint centre (3,) of a strut, m."""
+        base = np.array(strut["base"], float)
+        if strut["drive"] is None:
+            return base
+        i = self.index[strut["drive"]]
+        drive = self.drives[i]
+        if drive["kind"] == "telescopic":
+            return base
+        axis = np.array(drive["axis"], float) / np.linalg.norm(drive["axis"])
+        origin = np.array(drive.get("origin", [0.0, 0.0, 0.0]), float)
+        moved = drive.get("scale", 1.0) * joints[i] + drive.get("offset", 0.0)
+        if drive["kind"] == "slider":
+            return np.asarray(origin + base + moved * axis)
+        return np.asarray(origin + turned_about(axis, moved) @ base)
+
+    def platform_joint(self, strut: Mapping[str, Any], point: Vector, rotation: Vector) -> Vector:
+        """Platform-side joint centre (3,) of a strut, base frame, m."""
+        return np.asarray(point + rotation @ (np.array(strut["platform"], float) - self.tool))
+
+    def length(self, strut: Mapping[str, Any], joints: Vector) -> float:
+        """The length that a strut closes at, m."""
+        if strut["length"] is not None:
+            return float(strut["length"])
+        drive = self.drives[self.index[strut["drive"]]]
+        coordinate = joints[self.index[strut["drive"]]]
+        return float(drive.get("scale", 1.0) * coordinate + drive.get("offset", 0.0))
+
+    def closures(self, joints: Vector, point: Vector, rotation: Vector) -> Vector:
+        """(n_strut,) distance between each strut's joint centres less its length, m."""
+        return np.array(
+            [
+                np.linalg.norm(
+                    self.platform_joint(strut, point, rotation) - self.base_joint(strut, joints)
+                )
+                - self.length(strut, joints)
+                for strut in self.struts
+            ]
+        )
+
+    def roots(self, drive: Mapping[str, Any], point: Vector, rotation: Vector) -> list[float]:
+        """Joint coordinates [in working mode "-", in "+"] that close a drive's first strut.
+
+        One value only for a telescopic drive, none where the strut cannot reach.
+        """
+        strut = next(s for s in self.struts if s["drive"] == drive["name"])
+        platform, base = self.platform_joint(strut, point, rotation), np.array(strut["base"], float)
+        scale, offset = drive.get("scale", 1.0), drive.get("offset", 0.0)
+        if drive["kind"] == "telescopic":
+            return [(float(np.linalg.norm(platform - base)) - offset) / scale]
+        axis = np.array(drive["axis"], float) / np.linalg.norm(drive["axis"])
+        span = platform - np.array(drive.get("origin", [0.0, 0.0, 0.0]), float)
+        if drive["kind"] == "slider":
+            span = span - base
+            along = float(span @ axis)
+            under = strut["length"] ** 2 - span @ span + along**2
+            if under < 0:
+                return []
+            moved = [along - math.sqrt(under), along + math.sqrt(under)]
+        else:
+            arm, reach = base - (base @ axis) * axis, span - (span @ axis) * axis
+            cosine = (span @ span + base @ base - strut["length"] ** 2) / 2
+            cosine = (cosine - (span @ axis) * (base @ axis)) / (
+                np.linalg.norm(arm) * np.linalg.norm(reach)
+            )
+            if abs(cosine) > 1:
+                return []
+            towards = math.atan2(float(np.cross(arm, reach) @ axis), float(arm @ reach))
+            moved = [towards - math.acos(cosine), towards + math.acos(cosine)]
+        return [(value - offset) / scale for value in moved]
+
+    def inverse(self, pose: ArrayLike) -> tuple[Vector, Vector, Vector]:
+        """Joints (n_drive,), tool point (3,) and rotation (3, 3) of a commanded pose.
+
+        Raises ValueError where a strut cannot reach. Parasitic freedoms start at home.
+        """
+        point, rotation = self.placement(self.commanded, pose)
+        joints = []
+        for drive in self.drives:
+            roots = self.roots(drive, point, rotation)
+            if not roots:
+                raise ValueError(f"drive {drive['name']} does not reach {pose}")
+            joints.append(roots[0] if drive["working_mode"] == "-" else roots[-1])
+        if not self.parasitic:
+            return np.array(joints), point, rotation
+
+        def closures(unknown: Vector) -> Vector:
+            found = self._with_parasitic(pose, unknown[len(self.drives) :])
+            return self.closures(unknown[: len(self.drives)], *found)
+
+        start = np.concatenate([joints, [self.home[name] for name in self.parasitic]])
+        solved = self._solved(closures, start)
+        return solved[: len(joints)], *self._with_parasitic(pose, solved[len(joints) :])
+
+    def forward(self, joints: ArrayLike, point: Vector, rotation: Vector) -> tuple[Vector, Vector]:
+        """Tool point (3,) and rotation (3, 3) that close at `joints`, near the placement given."""
+        coordinates = np.asarray(joints, float)
+        moves = [i for i, name in enumerate((*POSITION, *ANGLES)) if name in self.dof]
+
+        def placed(small: Vector) -> tuple[Vector, Vector]:
+            whole = np.zeros(6)
+            whole[moves] = small
+            return point + whole[:3], rotation_by_vector(whole[3:]) @ rotation
+
+        solved = self._solved(
+            lambda s: self.closures(coordinates, *placed(s)), np.zeros(len(moves))
+        )
+        return placed(solved)
+
+    def _with_parasitic(self, pose: ArrayLike, parasitic: Vector) -> tuple[Vector, Vector]:
+        names = [*self.commanded, *self.parasitic]
+        return self.placement(names, np.concatenate([np.asarray(pose, float), parasitic]))
+
+    @staticmethod
+    def _solved(closures: Any, start: Vector) -> Vector:
+        solved, found, _, message = fsolve(closures, start, xtol=1e-14, full_output=True)
+        # MINPACK calls "no further progress" a failure even where it stands on the root.
+        if np.abs(found["fvec"]).max() > CLOSED:
+            raise ValueError(f"the reference found no root: {message}")
+        return np.asarray(solved)

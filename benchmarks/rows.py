@@ -1,0 +1,44 @@
+"""What a benchmark is and what it reports.
+
+Imports nothing heavy: a child's peak memory starts from that of the runner.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """A module of this package by its name, and how many cores it may use."""
+
+    name: str
+    cores: int = 1
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the results: a figure, what was asked of it, and the times behind it."""
+
+    what: str
+    measured: float
+    unit: str  # "x" for a ratio
+    bound: Literal["at least", "at most"]
+    asked: float | None  # None: told for orientation
+    detail: str
+
+    @property
+    def met(self) -> bool:
+        """Whether the figure is as good as was asked; always so where nothing was asked."""
+        if self.asked is None:
+            return True
+        if self.bound == "at least":
+            return self.measured >= self.asked
+        return self.measured <= self.asked
+
+    def cells(self) -> tuple[str, str, str, str, str]:
+        """What, measured, asked, met or missed, and the times behind it, as text."""
+        asked = "" if self.asked is None else f"{self.bound} {self.asked:g} {self.unit}"
+        verdict = "" if self.asked is None else ("met" if self.met else "**missed**")
+        return (self.what, f"{self.measured:.3g} {self.unit}", asked, verdict, self.detail)

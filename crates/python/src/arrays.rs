@@ -6,6 +6,9 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use truepose_kernel::batch::Rows;
 
+/// An array of results.
+pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+
 /// An array of rows: any leading shape, a fixed last dimension.
 pub struct Input<'py> {
     array: PyReadonlyArrayDyn<'py, f64>,

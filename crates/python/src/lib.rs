@@ -3,6 +3,7 @@
 mod arrays;
 mod description;
 mod elements;
+mod evaluate;
 mod failure;
 mod machine;
 mod toml_lines;

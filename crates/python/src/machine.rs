@@ -1,331 +1,41 @@
 //! The machine as a Python class.
 
-use crate::arrays::{Input, output};
+use crate::arrays::{Array, Input, output};
 use crate::description::description;
-use crate::failure::{KernelError, kernel_error, pose_error};
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
+use crate::evaluate::{BLOCK, Quantity, codes, in_blocks, part, write_coordinates};
+use crate::failure::{KernelError, kernel_error};
+use numpy::{PyArray1, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 use std::collections::BTreeMap;
 use truepose_kernel::Status;
-use truepose_kernel::batch::{self, Deviations, FirstOrder, Rows, Samples};
+use truepose_kernel::batch::{self, Deviations, Rows, Samples};
 use truepose_kernel::kinematics::{self, Obstacle};
 use truepose_kernel::machine::{COMPONENTS, FREEDOMS, chosen};
 use truepose_kernel::spatial::{Pose, rotate, rotation_matrix};
 
-/// Samples between two looks at Ctrl-C.
-const BLOCK: usize = 65_536;
-
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
-
 /// A parallel kinematic machine: immutable, picklable. SI units and radians throughout.
 #[pyclass(frozen, module = "truepose._kernel", name = "Machine")]
 pub struct Machine {
-    machine: truepose_kernel::Machine,
+    pub inner: truepose_kernel::Machine,
     description: Py<PyDict>,
     replaced: BTreeMap<usize, f64>,
-}
-
-/// Joints and poses of commands, with their status.
-struct Placed {
-    joints: Vec<f64>,
-    poses: Vec<f64>,
-    status: Vec<Status>,
-}
-
-/// Calls `work(first, size)` for blocks of samples without the GIL, looking at Ctrl-C in between.
-fn in_blocks(
-    py: Python<'_>,
-    count: usize,
-    mut work: impl FnMut(usize, usize) + Send,
-) -> PyResult<()> {
-    let mut first = 0;
-    while first < count {
-        let size = BLOCK.min(count - first);
-        py.detach(|| work(first, size));
-        first += size;
-        if first < count {
-            py.check_signals()?;
-        }
-    }
-    Ok(())
-}
-
-fn codes<'py>(
-    py: Python<'py>,
-    leading: &[usize],
-    status: &[Status],
-) -> PyResult<Bound<'py, PyAny>> {
-    let numbers: Vec<u8> = status.iter().map(|&status| status as u8).collect();
-    PyArray1::from_vec(py, numbers)
-        .into_any()
-        .call_method1("reshape", (PyTuple::new(py, leading)?,))
 }
 
 fn names(flags: &[bool; 6], all: [&'static str; 6]) -> Vec<&'static str> {
     chosen(flags).into_iter().map(|k| all[k]).collect()
 }
-
 impl Machine {
     fn build(table: &Bound<'_, PyDict>, replaced: BTreeMap<usize, f64>) -> PyResult<Self> {
         let machine = truepose_kernel::Machine::new(&description(table)?).map_err(kernel_error)?;
         let values: Vec<(usize, f64)> =
             replaced.iter().map(|(&index, &value)| (index, value)).collect();
         Ok(Machine {
-            machine: machine.with_values(&values),
+            inner: machine.with_values(&values),
             description: table.copy()?.unbind(),
             replaced,
         })
-    }
-
-    fn components(&self) -> usize {
-        self.machine.dof_count()
-    }
-
-    fn columns(&self, columns: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
-        let columns: Vec<usize> =
-            columns.try_iter()?.map(|item| item?.extract()).collect::<PyResult<_>>()?;
-        match columns.iter().find(|&&column| column >= self.machine.nominal.len()) {
-            Some(column) => {
-                let message = format!(
-                    "parameter {column} does not exist: there are {}",
-                    self.machine.nominal.len()
-                );
-                Err(PyIndexError::new_err(message))
-            }
-            None => Ok(columns),
-        }
-    }
-
-    /// Joints, poses and status of all commands, for deviated parameters.
-    fn placed(
-        &self,
-        py: Python<'_>,
-        commands: &Input<'_>,
-        deviation: Option<(&[usize], &Input<'_>)>,
-    ) -> PyResult<Placed> {
-        let (count, width) = (commands.count, self.machine.drives.len());
-        let mut placed = Placed {
-            joints: vec![0.0; count * width],
-            poses: vec![0.0; count * 7],
-            status: vec![Status::Ok; count],
-        };
-        let values = deviation.map(|(_, values)| values.serves(count, "values")).transpose()?;
-        let data = commands.data();
-        let inner = deviation.map(|(columns, values)| (columns, values.data(), values.width));
-        let (machine, step) = (&self.machine, commands.width);
-        in_blocks(py, count, |first, size| {
-            let deviations = match inner {
-                Some((columns, data, width)) => {
-                    Deviations { columns, values: part(data, width, first, values == Some(true)) }
-                }
-                None => Deviations::NONE,
-            };
-            batch::inverses(
-                machine,
-                &Rows::each(&data[first * step..], step),
-                &deviations,
-                &mut placed.joints[first * width..(first + size) * width],
-                &mut placed.poses[first * 7..(first + size) * 7],
-                &mut placed.status[first..first + size],
-            );
-        })?;
-        Ok(placed)
-    }
-
-    fn commands<'py>(&self, poses: &Bound<'py, PyAny>) -> PyResult<Input<'py>> {
-        Input::new(poses, &[self.machine.commanded_count()], "poses")
-    }
-
-    /// One first-order quantity at samples that close the struts.
-    fn quantity<'py, 'a>(
-        &self,
-        py: Python<'py>,
-        at: At<'_>,
-        leading: &[usize],
-        further: &[usize],
-        quantity: impl Fn(usize) -> Quantity<'a>,
-    ) -> PyResult<(Array<'py>, Vec<Status>)> {
-        let out = output(py, leading, further)?;
-        let width: usize = further.iter().product();
-        let mut status = vec![Status::Ok; at.count];
-        {
-            let mut writable = out.readwrite();
-            let data = writable.as_slice_mut()?;
-            let mut first = 0;
-            while first < at.count {
-                let size = BLOCK.min(at.count - first);
-                let samples = Samples {
-                    count: size,
-                    joints: part(at.joints, self.machine.drives.len(), first, at.shared_joints),
-                    poses: part(at.poses, 7, first, at.shared_poses),
-                    deviations: Deviations::NONE,
-                };
-                let quantity = quantity(first);
-                let out = &mut data[first * width..(first + size) * width];
-                let status = &mut status[first..first + size];
-                let machine = &self.machine;
-                py.detach(|| quantity.compute(machine, &samples, out, status));
-                first += size;
-                py.check_signals()?;
-            }
-        }
-        Ok((out, status))
-    }
-
-    /// A public first-order call: inverse kinematics, then the quantity, then one error or status.
-    fn at_commands<'py, 'a>(
-        &self,
-        py: Python<'py>,
-        commands: &Input<'py>,
-        want_status: bool,
-        further: &[usize],
-        quantity: impl Fn(usize) -> Quantity<'a>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let placed = self.placed(py, commands, None)?;
-        let at = At {
-            count: commands.count,
-            joints: &placed.joints,
-            poses: &placed.poses,
-            shared_joints: false,
-            shared_poses: false,
-        };
-        let (out, mut status) = self.quantity(py, at, &commands.leading, further, quantity)?;
-        for (status, &inverse) in status.iter_mut().zip(&placed.status) {
-            // Out of travel is the least that can be wrong with a pose.
-            if !inverse.is_solved() || *status == Status::Ok {
-                *status = inverse;
-            }
-        }
-        self.answer(py, out, &commands.leading, &status, want_status, Some(commands))
-    }
-
-    /// The result with its status, or one error for all failing poses.
-    fn answer<'py>(
-        &self,
-        py: Python<'py>,
-        result: Array<'py>,
-        leading: &[usize],
-        status: &[Status],
-        want_status: bool,
-        commands: Option<&Input<'_>>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        if want_status {
-            return (result, codes(py, leading, status)?).into_bound_py_any(py);
-        }
-        match status.iter().position(|&status| status != Status::Ok) {
-            None => Ok(result.into_any()),
-            Some(index) => {
-                let count = status.iter().filter(|&&status| status != Status::Ok).count();
-                let reason = match commands {
-                    Some(commands) => {
-                        let width = commands.width;
-                        self.reason(
-                            &commands.data()[index * width..(index + 1) * width],
-                            status[index],
-                        )
-                    }
-                    None => plain_reason(status[index]).to_owned(),
-                };
-                Err(pose_error(py, count, index, status[index].name(), reason))
-            }
-        }
-    }
-
-    fn reason(&self, command: &[f64], status: Status) -> String {
-        let machine = &self.machine;
-        let pose = kinematics::commanded_pose(machine, command);
-        let parts: Vec<String> = kinematics::obstacles(machine, &machine.nominal, &pose)
-            .into_iter()
-            .map(|obstacle| match obstacle {
-                Obstacle::Strut(i, amount) => {
-                    let word = if amount > 0.0 { "short" } else { "long" };
-                    let name = &machine.struts[i].name;
-                    format!("strut {name} is {:.6} mm too {word}", 1e3 * amount.abs())
-                }
-                Obstacle::Travel(i, amount) => {
-                    let drive = &machine.drives[i];
-                    let word = if amount > 0.0 { "above" } else { "below" };
-                    let angle = drive.kind.table().coordinate.unit() == "rad";
-                    let (amount, unit) = if angle {
-                        (amount.abs().to_degrees(), "deg")
-                    } else {
-                        (1e3 * amount.abs(), "mm")
-                    };
-                    format!("drive {} is {amount:.6} {unit} {word} its travel", drive.name)
-                }
-                Obstacle::Singular(index) => {
-                    format!("smallest over largest singular value is {index:.1e}, below 1e-6")
-                }
-            })
-            .collect();
-        if parts.is_empty() { plain_reason(status).to_owned() } else { parts.join("; ") }
-    }
-}
-
-fn plain_reason(status: Status) -> &'static str {
-    match status {
-        Status::Ok => "nothing is wrong",
-        Status::OutOfTravel => "a joint is outside its travel",
-        Status::Unreachable => "a strut does not reach",
-        Status::Singular => "the platform is not held: the closures are dependent",
-        Status::NotConverged => "no pose closes the struts near the start",
-        Status::BranchLost => "the struts close only beyond a singular pose",
-    }
-}
-
-/// Rows of `data` from sample `first` on, or its one row for all.
-fn part(data: &[f64], width: usize, first: usize, shared: bool) -> Rows<'_> {
-    if shared { Rows::shared(&data[..width]) } else { Rows::each(&data[first * width..], width) }
-}
-
-/// Samples that close the struts.
-#[derive(Clone, Copy)]
-struct At<'a> {
-    count: usize,
-    joints: &'a [f64],
-    poses: &'a [f64],
-    shared_joints: bool,
-    shared_poses: bool,
-}
-
-/// Any of the kernel's first-order quantities.
-enum Quantity<'a> {
-    Sensitivity(batch::Sensitivity<'a>),
-    JointJacobian(batch::JointJacobian),
-    Forces(batch::Forces<'a>),
-    Loads(batch::Loads<'a>),
-    Compliance(batch::Compliance<'a>),
-    Stiffness(batch::Stiffness<'a>),
-}
-
-impl Quantity<'_> {
-    fn compute(
-        &self,
-        machine: &truepose_kernel::Machine,
-        samples: &Samples<'_>,
-        out: &mut [f64],
-        status: &mut [Status],
-    ) {
-        fn run(
-            quantity: &impl FirstOrder,
-            machine: &truepose_kernel::Machine,
-            samples: &Samples<'_>,
-            out: &mut [f64],
-            status: &mut [Status],
-        ) {
-            batch::first_order(machine, samples, quantity, out, status);
-        }
-        match self {
-            Quantity::Sensitivity(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::JointJacobian(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Forces(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Loads(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Compliance(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Stiffness(quantity) => run(quantity, machine, samples, out, status),
-        }
     }
 }
 
@@ -350,62 +60,59 @@ impl Machine {
 
     #[getter]
     fn dof<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, names(&self.machine.dof, FREEDOMS))
+        PyTuple::new(py, names(&self.inner.dof, FREEDOMS))
     }
     #[getter]
     fn commanded<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, names(&self.machine.commanded, FREEDOMS))
+        PyTuple::new(py, names(&self.inner.commanded, FREEDOMS))
     }
     #[getter(components)]
     fn component_names<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, names(&self.machine.dof, COMPONENTS))
+        PyTuple::new(py, names(&self.inner.dof, COMPONENTS))
     }
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, self.machine.drives.iter().map(|drive| &drive.name))
+        PyTuple::new(py, self.inner.drives.iter().map(|drive| &drive.name))
     }
     #[getter]
     fn closures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, self.machine.struts.iter().map(|strut| &strut.name))
+        PyTuple::new(py, self.inner.struts.iter().map(|strut| &strut.name))
     }
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, self.machine.parameters.iter().map(|parameter| &parameter.name))
+        PyTuple::new(py, self.inner.parameters.iter().map(|parameter| &parameter.name))
     }
     #[getter]
     fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, self.machine.parameters.iter().map(|parameter| parameter.unit))
+        PyTuple::new(py, self.inner.parameters.iter().map(|parameter| parameter.unit))
     }
     #[getter]
     fn nominal<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        PyArray1::from_slice(py, &self.machine.nominal)
+        PyArray1::from_slice(py, &self.inner.nominal)
     }
     #[getter]
     fn characteristic_length(&self) -> f64 {
-        self.machine.characteristic_length
+        self.inner.characteristic_length
     }
     #[getter]
     fn home<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        let coordinates = self.machine.home.to_coordinates();
-        PyArray1::from_iter(py, chosen(&self.machine.dof).into_iter().map(|k| coordinates[k]))
+        let coordinates = self.inner.home.to_coordinates();
+        PyArray1::from_iter(py, chosen(&self.inner.dof).into_iter().map(|k| coordinates[k]))
     }
     #[getter]
     fn length_parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        PyArray1::from_iter(
-            py,
-            self.machine.struts.iter().map(|strut| strut.length_parameter as i64),
-        )
+        PyArray1::from_iter(py, self.inner.struts.iter().map(|strut| strut.length_parameter as i64))
     }
     #[getter]
     fn working_modes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let word = |mode: f64| if mode < 0.0 { "-" } else { "+" };
-        PyTuple::new(py, self.machine.drives.iter().map(|drive| word(drive.mode)))
+        PyTuple::new(py, self.inner.drives.iter().map(|drive| word(drive.mode)))
     }
 
     fn replace(&self, py: Python<'_>, values: BTreeMap<String, f64>) -> PyResult<Self> {
         let mut replaced = self.replaced.clone();
         for (name, value) in values {
-            let found = self.machine.parameters.iter().position(|parameter| parameter.name == name);
+            let found = self.inner.parameters.iter().position(|parameter| parameter.name == name);
             let refused = |code, message| Err(KernelError::new_err((code, message, name.clone())));
             match found {
                 None => {
@@ -432,7 +139,7 @@ impl Machine {
     ) -> PyResult<Bound<'py, PyAny>> {
         let commands = self.commands(poses)?;
         let placed = self.placed(py, &commands, None)?;
-        let out = output(py, &commands.leading, &[self.machine.drives.len()])?;
+        let out = output(py, &commands.leading, &[self.inner.drives.len()])?;
         out.readwrite().as_slice_mut()?.copy_from_slice(&placed.joints);
         self.answer(py, out, &commands.leading, &placed.status, status, Some(&commands))
     }
@@ -446,7 +153,7 @@ impl Machine {
         start: Option<&Bound<'py, PyAny>>,
         status: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let machine = &self.machine;
+        let machine = &self.inner;
         let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
         let count = joints.count;
         let (starts, shared) = match start {
@@ -502,11 +209,11 @@ impl Machine {
         poses: &Bound<'py, PyAny>,
         status: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let count = self.machine.nominal.len();
+        let count = self.inner.nominal.len();
         let columns: Vec<usize> = (0..count).collect();
         let further = [self.components(), count];
         self.at_commands(py, &self.commands(poses)?, status, &further, |_| {
-            Quantity::Sensitivity(batch::Sensitivity::new(&self.machine, &columns))
+            Quantity::Sensitivity(batch::Sensitivity::new(&self.inner, &columns))
         })
     }
 
@@ -518,9 +225,9 @@ impl Machine {
         poses: &Bound<'py, PyAny>,
         status: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let further = [self.components(), self.machine.drives.len()];
+        let further = [self.components(), self.inner.drives.len()];
         self.at_commands(py, &self.commands(poses)?, status, &further, |_| {
-            Quantity::JointJacobian(batch::JointJacobian::new(&self.machine))
+            Quantity::JointJacobian(batch::JointJacobian::new(&self.inner))
         })
     }
 
@@ -538,7 +245,7 @@ impl Machine {
         {
             let mut writable = out.readwrite();
             let data = writable.as_slice_mut()?;
-            let (machine, width) = (&self.machine, self.machine.drives.len());
+            let (machine, width) = (&self.inner, self.inner.drives.len());
             in_blocks(py, commands.count, |first, size| {
                 for i in first..first + size {
                     let joints = &placed.joints[i * width..(i + 1) * width];
@@ -566,9 +273,9 @@ impl Machine {
         let commands = self.commands(poses)?;
         let wrench = Input::new(wrench, &[6], "wrench")?;
         let shared = wrench.serves(commands.count, "wrench")?;
-        let further = [self.machine.closure_count()];
+        let further = [self.inner.closure_count()];
         self.at_commands(py, &commands, status, &further, |first| {
-            Quantity::Forces(batch::Forces::new(&self.machine, wrench.rows(first, shared)))
+            Quantity::Forces(batch::Forces::new(&self.inner, wrench.rows(first, shared)))
         })
     }
 
@@ -609,7 +316,7 @@ impl Machine {
         columns: &Bound<'py, PyAny>,
         values: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let machine = &self.machine;
+        let machine = &self.inner;
         let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
         let placements = Input::new(placements, &[7], "placements")?;
         let columns = self.columns(columns)?;
@@ -651,7 +358,7 @@ impl Machine {
         let columns = self.columns(columns)?;
         let further = [self.components(), columns.len()];
         self.at_placements(py, joints, placements, None, &further, |_, _| {
-            Quantity::Sensitivity(batch::Sensitivity::new(&self.machine, &columns))
+            Quantity::Sensitivity(batch::Sensitivity::new(&self.inner, &columns))
         })
     }
 
@@ -675,7 +382,7 @@ impl Machine {
             &further,
             |first, shared| {
                 let rows = wrenches.rows(first, shared);
-                Quantity::Loads(batch::Loads::new(&self.machine, &columns, rows))
+                Quantity::Loads(batch::Loads::new(&self.inner, &columns, rows))
             },
         )
     }
@@ -695,7 +402,7 @@ impl Machine {
         let name = Some((&given, "parameter_compliance"));
         self.at_placements(py, joints, placements, name, &further, |first, shared| {
             let rows = given.rows(first, shared);
-            Quantity::Compliance(batch::Compliance::new(&self.machine, &columns, rows))
+            Quantity::Compliance(batch::Compliance::new(&self.inner, &columns, rows))
         })
     }
 
@@ -714,7 +421,7 @@ impl Machine {
         let name = Some((&given, "parameter_compliance"));
         self.at_placements(py, joints, placements, name, &further, |first, shared| {
             let rows = given.rows(first, shared);
-            Quantity::Stiffness(batch::Stiffness::new(&self.machine, &columns, rows))
+            Quantity::Stiffness(batch::Stiffness::new(&self.inner, &columns, rows))
         })
     }
 
@@ -725,7 +432,7 @@ impl Machine {
         joints: &Bound<'py, PyAny>,
         placements: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
-        let machine = &self.machine;
+        let machine = &self.inner;
         let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
         let placements = Input::new(placements, &[7], "placements")?;
         let shared = joints.serves(placements.count, "joints")?;
@@ -751,7 +458,7 @@ impl Machine {
         placements: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
         let placements = Input::new(placements, &[7], "placements")?;
-        let freedoms = chosen(&self.machine.dof);
+        let freedoms = chosen(&self.inner.dof);
         let out = output(py, &placements.leading, &[freedoms.len()])?;
         {
             let mut writable = out.readwrite();
@@ -769,7 +476,7 @@ impl Machine {
         py: Python<'py>,
         poses: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
-        let widths = [self.components(), self.machine.commanded_count()];
+        let widths = [self.components(), self.inner.commanded_count()];
         let poses = Input::new(poses, &widths, "poses")?;
         let out = output(py, &poses.leading, &[7])?;
         out.readwrite().as_slice_mut()?.copy_from_slice(&self.rows_of_poses(&poses));
@@ -783,7 +490,7 @@ impl Machine {
         joints: &Bound<'py, PyAny>,
         placements: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
-        let machine = &self.machine;
+        let machine = &self.inner;
         let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
         let placements = Input::new(placements, &[7], "placements")?;
         let shared = joints.serves(placements.count, "joints")?;
@@ -815,7 +522,7 @@ impl Machine {
         pose: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyList>> {
         let command = self.commands(pose)?;
-        let machine = &self.machine;
+        let machine = &self.inner;
         let list = PyList::empty(py);
         if !command.is_single() {
             return Err(pyo3::exceptions::PyValueError::new_err("explain takes one pose"));
@@ -840,73 +547,5 @@ impl Machine {
             list.append(entry)?;
         }
         Ok(list)
-    }
-}
-
-impl Machine {
-    /// Seven numbers for each pose given in all freedoms or in the commanded ones.
-    fn rows_of_poses(&self, poses: &Input<'_>) -> Vec<f64> {
-        let machine = &self.machine;
-        let home = machine.home.to_coordinates();
-        let freedoms = chosen(if poses.width == self.components() {
-            &machine.dof
-        } else {
-            &machine.commanded
-        });
-        let mut rows = Vec::with_capacity(7 * poses.count);
-        for pose in poses.data().chunks_exact(poses.width) {
-            let mut coordinates = home;
-            for (&freedom, &value) in freedoms.iter().zip(pose) {
-                coordinates[freedom] = value;
-            }
-            rows.extend(Pose::from_coordinates(coordinates).to_row());
-        }
-        rows
-    }
-
-    fn placed_arrays<'py>(&self, py: Python<'py>, placed: &Placed) -> PyResult<Bound<'py, PyAny>> {
-        let count = placed.status.len();
-        let joints = output(py, &[count], &[self.machine.drives.len()])?;
-        joints.readwrite().as_slice_mut()?.copy_from_slice(&placed.joints);
-        let poses = output(py, &[count], &[7])?;
-        poses.readwrite().as_slice_mut()?.copy_from_slice(&placed.poses);
-        (joints, poses, codes(py, &[count], &placed.status)?).into_bound_py_any(py)
-    }
-
-    /// A block's first-order quantity at given joints and placements.
-    fn at_placements<'py, 'a>(
-        &self,
-        py: Python<'py>,
-        joints: &Bound<'py, PyAny>,
-        placements: &Bound<'py, PyAny>,
-        given: Option<(&Input<'_>, &str)>,
-        further: &[usize],
-        quantity: impl Fn(usize, bool) -> Quantity<'a>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let joints = Input::new(joints, &[self.machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
-        let count = joints.count.max(placements.count).max(given.map_or(1, |(rows, _)| rows.count));
-        let at = At {
-            count,
-            joints: joints.data(),
-            poses: placements.data(),
-            shared_joints: joints.serves(count, "joints")?,
-            shared_poses: placements.serves(count, "placements")?,
-        };
-        let shared = given.map(|(rows, what)| rows.serves(count, what)).transpose()?;
-        let (out, status) = self
-            .quantity(py, at, &[count], further, |first| quantity(first, shared == Some(true)))?;
-        (out, codes(py, &[count], &status)?).into_bound_py_any(py)
-    }
-}
-
-fn write_coordinates(row: &mut [f64], freedoms: &[usize], pose: &Pose<f64>, found: bool) {
-    if !found {
-        row.fill(f64::NAN);
-        return;
-    }
-    let coordinates = pose.to_coordinates();
-    for (value, &freedom) in row.iter_mut().zip(freedoms) {
-        *value = coordinates[freedom];
     }
 }

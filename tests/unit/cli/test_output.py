@@ -184,16 +184,24 @@ def test_ctrl_c_leaves_the_old_file(
     assert list(tmp_path.iterdir()) == [file]
 
 
+# A child of a background job starts deaf to Ctrl-C.
+HEARING = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+
+
 def test_ctrl_c_in_the_middle_of_long_work(tmp_path: Path) -> None:
     grid = ["--set", "workspace.grid.x=[200,400,3000]", "--set", "workspace.grid.y=[100,300,300]"]
     process = subprocess.Popen(
         [
-            sys.executable, "-c", "from truepose.cli import main; main()",
+            sys.executable, "-c", f"{HEARING}; from truepose.cli import main; main()",
             "budget", PLANAR, *grid, "--output", tmp_path / "result.json",
         ],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    time.sleep(2.0)
+    began = time.monotonic()
+    while not list(tmp_path.iterdir()):  # the temporary file: the result is being written
+        assert process.poll() is None
+        assert time.monotonic() - began < 120
+        time.sleep(0.02)
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130, errors

@@ -122,6 +122,8 @@ pub struct MachineDrive {
     pub frame: DriveFrame,
     /// Where its parameters begin.
     pub first: usize,
+    /// Where its parameter `scale` (true motion per commanded motion) stands among all parameters.
+    pub scale: Option<usize>,
     /// Lowest and highest joint coordinate.
     pub travel: [f64; 2],
     /// Branch of the inverse: +1 or -1.
@@ -366,11 +368,13 @@ impl Machine {
         }
         let struts =
             (0..self.struts.len()).filter(|&i| self.struts[i].drive == Some(index)).collect();
+        let scale = table.parameters.iter().position(|parameter| parameter.name == "scale");
         self.drives.push(MachineDrive {
             name: drive.name.clone(),
             kind: drive.kind,
             frame,
             first,
+            scale: scale.map(|place| first + place),
             travel: drive.travel,
             mode: drive.working_mode.unwrap_or(1.0),
             struts,
@@ -481,17 +485,10 @@ impl Machine {
             let parameters = &self.nominal[drive.first..];
             let joint =
                 drive.kind.inverse(&drive.frame, parameters, mode, base, length, platform).joint;
-            let joint = drive.wrapped(joint, self.scale_of(index));
+            let joint = drive.wrapped(joint, drive.scale.map_or(1.0, |scale| self.nominal[scale]));
             (joint - middle).abs()
         };
         if away(-1.0) < away(1.0) { -1.0 } else { 1.0 }
-    }
-
-    /// The nominal scale of a drive (true motion per commanded motion).
-    pub fn scale_of(&self, drive: usize) -> f64 {
-        let drive = &self.drives[drive];
-        let place = drive.kind.table().parameters.iter().position(|field| field.name == "scale");
-        place.map_or(1.0, |k| self.nominal[drive.first + k])
     }
 }
 

@@ -273,6 +273,24 @@ impl Machine {
         (joints, poses, codes(py, &[count], &placed.status)?).into_bound_py_any(py)
     }
 
+    /// A block's compliance or stiffness from (columns, compliances of these parameters).
+    pub fn elastic_at<'py>(
+        &self,
+        py: Python<'py>,
+        joints: &Bound<'py, PyAny>,
+        placements: &Bound<'py, PyAny>,
+        (columns, compliances): (&Bound<'py, PyAny>, &Bound<'py, PyAny>),
+        quantity: impl for<'a> Fn(&'a truepose_kernel::Machine, &[usize], Rows<'a>) -> Quantity<'a>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let columns = self.columns(columns)?;
+        let given = Input::new(compliances, &[columns.len()], "parameter_compliance")?;
+        let further = [self.components(), self.components()];
+        let name = Some((&given, "parameter_compliance"));
+        self.at_placements(py, joints, placements, name, &further, |first, shared| {
+            quantity(&self.inner, &columns, given.rows(first, shared))
+        })
+    }
+
     /// A block's first-order quantity at given joints and placements.
     pub fn at_placements<'py, 'a>(
         &self,

@@ -396,13 +396,9 @@ impl Machine {
         columns: &Bound<'py, PyAny>,
         parameter_compliance: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let columns = self.columns(columns)?;
-        let given = Input::new(parameter_compliance, &[columns.len()], "parameter_compliance")?;
-        let further = [self.components(), self.components()];
-        let name = Some((&given, "parameter_compliance"));
-        self.at_placements(py, joints, placements, name, &further, |first, shared| {
-            let rows = given.rows(first, shared);
-            Quantity::Compliance(batch::Compliance::new(&self.inner, &columns, rows))
+        let given = (columns, parameter_compliance);
+        self.elastic_at(py, joints, placements, given, |machine, columns, rows| {
+            Quantity::Compliance(batch::Compliance::new(machine, columns, rows))
         })
     }
 
@@ -415,13 +411,9 @@ impl Machine {
         columns: &Bound<'py, PyAny>,
         parameter_compliance: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let columns = self.columns(columns)?;
-        let given = Input::new(parameter_compliance, &[columns.len()], "parameter_compliance")?;
-        let further = [self.components(), self.components()];
-        let name = Some((&given, "parameter_compliance"));
-        self.at_placements(py, joints, placements, name, &further, |first, shared| {
-            let rows = given.rows(first, shared);
-            Quantity::Stiffness(batch::Stiffness::new(&self.inner, &columns, rows))
+        let given = (columns, parameter_compliance);
+        self.elastic_at(py, joints, placements, given, |machine, columns, rows| {
+            Quantity::Stiffness(batch::Stiffness::new(machine, columns, rows))
         })
     }
 

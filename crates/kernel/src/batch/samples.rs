@@ -46,8 +46,7 @@ impl<'a> Rows<'a> {
             }
             return;
         }
-        let rows = &self.data[first * self.width..(first + size) * self.width];
-        S::load_rows(rows, columns);
+        S::load_rows(&self.data[first * self.width..], size, columns);
     }
 }
 

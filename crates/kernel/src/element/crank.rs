@@ -1,7 +1,7 @@
 //! An arm that turns about a fixed axis.
 
 use super::{Dimension, Drawing, Drive, DriveFrame, ElementTable, Field, ParameterField, Reach};
-use super::{axis_parameters, parameter};
+use super::{axis_parameter_fields, axis_parameters};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, add, cross, dot, scale as scaled, subtract};
 
@@ -39,15 +39,7 @@ const FIELDS: &[Field] = &[
     },
 ];
 
-const PARAMETERS: &[ParameterField] = &[
-    parameter("origin.x", Dimension::Length),
-    parameter("origin.y", Dimension::Length),
-    parameter("origin.z", Dimension::Length),
-    parameter("axis.u", Dimension::Angle),
-    parameter("axis.v", Dimension::Angle),
-    parameter("offset", Dimension::Angle),
-    parameter("scale", Dimension::Scale),
-];
+const PARAMETERS: &[ParameterField] = &axis_parameter_fields(Dimension::Angle);
 
 impl Drive for Crank {
     const TABLE: ElementTable = ElementTable {

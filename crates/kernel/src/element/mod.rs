@@ -374,7 +374,20 @@ drives! {
     Telescopic => telescopic::Telescopic,
 }
 
-/// `origin.x|y|z`, `axis.u|v`, `offset`, `scale`: the parameters of every drive with an axis.
+/// The parameters of every drive with an axis; the offset is of the joint coordinate's dimension.
+const fn axis_parameter_fields(offset: Dimension) -> [ParameterField; 7] {
+    [
+        parameter("origin.x", Dimension::Length),
+        parameter("origin.y", Dimension::Length),
+        parameter("origin.z", Dimension::Length),
+        parameter("axis.u", Dimension::Angle),
+        parameter("axis.v", Dimension::Angle),
+        parameter("offset", offset),
+        parameter("scale", Dimension::Scale),
+    ]
+}
+
+/// The values of [`axis_parameter_fields`].
 #[inline(always)]
 fn axis_parameters<S: Scalar>(parameters: &[S]) -> [S; 7] {
     let mut values = [parameters[0]; 7];

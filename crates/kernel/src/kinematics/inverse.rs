@@ -44,7 +44,7 @@ pub fn lane_inverse<S: Real>(machine: &Machine, p: &[S], pose: &Pose<S>, joints:
         *joint = reach.joint;
         margin = margin.min(reach.margin);
         if drive.kind.table().coordinate == Dimension::Angle {
-            let scale = p[drive.first + 6];
+            let scale = drive.scale.map_or(S::splat(1.0), |scale| p[scale]);
             for lane in 0..S::WIDTH {
                 joint.set_lane(lane, drive.wrapped(reach.joint.lane(lane), scale.lane(lane)));
             }

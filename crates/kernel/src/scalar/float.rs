@@ -66,7 +66,7 @@ impl Real for f64 {
         self < limit
     }
     #[inline(always)]
-    fn load_rows(rows: &[f64], columns: &mut [f64]) {
+    fn load_rows(rows: &[f64], _count: usize, columns: &mut [f64]) {
         columns.copy_from_slice(&rows[..columns.len()]);
     }
     #[inline(always)]

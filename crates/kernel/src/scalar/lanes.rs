@@ -144,49 +144,78 @@ impl<const LEVEL: u8> Real for Lanes<LEVEL> {
         below
     }
     #[inline(always)]
-    fn load_rows(rows: &[f64], columns: &mut [Self]) {
+    fn load_rows(rows: &[f64], count: usize, columns: &mut [Self]) {
         let width = columns.len();
-        if width < LANES || rows.len() < width * LANES {
-            let last = rows.len() / width.max(1) - 1;
+        if count < LANES || rows.len() < (LANES - 1) * width + width.max(LANES) {
             for k in 0..LANES {
-                let row = &rows[k.min(last) * width..(k.min(last) + 1) * width];
+                let row = &rows[k.min(count - 1) * width..][..width];
                 for (column, &value) in columns.iter_mut().zip(row) {
                     column.0[k] = value;
                 }
             }
-            return;
-        }
-        for first in tiles(width) {
-            let mut tile = [Lanes([0.0; LANES]); LANES];
-            for k in 0..LANES {
-                let row = &rows[k * width + first..k * width + first + LANES];
-                tile[k].0.copy_from_slice(row);
+        } else if width < LANES {
+            // A narrow row is read as a whole tile, with the beginning of the next.
+            let tile = load_tile(rows, width);
+            for (column, &lanes) in columns.iter_mut().zip(&tile) {
+                *column = lanes;
             }
-            columns[first..first + LANES].copy_from_slice(&transpose(tile));
+        } else {
+            for first in tiles(width) {
+                columns[first..first + LANES].copy_from_slice(&load_tile(&rows[first..], width));
+            }
         }
     }
     #[inline(always)]
     fn store_rows(columns: &[Self], rows: &mut [f64], stride: usize, count: usize) {
         let width = columns.len();
-        if width < LANES || count < LANES {
+        if count < LANES || (width < LANES && stride != width) {
             for k in 0..count {
                 let row = &mut rows[k * stride..k * stride + width];
                 for (value, column) in row.iter_mut().zip(columns) {
                     *value = column.0[k];
                 }
             }
-            return;
-        }
-        for first in tiles(width) {
+        } else if width < LANES {
+            // A narrow row is written as a whole tile, whose end the next row overwrites; the last
+            // row alone is cut.
             let mut tile = [Lanes([0.0; LANES]); LANES];
-            tile.copy_from_slice(&columns[first..first + LANES]);
+            for (lanes, &column) in tile.iter_mut().zip(columns) {
+                *lanes = column;
+            }
             let tile = transpose(tile);
-            for k in 0..LANES {
-                let row = &mut rows[k * stride + first..k * stride + first + LANES];
-                row.copy_from_slice(&tile[k].0);
+            for k in 0..LANES - 1 {
+                let rest = &mut rows[k * width..];
+                if rest.len() < LANES {
+                    rest[..width].copy_from_slice(&tile[k].0[..width]);
+                } else {
+                    rest[..LANES].copy_from_slice(&tile[k].0);
+                }
+            }
+            let last = &mut rows[(LANES - 1) * width..LANES * width];
+            for (value, &number) in last.iter_mut().zip(&tile[LANES - 1].0) {
+                *value = number;
+            }
+        } else {
+            for first in tiles(width) {
+                let mut tile = [Lanes([0.0; LANES]); LANES];
+                tile.copy_from_slice(&columns[first..first + LANES]);
+                let tile = transpose(tile);
+                for k in 0..LANES {
+                    rows[k * stride + first..][..LANES].copy_from_slice(&tile[k].0);
+                }
             }
         }
     }
+}
+
+/// Eight numbers of each of eight rows, as eight columns.
+#[inline(always)]
+fn load_tile<const LEVEL: u8>(rows: &[f64], width: usize) -> [Lanes<LEVEL>; LANES] {
+    let mut tile = [Lanes([0.0; LANES]); LANES];
+    for k in 0..LANES {
+        tile[k].0.copy_from_slice(&rows[k * width..][..LANES]);
+    }
+    transpose(tile)
 }
 
 /// Where the 8-wide tiles of `width >= 8` columns begin; the last may overlap the one before.
@@ -277,10 +306,17 @@ mod tests {
                 let columns: Vec<Lanes<PORTABLE>> = (0..width)
                     .map(|j| Lanes(std::array::from_fn(|k| (100 * k + j) as f64)))
                     .collect();
-                let mut rows = vec![0.0; count * width];
+                // What stands behind the rows must stay.
+                let mut rows = vec![-1.0; count * width + 3];
+                let behind = rows.split_off(count * width);
                 Lanes::store_rows(&columns, &mut rows, width, count);
                 let mut back = vec![Lanes::<PORTABLE>::default(); width];
-                Lanes::load_rows(&rows, &mut back);
+                Lanes::load_rows(&rows, count, &mut back);
+                assert_eq!(behind, [-1.0; 3]);
+                rows.extend(&behind);
+                let mut again = vec![Lanes::<PORTABLE>::default(); width];
+                Lanes::load_rows(&rows, count, &mut again);
+                assert_eq!(again, back);
                 for (column, back) in columns.iter().zip(&back) {
                     for k in 0..LANES {
                         assert_eq!(back.0[k], column.0[k.min(count - 1)]);

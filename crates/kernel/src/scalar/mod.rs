@@ -70,9 +70,10 @@ pub trait Real: Scalar + Default + PartialEq {
     fn min(self, other: Self) -> Self;
     /// Whether every lane is below the limit; a NaN is not.
     fn all_below(self, limit: f64) -> bool;
-    /// Reads `rows[k * columns.len() + j]` into lane `k` of `columns[j]`; lanes beyond the rows repeat
-    /// the last row. `rows` must hold at least one row.
-    fn load_rows(rows: &[f64], columns: &mut [Self]);
-    /// Writes `columns[j]` of lane `k` to `rows[k * stride + j]` for the first `count` lanes.
+    /// Reads `rows[k * columns.len() + j]` into lane `k` of `columns[j]` for the first `count` lanes;
+    /// the others repeat the last of these. `rows` may go on beyond them.
+    fn load_rows(rows: &[f64], count: usize, columns: &mut [Self]);
+    /// Writes `columns[j]` of lane `k` to `rows[k * stride + j]` for the first `count` lanes. Rows that
+    /// touch (`stride == columns.len()`) must end with the slice.
     fn store_rows(columns: &[Self], rows: &mut [f64], stride: usize, count: usize);
 }

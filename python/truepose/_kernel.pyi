@@ -159,7 +159,8 @@ class Machine:
     def explain(self, pose: ArrayLike) -> list[dict[str, Any]]:
         """What keeps one commanded pose from being used, and by how much.
 
-        Each is `what` ("strut", "travel", "singular"), `name`, `amount` and `unit`.
+        Each is `what` ("strut", "travel", "singular"), `name`, `amount` and `unit`; the amount is
+        negative where a strut would have to be shorter, or a joint is below its travel.
         """
 
 def elements() -> dict[str, list[dict[str, Any]]]:

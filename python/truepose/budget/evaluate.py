@@ -139,7 +139,7 @@ def budget(
                 running.add(values[_HIGHEST[name]][usable])
             statistics.add(values["worst"][usable])
     if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out)
+        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
 
     shares = comparison.share(statistics.highest[:, 0])
     over_all: dict[str, Any] = {name: running.value for name, running in highest.items()}

@@ -6,7 +6,7 @@ Ctrl-C and progress in between two blocks, and is long enough for the kernel's l
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -152,11 +152,18 @@ def select(block: Block, usable: Flags) -> Block:
     )
 
 
-def no_pose_left(machine: Machine, poses: Floats, left_out: LeftOut) -> RequestError:
-    """The error where no pose can be used: what fails, by how much, where it fails least."""
+def no_pose_left(
+    machine: Machine, poses: Floats, left_out: LeftOut, *, of_file: bool
+) -> RequestError:
+    """The error where no pose can be used: what fails, by how much, where it fails least.
+
+    `of_file`: the poses are those of the machine file.
+    """
     _, status = left_out.sorted()
     names, counts = np.unique(status, return_counts=True)
-    found = ", ".join(f"{count} {name}" for name, count in zip(names, counts, strict=True))
+    found = ", ".join(
+        f"{count} {str(name).replace('_', ' ')}" for name, count in zip(names, counts, strict=True)
+    )
     looked_at = np.unique(np.linspace(0, len(poses) - 1, EXPLAINED).astype(np.intp))
     nearest: tuple[float, str] | None = None
     for pose in poses[looked_at]:
@@ -169,19 +176,26 @@ def no_pose_left(machine: Machine, poses: Floats, left_out: LeftOut) -> RequestE
                 f"{name} = {_in_file_units(machine, value, _dimension_of(name))}"
                 for name, value in zip(machine.commanded, pose, strict=True)
             )
-            what = "; ".join(_fault(machine, fault) for fault in faults)
-            nearest = (excess, f"nearest at {where}: {what}")
+            nearest = (excess, f"nearest at {where}: {faults_text(machine, faults)}")
     return RequestError(
         Problem(
             code="no-pose-left",
-            message=f"none of the {len(poses)} poses can be used",
+            message=f"none of the {len(poses)} poses can be used"
+            if len(poses) > 1
+            else "the only pose cannot be used",
             file=machine.file,
-            path="workspace",
+            line=machine.workspace.line if of_file and machine.workspace else None,
+            path="workspace" if of_file else None,
             found=found + (f"; {nearest[1]}" if nearest else ""),
             expected="poses that the machine can reach, within travel and off singularities",
             hint="move the workspace, or check lengths, travel and working_mode",
         )
     )
+
+
+def faults_text(machine: Machine, faults: Iterable[dict[str, object]]) -> str:
+    """What the kernel's `explain` says of a pose, for people: which part, by how much."""
+    return "; ".join(_fault(machine, fault) for fault in faults)
 
 
 def _fault(machine: Machine, fault: dict[str, object]) -> str:

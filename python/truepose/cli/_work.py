@@ -13,10 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import truepose
+from truepose.budget.poses import faults_text
 from truepose.cli._options import Request
 from truepose.cli._progress import progress
 from truepose.cli._show import show_tables
 from truepose.errors import Problem, RequestError
+from truepose.machine.suggestion import counted
 from truepose.report import formats
 from truepose.report.display import pose_text
 from truepose.report.result import Result
@@ -112,13 +114,15 @@ def refuse_left_out(
     left_out = list(zip(np.asarray(numbers), np.asarray(poses), np.asarray(statuses), strict=True))
     if not (request.strict and left_out):
         return
+    line = machine.workspace.line if machine.workspace is not None else None
     problems = [
         Problem(
             "unusable-pose",
             f"pose {number} cannot be used: {pose_text(pose, machine.commanded)}",
             file=machine.file,
-            found=str(status).replace("_", " "),
-            expected="a pose within reach",
+            line=line,
+            found=_why(machine, pose, str(status)),
+            expected="a pose within reach and travel, off singularities",
         )
         for number, pose, status in left_out[:MOST_PROBLEMS]
     ]
@@ -126,12 +130,21 @@ def refuse_left_out(
         problems.append(
             Problem(
                 "unusable-pose",
-                f"{len(left_out) - MOST_PROBLEMS} more poses cannot be used",
+                f"{counted(len(left_out) - MOST_PROBLEMS, 'more pose')} cannot be used",
                 file=machine.file,
+                line=line,
+                found=f"{len(left_out)} poses that cannot be used, the first {MOST_PROBLEMS} above",
+                expected="none",
                 hint="`truepose check` counts them and says why",
             )
         )
     raise RequestError(*problems)
+
+
+def _why(machine: Machine, pose: np.ndarray, status: str) -> str:
+    """The status of a pose that cannot be used, and which part fails by how much."""
+    because = faults_text(machine, machine.kernel.explain(pose))
+    return status.replace("_", " ") + (f": {because}" if because else "")
 
 
 def _refuse_left_out_of(request: Request, machine: Machine, dataset: xr.Dataset) -> None:

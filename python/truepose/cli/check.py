@@ -86,14 +86,20 @@ def _text(form: str, machine: Machine, found: Reach, answers: tuple[Answer, ...]
     import json
 
     from truepose.report import inputs, reach
+    from truepose.report.result import in_file_units, pose_si
 
     rows = [answer.as_data(machine) for answer in answers]
     if form == "csv":
         buffer = io.StringIO()
-        columns = ["quantity", "state", "highest", "asked", "units", "at", "met"]
-        writer = csv.DictWriter(buffer, columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+        where = [
+            f"pose_{name} [{in_file_units(machine, 0.0, pose_si(name))[1]}]"
+            for name in machine.commanded
+        ]
+        columns = ["quantity", "state", "highest", "asked", "units", "met", "pose"]
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow([*columns, *where])
+        for row in rows:
+            writer.writerow([*(row[column] for column in columns), *row["at"].values()])
         return buffer.getvalue().rstrip("\n")
     return json.dumps(
         {

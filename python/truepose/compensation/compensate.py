@@ -70,7 +70,7 @@ def compensate(
         values, statuses = _correct(machine, block, deviations, second_order)
         rows.append(block, values, walk.keep(block.indices, *statuses))
     if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out)
+        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
     return assemble(machine, given, SCHEMA, rows, table, walk.left_out)
 
 

@@ -14,7 +14,7 @@ from truepose.machine.condition import DEFAULT_PART
 from truepose.machine.dimensions import FREEDOMS
 from truepose.machine.document import ARRAY_TABLES, Document, Key, named_rows
 from truepose.machine.elements import drive_kinds
-from truepose.machine.suggestion import did_you_mean, one_of
+from truepose.machine.suggestion import counted, did_you_mean, one_of
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.strut import StrutTable
 from truepose.machine.tables.workspace import WorkspaceTable
@@ -75,7 +75,7 @@ def _distinct_names(document: Document, validated: Validated) -> Iterator[Proble
 
 
 def _drives_of_struts(document: Document, validated: Validated) -> Iterator[Problem]:
-    names = [name for _, name in named_rows(document.data, "drive")]
+    names = list(dict.fromkeys(name for _, name in named_rows(document.data, "drive")))
     used = set()
     for index, row in enumerate(_rows(document, "strut")):
         drive = row.get("drive")
@@ -176,8 +176,9 @@ def _counts(document: Document, validated: Validated) -> Iterator[Problem]:
             "closure-count",
             f"too {few} closures for the platform's freedoms",
             ("machine", "dof"),
-            found=f"{struts} struts for {len(dof)} freedoms ({' '.join(dof)})",
-            expected=f"{len(dof)} struts",
+            found=f"{counted(struts, 'strut')} for {counted(len(dof), 'freedom')} "
+            f"({' '.join(dof)})",
+            expected=counted(len(dof), "strut"),
             hint="each strut is one closure and takes one freedom"
             + ("" if few == "few" else "; over-constrained machines are not supported yet"),
         )
@@ -198,9 +199,9 @@ def _counts(document: Document, validated: Validated) -> Iterator[Problem]:
             "drive-count",
             f"too {'few' if drives < len(commanded) else 'many'} drives for the commanded freedoms",
             where,
-            found=f"{drives} drives for {len(commanded)} commanded freedoms "
+            found=f"{counted(drives, 'drive')} for {counted(len(commanded), 'commanded freedom')} "
             f"({' '.join(commanded)})",
-            expected=f"{len(commanded)} drives",
+            expected=counted(len(commanded), "drive"),
             hint="commanded names the freedoms that the drives decide, if not all of dof"
             if drives < len(commanded)
             else None,
@@ -273,10 +274,10 @@ def _pose_rows(document: Document, validated: Validated) -> Iterator[Problem]:
         if len(pose) != len(commanded):
             yield document.problem(
                 "wrong-type",
-                f"a pose of {len(pose)} numbers",
+                f"a pose of {counted(len(pose), 'number')}",
                 ("workspace", "poses", index),
                 found=shown_value(pose),
-                expected=f"{len(commanded)} numbers: {', '.join(commanded)}",
+                expected=f"{counted(len(commanded), 'number')}: {', '.join(commanded)}",
             )
 
 

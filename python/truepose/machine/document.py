@@ -201,17 +201,16 @@ def _lines(text: str) -> dict[Key, int]:
 
 
 def _missing(path: Path) -> Problem:
-    others = (
-        sorted(other.name for other in path.parent.glob("*.toml")) if path.parent.is_dir() else []
-    )
-    near = get_close_matches(path.name, others, n=1)
+    folder = sorted(path.parent.glob("*.toml")) if path.parent.is_dir() else []
+    others = {other.stem: other for other in folder}  # the ending makes no two names alike
+    near = get_close_matches(path.stem, others, n=1)
     return Problem(
         "file-missing",
         f"there is no file {path}",
         str(path),
         found="nothing",
         expected="a machine file (TOML)",
-        hint=f"did you mean {path.parent / near[0]}?" if near else None,
+        hint=f"did you mean {others[near[0]]}?" if near else None,
     )
 
 

@@ -92,7 +92,7 @@ def _require_schema(document: Document) -> None:
             "unsupported-schema",
             "this version reads no such machine file",
             ("schema",),
-            found=str(schema),
+            found=shown_value(schema),
             expected=str(SCHEMA),
             hint="a newer version of truepose may read it"
             if isinstance(schema, int) and schema > SCHEMA
@@ -211,13 +211,14 @@ def _workspace(
     if table is None:
         return None, {}
     commanded = machine.commanded or machine.dof
+    line = document.line(("workspace",))
     home = {} if table.home is None else _home(table.home)
     if table.poses is not None:
         listed = _listed(document, table.poses, commanded, validated.units, problems)
         if table.home is None and len(listed):
             middle = 0.5 * (listed.min(axis=0) + listed.max(axis=0))
             home = dict(zip(commanded, middle.tolist(), strict=True))
-        return Workspace(listed=listed), home
+        return Workspace(listed=listed, line=line), home
     axes = []
     for freedom in commanded:
         span = None if table.grid is None else getattr(table.grid, freedom)
@@ -227,7 +228,7 @@ def _workspace(
         axes.append(GridAxis(freedom, *span))
     if table.home is None:
         home = {axis.name: axis.centre for axis in axes}
-    return Workspace(tuple(axes)), home
+    return Workspace(tuple(axes), line=line), home
 
 
 def _home(table: HomeTable) -> dict[str, float]:

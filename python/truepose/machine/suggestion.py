@@ -1,4 +1,4 @@
-"""The nearest word to one that is not known."""
+"""Words for messages: the nearest to one that is not known, lists, counts."""
 
 from __future__ import annotations
 
@@ -24,3 +24,8 @@ def one_of(words: Iterable[str], *, limit: int = 24) -> str:
     every = list(words)
     shown = ", ".join(every[:limit]) + (", ..." if len(every) > limit else "")
     return shown if len(every) == 1 else f"one of {shown}"
+
+
+def counted(number: int, word: str) -> str:
+    """`1 strut`, `2 struts`."""
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"

@@ -135,8 +135,8 @@ class UnitSystem:
                 f"no unit declared for {wanted.phrase}",
                 found=f"the bare number {shown_value(value)}",
                 expected=_expected(wanted),
-                hint=f'write {wanted.name} = "..." under [units], or the unit with the number: '
-                f'"{shown_value(value)} {_written(wanted)}"',
+                hint=f'write {wanted.name} = "..." under [units], or the unit with the number, '
+                f'as in "{wanted.example}"',
             )
         return float(unit.to_si(number))
 
@@ -246,10 +246,6 @@ def _file_unit(text: str, unit: Any, wanted: Dimension) -> FileUnit:
         return FileUnit(text, float(step), zero)
     scale = registry.Quantity(1.0, unit).to(wanted.si if wanted.si != "1" else "").magnitude
     return FileUnit(text, float(scale))
-
-
-def _written(wanted: Dimension) -> str:
-    return wanted.example.partition(" ")[2] or wanted.si
 
 
 def _expected(wanted: Dimension) -> str:

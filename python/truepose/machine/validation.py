@@ -118,7 +118,7 @@ def _units(document: Document, problems: list[Problem]) -> UnitSystem:
         good = {key: value for key, value in table.items() if key not in broken}
         filled, _ = _fill(document, ("units",), UnitsTable, good, None)
     problems += [problem for _, problem in found]
-    declared: dict[str, FileUnit] = {} if filled is None else filled.model_dump(exclude_unset=True)
+    declared: dict[str, FileUnit] = {}
     if filled is not None:
         declared = {name: getattr(filled, name) for name in filled.model_fields_set}
     return UnitSystem(declared, frozenset(broken))
@@ -311,7 +311,9 @@ def _problem(
 
 
 def _wrong_count(document: Document, key: Key, value: Any, context: Mapping[str, Any]) -> Problem:
-    wanted = context.get("max_length", context.get("min_length"))
+    wanted = context.get("max_length")
+    if wanted is None and "min_length" in context:
+        wanted = f"{context['min_length']} or more"
     return document.problem(
         "wrong-type",
         f"a list of {len(value)}" if isinstance(value, list | tuple) else "a list of another size",

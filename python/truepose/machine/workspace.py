@@ -29,10 +29,14 @@ class GridAxis:
 
 @dataclass(frozen=True)
 class Workspace:
-    """Either `axes`, one per commanded freedom in their order, or `listed` poses; SI."""
+    """Either `axes`, one per commanded freedom in their order, or `listed` poses; SI.
+
+    `line` is where the machine file gives them.
+    """
 
     axes: tuple[GridAxis, ...] = ()
     listed: NDArray[np.float64] | None = None
+    line: int | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from truepose.report.display import Array, pose_text, where_highest
-from truepose.report.result import in_file_units
+from truepose.report.result import in_file_units, pose_in_file_units
 from truepose.report.study import Study
 
 if TYPE_CHECKING:
@@ -17,15 +18,19 @@ BEFORE, AFTER = "before compensation", "after compensation"
 
 @dataclass(frozen=True)
 class Answer:
-    """One quantity against what was asked of it, SI. `asked` is None where nothing is asked."""
+    """One quantity against what was asked of it, SI. `asked` is None where nothing is asked.
+
+    `number` is that of its worst pose in the poses asked for, `pose` has the pose by freedom.
+    """
 
     quantity: str
     state: str
     highest: float
     asked: float | None
-    at: str
+    number: int
+    pose: Mapping[str, float]
 
-    def as_data(self, machine: Machine) -> dict[str, object]:
+    def as_data(self, machine: Machine) -> dict[str, Any]:
         """The answer for programs, in the units of the machine's file."""
         si = "m" if self.quantity == "position" else "rad"
         highest, units = in_file_units(machine, self.highest, si)
@@ -36,9 +41,15 @@ class Answer:
             "highest": highest,
             "asked": asked,
             "units": units,
-            "at": self.at,
+            "pose": self.number,
+            "at": pose_in_file_units(machine, self.pose),
             "met": self.met,
         }
+
+    @property
+    def at(self) -> str:
+        """The worst pose for people."""
+        return pose_text(list(self.pose.values()), list(self.pose))
 
     @property
     def met(self) -> bool | None:
@@ -72,8 +83,9 @@ def answers(study: Study) -> tuple[Answer, ...]:
 
 def _answer(study: Study, quantity: str, state: str, size: Array, asked: float | None) -> Answer:
     worst = where_highest(size)
-    pose = pose_text(study.poses[worst], study.machine.commanded)
-    return Answer(quantity, state, float(size[worst]), asked, pose)
+    number = int(study.numbers[worst])
+    pose = dict(zip(study.machine.commanded, study.poses[worst].tolist(), strict=True))
+    return Answer(quantity, state, float(size[worst]), asked, number, pose)
 
 
 def met(found: tuple[Answer, ...], state: str) -> bool | None:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truepose.budget.poses import OK
-from truepose.report.display import MILLI, is_position, number, pose_text, where_highest
-from truepose.report.result import in_file_units
+from truepose.report.display import MILLI, number, pose_text, where_highest
+from truepose.report.result import in_file_units, pose_in_file_units
 from truepose.report.tables import MOST_LISTED, Table
 
 if TYPE_CHECKING:
@@ -24,7 +24,8 @@ EXPLAINED = 2000
 class Reason:
     """One cause for leaving poses out: which part, in how many poses, at most by how much.
 
-    `amount` and `limit` in m for a strut, m or rad for a travel, a ratio for a singularity.
+    `amount` in m for a strut, m or rad for a travel, a ratio for a singularity. It is negative
+    where a strut would have to be shorter, or a joint coordinate is below its travel.
     """
 
     what: str
@@ -37,10 +38,12 @@ class Reason:
         if self.what == "singular":
             return f"singular: conditioning down to {self.amount:.2g}"
         factor, unit = (MILLI, "mm") if self.unit == "m" else (180.0 / np.pi, "°")
-        by = f"{number(self.amount * factor, 3)} {unit}"
+        by = f"{number(abs(self.amount) * factor, 3)} {unit}"
         if self.what == "travel":
-            return f"drive {self.name}: up to {by} outside its travel"
-        return f"strut {self.name}: up to {by} too far to reach"
+            side = "below" if self.amount < 0.0 else "above"
+            return f"drive {self.name}: up to {by} {side} its travel"
+        side = "near" if self.amount < 0.0 else "far"
+        return f"strut {self.name}: up to {by} too {side} to reach"
 
 
 @dataclass(frozen=True)
@@ -84,22 +87,23 @@ def reach(machine: Machine) -> Reach:
 
 
 def _reasons(machine: Machine, poses: NDArray[np.float64]) -> tuple[Reason, ...]:
-    """Causes by part, the one that stops most poses first."""
-    found: dict[tuple[str, str], list[float]] = {}
+    """Causes by part and side, the one that stops most poses first."""
+    found: dict[tuple[str, str, bool], list[float]] = {}
     for pose in poses[:: max(1, -(-len(poses) // EXPLAINED))]:
         for cause in machine.kernel.explain(pose):
-            key = (str(cause["what"]), str(cause["name"]))
-            found.setdefault(key, []).append(float(cause["amount"]))
+            amount = float(cause["amount"])
+            key = (str(cause["what"]), str(cause["name"]), amount < 0.0)
+            found.setdefault(key, []).append(amount)
     angles = {drive.name for drive in machine.drives if drive.coordinate == "angle"}
     reasons = [
         Reason(
             what,
             name,
             len(amounts),
-            min(amounts) if what == "singular" else max(amounts),
+            min(amounts) if what == "singular" else max(amounts, key=abs),
             {"singular": "1", "strut": "m"}.get(what, "rad" if name in angles else "m"),
         )
-        for (what, name), amounts in found.items()
+        for (what, name, _), amounts in found.items()
     ]
     return tuple(sorted(reasons, key=lambda reason: -reason.count))
 
@@ -134,10 +138,8 @@ def as_data(machine: Machine, found: Reach) -> dict[str, Any]:
     for reason in found.reasons:
         amount, units = in_file_units(machine, reason.amount, reason.unit)
         reasons.append({**vars(reason), "amount": amount, "unit": units})
-    pose = {
-        name: in_file_units(machine, float(value), "m" if is_position(name) else "rad")[0]
-        for name, value in zip(machine.commanded, found.worst_pose, strict=True)
-    }
+    worst = dict(zip(machine.commanded, found.worst_pose.tolist(), strict=True))
+    pose = pose_in_file_units(machine, worst)
     return {
         "poses": len(found.poses),
         "status": dict(zip(map(str, names), map(int, counts), strict=True)),

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from truepose.report.display import is_position
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,6 +27,16 @@ def in_file_units(machine: Machine, value: float, unit: str) -> tuple[float, str
         return value, unit
     to = machine.file_units[dimension]
     return float(to.to_file(value)), to.label
+
+
+def pose_in_file_units(machine: Machine, pose: Mapping[str, float]) -> dict[str, float]:
+    """A pose by freedom, from SI to the file's units."""
+    return {name: in_file_units(machine, value, pose_si(name))[0] for name, value in pose.items()}
+
+
+def pose_si(freedom: str) -> str:
+    """SI unit of a freedom of the platform (x y z a b c)."""
+    return "m" if is_position(freedom) else "rad"
 
 
 @dataclass(frozen=True)

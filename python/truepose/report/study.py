@@ -58,16 +58,19 @@ class Study:
 
     @cached_property
     def has_band(self) -> tuple[bool, ...]:
-        """Per source: whether its lower and upper edge differ anywhere."""
-        lower, upper = self.values("error_lower"), self.values("error_upper")
-        return tuple(
-            bool(np.any(lower[:, index] != upper[:, index])) for index in range(len(self.sources))
-        )
+        """Per source: whether it can do more than its error at the shift, anywhere."""
+        wider = self.values("worst") > np.abs(self.values("error"))
+        return tuple(bool(wider[:, index].any()) for index in range(len(self.sources)))
 
     @cached_property
     def n_pose(self) -> int:
         """Number of poses that were evaluated."""
         return int(self.budget.sizes["pose"])
+
+    @cached_property
+    def numbers(self) -> NDArray[np.intp]:
+        """(n_pose,) number of each pose in the poses asked for, from 0, as files have it."""
+        return np.asarray(self.budget["pose"].values, np.intp)
 
     @cached_property
     def poses(self) -> Array:
@@ -116,13 +119,16 @@ class Study:
 
     @cached_property
     def overall_worst(self) -> Array:
-        """(n_pose, n_component) the most that all sources together can do, linear in the bands.
+        """(n_pose, n_component) the most that all sources together can do.
 
-        |overall error with every source at its shift| + each source's band, the bands added
-        because sources do not know of each other.
+        |overall error with every source at its shift| + each source's linear band, the bands
+        added because sources do not know of each other; or the exact error at an edge where that
+        is larger, as in `remaining_worst`.
         """
         bands = self.values("worst") - np.abs(self.values("error"))
-        return np.asarray(np.abs(self.values("overall_error")) + bands.sum(axis=1))
+        linear = np.abs(self.values("overall_error")) + bands.sum(axis=1)
+        exact = [np.abs(self.values(f"overall_error_{edge}")) for edge in ("lower", "upper")]
+        return np.asarray(np.maximum.reduce([linear, *exact]))
 
     @cached_property
     def remaining_worst(self) -> Array:

@@ -77,7 +77,8 @@ def highest_absolute(study: Study) -> Table:
         "Highest absolute error",
         ("source", *(f"{name}, {error_unit(name)}" for name in study.components)),
         tuple(zip(_edge_labels(study), *cells, strict=True)),
-        note="Over all poses, per axis of the base frame.",
+        note="Over all poses, per axis of the base frame. Lower, upper: lengths and offsets all at "
+        "that end of their bands, the rest at the shift; the ranking has the most a source can do.",
     )
 
 
@@ -147,7 +148,8 @@ def answers(found: Sequence[Answer]) -> Table:
         ("", "answer", "at most", "asked", "at"),
         tuple(rows),
         words=5,
-        note="At most: all sources at their shifts, and their bands added linearly.",
+        note="At most: all sources at their shifts, and their bands added linearly; the exact "
+        "error at an edge where that is larger.",
     )
 
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from truepose.errors import Problem, RequestError
+from truepose.machine.suggestion import one_of
 
 
 def require_writable(path: Path, endings: Collection[str], inputs: Collection[Path] = ()) -> None:
@@ -25,7 +26,7 @@ def require_writable(path: Path, endings: Collection[str], inputs: Collection[Pa
             "the ending of the output file does not say what to write",
             path,
             found=ending or "no ending",
-            expected="one of " + ", ".join(sorted(endings)),
+            expected=one_of(sorted(endings)),
         )
     if not folder.is_dir():
         raise _refusal(

@@ -69,7 +69,7 @@ def test_none_left_says_what_fails_and_by_how_much(run: object, machine: object)
     assert problem.code == "no-pose-left"
     assert "none of the 3 poses" in problem.message
     assert problem.found is not None
-    assert "1 out_of_travel, 2 unreachable" in problem.found
+    assert "1 out of travel, 2 unreachable" in problem.found
     # The nearest of them, in the file's units: both carriages at 1000 of 900 mm.
     assert "x = 300 mm, y = 600 mm" in problem.found
     assert re.search(r"drive d1 is 100 mm out of travel; drive d2 is 100 mm", problem.found)

@@ -56,6 +56,20 @@ def test_check_answers_in_the_units_of_the_file(capsys: pytest.CaptureFixture[st
     assert [each["shift"] for each in thermal["deviations"]] == pytest.approx([0.0825, 0.0825])
 
 
+def test_check_says_where_in_the_units_of_the_file(capsys: pytest.CaptureFixture[str]) -> None:
+    machine = MACHINES / "hexapod.toml"  # in inches
+    document = json.loads(call(capsys, "check", machine, "--format", "json").out)
+    answer = document["answers"][0]
+    assert answer["at"] == {"x": 4.0, "y": 4.0, "z": 18.0, "a": -10.0, "b": -10.0, "c": 0.0}
+    pose = truepose.load(machine).poses()[answer["pose"]]
+    assert pose[:3] == pytest.approx([0.1016, 0.1016, 0.4572])
+    header, first, *_ = call(capsys, "check", machine, "--format", "csv").out.splitlines()
+    assert header.endswith(
+        "pose_x [in],pose_y [in],pose_z [in],pose_a [deg],pose_b [deg],pose_c [deg]"
+    )
+    assert [float(cell) for cell in first.split(",")[-6:]] == list(answer["at"].values())
+
+
 def test_check_says_why_poses_are_left_out(capsys: pytest.CaptureFixture[str]) -> None:
     setting = ["--set", "workspace.grid.x=[-100, 200, 3]"]
     document = json.loads(call(capsys, "check", PLANAR, *setting, "--format", "json").out)
@@ -75,6 +89,28 @@ def test_check_of_poses_out_of_travel(capsys: pytest.CaptureFixture[str]) -> Non
     assert (reason["what"], reason["name"]) == ("travel", "d1")
     # Carriage 1 stands highest at x = 200, y = 300: 300 + sqrt(500^2 - 200^2).
     assert reason["amount"] == pytest.approx(300 + 210000**0.5 - 700)
+
+
+def test_check_says_on_which_side_a_pose_is_out(capsys: pytest.CaptureFixture[str]) -> None:
+    setting = ["--set", "workspace.grid.y=[-900, 900, 3]"]
+    document = json.loads(call(capsys, "check", PLANAR, *setting, "--format", "json").out)
+    # At y = 0 all is well; at -900 and 900 a carriage is 300 to 500 mm higher than the tool.
+    amounts = {
+        (each["name"], each["amount"] < 0): each for each in document["workspace"]["reasons"]
+    }
+    assert set(amounts) == {("d1", False), ("d1", True), ("d2", False), ("d2", True)}
+    highest, lowest = 210000**0.5, 90000**0.5
+    assert amounts["d1", False]["amount"] == pytest.approx(highest)
+    assert amounts["d1", True]["amount"] == pytest.approx(lowest - 900)
+    shown = call(capsys, "check", PLANAR, *setting).out
+    assert f"drive d1: up to {900 - lowest:.3f} mm below its travel" in shown
+    assert f"drive d1: up to {highest:.3f} mm above its travel" in shown
+
+
+def test_check_says_that_a_pose_is_too_near(capsys: pytest.CaptureFixture[str]) -> None:
+    setting = ["--set", "workspace.grid={ x = [0, 50, 2], y = [20, 20, 1] }"]
+    outcome = call(capsys, "check", MACHINES / "five_bar.toml", *setting)
+    assert "strut 2: up to 22.379 mm too near to reach" in outcome.out
 
 
 def test_every_machine_shipped_can_be_checked(capsys: pytest.CaptureFixture[str]) -> None:

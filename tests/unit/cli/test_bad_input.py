@@ -54,6 +54,8 @@ def test_no_pose_left(capsys: pytest.CaptureFixture[str]) -> None:
     outcome = call(capsys, "budget", PLANAR, "--set", NOWHERE)
     assert outcome.code == 2
     assert "no-pose-left" in outcome.codes
+    line = 1 + PLANAR.read_text().splitlines().index("[workspace]")
+    assert f"planar_two_slider.toml:{line}:" in outcome.err
     assert "strut" in outcome.err
 
 
@@ -65,7 +67,8 @@ def test_strict_names_the_poses_that_cannot_be_used(capsys: pytest.CaptureFixtur
     assert "unusable-pose" in strict.codes
     shown = f"x \N{MINUS SIGN}{-first['x']:g} mm, y {first['y']:g} mm"
     assert f"pose {first['pose']} cannot be used: {shown}" in strict.err
-    assert "unreachable" in strict.err
+    # At x = -900 mm the guideways at 0 and 600 mm are 900 and 1500 mm away, the struts 500 long.
+    assert "unreachable: strut 1 misses by 400 mm; strut 2 misses by 1000 mm" in strict.err
     assert call(capsys, "check", PLANAR, "--set", OUT_OF_REACH, "--strict").err == strict.err
 
 

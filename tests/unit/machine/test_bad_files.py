@@ -84,7 +84,7 @@ CASES = [
     bad("wrong-dimension", "temperature = 35", 'temperature = "35 C"', "35 C", '"degC"'),
     bad("wrong-dimension", 'length = "mm"', 'length = "N"', 'length = "N"', "found a force"),
     bad("no-unit", 'section_area = "28 mm^2"', "section_area = 28", "section_area = 28",
-        "no unit declared for an area", '"28 mm^2"'),
+        "no unit declared for an area", '"28.3 mm^2"'),
     bad("no-unit", 'modulus = "210 GPa"', "modulus = 2.1e11", "modulus = 2.1e11", "a stress"),
     bad("unknown-unit", "length = 500", 'length = "500 mmm"', "mmm", 'unknown unit "mmm"'),
     bad("unknown-unit", "length = 500", 'length = "long"', "long", "not a number with a unit"),
@@ -223,6 +223,13 @@ def test_a_bad_unit_is_reported_once_and_not_for_every_number(tmp_path: Path) ->
     assert [problem.code for problem in problems] == ["unknown-unit"]
 
 
+def test_a_platform_without_freedom(tmp_path: Path) -> None:
+    problems = problems_of(tmp_path, edited(PLANAR, ('dof = ["x", "y"]', "dof = []")))
+    assert [(each.path, each.expected) for each in problems] == [
+        ("machine.dof", "a list of 1 or more")
+    ]
+
+
 def test_a_unit_that_is_not_declared_is_reported_once(tmp_path: Path) -> None:
     text = edited(PLANAR, ('force = "N"\n', ""), ('temperature = "degC"\n', ""))
     problems = problems_of(tmp_path, text)
@@ -306,6 +313,7 @@ def test_a_missing_file(tmp_path: Path) -> None:
     problem = only_problem(tmp_path / "hexpod.toml")
     assert problem.code == "file-missing"
     assert "hexapod.toml" in problem.hint
+    assert only_problem(tmp_path / "planar.toml").hint is None, "a like ending is no likeness"
     assert only_problem(tmp_path / "no" / "where.toml").code == "file-missing"
     assert only_problem(tmp_path / "hexapod.toml" / "below").code == "file-missing"
 

@@ -59,6 +59,14 @@ def test_a_source_with_a_band_has_two_rows_and_one_without_has_one(study: Study)
         assert cell(text) == pytest.approx(float(upper.sel(component=name)) * 1e6, abs=0.01)
 
 
+def test_a_band_that_no_edge_shows_is_still_a_band() -> None:
+    study = planar_study()
+    for edge in ("lower", "upper"):  # bands of coordinates alone leave the edges at the shift
+        study.budget[f"error_{edge}"] = study.budget["error"].copy()
+    labels = [row[0] for row in tables.highest_absolute(study).rows]
+    assert labels[:3] == ["tolerance, lower", "tolerance, upper", "thermal"]
+
+
 def test_percentages_are_of_coordinates_only(study: Study) -> None:
     names = [name.partition(",")[0] for name in tables.highest_percent(study).header[1:]]
     assert names == [name for name in study.components if name in "xyz"]
@@ -80,12 +88,21 @@ def test_all_sources_together_add_their_bands_and_not_their_shifts(study: Study)
     np.testing.assert_allclose(study.overall_worst, np.abs(shift) + band, rtol=1e-12)
 
 
+def test_an_exact_error_beyond_the_linear_sum_counts_before_compensation_as_after_it() -> None:
+    study = planar_study()
+    beyond = 2.0 * study.overall_worst
+    study.budget["overall_error_lower"] = (("pose", "component"), -beyond)
+    fresh = Study(study.machine, study.budget, study.compensation)
+    np.testing.assert_array_equal(fresh.overall_worst, beyond)
+
+
 def test_answers(study: Study) -> None:
     position, *_ = found = accuracy.answers(study)
     size = np.linalg.norm(study.overall_worst[:, study.positions], axis=1)
     assert position.highest == size.max()
     assert position.met is False
     assert position.at == pose_text(study.poses[size.argmax()], study.machine.commanded)
+    assert position.number == study.budget["pose"].values[size.argmax()]
     assert accuracy.met(found, accuracy.BEFORE) is False
     turning = [answer for answer in found if answer.quantity == "orientation"]
     assert bool(turning) == bool(study.rotations)

@@ -13,7 +13,7 @@ class DriveTable(FileTable):
     """An actuated joint."""
 
     name: PartName = Field(description="Name of the drive and of its joint coordinate.")
-    kind: str = Field(description="The kind of drive; see below.")
+    kind: str = Field(description="The kind of drive, such as `slider`.")
     working_mode: Literal["+", "-"] | None = Field(
         None,
         description="The branch of the inverse kinematics. "

@@ -46,8 +46,9 @@ def finish_panels(figure: go.Figure, study: Study) -> go.Figure:
         margin={"l": 80, "r": 20, "t": 45, "b": 50},
         hovermode="x unified",
     )
-    margin = 0.5 + 0.01 * study.n_pose
-    figure.update_xaxes(range=[1 - margin, study.n_pose + margin], zeroline=False)
+    first, last = int(study.numbers[0]), int(study.numbers[-1])
+    margin = 0.5 + 0.01 * (last - first + 1)
+    figure.update_xaxes(range=[first - margin, last + margin], zeroline=False)
     for component, name in enumerate(study.components):
         at = place(study, component)
         figure.update_yaxes(title_text=f"error in {name}, {error_unit(name)}", **at)
@@ -70,7 +71,7 @@ def add_pose_labels(figure: go.Figure, study: Study, drawn: NDArray[np.intp]) ->
     for component in range(len(study.components)):
         figure.add_trace(
             go.Scatter(
-                x=drawn + 1,
+                x=study.numbers[drawn],
                 y=np.zeros(len(drawn), dtype=np.float32),
                 text=labels,
                 mode="lines",

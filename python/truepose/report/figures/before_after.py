@@ -54,7 +54,7 @@ def figure(study: Study) -> go.Figure:
         edges = [values[drawn] * MICRO for values in errors]
         for component in range(len(study.components)):
             lower, upper, middle = (edge[:, component] for edge in edges)
-            common: dict[str, Any] = {"x": drawn + 1, "legendgroup": name}
+            common: dict[str, Any] = {"x": study.numbers[drawn], "legendgroup": name}
             _add_band(figure, place(study, component), lower, upper, name, colour, fill, common)
             figure.add_trace(
                 go.Scatter(

@@ -43,7 +43,7 @@ def figure(study: Study) -> go.Figure:
         for component in range(len(study.components)):
             figure.add_trace(
                 go.Scatter(
-                    x=drawn + 1,
+                    x=study.numbers[drawn],
                     y=small(errors[:, component]),
                     name=name,
                     legendgroup=variable,

@@ -23,8 +23,8 @@ def caption(study: Study) -> str:
     drawn = drawn_poses(study.position_norm(study.overall_worst))
     return (
         "Exact error of each source alone, actual minus commanded, in the base frame. Where a "
-        "source has a band, the solid line is its upper edge and the dashed line its lower edge."
-        + thinning_note(len(drawn), study.n_pose)
+        "source has a band, the solid line has its lengths and offsets all at their upper edge, "
+        "the dashed line all at their lower edge." + thinning_note(len(drawn), study.n_pose)
     )
 
 
@@ -42,7 +42,7 @@ def figure(study: Study) -> go.Figure:
             for component in range(len(study.components)):
                 figure.add_trace(
                     go.Scatter(
-                        x=drawn + 1,
+                        x=study.numbers[drawn],
                         y=small(errors[:, component]),
                         name=f"{source}, {edge}" if edge else source,
                         legendgroup=f"{source} {edge}",

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 MOST_MAPS = 6
 PER_ROW = 3
 ROW_HEIGHT = {2: 300, 3: 310}
+TITLE_MARGIN = 30
+"""Pixels that keep the titles of the first row clear of plotly's buttons."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ def figure(study: Study) -> go.Figure:
             row=number // columns + 1,
             col=number % columns + 1,
         )
-    finish(figure, 80 + ROW_HEIGHT[len(places.axes)] * rows)
+    finish(figure, 80 + TITLE_MARGIN + ROW_HEIGHT[len(places.axes)] * rows)
     _label_axes(figure, places, len(maps))
     highest = max(float(np.nanmax(each.worst)) for each in maps)
     figure.update_layout(
@@ -97,7 +99,9 @@ def figure(study: Study) -> go.Figure:
             "cmax": highest if highest > 0 else 1.0,
             "colorbar": {"title": {"text": "µm"}, "thickness": 16, "len": 0.9},
         },
-        margin={"l": 5, "r": 5, "t": 30, "b": 0} if spatial else {"l": 70, "t": 40, "b": 55},
+        margin={"l": 5, "r": 5, "t": 30 + TITLE_MARGIN, "b": 0}
+        if spatial
+        else {"l": 70, "t": 40 + TITLE_MARGIN, "b": 55},
     )
     return figure
 

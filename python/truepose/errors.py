@@ -57,6 +57,7 @@ CATALOGUE: dict[str, str] = {
     "grid-count": "a grid count that is not a whole number of one or more",
     "grid-ends": "a grid count of one with two different ends",
     "grid-too-large": "a grid of more poses than are allowed",
+    "no-accuracy": "the accuracy asked is required of a file that asks for none",
     "no-workspace": "poses are wanted from a file that gives no workspace",
     # requests
     "bad-setting": "a --set that is not key=value, or that leads nowhere",

@@ -19,6 +19,7 @@ from truepose.cli._progress import progress
 from truepose.cli._show import show_tables
 from truepose.errors import Problem, RequestError
 from truepose.machine.suggestion import counted
+from truepose.machine.workspace import Accuracy
 from truepose.report import formats
 from truepose.report.display import pose_text
 from truepose.report.result import Result
@@ -36,10 +37,27 @@ MOST_PROBLEMS = 20
 
 
 def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMATS)) -> Machine:
-    """Refuse an output that cannot be written, then read the machine file."""
+    """Refuse an output that cannot be written, then read the machine file.
+
+    Raises `RequestError` (no-accuracy) where an accuracy is required that the file does not ask
+    for: a silent yes would let a machine pass that nobody judged.
+    """
     if request.output is not None:
         require_writable(request.output, endings, [request.machine_file])
-    return truepose.load(request.machine_file, settings=request.settings)
+    machine = truepose.load(request.machine_file, settings=request.settings)
+    if request.require_accuracy and machine.accuracy == Accuracy():
+        raise RequestError(
+            Problem(
+                "no-accuracy",
+                "--require-accuracy needs an accuracy to judge by",
+                file=str(request.machine_file),
+                path="accuracy",
+                found="nothing",
+                expected='[accuracy] with target = "0.5 mm", or angle_target',
+                hint='try it with --set accuracy.target="0.5 mm"',
+            )
+        )
+    return machine
 
 
 def evaluate(request: Request, machine: Machine) -> xr.Dataset:

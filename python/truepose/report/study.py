@@ -134,9 +134,11 @@ class Study:
     def remaining_worst(self) -> Array:
         """(n_pose, n_component) the most that remains after compensation.
 
-        The linear bound, or what the re-simulation found where that is larger.
+        The linear bound with the second-order term of the compensation's law, or what the
+        re-simulation found where that is larger.
         """
+        bound = self.compensated("bound") + self.compensated("second_order")
         simulated = [
             np.abs(self.compensated(f"residual_{edge}")) for edge in ("lower", "middle", "upper")
         ]
-        return np.asarray(np.maximum.reduce([self.compensated("bound"), *simulated]))
+        return np.asarray(np.maximum.reduce([bound, *simulated]))

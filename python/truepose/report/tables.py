@@ -148,8 +148,9 @@ def answers(found: Sequence[Answer]) -> Table:
         ("", "answer", "at most", "asked", "at"),
         tuple(rows),
         words=5,
-        note="At most: all sources at their shifts, and their bands added linearly; the exact "
-        "error at an edge where that is larger.",
+        note="At most: all sources at their shifts, and their bands added linearly (after "
+        "compensation with the second-order term of its law); the exact error at an edge where "
+        "that is larger.",
     )
 
 

@@ -23,7 +23,7 @@ def overall_worst() -> float:
 def remaining() -> float:
     """What compensation leaves of it, mm."""
     found = truepose.compensate(truepose.load(PLANAR))
-    worst = np.maximum(found["bound"], np.abs(found["residual_lower"]))
+    worst = np.maximum(found["bound"] + found["second_order"], np.abs(found["residual_lower"]))
     worst = np.maximum(worst, np.abs(found["residual_upper"]))
     return float(np.sqrt((worst**2).sum("component")).max() * 1e3)
 
@@ -128,7 +128,11 @@ def test_no_accuracy_asked_is_no_failure(
     assert tail.count("\n[") == 0
     file = tmp_path / "machine.toml"
     file.write_text(head)
-    for command in (["check"], ["budget", "--require-accuracy"]):
-        outcome = call(capsys, *command, file)
+    for command in ("check", "budget"):
+        outcome = call(capsys, command, file)
         assert outcome.code == 0
         assert "no accuracy asked" in outcome.out
+    outcome = call(capsys, "budget", "--require-accuracy", file)
+    assert outcome.code == 2
+    assert "no-accuracy" in outcome.err
+    assert outcome.out == ""

@@ -60,7 +60,7 @@ CATALOGUE: dict[str, str] = {
     "no-accuracy": "the accuracy asked is required of a file that asks for none",
     "no-workspace": "poses are wanted from a file that gives no workspace",
     # requests
-    "bad-setting": "a --set that is not key=value, or that leads nowhere",
+    "bad-setting": "a --set, or a TRUEPOSE_ variable, that is not what it can be",
     "unknown-parameter": "a parameter that the machine does not have",
     "no-stiffness": "a stiffness is wanted of a strut that gives none",
     "bad-condition": "a condition of values that cannot be",

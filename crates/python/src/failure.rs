@@ -3,6 +3,7 @@
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use truepose_kernel::MachineError;
 
 create_exception!(
@@ -29,6 +30,21 @@ pub fn pose_error(
         .import("truepose.errors")
         .and_then(|module| module.getattr("PoseError"))
         .and_then(|class| class.call1((count, index, status, reason)));
+    match raised {
+        Ok(error) => PyErr::from_value(error),
+        Err(error) => error,
+    }
+}
+
+/// A `truepose.errors.RequestError` of code bad-setting.
+pub fn request_error(py: Python<'_>, message: &str, found: &str, expected: &str) -> PyErr {
+    let raised = py.import("truepose.errors").and_then(|module| {
+        let parts = PyDict::new(py);
+        parts.set_item("found", found)?;
+        parts.set_item("expected", expected)?;
+        let problem = module.getattr("Problem")?.call(("bad-setting", message), Some(&parts))?;
+        module.getattr("RequestError")?.call1((problem,))
+    });
     match raised {
         Ok(error) => PyErr::from_value(error),
         Err(error) => error,

@@ -53,9 +53,28 @@ fn use_instruction_set(name: &str) -> PyResult<()> {
     }
 }
 
+/// Uses the number of threads that TRUEPOSE_THREADS asks for, if it is set.
+fn threads_from_environment(py: Python<'_>) -> PyResult<()> {
+    let Some(text) = std::env::var_os("TRUEPOSE_THREADS") else { return Ok(()) };
+    let text = text.to_string_lossy();
+    match text.trim().parse::<usize>() {
+        Ok(count) if count > 0 => {
+            batch::set_threads(count);
+            Ok(())
+        }
+        _ => Err(failure::request_error(
+            py,
+            "TRUEPOSE_THREADS is no number of threads",
+            &text,
+            "a whole number from 1 on",
+        )),
+    }
+}
+
 #[pymodule]
 fn _kernel(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
+    threads_from_environment(py)?;
     module.add("STATUS", PyTuple::new(py, Status::ALL.map(Status::name))?)?;
     module.add("KernelError", py.get_type::<failure::KernelError>())?;
     module.add_class::<machine::Machine>()?;

@@ -113,6 +113,29 @@ class Problem:
         return asdict(self)
 
 
+class ReadingError(ValueError):
+    """A value that cannot be read.
+
+    Its parts are those of the `Problem` that it becomes where its place in the file is known.
+    """
+
+    def __init__(
+        self,
+        code: str,
+        message: str,
+        *,
+        found: str | None = None,
+        expected: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.code = code
+        self.message = message
+        self.found = found
+        self.expected = expected
+        self.hint = hint
+
+
 class TrueposeError(Exception):
     """The input cannot be used; `problems` says why, one entry per thing that is wrong."""
 

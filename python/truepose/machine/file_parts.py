@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol, TypeAlias, TypeVar
 from pydantic import BaseModel
 
 from truepose import _kernel
-from truepose.errors import Problem
+from truepose.errors import Problem, ReadingError
 from truepose.machine.condition import Condition
 from truepose.machine.document import Document
 from truepose.machine.parts_of_machine import Drive, Strut
@@ -79,14 +79,7 @@ class FileParts:
         try:
             return read_tolerance(value, dimension, self._units)
         except QuantityError as error:
-            self.refuse(
-                error.code,
-                error.message,
-                path,
-                found=error.found,
-                expected=error.expected,
-                hint=error.hint,
-            )
+            self._refuse_reading(error, path)
             return None
 
     def band(self, tolerance: Tolerance, nominal: float, path: str) -> Band | None:
@@ -94,15 +87,18 @@ class FileParts:
         try:
             return tolerance.band(nominal)
         except ToleranceClassError as error:
-            self.refuse(
-                error.code,
-                error.message,
-                path,
-                found=error.found,
-                expected=error.expected,
-                hint=error.hint,
-            )
+            self._refuse_reading(error, path)
             return None
+
+    def _refuse_reading(self, error: ReadingError, path: str) -> None:
+        self.refuse(
+            error.code,
+            error.message,
+            path,
+            found=error.found,
+            expected=error.expected,
+            hint=error.hint,
+        )
 
     def refuse(
         self,

@@ -15,6 +15,8 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 
+from truepose.errors import ReadingError
+
 _MM = 1e-3
 _UM = 1e-6
 _ARCMIN = math.pi / 180.0 / 60.0
@@ -42,21 +44,8 @@ STANDARDS = (
 )
 
 
-class ToleranceClassError(ValueError):
-    """A class that no table has, or that has no value for a size.
-
-    `code`, `found`, `expected` and `hint` are those of `truepose.errors.Problem`.
-    """
-
-    def __init__(
-        self, code: str, message: str, found: str, expected: str, hint: str | None = None
-    ) -> None:
-        super().__init__(message)
-        self.code = code
-        self.message = message
-        self.found = found
-        self.expected = expected
-        self.hint = hint
+class ToleranceClassError(ReadingError):
+    """A class that no table has, or that has no value for a size."""
 
 
 @dataclass(frozen=True)
@@ -103,9 +92,9 @@ def canonical(designation: str, dimension: str = "length") -> str:
     raise ToleranceClassError(
         "unknown-tolerance-class",
         "unknown tolerance class",
-        f'"{designation}"',
-        " or ".join(f'"{example}"' for example in _examples(dimension)),
-        f'did you mean "{known[near[0]]}"?' if near else None,
+        found=f'"{designation}"',
+        expected=" or ".join(f'"{example}"' for example in _examples(dimension)),
+        hint=f'did you mean "{known[near[0]]}"?' if near else None,
     )
 
 
@@ -139,8 +128,8 @@ def half_band(designation: str, nominal: float, dimension: str = "length") -> fl
     raise ToleranceClassError(
         "tolerance-out-of-range",
         f"{standard.title} gives {name} no value for {size:g} mm",
-        f"{name} on {size:g} mm",
-        f"a size over {covered[0].over:g} mm and up to {covered[-1].up_to:g} mm, "
+        found=f"{name} on {size:g} mm",
+        expected=f"a size over {covered[0].over:g} mm and up to {covered[-1].up_to:g} mm, "
         "or the limits outright",
     )
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truepose.errors import ReadingError
 from truepose.machine.dimensions import DIMENSIONS, Dimension
 
 if TYPE_CHECKING:
@@ -31,24 +32,8 @@ _OFFSET_SCALES = {"degree_Celsius", "degree_Fahrenheit", "degree_Reaumur"}
 _RELATIVE_TEMPERATURE = "delta_degree"
 
 
-class QuantityError(ValueError):
-    """A value that is not the quantity wanted; `code` as in `truepose.errors.CATALOGUE`."""
-
-    def __init__(
-        self,
-        code: str,
-        message: str,
-        *,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
-        super().__init__(message)
-        self.code = code
-        self.message = message
-        self.found = found
-        self.expected = expected
-        self.hint = hint
+class QuantityError(ReadingError):
+    """A value that is not the quantity wanted."""
 
 
 @dataclass(frozen=True)

@@ -194,8 +194,6 @@ pub trait Drive {
     ) -> [f64; 2];
 }
 
-/// No drive has more parameters than this.
-pub const MAX_DRIVE_PARAMETERS: usize = 7;
 /// Where a closure's gradient keeps the derivatives to the strut's own parameters, in their order.
 pub const OWN: usize = 7;
 /// Where the drive's parameters end.
@@ -285,6 +283,18 @@ fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
     ClosureGradient { centre: to_centre, joint: chained[count] }
 }
 
+const fn most(counts: &[usize]) -> usize {
+    let mut result = 0;
+    let mut k = 0;
+    while k < counts.len() {
+        if counts[k] > result {
+            result = counts[k];
+        }
+        k += 1;
+    }
+    result
+}
+
 /// Makes the closed set of drives from its list, with static dispatch on any scalar.
 macro_rules! drives {
     ($($name:ident => $type:path),+ $(,)?) => {
@@ -292,6 +302,10 @@ macro_rules! drives {
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[allow(missing_docs)] // each is described by its table
         pub enum DriveKind { $($name),+ }
+
+        /// The most parameters that a drive of the list has.
+        pub const MAX_DRIVE_PARAMETERS: usize =
+            most(&[$(<$type as Drive>::TABLE.parameters.len()),+]);
 
         impl DriveKind {
             /// Every kind, in the order of the list.

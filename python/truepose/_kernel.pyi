@@ -29,7 +29,7 @@ _WithStatus = tuple[_Floats, _Codes]
 
 STATUS: tuple[str, ...]
 """Status of a pose by its code: ok, out_of_travel, unreachable, singular, not_converged,
-branch_lost."""
+branch_lost, joint_limit."""
 
 class KernelError(ValueError):
     """A description is no machine. `args` are (code, message, place), as in `strut.1.length`."""
@@ -42,7 +42,12 @@ class Machine:
     0 where missing), `tool` (3,), `characteristic_length` or None; `drives`, each `name`, `kind`,
     `travel` (2,), `working_mode` "+", "-" or None, and the fields of its kind (`elements()`);
     `struts`, each `name`, `drive` or None, `base` (3,), `platform` (3,), and `length`, which is
-    None exactly where a telescopic drive is the length. Raises `KernelError`.
+    None exactly where a telescopic drive is the length, and optionally `ring_radius`, `ring_axis`
+    (3,), and `base_axis`, `base_angle_limit`, `platform_axis`, `platform_angle_limit` (rad);
+    `guides`, each `name`, `kind` and the fields of its kind. Where there are more closures than
+    freedoms `closure_compliance` (n_closure,), m/N, and `parameter_compliance` (name -> m/N or
+    rad/(N m)) say how they share a misfit out; an infinite one carries nothing.
+    Raises `KernelError`.
     """
 
     def __new__(cls, description: Mapping[str, Any]) -> Machine: ...
@@ -56,6 +61,8 @@ class Machine:
     def joints(self) -> tuple[str, ...]: ...
     @property
     def closures(self) -> tuple[str, ...]: ...
+    @property
+    def overconstrained(self) -> bool: ...
     @property
     def parameters(self) -> tuple[str, ...]: ...
     @property
@@ -128,6 +135,44 @@ class Machine:
         self, joints: ArrayLike, placements: ArrayLike, columns: ArrayLike
     ) -> _WithStatus:
         """(sensitivity (n, n_component, k), status)."""
+    def base_loads_at(
+        self, joints: ArrayLike, placements: ArrayLike, forces: ArrayLike, columns: ArrayLike
+    ) -> _Floats:
+        """Loads (n, k) on parameters from forces on the base-side joint centres themselves.
+
+        `forces` (n or 1, 3 n_strut), N, base axes, x y z of each strut in turn.
+        """
+
+    def settle_at(
+        self,
+        joints: ArrayLike,
+        placements: ArrayLike,
+        columns: ArrayLike,
+        values: ArrayLike,
+        clearances: ArrayLike,
+        wrenches: ArrayLike,
+    ) -> tuple[_Floats, _Floats, _Floats, _Floats, _Codes]:
+        """Where an over-constrained machine comes to rest.
+
+        (errors (n, n_component), forces, absorbed, strain (n, n_closure), status), for deviated
+        parameters, half clearances of the closures (n or 1, n_closure), m, and a wrench (n or 1, 6)
+        on the tool.
+        """
+
+    def internal_forces_at(
+        self, joints: ArrayLike, placements: ArrayLike, columns: ArrayLike
+    ) -> tuple[_Floats, _Codes]:
+        """(forces (n, n_closure, k), status) that unit deviations of parameters strain.
+
+        N/m or N/rad, a strut's tension positive; in a machine with more closures than freedoms.
+        """
+
+    def free_motions(self, pose: ArrayLike) -> _Floats | None:
+        """The twists (k, 6) of the platform about its tool point that nothing holds.
+
+        At one commanded pose, m and rad; None where the joints do not reach it.
+        """
+
     def loads_at(
         self, joints: ArrayLike, placements: ArrayLike, wrenches: ArrayLike, columns: ArrayLike
     ) -> _WithStatus:
@@ -155,7 +200,7 @@ class Machine:
     def placement_of(self, poses: ArrayLike) -> _Floats:
         """(n, 7) of poses (n, n_dof) or (n, n_commanded)."""
     def joint_centres(self, joints: ArrayLike, placements: ArrayLike) -> _Floats:
-        """(n, n_closure, 2, 3) base-side and platform-side joint centres, base frame, m."""
+        """(n, n_strut, 2, 3) base-side and platform-side joint centres, base frame, m."""
     def explain(self, pose: ArrayLike) -> list[dict[str, Any]]:
         """What keeps one commanded pose from being used, and by how much.
 

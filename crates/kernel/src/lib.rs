@@ -16,5 +16,7 @@ pub mod spatial;
 pub mod statics;
 mod status;
 
-pub use machine::{Description, DriveDescription, Machine, MachineError, StrutDescription};
+pub use machine::{
+    Description, DriveDescription, GuideDescription, Machine, MachineError, StrutDescription,
+};
 pub use status::Status;

@@ -16,17 +16,20 @@ pub enum Status {
     NotConverged = 4,
     /// A root was found only beyond a singular pose: another assembly of the machine.
     BranchLost = 5,
+    /// The joints are right but a strut leans beyond the limit of one of its joints.
+    JointLimit = 6,
 }
 
 impl Status {
     /// Every status, at the place of its number.
-    pub const ALL: [Status; 6] = [
+    pub const ALL: [Status; 7] = [
         Status::Ok,
         Status::OutOfTravel,
         Status::Unreachable,
         Status::Singular,
         Status::NotConverged,
         Status::BranchLost,
+        Status::JointLimit,
     ];
 
     /// The word in results and messages.
@@ -38,11 +41,12 @@ impl Status {
             Status::Singular => "singular",
             Status::NotConverged => "not_converged",
             Status::BranchLost => "branch_lost",
+            Status::JointLimit => "joint_limit",
         }
     }
 
     /// Whether there is a result to go on with.
     pub fn is_solved(self) -> bool {
-        matches!(self, Status::Ok | Status::OutOfTravel)
+        matches!(self, Status::Ok | Status::OutOfTravel | Status::JointLimit)
     }
 }

@@ -2,26 +2,66 @@
 
 use std::path::Path;
 use std::process::Command;
-use truepose_kernel::element::{DriveFrame, DriveKind, strut};
+use truepose_kernel::element::guide::{GuideFrames, GuideKind, GuideLimb};
+use truepose_kernel::element::{Direction, DriveKind, strut};
 use truepose_kernel::scalar::{Dual, Interval, LANES, Lanes, Scalar, Tape, Trace};
+use truepose_kernel::spatial::{quaternion_from_euler, rotation_matrix};
 
 type Many = Lanes<{ truepose_kernel::dispatch::PORTABLE }>;
 
-/// Numbers of the closure below: base (3), platform (3), length, drive parameters (7), joint.
+/// Numbers of the closures below: base (3), platform (3), length, drive parameters (7), joint.
 const INPUTS: usize = 15;
 
-/// The closure of a strut on a drive with an axis: everything that an element reads.
-fn residual<S: Scalar>(kind: DriveKind, frame: &DriveFrame, x: &[S; INPUTS]) -> S {
-    let (centre, length) = kind.place(frame, &x[7..14], x[14], [x[0], x[1], x[2]], x[6]);
-    strut::closure(centre, [x[3], x[4], x[5]], length)
+/// The drives with an axis.
+const DRIVES: [DriveKind; 2] = [DriveKind::Slider, DriveKind::Crank];
+
+/// Every kind of closure that the elements make.
+#[derive(Clone, Copy, Debug)]
+enum Closure {
+    /// A strut on a drive with an axis: everything that a drive reads.
+    Driven(DriveKind),
+    /// A strut whose platform-side joint slides on a ring.
+    Ring,
+    /// One closure of a guide.
+    Guide(GuideKind, usize),
 }
 
-fn kinds() -> [DriveKind; 2] {
-    [DriveKind::Slider, DriveKind::Crank]
+fn residual<S: Scalar>(closure: Closure, frame: &Direction, x: &[S; INPUTS]) -> S {
+    match closure {
+        Closure::Driven(kind) => {
+            let (centre, length) = kind.place(frame, &x[7..14], x[14], [x[0], x[1], x[2]], x[6]);
+            strut::closure(centre, [x[3], x[4], x[5]], length)
+        }
+        Closure::Ring => {
+            let (base, centre) = ([x[0], x[1], x[2]], [x[3], x[4], x[5]]);
+            let axis = frame.tilted(x[10], x[11]);
+            let (nearest, _) = strut::nearest_on_ring(centre, axis, x[7], base);
+            strut::closure(base, nearest, x[6])
+        }
+        Closure::Guide(kind, which) => {
+            let frames = GuideFrames { frame: *frame, platform: Direction::new([0.9, 0.3, -0.1]) };
+            let limb = GuideLimb {
+                frame_point: [x[0], x[1], x[2]],
+                arm: [x[3], x[4], x[5]],
+                tilts: [[x[7], x[8]], [x[9], x[10]]],
+            };
+            let angles = [0.3, -0.2, 0.5].map(|angle| x[0].lift(angle));
+            let rotation = rotation_matrix(quaternion_from_euler(angles));
+            kind.residual(which, &frames, &limb, (&rotation, [x[11], x[12], x[13]]), 0.7)
+        }
+    }
 }
 
-fn frame() -> DriveFrame {
-    DriveFrame::new([0.2, -0.5, 0.9])
+fn kinds() -> Vec<Closure> {
+    let drives = DRIVES.map(Closure::Driven);
+    let guides = GuideKind::ALL
+        .iter()
+        .flat_map(|&kind| (0..kind.closures()).map(move |which| Closure::Guide(kind, which)));
+    drives.into_iter().chain([Closure::Ring]).chain(guides).collect()
+}
+
+fn frame() -> Direction {
+    Direction::new([0.2, -0.5, 0.9])
 }
 
 /// Samples of the inputs, the same everywhere.
@@ -71,11 +111,11 @@ fn dual_derivatives_equal_central_differences() {
 
 #[test]
 fn the_gradient_that_kinematics_uses_is_the_dual_one() {
-    for kind in kinds() {
+    for kind in DRIVES {
         for x in samples(20) {
             let dual: [Dual<f64, INPUTS>; INPUTS] =
                 std::array::from_fn(|i| Dual::variable(x[i], i));
-            let expected = residual(kind, &frame(), &dual).parts;
+            let expected = residual(Closure::Driven(kind), &frame(), &dual).parts;
             let mut places = [0.0; truepose_kernel::element::PLACES];
             let points = [[x[0], x[1], x[2]], [x[3], x[4], x[5]]];
             let gradient = kind.gradient(&frame(), &x[7..14], x[14], points, x[6], &mut places);
@@ -173,7 +213,7 @@ fn hexadecimal(text: &str) -> f64 {
 
 #[test]
 fn the_closed_form_inverse_gives_back_the_joint() {
-    for kind in kinds() {
+    for kind in DRIVES {
         for x in samples(200) {
             let (centre, _) = kind.place(&frame(), &x[7..14], x[14], [x[0], x[1], x[2]], x[6]);
             let platform = [x[3], x[4], x[5]];

@@ -4,9 +4,10 @@ use crate::failure::KernelError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
-use truepose_kernel::element::DriveKind;
-use truepose_kernel::machine::FREEDOMS;
-use truepose_kernel::{Description, DriveDescription, StrutDescription};
+use truepose_kernel::element::guide::GuideKind;
+use truepose_kernel::element::{DriveKind, Field};
+use truepose_kernel::machine::{FREEDOMS, JointLimit};
+use truepose_kernel::{Description, DriveDescription, GuideDescription, StrutDescription};
 
 fn refused<T>(code: &'static str, message: String, place: &str) -> PyResult<T> {
     Err(KernelError::new_err((code, message, place.to_owned())))
@@ -61,16 +62,53 @@ fn drive(table: &Bound<'_, PyDict>) -> PyResult<DriveDescription> {
             }
         },
     };
-    let mut fields = BTreeMap::new();
-    for field in kind.table().fields {
+    let fields = element_fields(table, kind.table().fields)?;
+    let travel = item(table, "travel", &place)?.extract()?;
+    Ok(DriveDescription { name, kind, travel, working_mode, fields })
+}
+
+/// An element's own fields, as far as they are given.
+fn element_fields(
+    table: &Bound<'_, PyDict>,
+    fields: &[Field],
+) -> PyResult<BTreeMap<String, Vec<f64>>> {
+    let mut found = BTreeMap::new();
+    for field in fields {
         if let Some(value) = optional(table, field.name)? {
             let numbers =
                 if field.shape == 0 { vec![value.extract::<f64>()?] } else { value.extract()? };
-            fields.insert(field.name.to_owned(), numbers);
+            found.insert(field.name.to_owned(), numbers);
         }
     }
-    let travel = item(table, "travel", &place)?.extract()?;
-    Ok(DriveDescription { name, kind, travel, working_mode, fields })
+    Ok(found)
+}
+
+fn guide(table: &Bound<'_, PyDict>) -> PyResult<GuideDescription> {
+    let name: String = item(table, "name", "guide")?.extract()?;
+    let place = format!("guide.{name}");
+    let word: String = item(table, "kind", &place)?.extract()?;
+    let Some(&kind) = GuideKind::ALL.iter().find(|kind| kind.table().kind == word) else {
+        return refused("unknown-kind", format!("there is no guide of kind {word:?}"), &place);
+    };
+    let fields = element_fields(table, kind.table().fields)?;
+    for field in kind.table().fields {
+        if fields.get(field.name).is_some_and(|value| value.len() != field.shape.max(1)) {
+            let message = format!("it needs {} number(s)", field.shape.max(1));
+            return refused("missing-field", message, &format!("{place}.{}", field.name));
+        }
+    }
+    Ok(GuideDescription { name, kind, fields })
+}
+
+/// The limit of a joint: its axis and the largest angle, both or neither.
+fn limit(table: &Bound<'_, PyDict>, end: &str, place: &str) -> PyResult<Option<JointLimit>> {
+    match optional(table, &format!("{end}_angle_limit"))? {
+        None => Ok(None),
+        Some(angle) => Ok(Some(JointLimit {
+            axis: item(table, &format!("{end}_axis"), place)?.extract()?,
+            angle: angle.extract()?,
+        })),
+    }
 }
 
 fn strut(table: &Bound<'_, PyDict>) -> PyResult<StrutDescription> {
@@ -82,6 +120,11 @@ fn strut(table: &Bound<'_, PyDict>) -> PyResult<StrutDescription> {
         base: item(table, "base", &place)?.extract()?,
         platform: item(table, "platform", &place)?.extract()?,
         length: extracted("length")?.map(|value| value.extract()).transpose()?,
+        ring: match extracted("ring_radius")?.map(|value| value.extract()).transpose()? {
+            None | Some(0.0) => None,
+            Some(radius) => Some((radius, item(table, "ring_axis", &place)?.extract()?)),
+        },
+        limits: [limit(table, "base", &place)?, limit(table, "platform", &place)?],
         name,
     })
 }
@@ -111,6 +154,12 @@ pub fn description(table: &Bound<'_, PyDict>) -> PyResult<Description> {
         Some(point) => point.extract()?,
     };
     let length = optional(table, "characteristic_length")?;
+    let guides = match optional(table, "guides")? {
+        None => PyList::empty(table.py()),
+        Some(list) => list.cast_into::<PyList>()?,
+    };
+    let closure_compliance = optional(table, "closure_compliance")?;
+    let parameter_compliance = optional(table, "parameter_compliance")?;
     let drives = item(table, "drives", "machine")?.cast_into::<PyList>()?;
     let struts = item(table, "struts", "machine")?.cast_into::<PyList>()?;
     Ok(Description {
@@ -127,5 +176,17 @@ pub fn description(table: &Bound<'_, PyDict>) -> PyResult<Description> {
             .iter()
             .map(|table| strut(table.cast::<PyDict>()?))
             .collect::<PyResult<_>>()?,
+        guides: guides
+            .iter()
+            .map(|table| guide(table.cast::<PyDict>()?))
+            .collect::<PyResult<_>>()?,
+        closure_compliance: closure_compliance
+            .map(|value| value.extract())
+            .transpose()?
+            .unwrap_or_default(),
+        parameter_compliance: parameter_compliance
+            .map(|value| value.extract())
+            .transpose()?
+            .unwrap_or_default(),
     })
 }

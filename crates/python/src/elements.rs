@@ -2,6 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use truepose_kernel::element::guide::GuideKind;
 use truepose_kernel::element::{DriveKind, ElementTable, strut};
 
 fn entry<'py>(py: Python<'py>, table: &ElementTable) -> PyResult<Bound<'py, PyDict>> {
@@ -37,8 +38,9 @@ fn entry<'py>(py: Python<'py>, table: &ElementTable) -> PyResult<Bound<'py, PyDi
     Ok(entry)
 }
 
-/// Every element by family: `{"drive": [...], "strut": [...]}`, each with kind, doc, sets_length,
-/// drawing, coordinate, fields (name, shape, dimension, default, doc) and parameters (name, dimension).
+/// Every element by family: `{"drive": [...], "strut": [...], "guide": [...]}`, each with kind, doc, sets_length,
+/// drawing, coordinate, fields (name, shape, dimension, default, doc) and parameters (name, dimension); a guide also has
+/// `closures`, how many.
 #[pyfunction]
 pub fn elements(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let families = PyDict::new(py);
@@ -48,5 +50,12 @@ pub fn elements(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     }
     families.set_item("drive", drives)?;
     families.set_item("strut", PyList::new(py, [entry(py, &strut::TABLE)?])?)?;
+    let guides = PyList::empty(py);
+    for kind in GuideKind::ALL {
+        let entry = entry(py, kind.table())?;
+        entry.set_item("closures", kind.closures())?;
+        guides.append(entry)?;
+    }
+    families.set_item("guide", guides)?;
     Ok(families)
 }

@@ -232,6 +232,12 @@ impl Machine {
                     };
                     format!("drive {} is {amount:.6} {unit} {word} its travel", drive.name)
                 }
+                Obstacle::Leaning(i, end, angle) => {
+                    let end = ["base", "platform"][end];
+                    let name = &machine.struts[i].name;
+                    let angle = angle.to_degrees();
+                    format!("strut {name} leans {angle:.6} deg beyond the limit of its {end} joint")
+                }
                 Obstacle::Singular(index) => {
                     format!("smallest over largest singular value is {index:.1e}, below 1e-6")
                 }
@@ -325,6 +331,7 @@ fn plain_reason(status: Status) -> &'static str {
         Status::Unreachable => "a strut does not reach",
         Status::Singular => "the platform is not held: the closures are dependent",
         Status::NotConverged => "no pose closes the struts near the start",
+        Status::JointLimit => "a strut leans beyond the limit of one of its joints",
         Status::BranchLost => "the struts close only beyond a singular pose",
     }
 }
@@ -352,6 +359,7 @@ pub enum Quantity<'a> {
     Loads(batch::Loads<'a>),
     Compliance(batch::Compliance<'a>),
     Stiffness(batch::Stiffness<'a>),
+    InternalForces(batch::InternalForces<'a>),
 }
 
 impl Quantity<'_> {
@@ -378,6 +386,7 @@ impl Quantity<'_> {
             Quantity::Loads(quantity) => run(quantity, machine, samples, out, status),
             Quantity::Compliance(quantity) => run(quantity, machine, samples, out, status),
             Quantity::Stiffness(quantity) => run(quantity, machine, samples, out, status),
+            Quantity::InternalForces(quantity) => run(quantity, machine, samples, out, status),
         }
     }
 }

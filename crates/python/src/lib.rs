@@ -1,6 +1,7 @@
 //! `truepose._kernel`: the kernel as a Python module. Conversion, shapes and errors only.
 
 mod arrays;
+mod blocks;
 mod description;
 mod elements;
 mod evaluate;

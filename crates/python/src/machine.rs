@@ -7,13 +7,13 @@ use crate::failure::{KernelError, kernel_error};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList, PyTuple};
+use pyo3::types::{PyDict, PyTuple};
 use std::collections::BTreeMap;
 use truepose_kernel::Status;
 use truepose_kernel::batch::{self, Deviations, Rows, Samples};
-use truepose_kernel::kinematics::{self, Obstacle};
+use truepose_kernel::kinematics::{self, Sample};
 use truepose_kernel::machine::{COMPONENTS, FREEDOMS, chosen};
-use truepose_kernel::spatial::{Pose, rotate, rotation_matrix};
+use truepose_kernel::spatial::Pose;
 
 /// A parallel kinematic machine: immutable, picklable. SI units and radians throughout.
 #[pyclass(frozen, module = "truepose._kernel", name = "Machine")]
@@ -76,7 +76,22 @@ impl Machine {
     }
     #[getter]
     fn closures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, self.inner.struts.iter().map(|strut| &strut.name))
+        let inner = &self.inner;
+        let guides = inner.guide_closures.iter().map(|&(guide, which)| {
+            let guide = &inner.guides[guide];
+            if guide.kind.closures() == 1 {
+                guide.name.clone()
+            } else {
+                format!("{}.{}", guide.name, which + 1)
+            }
+        });
+        let struts = inner.struts.iter().map(|strut| strut.name.clone());
+        PyTuple::new(py, struts.chain(guides).collect::<Vec<_>>())
+    }
+    /// Whether there are more closures than freedoms.
+    #[getter]
+    fn overconstrained(&self) -> bool {
+        self.inner.is_overconstrained()
     }
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
@@ -174,7 +189,9 @@ impl Machine {
             if count == 1 {
                 // One pose: no lanes to fill and nothing to share out.
                 let limbs = kinematics::limbs(machine, &machine.nominal, joints.data());
-                let (pose, code) = kinematics::forward(machine, &limbs, &Pose::from_row(&starts));
+                let sample = Sample { machine, p: &machine.nominal, limbs: &limbs };
+                let start = Pose::from_row(&starts);
+                let (pose, code) = kinematics::forward(&sample, joints.data(), &start);
                 codes[0] = code;
                 write_coordinates(data, &freedoms, &pose, code == Status::Ok);
             } else {
@@ -417,7 +434,7 @@ impl Machine {
         })
     }
 
-    /// The length of each strut, m, (n, n_closure).
+    /// The length of each strut, m, (n, n_strut).
     fn lengths_at<'py>(
         &self,
         py: Python<'py>,
@@ -428,7 +445,7 @@ impl Machine {
         let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
         let placements = Input::new(placements, &[7], "placements")?;
         let shared = joints.serves(placements.count, "joints")?;
-        let width = machine.closure_count();
+        let width = machine.struts.len();
         let out = output(py, &[placements.count], &[width])?;
         {
             let mut writable = out.readwrite();
@@ -473,71 +490,5 @@ impl Machine {
         let out = output(py, &poses.leading, &[7])?;
         out.readwrite().as_slice_mut()?.copy_from_slice(&self.rows_of_poses(&poses));
         Ok(out)
-    }
-
-    /// Base-side and platform-side joint centres, base frame, (n, n_closure, 2, 3).
-    fn joint_centres<'py>(
-        &self,
-        py: Python<'py>,
-        joints: &Bound<'py, PyAny>,
-        placements: &Bound<'py, PyAny>,
-    ) -> PyResult<Array<'py>> {
-        let machine = &self.inner;
-        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
-        let shared = joints.serves(placements.count, "joints")?;
-        let width = machine.closure_count();
-        let out = output(py, &[placements.count], &[width, 2, 3])?;
-        {
-            let mut writable = out.readwrite();
-            for (i, cell) in writable.as_slice_mut()?.chunks_exact_mut(6 * width).enumerate() {
-                let limbs =
-                    kinematics::limbs(machine, &machine.nominal, joints.rows(0, shared).row(i));
-                let pose = Pose::from_row(&placements.data()[7 * i..7 * i + 7]);
-                let rotation = rotation_matrix(pose.rotation);
-                for (cell, limb) in cell.chunks_exact_mut(6).zip(&limbs) {
-                    let arm = rotate(&rotation, limb.arm);
-                    for k in 0..3 {
-                        cell[k] = limb.base[k];
-                        cell[3 + k] = arm[k] + pose.position[k];
-                    }
-                }
-            }
-        }
-        Ok(out)
-    }
-
-    /// What keeps one commanded pose from being used: a list of dicts (what, name, amount, unit).
-    fn explain<'py>(
-        &self,
-        py: Python<'py>,
-        pose: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyList>> {
-        let command = self.commands(pose)?;
-        let machine = &self.inner;
-        let list = PyList::empty(py);
-        if !command.is_single() {
-            return Err(pyo3::exceptions::PyValueError::new_err("explain takes one pose"));
-        }
-        let pose = kinematics::commanded_pose(machine, command.data());
-        for obstacle in kinematics::obstacles(machine, &machine.nominal, &pose) {
-            let (what, name, amount, unit) = match obstacle {
-                Obstacle::Strut(i, amount) => {
-                    ("strut", machine.struts[i].name.as_str(), amount, "m")
-                }
-                Obstacle::Travel(i, amount) => {
-                    let drive = &machine.drives[i];
-                    ("travel", drive.name.as_str(), amount, drive.kind.table().coordinate.unit())
-                }
-                Obstacle::Singular(index) => ("singular", "", index, "1"),
-            };
-            let entry = PyDict::new(py);
-            entry.set_item("what", what)?;
-            entry.set_item("name", name)?;
-            entry.set_item("amount", amount)?;
-            entry.set_item("unit", unit)?;
-            list.append(entry)?;
-        }
-        Ok(list)
     }
 }

@@ -6,8 +6,10 @@
 use super::samples::{Group, Rows, Samples};
 use super::threads::for_chunks;
 use crate::dispatch::{Work, dispatch};
-use crate::kinematics::{Limbs, Linearisation, SINGULAR, condition, limbs};
-use crate::linear::{Order, SIX, factor_pivoting};
+use crate::kinematics::{
+    Limbs, Linearisation, SINGULAR, Sample, condition, internal_forces, limbs,
+};
+use crate::linear::{CLOSURES, Order, SIX, factor_pivoting};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::statics::{
@@ -55,7 +57,8 @@ pub fn first_order(
 ) {
     let width = quantity.width();
     for_chunks(samples.count, (out, width), (&mut [], 0), status, |first, out, _, status| {
-        dispatch(Chunk { machine, samples, quantity, first, out, status });
+        let chunk = Chunk { machine, samples, quantity, first, out, status };
+        if machine.plain { dispatch(chunk) } else { chunk.run::<f64>() }
     });
 }
 
@@ -114,7 +117,9 @@ fn single_order<S: Real>(machine: &Machine, group: &Group<S>, size: usize) -> Or
     let (p, q, pose) = group.single(group.first_finite(size));
     let mut linear = Linearisation::default();
     linear.differentiate(machine, &p, &q, &pose);
-    factor_pivoting(&linear.rows).order
+    let mut square = [[0.0; SIX]; SIX];
+    square.copy_from_slice(&linear.rows[..SIX]);
+    factor_pivoting(&square).order
 }
 
 /// One sample on the single road.
@@ -129,10 +134,9 @@ fn alone<S: Real, Q: FirstOrder>(
 ) -> Status {
     let (p, q, pose) = group.single(lane);
     let mut linear = Linearisation::default();
-    linear.differentiate(machine, &p, &q, &pose);
-    let order = factor_pivoting(&linear.rows).order;
-    linear.fill(machine, &p, &q, &limbs(machine, &p, &q), &pose, &order);
-    let regular = linear.regular > 0.0 || condition(machine, &p, &q, &pose) >= SINGULAR;
+    let at = limbs(machine, &p, &q);
+    linear.fill_alone(&Sample { machine, p: &p, limbs: &at }, &q, &pose);
+    let regular = condition(machine, &p, &q, &pose) >= SINGULAR;
     if regular || quantity.survives_singular() {
         let width = out.len() / quantity.parts();
         for (part, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
@@ -285,7 +289,11 @@ impl<'a> Forces<'a> {
 }
 
 #[inline(always)]
-fn multipliers<S: Real>(linear: &Linearisation<S>, wrenches: &Rows<'_>, place: Place) -> [S; SIX] {
+fn multipliers<S: Real>(
+    linear: &Linearisation<S>,
+    wrenches: &Rows<'_>,
+    place: Place,
+) -> [S; CLOSURES] {
     let mut wrench = [S::default(); SIX];
     wrenches.load(place.first, place.size, &mut wrench);
     closure_forces(linear, &wrench)
@@ -423,6 +431,48 @@ impl FirstOrder for Stiffness<'_> {
             for &i in &self.from.components {
                 for (&k, cell) in self.from.components.iter().zip(&mut cells) {
                     cell.set_lane(lane, matrix.map_or(f64::NAN, |matrix| matrix[i][k]));
+                }
+            }
+        }
+    }
+}
+
+/// Forces in the closures per unit of some parameters, (closure, parameter) per sample: what a deviation
+/// strains in a machine with more closures than freedoms, N/m or N/rad.
+pub struct InternalForces<'a> {
+    machine: &'a Machine,
+    readers: Vec<&'a [(usize, usize)]>,
+}
+
+impl<'a> InternalForces<'a> {
+    /// For the parameters of the given indices.
+    pub fn new(machine: &'a Machine, columns: &[usize]) -> Self {
+        InternalForces { machine, readers: readers(machine, columns) }
+    }
+}
+
+impl FirstOrder for InternalForces<'_> {
+    fn width(&self) -> usize {
+        self.machine.closure_count() * self.readers.len()
+    }
+    #[inline(always)]
+    fn write<S: Real>(
+        &self,
+        linear: &Linearisation<S>,
+        _place: Place,
+        _part: usize,
+        columns: &mut [S],
+    ) {
+        // Such machines run sample by sample; a lane is one of them.
+        for lane in 0..S::WIDTH {
+            let forces = internal_forces(self.machine, &linear.lane(lane));
+            let mut cells = columns.iter_mut();
+            for row in &forces[..self.machine.closure_count()] {
+                for (readers, cell) in self.readers.iter().zip(&mut cells) {
+                    let force = |&(closure, place): &(usize, usize)| {
+                        row[closure] * linear.to_parameters[closure][place].lane(lane)
+                    };
+                    cell.set_lane(lane, readers.iter().map(force).sum());
                 }
             }
         }

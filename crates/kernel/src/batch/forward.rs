@@ -3,7 +3,7 @@
 use super::samples::{Group, Samples};
 use super::threads::for_chunks;
 use crate::dispatch::{Work, dispatch};
-use crate::kinematics::{Limbs, descend, forward, limbs, start_order};
+use crate::kinematics::{Limbs, Sample, descend, forward, limbs, start_order};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::spatial::{Pose, relative_rotation};
@@ -49,7 +49,8 @@ fn run(
     status: &mut [Status],
 ) {
     for_chunks(samples.count, (out, width), (&mut [], 0), status, |first, out, _, status| {
-        dispatch(Chunk { machine, samples, kept, width, first, out, status });
+        let chunk = Chunk { machine, samples, kept, width, first, out, status };
+        if machine.plain { dispatch(chunk) } else { chunk.run::<f64>() }
     });
 }
 
@@ -77,14 +78,7 @@ impl Work for Chunk<'_> {
                 at = limbs(machine, &group.p, &group.q);
             }
             if S::WIDTH == 1 {
-                alone(
-                    machine,
-                    &single_limbs(&at, 0),
-                    &group.pose.lane(0),
-                    kept,
-                    out,
-                    &mut status[0],
-                );
+                alone(machine, &group, &at, 0, kept, out, &mut status[0]);
                 continue;
             }
             if number == 0 {
@@ -113,16 +107,16 @@ impl Work for Chunk<'_> {
                 // Also true where it is NaN.
                 if !(found.proof.lane(lane) > 0.0) {
                     let out = &mut out[width * lane..width * (lane + 1)];
-                    let start = group.pose.lane(lane);
-                    alone(machine, &single_limbs(&at, lane), &start, kept, out, &mut status[lane]);
+                    alone(machine, &group, &at, lane, kept, out, &mut status[lane]);
                 }
             }
         }
     }
 }
 
+/// How far one pose is from another: displacement of the tool point and rotation vector, base frame.
 #[inline(always)]
-fn displacement<S: Real>(from: &Pose<S>, to: &Pose<S>) -> [S; 6] {
+pub fn displacement<S: Real>(from: &Pose<S>, to: &Pose<S>) -> [S; 6] {
     let mut error = [S::default(); 6];
     for k in 0..3 {
         error[k] = to.position[k] - from.position[k];
@@ -144,15 +138,20 @@ fn single_limbs<S: Real>(limbs: &Limbs<S>, lane: usize) -> Limbs<f64> {
 
 /// One sample on the single road; NaN where there is no pose to tell.
 #[inline(never)]
-fn alone(
+fn alone<S: Real>(
     machine: &Machine,
-    limbs: &Limbs<f64>,
-    start: &Pose<f64>,
+    group: &Group<S>,
+    at: &Limbs<S>,
+    lane: usize,
     kept: Kept<'_>,
     out: &mut [f64],
     status: &mut Status,
 ) {
-    let (pose, outcome) = forward(machine, limbs, start);
+    // The placed struts are all that a plain machine's closures read.
+    let (p, q) = if machine.plain { (Vec::new(), [0.0; 6]) } else { group.inputs(lane) };
+    let at = single_limbs(at, lane);
+    let start = group.pose.lane(lane);
+    let (pose, outcome) = forward(&Sample { machine, p: &p, limbs: &at }, &q, &start);
     *status = outcome;
     if outcome != Status::Ok {
         out.fill(f64::NAN);
@@ -161,7 +160,7 @@ fn alone(
     match kept {
         Kept::Pose => out.copy_from_slice(&pose.to_row()),
         Kept::Displacement(components) => {
-            let error = displacement(start, &pose);
+            let error = displacement(&start, &pose);
             for (value, &component) in out.iter_mut().zip(components) {
                 *value = error[component];
             }

@@ -3,7 +3,7 @@
 use super::samples::{Deviations, Group, Rows};
 use super::threads::for_chunks;
 use crate::dispatch::{Work, dispatch};
-use crate::kinematics::{commanded_pose, in_travel, inverse, lane_inverse};
+use crate::kinematics::{commanded_pose, inverse, lane_inverse, permitted};
 use crate::linear::SIX;
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
@@ -28,7 +28,11 @@ pub fn inverses(
         status,
         |first, joints, poses, status| {
             let chunk = Chunk { machine, commands, deviations, first, joints, poses, status };
-            if machine.has_direct_inverse() { dispatch(chunk) } else { chunk.run::<f64>() }
+            if machine.has_direct_inverse() && machine.plain {
+                dispatch(chunk)
+            } else {
+                chunk.run::<f64>()
+            }
         },
     );
 }
@@ -94,10 +98,9 @@ impl Work for Chunk<'_> {
                 status[lane] = if !(margin.lane(lane) >= 0.0) {
                     joints.fill(f64::NAN);
                     Status::Unreachable
-                } else if in_travel(machine, joints) {
-                    Status::Ok
                 } else {
-                    Status::OutOfTravel
+                    let p = if machine.limited { group.inputs(lane).0 } else { Vec::new() };
+                    permitted(machine, &p, joints, &pose.lane(lane))
                 };
             }
         }

@@ -3,6 +3,7 @@
 //! A batch is cut into chunks for the threads, a chunk into groups of lanes. What a group cannot
 //! prove good is done again sample by sample on the single road, and each sample has its status.
 
+mod base_loads;
 mod first_order;
 mod forward;
 mod inverse;
@@ -10,10 +11,12 @@ mod samples;
 mod threads;
 
 pub use crate::dispatch::{InstructionSet, instruction_set, use_instruction_set};
+pub use base_loads::base_loads;
 pub use first_order::{
-    Compliance, FirstOrder, Forces, JointJacobian, Loads, Sensitivity, Stiffness, first_order,
+    Compliance, FirstOrder, Forces, InternalForces, JointJacobian, Loads, Sensitivity, Stiffness,
+    first_order,
 };
-pub use forward::{displacements, forward_poses};
+pub use forward::{displacement, displacements, forward_poses};
 pub use inverse::inverses;
 pub use samples::{Deviations, Rows, Samples};
 pub use threads::{set_threads, threads};

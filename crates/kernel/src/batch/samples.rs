@@ -157,10 +157,16 @@ impl<S: Real> Group<S> {
 
     /// One sample of the group alone: parameters, joints, pose.
     pub fn single(&self, lane: usize) -> (Vec<f64>, [f64; SIX], Pose<f64>) {
+        let (parameters, joints) = self.inputs(lane);
+        (parameters, joints, self.pose.lane(lane))
+    }
+
+    /// Parameters and joints of one sample.
+    pub fn inputs(&self, lane: usize) -> (Vec<f64>, [f64; SIX]) {
         let mut joints = [0.0; SIX];
         for (joint, q) in joints.iter_mut().zip(&self.q) {
             *joint = q.lane(lane);
         }
-        (self.p.iter().map(|value| value.lane(lane)).collect(), joints, self.pose.lane(lane))
+        (self.p.iter().map(|value| value.lane(lane)).collect(), joints)
     }
 }

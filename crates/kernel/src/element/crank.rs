@@ -1,6 +1,6 @@
 //! An arm that turns about a fixed axis.
 
-use super::{Dimension, Drawing, Drive, DriveFrame, ElementTable, Field, ParameterField, Reach};
+use super::{Dimension, Direction, Drawing, Drive, ElementTable, Field, ParameterField, Reach};
 use super::{axis_parameter_fields, axis_parameters};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, add, cross, dot, scale as scaled, subtract};
@@ -56,14 +56,14 @@ impl Drive for Crank {
 
     #[inline(always)]
     fn place<S: Scalar>(
-        frame: &DriveFrame,
+        nominal: &Direction,
         parameters: &[S],
         joint: S,
         base: Vector<S>,
         length: S,
     ) -> (Vector<S>, S) {
         let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
-        let arm = Arm::new(frame.tilted(u, v), base);
+        let arm = Arm::new(nominal.tilted(u, v), base);
         let (sine, cosine) = scale.mul_add(joint, offset).sin_cos();
         let turned = add(scaled(arm.radial, cosine), scaled(arm.ahead, sine));
         (add([x, y, z], add(arm.axial, turned)), length)
@@ -73,7 +73,7 @@ impl Drive for Crank {
     /// P cos + Q sin = C: two angles about the direction of (P, Q).
     #[inline(always)]
     fn inverse<S: Scalar>(
-        frame: &DriveFrame,
+        nominal: &Direction,
         parameters: &[S],
         mode: f64,
         base: Vector<S>,
@@ -81,7 +81,7 @@ impl Drive for Crank {
         platform: Vector<S>,
     ) -> Reach<S> {
         let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
-        let arm = Arm::new(frame.tilted(u, v), base);
+        let arm = Arm::new(nominal.tilted(u, v), base);
         let w = subtract(platform, [x, y, z]);
         let (p, q) = (dot(w, arm.radial), dot(w, arm.ahead));
         let c =
@@ -93,13 +93,13 @@ impl Drive for Crank {
     }
 
     fn span(
-        frame: &DriveFrame,
+        nominal: &Direction,
         parameters: &[f64],
         base: Vector<f64>,
         platform: Vector<f64>,
     ) -> [f64; 2] {
         let [x, y, z, u, v, _, _] = axis_parameters(parameters);
-        let arm = Arm::new(frame.tilted(u, v), base);
+        let arm = Arm::new(nominal.tilted(u, v), base);
         let w = subtract(platform, [x, y, z]);
         let middle = dot(w, w) + dot(base, base) - 2.0 * dot(w, arm.axial);
         let swing = 2.0 * dot(w, arm.radial).hypot(dot(w, arm.ahead));

@@ -5,12 +5,16 @@
 //! and with the drives is the library's business ([`crate::kinematics`]).
 
 mod crank;
+pub mod guide;
+mod line;
+mod plane;
 mod slider;
 pub mod strut;
 mod telescopic;
+mod universal;
 
 use crate::scalar::{Dual, Scalar};
-use crate::spatial::{Vector, dot, norm, scale, tangents};
+use crate::spatial::{Vector, dot, norm, scale, subtract, tangents};
 
 /// What a number measures; the machine file's units follow from it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,20 +122,20 @@ pub struct ElementTable {
     pub coordinate: Dimension,
 }
 
-/// The nominal axis of a drive and the two directions in which its `axis.u`, `axis.v` tilt it.
+/// A nominal direction and the two directions in which its deviations `u`, `v` tilt it.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct DriveFrame {
+pub struct Direction {
     /// Unit vector.
     pub axis: Vector<f64>,
     /// Unit vectors; with the axis a right-handed frame.
     pub tangents: [Vector<f64>; 2],
 }
 
-impl DriveFrame {
-    /// From any non-zero direction.
+impl Direction {
+    /// From any non-zero vector.
     pub fn new(direction: Vector<f64>) -> Self {
         let axis = scale(direction, 1.0 / norm(direction));
-        DriveFrame { axis, tangents: tangents(axis) }
+        Direction { axis, tangents: tangents(axis) }
     }
 
     /// The unit axis tilted by `u` and `v` (tangents of the tilt angles).
@@ -143,6 +147,20 @@ impl DriveFrame {
             axis[k] = v.mul_add(v.lift(self.tangents[1][k]), first);
         }
         scale(axis, u.lift(1.0) / norm(axis))
+    }
+
+    /// The tilted unit axis and two vectors across it.
+    #[inline(always)]
+    pub fn tilted_triad<S: Scalar>(&self, u: S, v: S) -> [Vector<S>; 3] {
+        if self.axis == [0.0; 3] {
+            return [[u.lift(0.0); 3]; 3];
+        }
+        let axis = self.tilted(u, v);
+        let across = self.tangents.map(|tangent| {
+            let tangent = tangent.map(|value| u.lift(value));
+            subtract(tangent, scale(axis, dot(tangent, axis)))
+        });
+        [axis, across[0], across[1]]
     }
 }
 
@@ -168,7 +186,7 @@ pub trait Drive {
     /// `base` is the joint centre as the machine file gives it; `length` the strut's own length
     /// (unused where the drive is the length).
     fn place<S: Scalar>(
-        frame: &DriveFrame,
+        nominal: &Direction,
         parameters: &[S],
         joint: S,
         base: Vector<S>,
@@ -177,7 +195,7 @@ pub trait Drive {
 
     /// The joint coordinate for a platform-side joint centre; `mode` (+1 or -1) picks the branch.
     fn inverse<S: Scalar>(
-        frame: &DriveFrame,
+        nominal: &Direction,
         parameters: &[S],
         mode: f64,
         base: Vector<S>,
@@ -187,7 +205,7 @@ pub trait Drive {
 
     /// The shortest and the longest strut that reaches `platform` from some joint coordinate.
     fn span(
-        frame: &DriveFrame,
+        nominal: &Direction,
         parameters: &[f64],
         base: Vector<f64>,
         platform: Vector<f64>,
@@ -198,9 +216,12 @@ pub trait Drive {
 pub const OWN: usize = 7;
 /// Where the drive's parameters end.
 pub const DRIVE_END: usize = OWN + MAX_DRIVE_PARAMETERS;
-/// Places of one closure's gradient: `base`, `platform`, `length`, the drive's parameters, `tool`.
-/// The platform's and the tool's are the library's to fill, since they depend on the attitude.
-pub const PLACES: usize = DRIVE_END + 3;
+/// Where the derivative to the radius of a strut's ring stands.
+pub const RING: usize = DRIVE_END + 3;
+/// Places of one closure's gradient: a strut's `base`, `platform`, `length`, the drive's parameters,
+/// `tool`, `ring_radius`; a guide's anchors, then `tool`. The platform's, the tool's and the ring's are
+/// the library's to fill, since they depend on the attitude.
+pub const PLACES: usize = RING + 1;
 
 /// The derivatives of one closure that need no knowledge of poses, beside those in its places.
 #[derive(Clone, Copy, Debug)]
@@ -243,24 +264,23 @@ fn strut_gradient<S: Scalar>([base, platform]: [Vector<S>; 2], length: S) -> (Ve
     ([closure.parts[0], closure.parts[1], closure.parts[2]], closure.parts[3])
 }
 
-/// The gradient of the strut closure through the drive `D`; `N` is its [`Drive::WIDTH`]. `points` are
-/// the strut's base as the machine file gives it and its platform-side joint centre.
+/// A strut's base-side joint centre and length through the drive `D`, as dual numbers in the drive's
+/// parameters, the joint coordinate, the strut's base point and its length; `N` is [`Drive::WIDTH`].
 #[inline(always)]
-fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
-    frame: &DriveFrame,
+fn driven_place<S: Scalar, D: Drive, const N: usize>(
+    nominal: &Direction,
     parameters: &[S],
     joint: S,
-    [base, platform]: [Vector<S>; 2],
+    base: Vector<S>,
     length: S,
-    places: &mut [S; PLACES],
-) -> ClosureGradient<S> {
+) -> (Vector<Dual<S, N>>, Dual<S, N>) {
     let count = D::TABLE.parameters.len();
     let mut inputs = [Dual::<S, N>::constant(joint); MAX_DRIVE_PARAMETERS];
     for k in 0..count {
         inputs[k] = Dual::variable(parameters[k], k);
     }
-    let (centre, own) = D::place(
-        frame,
+    D::place(
+        nominal,
         &inputs[..count],
         Dual::variable(joint, count),
         [
@@ -269,7 +289,22 @@ fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
             Dual::variable(base[2], count + 3),
         ],
         Dual::variable(length, count + 4),
-    );
+    )
+}
+
+/// The gradient of the strut closure through the drive `D`; `N` is its [`Drive::WIDTH`]. `points` are
+/// the strut's base as the machine file gives it and its platform-side joint centre.
+#[inline(always)]
+fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
+    nominal: &Direction,
+    parameters: &[S],
+    joint: S,
+    [base, platform]: [Vector<S>; 2],
+    length: S,
+    places: &mut [S; PLACES],
+) -> ClosureGradient<S> {
+    let count = D::TABLE.parameters.len();
+    let (centre, own) = driven_place::<S, D, N>(nominal, parameters, joint, base, length);
     let at = [centre[0].value, centre[1].value, centre[2].value];
     let (to_centre, to_length) = strut_gradient([at, platform], own.value);
     let mut chained = [joint; N];
@@ -281,6 +316,27 @@ fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
     places[6] = chained[count + 4];
     places[OWN..OWN + count].copy_from_slice(&chained[..count]);
     ClosureGradient { centre: to_centre, joint: chained[count] }
+}
+
+/// The work of a force on the base-side joint centre per unit of each parameter, through the drive `D`,
+/// at the places of a gradient.
+#[inline(always)]
+fn driven_base_load<S: Scalar, D: Drive, const N: usize>(
+    nominal: &Direction,
+    parameters: &[S],
+    joint: S,
+    base: Vector<S>,
+    force: Vector<S>,
+    places: &mut [S; PLACES],
+) {
+    let count = D::TABLE.parameters.len();
+    let (centre, _) = driven_place::<S, D, N>(nominal, parameters, joint, base, joint.lift(1.0));
+    let mut work = [joint; N];
+    for j in 0..N {
+        work[j] = dot(force, [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]]);
+    }
+    places[..3].copy_from_slice(&work[count + 1..count + 4]);
+    places[OWN..OWN + count].copy_from_slice(&work[..count]);
 }
 
 const fn most(counts: &[usize]) -> usize {
@@ -320,14 +376,14 @@ macro_rules! drives {
             #[inline(always)]
             pub fn place<S: Scalar>(
                 self,
-                frame: &DriveFrame,
+                nominal: &Direction,
                 parameters: &[S],
                 joint: S,
                 base: Vector<S>,
                 length: S,
             ) -> (Vector<S>, S) {
                 match self {
-                    $(DriveKind::$name => <$type as Drive>::place(frame, parameters, joint, base, length)),+
+                    $(DriveKind::$name => <$type as Drive>::place(nominal, parameters, joint, base, length)),+
                 }
             }
 
@@ -335,7 +391,7 @@ macro_rules! drives {
             #[inline(always)]
             pub fn inverse<S: Scalar>(
                 self,
-                frame: &DriveFrame,
+                nominal: &Direction,
                 parameters: &[S],
                 mode: f64,
                 base: Vector<S>,
@@ -343,20 +399,38 @@ macro_rules! drives {
                 platform: Vector<S>,
             ) -> Reach<S> {
                 match self {
-                    $(DriveKind::$name => <$type as Drive>::inverse(frame, parameters, mode, base, length, platform)),+
+                    $(DriveKind::$name => <$type as Drive>::inverse(nominal, parameters, mode, base, length, platform)),+
                 }
             }
 
             /// See [`Drive::span`].
             pub fn span(
                 self,
-                frame: &DriveFrame,
+                nominal: &Direction,
                 parameters: &[f64],
                 base: Vector<f64>,
                 platform: Vector<f64>,
             ) -> [f64; 2] {
                 match self {
-                    $(DriveKind::$name => <$type as Drive>::span(frame, parameters, base, platform)),+
+                    $(DriveKind::$name => <$type as Drive>::span(nominal, parameters, base, platform)),+
+                }
+            }
+
+            /// The work of a force on the base-side joint centre per unit of each parameter.
+            #[inline(always)]
+            pub fn base_load<S: Scalar>(
+                self,
+                nominal: &Direction,
+                parameters: &[S],
+                joint: S,
+                base: Vector<S>,
+                force: Vector<S>,
+                places: &mut [S; PLACES],
+            ) {
+                match self {
+                    $(DriveKind::$name => driven_base_load::<S, $type, { <$type as Drive>::WIDTH }>(
+                        nominal, parameters, joint, base, force, places,
+                    )),+
                 }
             }
 
@@ -364,7 +438,7 @@ macro_rules! drives {
             #[inline(always)]
             pub fn gradient<S: Scalar>(
                 self,
-                frame: &DriveFrame,
+                nominal: &Direction,
                 parameters: &[S],
                 joint: S,
                 points: [Vector<S>; 2],
@@ -373,7 +447,7 @@ macro_rules! drives {
             ) -> ClosureGradient<S> {
                 match self {
                     $(DriveKind::$name => driven_gradient::<S, $type, { <$type as Drive>::WIDTH }>(
-                        frame, parameters, joint, points, length, places,
+                        nominal, parameters, joint, points, length, places,
                     )),+
                 }
             }

@@ -1,6 +1,6 @@
 //! A carriage on a straight guideway.
 
-use super::{Dimension, Drawing, Drive, DriveFrame, ElementTable, Field, ParameterField, Reach};
+use super::{Dimension, Direction, Drawing, Drive, ElementTable, Field, ParameterField, Reach};
 use super::{axis_parameter_fields, axis_parameters};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, add, dot, norm, scale as scaled, subtract};
@@ -55,20 +55,20 @@ impl Drive for Slider {
 
     #[inline(always)]
     fn place<S: Scalar>(
-        frame: &DriveFrame,
+        nominal: &Direction,
         parameters: &[S],
         joint: S,
         base: Vector<S>,
         length: S,
     ) -> (Vector<S>, S) {
         let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
-        let carriage = add([x, y, z], scaled(frame.tilted(u, v), scale.mul_add(joint, offset)));
+        let carriage = add([x, y, z], scaled(nominal.tilted(u, v), scale.mul_add(joint, offset)));
         (add(carriage, base), length)
     }
 
     #[inline(always)]
     fn inverse<S: Scalar>(
-        frame: &DriveFrame,
+        nominal: &Direction,
         parameters: &[S],
         mode: f64,
         base: Vector<S>,
@@ -76,7 +76,7 @@ impl Drive for Slider {
         platform: Vector<S>,
     ) -> Reach<S> {
         let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
-        let axis = frame.tilted(u, v);
+        let axis = nominal.tilted(u, v);
         let from_origin = subtract(platform, add([x, y, z], base));
         let foot = dot(from_origin, axis);
         let perpendicular = subtract(from_origin, scaled(axis, foot));
@@ -88,13 +88,13 @@ impl Drive for Slider {
     }
 
     fn span(
-        frame: &DriveFrame,
+        nominal: &Direction,
         parameters: &[f64],
         base: Vector<f64>,
         platform: Vector<f64>,
     ) -> [f64; 2] {
         let [x, y, z, u, v, _, _] = axis_parameters(parameters);
-        let axis = frame.tilted(u, v);
+        let axis = nominal.tilted(u, v);
         let from_origin = subtract(platform, add([x, y, z], base));
         let foot = dot(from_origin, axis);
         [norm(subtract(from_origin, scaled(axis, foot))), f64::INFINITY]

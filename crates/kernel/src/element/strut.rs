@@ -2,7 +2,7 @@
 
 use super::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
 use crate::scalar::Scalar;
-use crate::spatial::{Vector, norm, subtract};
+use crate::spatial::{Vector, add, dot, norm, scale, subtract};
 
 /// Keys and parameters of a strut. Its length is a parameter only where no telescopic drive is it.
 pub const TABLE: ElementTable = ElementTable {
@@ -25,6 +25,21 @@ pub const TABLE: ElementTable = ElementTable {
             default: None,
             doc: "platform-side joint centre in the platform's axes",
         },
+        Field {
+            name: "ring_radius",
+            shape: 0,
+            dimension: Dimension::Length,
+            default: Some(0.0),
+            doc: "radius of a ring about `platform` on which the platform-side joint slides \
+                  (pentapods); 0: the joint stands at `platform`",
+        },
+        Field {
+            name: "ring_axis",
+            shape: 3,
+            dimension: Dimension::Direction,
+            default: Some(0.0),
+            doc: "axis of the ring, platform axes",
+        },
     ],
     parameters: PARAMETERS,
     coordinate: Dimension::Length,
@@ -40,6 +55,9 @@ const PARAMETERS: &[ParameterField] = &[
     parameter("length", Dimension::Length),
 ];
 
+/// The parameter of a strut whose platform-side joint slides on a ring, beside [`TABLE`]'s.
+pub const RING_RADIUS: ParameterField = parameter("ring_radius", Dimension::Length);
+
 /// The residual |B - A| - L in m. Its derivative to the platform's twist is the unit wrench of the
 /// strut's force.
 #[inline(always)]
@@ -53,4 +71,20 @@ pub fn closure<S: Scalar>(base: Vector<S>, platform: Vector<S>, length: S) -> S 
 pub fn squared_closure<S: Scalar>(base: Vector<S>, platform: Vector<S>, length: S) -> S {
     let d = subtract(platform, base);
     d[0].square_plus(d[1].square_plus(d[2].square_plus(-length.square())))
+}
+
+/// The point of a ring (centre, unit axis, radius) that is nearest to `from`, and the unit vector from
+/// the centre to it. Where a joint slides on a ring freely it stands there, and the strut's length is
+/// the distance to it; by the envelope theorem the closure's derivatives are those of a joint that stays.
+#[inline(always)]
+pub fn nearest_on_ring<S: Scalar>(
+    centre: Vector<S>,
+    axis: Vector<S>,
+    radius: S,
+    from: Vector<S>,
+) -> (Vector<S>, Vector<S>) {
+    let away = subtract(from, centre);
+    let across = subtract(away, scale(axis, dot(away, axis)));
+    let radial = scale(across, radius.lift(1.0) / norm(across));
+    (add(centre, scale(radial, radius)), radial)
 }

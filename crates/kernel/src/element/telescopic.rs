@@ -1,7 +1,7 @@
 //! A strut whose own length is driven.
 
 use super::parameter;
-use super::{Dimension, Drawing, Drive, DriveFrame, ElementTable, Field, ParameterField, Reach};
+use super::{Dimension, Direction, Drawing, Drive, ElementTable, Field, ParameterField, Reach};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, norm, subtract};
 
@@ -41,7 +41,7 @@ impl Drive for Telescopic {
 
     #[inline(always)]
     fn place<S: Scalar>(
-        _frame: &DriveFrame,
+        _nominal: &Direction,
         parameters: &[S],
         joint: S,
         base: Vector<S>,
@@ -52,7 +52,7 @@ impl Drive for Telescopic {
 
     #[inline(always)]
     fn inverse<S: Scalar>(
-        _frame: &DriveFrame,
+        _nominal: &Direction,
         parameters: &[S],
         _mode: f64,
         base: Vector<S>,
@@ -64,7 +64,7 @@ impl Drive for Telescopic {
     }
 
     fn span(
-        _frame: &DriveFrame,
+        _nominal: &Direction,
         _parameters: &[f64],
         _base: Vector<f64>,
         _platform: Vector<f64>,

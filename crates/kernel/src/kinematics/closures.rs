@@ -3,11 +3,12 @@
 //! The elements give closures of points; how a platform joint moves with the platform's twist
 //! (translation of the tool point, then rotation) is added here, once for all elements.
 
-use crate::element::strut;
-use crate::linear::{IN_ORDER, Matrix6, Order, SIX};
-use crate::machine::Machine;
-use crate::scalar::{Dual, Real};
-use crate::spatial::{Pose, Vector, add, cross, rotate, rotation_matrix};
+use crate::element::guide::{Anchor, GuideLimb};
+use crate::element::strut::{self, nearest_on_ring};
+use crate::linear::{CLOSURES, IN_ORDER, Matrix6, Order, SIX};
+use crate::machine::{Machine, MachineGuide, Ring};
+use crate::scalar::{Dual, Real, Scalar};
+use crate::spatial::{Pose, RotationMatrix, Vector, add, cross, rotate, rotation_matrix, subtract};
 
 /// One strut of one sample, ready for the iteration: everything that does not depend on the pose.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,13 +21,17 @@ pub struct Limb<S> {
     pub length: S,
 }
 
-/// The struts of one sample; those beyond the machine's closure count are unused.
-pub type Limbs<S> = [Limb<S>; SIX];
+/// The struts of one sample; those beyond the machine's are unused.
+pub type Limbs<S> = [Limb<S>; CLOSURES];
+/// Rows of all closures of one sample.
+pub type Rows = [[f64; SIX]; CLOSURES];
+/// Residuals of all closures of one sample.
+pub type Residuals = [f64; CLOSURES];
 
 /// Places every strut's joint centres for parameters `p` and joint coordinates `q`.
 #[inline(always)]
 pub fn limbs<S: Real>(machine: &Machine, p: &[S], q: &[S]) -> Limbs<S> {
-    let mut result = [Limb::default(); SIX];
+    let mut result = [Limb::default(); CLOSURES];
     let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
     for (limb, strut) in result.iter_mut().zip(&machine.struts) {
         let own = &p[strut.first..];
@@ -40,7 +45,7 @@ pub fn limbs<S: Real>(machine: &Machine, p: &[S], q: &[S]) -> Limbs<S> {
             None => (base, length),
             Some(index) => {
                 let drive = &machine.drives[index];
-                drive.kind.place(&drive.frame, &p[drive.first..], q[index], base, length)
+                drive.kind.place(&drive.nominal, &p[drive.first..], q[index], base, length)
             }
         };
     }
@@ -59,11 +64,67 @@ pub fn row<S: Real>(machine: &Machine, to_centre: Vector<S>, arm: Vector<S>) -> 
     row
 }
 
-/// Residuals and rows of a closure for all struts, in the given order of elimination: rows
-/// `0..closure_count` are closures, those beyond are identity rows of the freedoms that the frame
-/// holds, which are taken out of the closures.
+/// A ring joint's arm from the tool point, base axes: the ring's point nearest to the strut's base, and
+/// the unit vector from the ring's centre to it.
 #[inline(always)]
-fn rows_of<S: Real, const SQUARED: bool>(
+pub fn ring_arm<S: Scalar>(
+    ring: &Ring,
+    radius: S,
+    limb: &Limb<S>,
+    rotation: &RotationMatrix<S>,
+    position: Vector<S>,
+) -> (Vector<S>, Vector<S>) {
+    let axis = rotate(rotation, ring.axis.map(|value| radius.lift(value)));
+    let centre = rotate(rotation, limb.arm);
+    nearest_on_ring(centre, axis, radius, subtract(limb.base, position))
+}
+
+/// A guide's anchors for parameters `p`.
+#[inline(always)]
+pub fn guide_limb<S: Scalar>(guide: &MachineGuide, p: &[S], tool: Vector<S>) -> GuideLimb<S> {
+    let zero = tool[0].lift(0.0);
+    let value =
+        |anchor: Anchor, k: usize| guide.first[anchor as usize].map_or(zero, |at| p[at + k]);
+    let point = |anchor| [0, 1, 2].map(|k| value(anchor, k));
+    let tilt = |anchor| [0, 1].map(|k| value(anchor, k));
+    GuideLimb {
+        frame_point: point(Anchor::FramePoint),
+        arm: subtract(point(Anchor::PlatformPoint), tool),
+        tilts: [tilt(Anchor::FrameDirection), tilt(Anchor::PlatformDirection)],
+    }
+}
+
+/// Residual of a strut's closure and its derivatives to the platform-side joint centre.
+#[inline(always)]
+fn strut_closure<S: Real, const SQUARED: bool>(limb: &Limb<S>, centre: Vector<S>) -> Dual<S, 3> {
+    let at = [
+        Dual::<S, 3>::variable(centre[0], 0),
+        Dual::variable(centre[1], 1),
+        Dual::variable(centre[2], 2),
+    ];
+    let base =
+        [Dual::constant(limb.base[0]), Dual::constant(limb.base[1]), Dual::constant(limb.base[2])];
+    let length = Dual::constant(limb.length);
+    if SQUARED {
+        strut::squared_closure(base, at, length)
+    } else {
+        strut::closure(base, at, length)
+    }
+}
+
+/// The identity row of the freedom that the frame holds as its number `number`.
+#[inline(always)]
+pub fn held_row<S: Real>(machine: &Machine, number: usize) -> [S; SIX] {
+    let mut result = [S::default(); SIX];
+    result[machine.held[number]] = S::splat(1.0);
+    result
+}
+
+/// Residuals and rows of the squared closures of a plain machine: what Newton's iteration runs on. In
+/// the given order of elimination: closures `0..closure_count`, beyond them identity rows of the freedoms
+/// that the frame holds, which are taken out of the closures.
+#[inline(always)]
+pub fn squared_rows<S: Real>(
     machine: &Machine,
     limbs: &Limbs<S>,
     pose: &Pose<S>,
@@ -82,61 +143,13 @@ fn rows_of<S: Real, const SQUARED: bool>(
         }
         let limb = &limbs[i];
         let arm = rotate(&rotation, limb.arm);
-        let centre = add(arm, pose.position);
-        let at = [
-            Dual::<S, 3>::variable(centre[0], 0),
-            Dual::variable(centre[1], 1),
-            Dual::variable(centre[2], 2),
-        ];
-        let base = [
-            Dual::constant(limb.base[0]),
-            Dual::constant(limb.base[1]),
-            Dual::constant(limb.base[2]),
-        ];
-        let length = Dual::constant(limb.length);
-        let closure = if SQUARED {
-            strut::squared_closure(base, at, length)
-        } else {
-            strut::closure(base, at, length)
-        };
+        let closure = strut_closure::<S, true>(limb, add(arm, pose.position));
         rows[slot] = row(machine, closure.parts, arm);
         residuals[slot] = closure.value;
     }
 }
 
-/// The identity row of the freedom that the frame holds as its number `number`.
-#[inline(always)]
-pub fn held_row<S: Real>(machine: &Machine, number: usize) -> [S; SIX] {
-    let mut result = [S::default(); SIX];
-    result[machine.held[number]] = S::splat(1.0);
-    result
-}
-
-/// Residuals and rows of the squared closures: what Newton's iteration runs on.
-#[inline(always)]
-pub fn squared_rows<S: Real>(
-    machine: &Machine,
-    limbs: &Limbs<S>,
-    pose: &Pose<S>,
-    order: &Order,
-    rows: &mut Matrix6<S>,
-    residuals: &mut [S; SIX],
-) {
-    rows_of::<S, true>(machine, limbs, pose, order, rows, residuals);
-}
-
-/// Residuals (m) and rows (unit wrenches) of the closures themselves, as they come.
-pub fn closure_rows(
-    machine: &Machine,
-    limbs: &Limbs<f64>,
-    pose: &Pose<f64>,
-) -> (Matrix6<f64>, [f64; SIX]) {
-    let (mut rows, mut residuals) = ([[0.0; SIX]; SIX], [0.0; SIX]);
-    rows_of::<f64, false>(machine, limbs, pose, &IN_ORDER, &mut rows, &mut residuals);
-    (rows, residuals)
-}
-
-/// Residuals of the squared closures alone, in the given order.
+/// Residuals of the squared closures of a plain machine alone, in the given order.
 #[inline(always)]
 pub fn squared_residuals<S: Real>(
     machine: &Machine,
@@ -155,4 +168,74 @@ pub fn squared_residuals<S: Real>(
             S::default()
         };
     }
+}
+
+/// One sample of any machine on the single road: parameters, and the struts placed.
+#[derive(Clone, Copy)]
+pub struct Sample<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// All parameters; may be empty for a plain machine, which the placed struts tell all of.
+    pub p: &'a [f64],
+    /// The struts, placed for these parameters and the joints.
+    pub limbs: &'a Limbs<f64>,
+}
+
+impl Sample<'_> {
+    /// Residuals and rows of all closures as they come, struts squared or not; guides as they are.
+    fn system<const SQUARED: bool>(&self, pose: &Pose<f64>) -> (Rows, Residuals) {
+        let Sample { machine, p, limbs } = *self;
+        let (mut rows, mut residuals) = ([[0.0; SIX]; CLOSURES], [0.0; CLOSURES]);
+        let rotation = rotation_matrix(pose.rotation);
+        for (i, strut) in machine.struts.iter().enumerate() {
+            let limb = &limbs[i];
+            let arm = match &strut.ring {
+                None => rotate(&rotation, limb.arm),
+                Some(ring) => ring_arm(ring, p[ring.radius], limb, &rotation, pose.position).0,
+            };
+            let closure = strut_closure::<f64, SQUARED>(limb, add(arm, pose.position));
+            rows[i] = row(machine, closure.parts, arm);
+            residuals[i] = closure.value;
+        }
+        for (number, &(guide, which)) in machine.guide_closures.iter().enumerate() {
+            let guide = &machine.guides[guide];
+            let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
+            let limb = guide_limb(guide, p, tool);
+            let at = (&rotation, pose.position);
+            let (residual, mut row) =
+                guide.kind.row(which, &guide.frames, &limb, at, machine.characteristic_length);
+            for &freedom in &machine.held {
+                row[freedom] = 0.0;
+            }
+            rows[machine.struts.len() + number] = row;
+            residuals[machine.struts.len() + number] = residual;
+        }
+        (rows, residuals)
+    }
+
+    /// Residuals and rows on which Newton's iteration runs, as a square system: struts squared, identity
+    /// rows for the freedoms that the frame holds. Only for as many closures as freedoms.
+    pub fn squared(&self, pose: &Pose<f64>) -> (Matrix6<f64>, [f64; SIX]) {
+        let (rows, residuals) = self.system::<true>(pose);
+        let (mut square, mut values) = ([[0.0; SIX]; SIX], [0.0; SIX]);
+        square.copy_from_slice(&rows[..SIX]);
+        values.copy_from_slice(&residuals[..SIX]);
+        let count = self.machine.closure_count();
+        for number in 0..self.machine.held.len() {
+            square[count + number] = held_row(self.machine, number);
+        }
+        (square, values)
+    }
+
+    /// Residuals (m) and rows (unit wrenches) of the closures themselves.
+    pub fn closures(&self, pose: &Pose<f64>) -> (Rows, Residuals) {
+        self.system::<false>(pose)
+    }
+}
+
+/// A start order for a plain machine's lanes.
+pub fn start_rows(machine: &Machine, limbs: &Limbs<f64>, pose: &Pose<f64>) -> Matrix6<f64> {
+    let (mut rows, mut residuals) = ([[0.0; SIX]; SIX], [0.0; SIX]);
+    squared_rows(machine, limbs, pose, &IN_ORDER, &mut rows, &mut residuals);
+    rows
 }

@@ -6,11 +6,10 @@
 //! assembly is never returned as `ok`.
 
 use super::SINGULAR;
-use super::closures::{Limbs, closure_rows, squared_residuals, squared_rows};
+use super::closures::{Limbs, Sample, squared_residuals, squared_rows, start_rows};
 use super::linearisation::proven_regular;
-use crate::linear::{
-    IN_ORDER, Order, Pivoted, SIX, condition_index, factor, factor_pivoting, solve,
-};
+use super::overconstrained::{Surroundings, least_energy};
+use crate::linear::{Order, Pivoted, SIX, condition_index, factor, factor_pivoting, solve};
 use crate::machine::Machine;
 use crate::scalar::Real;
 use crate::spatial::Pose;
@@ -52,9 +51,7 @@ fn relative_size<S: Real>(machine: &Machine, twist: &[S; SIX]) -> S {
 
 /// The row order for a group of samples near one pose.
 pub fn start_order(machine: &Machine, limbs: &Limbs<f64>, pose: &Pose<f64>) -> Order {
-    let (mut rows, mut residuals) = ([[0.0; SIX]; SIX], [0.0; SIX]);
-    squared_rows(machine, limbs, pose, &IN_ORDER, &mut rows, &mut residuals);
-    factor_pivoting(&rows).order
+    factor_pivoting(&start_rows(machine, limbs, pose)).order
 }
 
 /// Newton's iteration on all lanes at once, rows in the given order.
@@ -108,16 +105,14 @@ enum Ending {
 
 /// Newton's iteration towards squared residuals equal to `target`.
 fn settle(
-    machine: &Machine,
-    limbs: &Limbs<f64>,
+    sample: &Sample<'_>,
     pose: &mut Pose<f64>,
     target: &[f64; SIX],
     longest: f64,
     sign: &mut f64,
 ) -> Ending {
-    let (mut rows, mut twist) = ([[0.0; SIX]; SIX], [0.0; SIX]);
     for _ in 0..STEPS {
-        squared_rows(machine, limbs, pose, &IN_ORDER, &mut rows, &mut twist);
+        let (rows, residuals) = sample.squared(pose);
         let Pivoted { factors, order, determinant } = factor_pivoting(&rows);
         if *sign == 0.0 {
             *sign = determinant.signum();
@@ -125,9 +120,13 @@ fn settle(
         if determinant.signum() != *sign {
             return Ending::Crossed;
         }
-        twist = std::array::from_fn(|k| twist[order[k]] - target[order[k]]);
-        solve(&factors, &mut twist);
-        let size = relative_size(machine, &twist);
+        let step = |residuals: [f64; SIX]| {
+            let mut twist = order.map(|row| residuals[row] - target[row]);
+            solve(&factors, &mut twist);
+            twist
+        };
+        let twist = step(residuals);
+        let size = relative_size(sample.machine, &twist);
         // Also true where it is NaN.
         if !(size <= longest) {
             return Ending::Lost;
@@ -135,13 +134,9 @@ fn settle(
         pose.step_back(&twist);
         if size < CHORD {
             for _ in 0..CHORD_STEPS {
-                squared_residuals(machine, limbs, pose, &order, &mut twist);
-                for k in 0..SIX {
-                    twist[k] -= target[order[k]];
-                }
-                solve(&factors, &mut twist);
+                let twist = step(sample.squared(pose).1);
                 pose.step_back(&twist);
-                if relative_size(machine, &twist) * size < SETTLED {
+                if relative_size(sample.machine, &twist) * size < SETTLED {
                     return Ending::Settled(determinant);
                 }
             }
@@ -150,34 +145,39 @@ fn settle(
     Ending::Lost
 }
 
-/// The pose of one sample, and what became of it.
+/// The pose of one sample, and what became of it, by the way that the machine's closures ask for.
 ///
-/// First the plain iteration. Where it crosses a singularity, steps too far or does not settle, the
-/// residual at the start is taken down to zero in shares, each a short iteration: the pose then moves
-/// continuously, as the machine itself would.
-pub fn forward(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64>, Status) {
+/// As many closures as freedoms: first the plain iteration. Where it crosses a singularity, steps too far
+/// or does not settle, the residual at the start is taken down to zero in shares, each a short iteration:
+/// the pose then moves continuously, as the machine itself would. More closures than freedoms: the pose
+/// of least elastic energy ([`super::overconstrained`]).
+pub fn forward(sample: &Sample<'_>, q: &[f64], start: &Pose<f64>) -> (Pose<f64>, Status) {
+    let Sample { machine, limbs, .. } = *sample;
     let shortest =
         limbs[..machine.struts.len()].iter().map(|limb| limb.length).fold(f64::INFINITY, f64::min);
     // Also true where it is NaN.
     if !(shortest > 0.0) {
         return (*start, Status::Unreachable);
     }
+    if machine.is_overconstrained() {
+        let settled = least_energy(sample, q, start, &Surroundings::default());
+        return (settled.pose, settled.status);
+    }
     let mut sign = 0.0;
     let mut pose = *start;
-    let plain = settle(machine, limbs, &mut pose, &[0.0; SIX], LONG_STEP, &mut sign);
+    let plain = settle(sample, &mut pose, &[0.0; SIX], LONG_STEP, &mut sign);
     if let Ending::Settled(determinant) = plain {
-        return judged(machine, limbs, pose, determinant);
+        return judged(sample, pose, determinant);
     }
-    if condition_at(machine, limbs, &pose) < SINGULAR {
+    if condition_at(sample, &pose) < SINGULAR {
         return (pose, Status::Singular);
     }
-    follow(machine, limbs, start)
+    follow(sample, start)
 }
 
 /// Takes the residual at the start down to zero in shares.
-fn follow(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64>, Status) {
-    let mut whole = [0.0; SIX];
-    squared_residuals(machine, limbs, start, &IN_ORDER, &mut whole);
+fn follow(sample: &Sample<'_>, start: &Pose<f64>) -> (Pose<f64>, Status) {
+    let (_, whole) = sample.squared(start);
     let mut sign = 0.0;
     let mut pose = *start;
     let mut left = 1.0;
@@ -188,7 +188,7 @@ fn follow(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64
         let next = if share >= left { 0.0 } else { left - share };
         let target = whole.map(|residual| residual * next);
         let mut trial = pose;
-        match settle(machine, limbs, &mut trial, &target, FOLLOWED_STEP, &mut sign) {
+        match settle(sample, &mut trial, &target, FOLLOWED_STEP, &mut sign) {
             Ending::Settled(determinant) => {
                 pose = trial;
                 last = determinant;
@@ -201,7 +201,7 @@ fn follow(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64
         }
         share *= 0.5;
         if share < SHORTEST_SHARE {
-            let singular = condition_at(machine, limbs, &pose) < SINGULAR;
+            let singular = condition_at(sample, &pose) < SINGULAR;
             let status = if singular {
                 Status::Singular
             } else if crossed {
@@ -212,28 +212,24 @@ fn follow(machine: &Machine, limbs: &Limbs<f64>, start: &Pose<f64>) -> (Pose<f64
             return (pose, status);
         }
     }
-    judged(machine, limbs, pose, last)
+    judged(sample, pose, last)
 }
 
 /// A settled pose is `ok` only where the platform is held.
-fn judged(
-    machine: &Machine,
-    limbs: &Limbs<f64>,
-    pose: Pose<f64>,
-    determinant: f64,
-) -> (Pose<f64>, Status) {
-    let regular = proven_regular(machine, limbs, determinant) > 0.0
-        || condition_at(machine, limbs, &pose) >= SINGULAR;
+fn judged(sample: &Sample<'_>, pose: Pose<f64>, determinant: f64) -> (Pose<f64>, Status) {
+    let proven =
+        sample.machine.plain && proven_regular(sample.machine, sample.limbs, determinant) > 0.0;
+    let regular = proven || condition_at(sample, &pose) >= SINGULAR;
     (pose, if regular { Status::Ok } else { Status::Singular })
 }
 
 /// Smallest over largest singular value of the scaled rows.
-fn condition_at(machine: &Machine, limbs: &Limbs<f64>, pose: &Pose<f64>) -> f64 {
-    let (mut rows, _) = closure_rows(machine, limbs, pose);
+pub fn condition_at(sample: &Sample<'_>, pose: &Pose<f64>) -> f64 {
+    let (mut rows, _) = sample.closures(pose);
     for row in &mut rows {
         for value in &mut row[3..] {
-            *value /= machine.characteristic_length;
+            *value /= sample.machine.characteristic_length;
         }
     }
-    condition_index(&rows, machine.struts.len(), &machine.dof)
+    condition_index(&rows, sample.machine.closure_count(), &sample.machine.dof)
 }

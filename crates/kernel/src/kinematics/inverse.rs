@@ -5,14 +5,16 @@
 //! solved for together by Newton's iteration, started from the closed forms at the home attitude.
 
 use super::SINGULAR;
-use super::closures::{closure_rows, limbs};
+use super::closures::{Limb, Rows, Sample, limbs, ring_arm};
+use super::forward::forward;
 use super::linearisation::Linearisation;
 use crate::element::{Dimension, Reach};
-use crate::linear::{Matrix6, Pivoted, SIX, condition_index, factor_pivoting, solve};
+use crate::linear::{Matrix6, Pivoted, SIX, condition_index, factor_pivoting, null_space, solve};
 use crate::machine::{Machine, MachineDrive, chosen};
 use crate::scalar::Real;
 use crate::spatial::{
-    Pose, RotationMatrix, Vector, add, dot, euler_axes, norm, rotate, rotation_matrix, subtract,
+    Pose, RotationMatrix, Vector, add, cross, dot, euler_axes, norm, rotate, rotation_matrix,
+    subtract,
 };
 use crate::status::Status;
 
@@ -65,16 +67,23 @@ fn closed_form<S: Real>(
     let strut = &machine.struts[drive.struts[0]];
     let own = &p[strut.first..];
     let tool = &p[machine.tool..];
-    let arm = rotate(rotation, [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]]);
+    let base = [own[0], own[1], own[2]];
+    let platform = [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]];
+    let arm = match &strut.ring {
+        None => rotate(rotation, platform),
+        Some(ring) => {
+            let limb = Limb { base, arm: platform, length: S::default() };
+            ring_arm(ring, p[ring.radius], &limb, rotation, position).0
+        }
+    };
     let length = match strut.own_length {
         Some(index) => p[index],
         None => S::splat(0.0),
     };
     let parameters = &p[drive.first..];
-    let base = [own[0], own[1], own[2]];
     let platform = add(arm, position);
     let mut reach =
-        drive.kind.inverse(&drive.frame, parameters, drive.mode, base, length, platform);
+        drive.kind.inverse(&drive.nominal, parameters, drive.mode, base, length, platform);
     if strut.own_length.is_some() {
         // The closed forms know the length's square only; no strut of negative length reaches.
         reach.margin = reach.margin.min(length);
@@ -97,7 +106,9 @@ pub fn inverse(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Inverse {
     let mut joints = vec![0.0; machine.drives.len()];
     let margin = lane_inverse(machine, p, pose, &mut joints);
     let mut solved = Inverse { joints, pose: *pose, status: Status::Ok };
-    if machine.has_direct_inverse() {
+    if machine.is_overconstrained() {
+        solve_strained(machine, p, margin, pose, &mut solved);
+    } else if machine.has_direct_inverse() {
         // Also true where it is NaN.
         if !(margin >= 0.0) {
             solved.status = Status::Unreachable;
@@ -108,10 +119,148 @@ pub fn inverse(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Inverse {
     if !solved.status.is_solved() {
         solved.pose = *pose;
         solved.joints.fill(f64::NAN);
-    } else if !in_travel(machine, &solved.joints) {
-        solved.status = Status::OutOfTravel;
+    } else {
+        solved.status = permitted(machine, p, &solved.joints, &solved.pose);
     }
     solved
+}
+
+/// Whether joints that are right may be commanded: within travel, and no strut leaning too far.
+pub fn permitted(machine: &Machine, p: &[f64], joints: &[f64], pose: &Pose<f64>) -> Status {
+    if !in_travel(machine, joints) {
+        Status::OutOfTravel
+    } else if machine.limited
+        && leanings(machine, p, joints, pose).any(|(_, _, beyond)| beyond > 0.0)
+    {
+        Status::JointLimit
+    } else {
+        Status::Ok
+    }
+}
+
+/// For every limited joint: the strut, the end (0 base, 1 platform) and by how much the strut leans
+/// beyond the limit, rad.
+fn leanings(
+    machine: &Machine,
+    p: &[f64],
+    joints: &[f64],
+    pose: &Pose<f64>,
+) -> impl Iterator<Item = (usize, usize, f64)> {
+    let rotation = rotation_matrix(pose.rotation);
+    let at = limbs(machine, p, joints);
+    let mut found = Vec::new();
+    for (i, strut) in machine.struts.iter().enumerate() {
+        let limb = &at[i];
+        let arm = match &strut.ring {
+            None => rotate(&rotation, limb.arm),
+            Some(ring) => ring_arm(ring, p[ring.radius], limb, &rotation, pose.position).0,
+        };
+        let along = subtract(add(arm, pose.position), limb.base);
+        for (end, limit) in strut.limits.iter().enumerate() {
+            let Some(limit) = limit else { continue };
+            let axis = match (end, strut.drive) {
+                (1, _) => rotate(&rotation, limit.axis),
+                (_, None) => limit.axis,
+                (_, Some(drive)) => carried(machine, p, joints, drive, limit.axis),
+            };
+            let angle = norm(cross(axis, along)).atan2(dot(axis, along));
+            found.push((i, end, angle - limit.angle));
+        }
+    }
+    found.into_iter()
+}
+
+/// A direction of a drive's carriage or crank, in base axes.
+fn carried(
+    machine: &Machine,
+    p: &[f64],
+    joints: &[f64],
+    drive: usize,
+    axis: Vector<f64>,
+) -> Vector<f64> {
+    let joint = joints[drive];
+    let drive = &machine.drives[drive];
+    let place = |point| drive.kind.place(&drive.nominal, &p[drive.first..], joint, point, 1.0).0;
+    subtract(place(axis), place([0.0; 3]))
+}
+
+/// Joints for which the pose of least elastic energy is the commanded one in its commanded freedoms, by
+/// Newton's iteration on the forward solution.
+fn solve_strained(
+    machine: &Machine,
+    p: &[f64],
+    seed_margin: f64,
+    pose: &Pose<f64>,
+    solved: &mut Inverse,
+) {
+    let unreachable = if seed_margin < 0.0 { Status::Unreachable } else { Status::NotConverged };
+    let wanted = pose.to_coordinates();
+    let commanded = chosen(&machine.commanded);
+    let l = machine.characteristic_length;
+    let unit = |freedom: usize| if freedom < 3 { 1.0 } else { l };
+    for _ in 0..STEPS {
+        let at = limbs(machine, p, &solved.joints);
+        let sample = Sample { machine, p, limbs: &at };
+        let (found, status) = forward(&sample, &solved.joints, &solved.pose);
+        if status != Status::Ok {
+            solved.status = if status == Status::NotConverged { unreachable } else { status };
+            return;
+        }
+        solved.pose = found;
+        let reached = found.to_coordinates();
+        let [a, b, c] = [reached[3], reached[4], reached[5]];
+        let axes = euler_axes([a, b, c]);
+        let mut linear = Linearisation::default();
+        linear.fill_alone(&sample, &solved.joints, &found);
+        // Twist per joint, and twist per coordinate, in the commanded freedoms.
+        let count = commanded.len();
+        let mut system = [[0.0; SIX]; SIX];
+        let mut step = [0.0; SIX];
+        for row in 0..SIX {
+            if row >= count {
+                system[row][row] = 1.0;
+                continue;
+            }
+            let freedom = commanded[row];
+            step[row] = (wanted[freedom] - reached[freedom]) * unit(freedom);
+            for joint in 0..count {
+                let mut twist = [0.0; SIX];
+                for &strut in &machine.drives[joint].struts {
+                    for (k, value) in twist.iter_mut().enumerate() {
+                        *value -= linear.inverse[k][strut] * linear.to_joint[strut];
+                    }
+                }
+                let rate = if freedom < 3 {
+                    twist[freedom]
+                } else {
+                    angle_rates(&axes, [twist[3], twist[4], twist[5]])[freedom - 3]
+                };
+                system[row][joint] = rate * unit(freedom) / joint_length(machine, joint);
+            }
+        }
+        let Pivoted { factors, order, .. } = factor_pivoting(&system);
+        let mut change = order.map(|row| step[row]);
+        solve(&factors, &mut change);
+        let size = change.iter().map(|value| value.abs()).sum::<f64>() / l;
+        // Also true where it is NaN.
+        if !(size < 10.0) {
+            solved.status = unreachable;
+            return;
+        }
+        for (joint, value) in solved.joints.iter_mut().enumerate() {
+            *value += change[joint] / joint_length(machine, joint);
+        }
+        if size < SETTLED {
+            return;
+        }
+    }
+    solved.status = unreachable;
+}
+
+/// Rates of the angles a, b, c for an angular velocity, by the instantaneous axes of the angles.
+fn angle_rates(axes: &[Vector<f64>; 3], rate: Vector<f64>) -> Vector<f64> {
+    let volume = dot(axes[0], cross(axes[1], axes[2]));
+    [0, 1, 2].map(|k| dot(rate, cross(axes[(k + 1) % 3], axes[(k + 2) % 3])) / volume)
 }
 
 /// Newton's iteration on parasitic freedoms and joints together.
@@ -122,13 +271,13 @@ fn solve_parasitic(machine: &Machine, p: &[f64], seed_margin: f64, solved: &mut 
     // the singularity of Euler angles; where an angle is commanded the others are stepped as angles.
     let by_angle = machine.commanded[3..].contains(&true);
     let l = machine.characteristic_length;
-    let count = machine.struts.len();
+    let count = machine.closure_count();
     let branch = |rates: &[f64]| rates.iter().map(|rate| rate.signum()).collect::<Vec<_>>();
     let mut wanted: Option<Vec<f64>> = None;
     let mut linear = Linearisation::default();
     for _ in 0..STEPS {
         let at = limbs(machine, p, &solved.joints);
-        let (_, residuals) = closure_rows(machine, &at, &solved.pose);
+        let (_, residuals) = Sample { machine, p, limbs: &at }.closures(&solved.pose);
         linear.differentiate(machine, p, &solved.joints, &solved.pose);
         let rows = &linear.rows;
         let [_, _, _, a, b, c] = solved.pose.to_coordinates();
@@ -149,7 +298,7 @@ fn solve_parasitic(machine: &Machine, p: &[f64], seed_margin: f64, solved: &mut 
                     dot([rows[i][3], rows[i][4], rows[i][5]], axes[freedom - 3]) / l
                 };
             }
-            if let Some(drive) = machine.struts[i].drive {
+            if let Some(drive) = machine.struts.get(i).and_then(|strut| strut.drive) {
                 system[i][parasitic.len() + drive] =
                     linear.to_joint[i] / joint_length(machine, drive);
             }
@@ -229,6 +378,8 @@ pub enum Obstacle {
     Travel(usize, f64),
     /// Smallest over largest singular value.
     Singular(f64),
+    /// Strut number, end (0 base, 1 platform), and by how much the strut leans beyond the limit, rad.
+    Leaning(usize, usize, f64),
 }
 
 /// What keeps a commanded pose from being used, with amounts.
@@ -244,7 +395,7 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
             None => [norm(subtract(platform, base)); 2],
             Some(drive) => {
                 let drive = &machine.drives[drive];
-                drive.kind.span(&drive.frame, &p[drive.first..], base, platform)
+                drive.kind.span(&drive.nominal, &p[drive.first..], base, platform)
             }
         };
         let fixed_in_closed_pose = strut.drive.is_none() && !machine.has_direct_inverse();
@@ -264,6 +415,11 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
                 found.push(Obstacle::Travel(index, joint - low));
             }
         }
+        if machine.limited {
+            let beyond = leanings(machine, p, &solved.joints, &solved.pose)
+                .filter(|&(_, _, beyond)| beyond > 0.0);
+            found.extend(beyond.map(|(strut, end, angle)| Obstacle::Leaning(strut, end, angle)));
+        }
         let index = condition(machine, p, &solved.joints, &solved.pose);
         if index < SINGULAR {
             found.push(Obstacle::Singular(index));
@@ -272,8 +428,8 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
     found
 }
 
-/// Smallest over largest singular value of the scaled closure Jacobian: 1 isotropic, 0 singular.
-pub fn condition(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> f64 {
+/// The closures' rows with rotations in units of the characteristic length.
+fn scaled_rows(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Rows {
     let mut linear = Linearisation::default();
     linear.differentiate(machine, p, q, pose);
     let mut rows = linear.rows;
@@ -282,7 +438,26 @@ pub fn condition(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> f
             *value /= machine.characteristic_length;
         }
     }
-    condition_index(&rows, machine.struts.len(), &machine.dof)
+    rows
+}
+
+/// Smallest over largest singular value of the scaled closure Jacobian: 1 isotropic, 0 singular.
+pub fn condition(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> f64 {
+    let rows = scaled_rows(machine, p, q, pose);
+    condition_index(&rows, machine.closure_count(), &machine.dof)
+}
+
+/// The twists of the platform about its tool point that no closure holds: none at a good pose. Of unit
+/// length where rotations are measured by the characteristic length.
+pub fn free_motions(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Vec<[f64; SIX]> {
+    let rows = scaled_rows(machine, p, q, pose);
+    let mut free = null_space(&rows, machine.closure_count(), &machine.dof, SINGULAR);
+    for twist in &mut free {
+        for value in &mut twist[3..] {
+            *value /= machine.characteristic_length;
+        }
+    }
+    free
 }
 
 /// The commanded pose that a row of values in the order of the commanded freedoms names; what is not

@@ -2,12 +2,13 @@
 //! parameters and joints. By implicit differentiation, never through an iteration.
 
 use super::SINGULAR;
-use super::closures::{Limbs, held_row, row};
-use crate::element::{DRIVE_END, PLACES, fixed_gradient};
-use crate::linear::{Matrix6, Order, SIX, factor, growth, invert};
+use super::closures::{Limb, Limbs, Sample, guide_limb, held_row, ring_arm, row};
+use super::overconstrained::spread;
+use crate::element::{DRIVE_END, PLACES, RING, fixed_gradient};
+use crate::linear::{CLOSURES, Order, SIX, factor, factor_pivoting, growth, invert};
 use crate::machine::Machine;
 use crate::scalar::Real;
-use crate::spatial::{Pose, add, rotate, rotate_back, rotation_matrix};
+use crate::spatial::{Pose, add, dot, rotate, rotate_back, rotation_matrix};
 
 /// A larger growth of rounding errors asks for an order of elimination of the sample's own.
 const GROWTH: f64 = 40.0;
@@ -17,21 +18,30 @@ const GROWTH: f64 = 40.0;
 #[derive(Clone, Debug, Default)]
 pub struct Linearisation<S> {
     /// Closure i to the platform's twist: the unit wrench of its force. Held freedoms are zero.
-    pub rows: Matrix6<S>,
-    /// The inverse of `rows`: twist per unit residual.
-    pub inverse: Matrix6<S>,
+    /// After the closures' come, where there is room, identity rows of the held freedoms.
+    pub rows: [[S; SIX]; CLOSURES],
+    /// The inverse of `rows`: twist per unit residual. Where there are more closures than freedoms, the
+    /// twist that leaves the least elastic energy.
+    pub inverse: [[S; CLOSURES]; SIX],
     /// Closure i to its joint.
-    pub to_joint: [S; SIX],
+    pub to_joint: [S; CLOSURES],
     /// Closure i to its parameters, at the places that [`Machine::readers`] names.
-    pub to_parameters: [[S; PLACES]; SIX],
+    pub to_parameters: [[S; PLACES]; CLOSURES],
     /// Positive where the rows are proven regular and their order of elimination served.
     pub regular: S,
 }
 
 impl<S: Real> Linearisation<S> {
-    /// Fills rows and gradients of all closures, by dual numbers through drive and strut at once.
+    /// Fills rows and gradients of the struts' closures, by dual numbers through drive and strut at once.
+    /// `PLAIN` machines have no rings, which need not be looked for.
     #[inline(always)]
-    pub fn differentiate(&mut self, machine: &Machine, p: &[S], q: &[S], pose: &Pose<S>) {
+    fn differentiate_struts<const PLAIN: bool>(
+        &mut self,
+        machine: &Machine,
+        p: &[S],
+        q: &[S],
+        pose: &Pose<S>,
+    ) {
         let rotation = rotation_matrix(pose.rotation);
         let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
         let count = machine.struts.len();
@@ -39,7 +49,14 @@ impl<S: Real> Linearisation<S> {
             let strut = &machine.struts[i];
             let own = &p[strut.first..];
             let base = [own[0], own[1], own[2]];
-            let arm = rotate(&rotation, [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]]);
+            let platform = [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]];
+            let mut arm = rotate(&rotation, platform);
+            let mut radial = arm;
+            let ring = if PLAIN { None } else { strut.ring.as_ref() };
+            if let Some(ring) = ring {
+                let limb = Limb { base, arm: platform, length: S::default() };
+                (arm, radial) = ring_arm(ring, p[ring.radius], &limb, &rotation, pose.position);
+            }
             let centre = add(arm, pose.position);
             let length = match strut.own_length {
                 Some(index) => p[index],
@@ -51,8 +68,8 @@ impl<S: Real> Linearisation<S> {
                 Some(index) => {
                     let drive = &machine.drives[index];
                     let parameters = &p[drive.first..];
-                    let (frame, joint) = (&drive.frame, q[index]);
-                    drive.kind.gradient(frame, parameters, joint, [base, centre], length, places)
+                    let (nominal, joint) = (&drive.nominal, q[index]);
+                    drive.kind.gradient(nominal, parameters, joint, [base, centre], length, places)
                 }
             };
             let platform = rotate_back(&rotation, gradient.centre);
@@ -60,15 +77,23 @@ impl<S: Real> Linearisation<S> {
                 places[3 + k] = platform[k];
                 places[DRIVE_END + k] = -platform[k];
             }
+            if ring.is_some() {
+                places[RING] = dot(gradient.centre, radial);
+            }
             self.to_joint[i] = gradient.joint;
             self.rows[i] = row(machine, gradient.centre, arm);
         }
-        for number in 0..machine.held.len() {
+    }
+
+    fn hold(&mut self, machine: &Machine) {
+        let count = machine.closure_count();
+        for number in 0..machine.held.len().min(CLOSURES - count) {
             self.rows[count + number] = held_row(machine, number);
         }
     }
 
-    /// Fills everything, at a pose that closes the struts; rows are eliminated in the given order.
+    /// Fills everything for a plain machine, at a pose that closes the struts; rows are eliminated in the
+    /// given order.
     #[inline(always)]
     pub fn fill(
         &mut self,
@@ -79,18 +104,75 @@ impl<S: Real> Linearisation<S> {
         pose: &Pose<S>,
         order: &Order,
     ) {
-        self.differentiate(machine, p, q, pose);
+        self.differentiate_struts::<true>(machine, p, q, pose);
+        self.hold(machine);
+        let mut determinant = self.eliminate(order);
+        for limb in &limbs[..machine.struts.len()] {
+            determinant = determinant * (limb.length + limb.length);
+        }
+        self.regular = proven_regular(machine, limbs, determinant).min(self.regular);
+    }
+
+    /// Inverts the first six rows; `regular` is positive where the order served. Returns the determinant.
+    #[inline(always)]
+    fn eliminate(&mut self, order: &Order) -> S {
         let mut factors = [[S::default(); SIX]; SIX];
         for k in 0..SIX {
             factors[k] = self.rows[order[k]];
         }
-        let mut determinant = factor(&mut factors);
-        for limb in &limbs[..machine.struts.len()] {
-            determinant = determinant * (limb.length + limb.length);
-        }
-        let stable = S::splat(GROWTH) - growth(&factors);
-        self.regular = proven_regular(machine, limbs, determinant).min(stable);
+        let determinant = factor(&mut factors);
+        self.regular = S::splat(GROWTH) - growth(&factors);
         invert(&factors, order, &mut self.inverse);
+        determinant
+    }
+}
+
+impl<S: Real> Linearisation<S> {
+    /// One sample of a group.
+    pub fn lane(&self, lane: usize) -> Linearisation<f64> {
+        Linearisation {
+            rows: self.rows.map(|row| row.map(|value| value.lane(lane))),
+            inverse: self.inverse.map(|row| row.map(|value| value.lane(lane))),
+            to_joint: self.to_joint.map(|value| value.lane(lane)),
+            to_parameters: self.to_parameters.map(|row| row.map(|value| value.lane(lane))),
+            regular: self.regular.lane(lane),
+        }
+    }
+}
+
+impl Linearisation<f64> {
+    /// Fills rows and gradients of all closures of one sample.
+    pub fn differentiate(&mut self, machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) {
+        self.differentiate_struts::<false>(machine, p, q, pose);
+        let rotation = rotation_matrix(pose.rotation);
+        let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
+        for (number, &(guide, which)) in machine.guide_closures.iter().enumerate() {
+            let i = machine.struts.len() + number;
+            let guide = &machine.guides[guide];
+            let limb = guide_limb(guide, p, tool);
+            let (at, length) = ((&rotation, pose.position), machine.characteristic_length);
+            let places = &mut self.to_parameters[i];
+            guide.kind.gradient(which, &guide.frames, &limb, at, length, places);
+            self.rows[i] = guide.kind.row(which, &guide.frames, &limb, at, length).1;
+            for &freedom in &machine.held {
+                self.rows[i][freedom] = 0.0;
+            }
+            self.to_joint[i] = 0.0;
+        }
+        self.hold(machine);
+    }
+
+    /// Fills everything of one sample of any machine; whether the rows are regular is not looked at.
+    pub fn fill_alone(&mut self, sample: &Sample<'_>, q: &[f64], pose: &Pose<f64>) {
+        let machine = sample.machine;
+        self.differentiate(machine, sample.p, q, pose);
+        if machine.is_overconstrained() {
+            self.inverse = spread(machine, self);
+        } else {
+            let mut square = [[0.0; SIX]; SIX];
+            square.copy_from_slice(&self.rows[..SIX]);
+            self.eliminate(&factor_pivoting(&square).order);
+        }
     }
 }
 

@@ -4,13 +4,16 @@ mod closures;
 mod forward;
 mod inverse;
 mod linearisation;
+mod overconstrained;
 
-pub use closures::{Limb, Limbs, closure_rows, limbs, squared_residuals, squared_rows};
+pub use closures::{Limb, Limbs, Sample, limbs, ring_arm};
 pub use forward::{Descent, descend, forward, start_order};
 pub use inverse::{
-    Inverse, Obstacle, commanded_pose, condition, in_travel, inverse, lane_inverse, obstacles,
+    Inverse, Obstacle, commanded_pose, condition, free_motions, inverse, lane_inverse, obstacles,
+    permitted,
 };
 pub use linearisation::{Linearisation, proven_regular};
+pub use overconstrained::{Settled, Surroundings, internal_forces, least_energy};
 
 /// Singular: smallest scaled singular value below this share of the largest.
 pub const SINGULAR: f64 = 1e-6;

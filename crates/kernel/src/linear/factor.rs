@@ -113,9 +113,10 @@ fn back_substitute<S: Real>(m: &Matrix6<S>, x: &mut [S; SIX]) {
     }
 }
 
-/// The inverse of the eliminated matrix; `order[k]` is the column that row k answers to.
+/// The inverse of the eliminated matrix, in the first six columns; `order[k]` is the column that row k
+/// answers to.
 #[inline(always)]
-pub fn invert<S: Real>(m: &Matrix6<S>, order: &Order, inverse: &mut Matrix6<S>) {
+pub fn invert<S: Real, const N: usize>(m: &Matrix6<S>, order: &Order, inverse: &mut [[S; N]; SIX]) {
     for column in 0..SIX {
         // The right-hand side is a unit vector: elimination starts at its own place.
         let mut x = [S::default(); SIX];

@@ -23,6 +23,25 @@ enum Operation {
     Select(usize, usize, usize),
 }
 
+impl Operation {
+    /// The places that it reads.
+    fn reads(self) -> [Option<usize>; 3] {
+        match self {
+            Operation::Input(_) | Operation::Constant(_) => [None; 3],
+            Operation::Negate(a)
+            | Operation::SquareRoot(a)
+            | Operation::Sine(a)
+            | Operation::Cosine(a) => [Some(a), None, None],
+            Operation::Add(a, b)
+            | Operation::Subtract(a, b)
+            | Operation::Multiply(a, b)
+            | Operation::Divide(a, b)
+            | Operation::Angle(a, b) => [Some(a), Some(b), None],
+            Operation::Select(a, b, c) => [Some(a), Some(b), Some(c)],
+        }
+    }
+}
+
 /// The operations recorded so far, in order.
 #[derive(Default)]
 pub struct Tape {
@@ -53,10 +72,24 @@ impl Tape {
         Trace { tape: self, place: operations.len() - 1 }
     }
 
-    /// A C99 function `void name(const double *x, double *y)` that computes `outputs`.
+    /// A C99 function `void name(const double *x, double *y)` that computes `outputs`; what they do not
+    /// need is left out.
     pub fn print_c(&self, name: &str, outputs: &[Trace<'_>]) -> String {
+        let operations = self.operations.borrow();
+        let mut needed = vec![false; operations.len()];
+        for output in outputs {
+            needed[output.place] = true;
+        }
+        // An operation reads earlier places only.
+        for place in (0..operations.len()).rev() {
+            if needed[place] {
+                for read in operations[place].reads().into_iter().flatten() {
+                    needed[read] = true;
+                }
+            }
+        }
         let mut code = format!("void {name}(const double *x, double *y)\n{{\n");
-        for (place, operation) in self.operations.borrow().iter().enumerate() {
+        for (place, operation) in operations.iter().enumerate().filter(|(at, _)| needed[*at]) {
             let expression = match *operation {
                 Operation::Input(i) => format!("x[{i}]"),
                 Operation::Constant(value) => literal(value),

@@ -2,15 +2,16 @@
 
 use crate::element::PLACES;
 use crate::kinematics::Linearisation;
-use crate::linear::SIX;
+use crate::linear::{CLOSURES, SIX};
 use crate::scalar::Real;
+use crate::statics::most_closures;
 
 /// The multipliers of `W^T lambda + F = 0` for a wrench `F` on the tool at the tool point, base axes
 /// (N, N m). A strut's tension is minus its multiplier.
 #[inline(always)]
-pub fn closure_forces<S: Real>(linear: &Linearisation<S>, wrench: &[S; SIX]) -> [S; SIX] {
-    let mut multipliers = [S::default(); SIX];
-    for i in 0..SIX {
+pub fn closure_forces<S: Real>(linear: &Linearisation<S>, wrench: &[S; SIX]) -> [S; CLOSURES] {
+    let mut multipliers = [S::default(); CLOSURES];
+    for i in 0..most_closures::<S>() {
         let mut sum = S::default();
         for k in 0..SIX {
             sum = linear.inverse[k][i].mul_add(wrench[k], sum);
@@ -24,8 +25,8 @@ pub fn closure_forces<S: Real>(linear: &Linearisation<S>, wrench: &[S; SIX]) -> 
 /// given (closure, place): positive drives the parameter up. For a strut's length it is the tension.
 #[inline(always)]
 pub fn parameter_load<S: Real>(
-    multipliers: &[S; SIX],
-    to_parameters: &[[S; PLACES]; SIX],
+    multipliers: &[S; CLOSURES],
+    to_parameters: &[[S; PLACES]; CLOSURES],
     readers: &[(usize, usize)],
 ) -> S {
     let mut load = S::default();

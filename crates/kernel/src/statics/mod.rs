@@ -4,5 +4,7 @@
 mod compliance;
 mod forces;
 
-pub use compliance::{closure_compliance, pose_compliance, pose_stiffness};
+pub use compliance::{
+    ClosureMatrix, closure_compliance, most_closures, pose_compliance, pose_stiffness,
+};
 pub use forces::{closure_forces, parameter_load};

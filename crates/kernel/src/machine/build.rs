@@ -1,171 +1,15 @@
-//! The immutable machine: elements, platform and the flat vector of parameters.
+//! From a description to a machine: elements, parameters and who reads which.
 
-use crate::element::{DRIVE_END, Dimension, DriveFrame, DriveKind, OWN, strut};
-use crate::linear::SIX;
-use crate::spatial::{Pose, Vector, norm, rotate, rotation_matrix, subtract};
+use super::description::error;
+use super::{
+    Description, DriveDescription, FREEDOMS, GuideDescription, Machine, MachineDrive, MachineError,
+    MachineGuide, Parameter, Ring, Strut, StrutDescription, chosen,
+};
+use crate::element::guide::{Anchor, GuideFrames, anchor_parameters};
+use crate::element::{DRIVE_END, Dimension, Direction, OWN, RING, strut};
+use crate::linear::{CLOSURES, SIX};
+use crate::spatial::{Pose, Vector, norm, scale};
 use std::collections::BTreeMap;
-use std::fmt;
-
-/// The names of a platform's freedoms; Euler angles a, b, c with `R = Rz(c) Ry(b) Rx(a)`.
-pub const FREEDOMS: [&str; SIX] = ["x", "y", "z", "a", "b", "c"];
-/// The names of an error's components: displacement and rotation vector.
-pub const COMPONENTS: [&str; SIX] = ["x", "y", "z", "rx", "ry", "rz"];
-
-/// A drive as the machine file gives it, in SI units.
-#[derive(Clone, Debug)]
-pub struct DriveDescription {
-    /// Unique among the drives.
-    pub name: String,
-    /// Which element.
-    pub kind: DriveKind,
-    /// Lowest and highest joint coordinate.
-    pub travel: [f64; 2],
-    /// +1, -1 or `None`: the root nearest mid-travel at home.
-    pub working_mode: Option<f64>,
-    /// The element's fields; missing ones take their default.
-    pub fields: BTreeMap<String, Vec<f64>>,
-}
-
-/// A strut as the machine file gives it, in SI units.
-#[derive(Clone, Debug)]
-pub struct StrutDescription {
-    /// Unique among the struts.
-    pub name: String,
-    /// The drive that carries it (or is its length); `None`: it hangs on the frame.
-    pub drive: Option<String>,
-    /// Base-side joint centre.
-    pub base: Vector<f64>,
-    /// Platform-side joint centre, platform axes.
-    pub platform: Vector<f64>,
-    /// Its own length; `None` exactly where the drive is the length.
-    pub length: Option<f64>,
-}
-
-/// A whole machine, in SI units.
-#[derive(Clone, Debug)]
-pub struct Description {
-    /// Which of x y z a b c the platform can move in.
-    pub dof: [bool; SIX],
-    /// Which of them the user commands.
-    pub commanded: [bool; SIX],
-    /// Start of the forward solution: x, y, z, a, b, c.
-    pub home: [f64; SIX],
-    /// The tool point in the platform's axes.
-    pub tool: Vector<f64>,
-    /// Scale between rotation and displacement, m; `None`: from the geometry.
-    pub characteristic_length: Option<f64>,
-    /// In the order of the joints.
-    pub drives: Vec<DriveDescription>,
-    /// In the order of the closures.
-    pub struts: Vec<StrutDescription>,
-}
-
-/// Why a description is no machine.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MachineError {
-    /// A stable word.
-    pub code: &'static str,
-    /// One sentence.
-    pub message: String,
-    /// The place in the description, as `strut.1.length`.
-    pub place: String,
-}
-
-impl fmt::Display for MachineError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.place, self.message)
-    }
-}
-
-impl std::error::Error for MachineError {}
-
-fn error<T>(
-    code: &'static str,
-    place: impl Into<String>,
-    message: String,
-) -> Result<T, MachineError> {
-    Err(MachineError { code, message, place: place.into() })
-}
-
-/// One number of the flat parameter vector.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Parameter {
-    /// As `strut.1.base.x`, `drive.d1.offset`, `tool.z`.
-    pub name: String,
-    /// Its SI unit.
-    pub unit: &'static str,
-}
-
-/// A strut, by indices into the machine.
-#[derive(Clone, Debug)]
-pub struct Strut {
-    /// Its name.
-    pub name: String,
-    /// The drive that carries it.
-    pub drive: Option<usize>,
-    /// Where `base.x` stands among the parameters; `platform.x` is three further.
-    pub first: usize,
-    /// Where `strut.N.length` stands; `None` where the drive is the length.
-    pub own_length: Option<usize>,
-    /// The parameter that every source which moves this strut's length moves.
-    pub length_parameter: usize,
-}
-
-/// A drive, by indices into the machine.
-#[derive(Clone, Debug)]
-pub struct MachineDrive {
-    /// Its name, which is the joint's name.
-    pub name: String,
-    /// Which element.
-    pub kind: DriveKind,
-    /// Its nominal axis.
-    pub frame: DriveFrame,
-    /// Where its parameters begin.
-    pub first: usize,
-    /// Where its parameter `scale` (true motion per commanded motion) stands among all parameters.
-    pub scale: Option<usize>,
-    /// Lowest and highest joint coordinate.
-    pub travel: [f64; 2],
-    /// Branch of the inverse: +1 or -1.
-    pub mode: f64,
-    /// The struts that it carries.
-    pub struts: Vec<usize>,
-}
-
-/// An immutable machine. All methods are pure; share it between threads freely.
-#[derive(Clone, Debug)]
-pub struct Machine {
-    /// Which of x y z a b c (and so of x y z rx ry rz) the platform can move in.
-    pub dof: [bool; SIX],
-    /// Which of them the user commands.
-    pub commanded: [bool; SIX],
-    /// The freedoms of a rigid body that the frame holds: those not in `dof`.
-    pub held: Vec<usize>,
-    /// The drives, in the order of the joints.
-    pub drives: Vec<MachineDrive>,
-    /// The struts, in the order of the closures.
-    pub struts: Vec<Strut>,
-    /// Names and units.
-    pub parameters: Vec<Parameter>,
-    /// Nominal values, SI.
-    pub nominal: Vec<f64>,
-    /// Where `tool.x` stands among the parameters.
-    pub tool: usize,
-    /// Scale between rotation and displacement, m.
-    pub characteristic_length: f64,
-    /// Start of the forward solution.
-    pub home: Pose<f64>,
-    /// For each parameter the closures that read it: (closure, place in its gradient).
-    pub readers: Vec<Vec<(usize, usize)>>,
-    /// What [`crate::kinematics::proven_regular`] multiplies by: `2^n l^r / (n-1)^((n-1)/2)` for n
-    /// closures, r rotations and the characteristic length l.
-    pub regularity_scale: f64,
-}
-
-/// The indices whose flag is set.
-pub fn chosen(flags: &[bool; SIX]) -> Vec<usize> {
-    (0..SIX).filter(|&k| flags[k]).collect()
-}
 
 impl Machine {
     /// Builds a machine from its description.
@@ -181,9 +25,15 @@ impl Machine {
             held: (0..SIX).filter(|&k| !description.dof[k]).collect(),
             drives: Vec::new(),
             struts: Vec::new(),
+            guides: Vec::new(),
+            guide_closures: Vec::new(),
+            closure_compliance: [0.0; CLOSURES],
+            parameter_compliance: Vec::new(),
             parameters: Vec::new(),
             nominal: Vec::new(),
             tool: 0,
+            plain: false,
+            limited: false,
             characteristic_length: 0.0,
             home: Pose::from_coordinates(description.home),
             readers: Vec::new(),
@@ -194,6 +44,9 @@ impl Machine {
         }
         for (index, drive) in description.drives.iter().enumerate() {
             machine.add_drive(index, drive)?;
+        }
+        for guide in &description.guides {
+            machine.add_guide(guide)?;
         }
         machine.tool = machine.nominal.len();
         for k in 0..3 {
@@ -210,6 +63,12 @@ impl Machine {
         }
         machine.check_counts()?;
         machine.find_readers();
+        machine.plain = machine.guides.is_empty()
+            && !machine.is_overconstrained()
+            && machine.struts.iter().all(|strut| strut.ring.is_none());
+        machine.limited =
+            machine.struts.iter().any(|strut| strut.limits.iter().any(Option::is_some));
+        machine.take_compliances(description)?;
         machine.characteristic_length =
             description.characteristic_length.unwrap_or_else(|| machine.geometric_length());
         if !(machine.characteristic_length > 0.0 && machine.characteristic_length.is_finite()) {
@@ -230,35 +89,6 @@ impl Machine {
             }
         }
         Ok(machine)
-    }
-
-    /// The same machine with other parameter values, by index.
-    pub fn with_values(&self, values: &[(usize, f64)]) -> Self {
-        let mut machine = self.clone();
-        for &(index, value) in values {
-            machine.nominal[index] = value;
-        }
-        machine
-    }
-
-    /// Number of closures.
-    pub fn closure_count(&self) -> usize {
-        self.struts.len()
-    }
-
-    /// Number of the platform's freedoms.
-    pub fn dof_count(&self) -> usize {
-        self.dof.iter().filter(|&&flag| flag).count()
-    }
-
-    /// Number of commanded freedoms.
-    pub fn commanded_count(&self) -> usize {
-        self.commanded.iter().filter(|&&flag| flag).count()
-    }
-
-    /// Whether each drive alone answers for one closure, so that the inverse is a closed form.
-    pub fn has_direct_inverse(&self) -> bool {
-        self.dof == self.commanded
     }
 
     fn add_parameter(&mut self, name: String, dimension: Dimension, value: f64) {
@@ -308,13 +138,100 @@ impl Machine {
             self.add_parameter(format!("{place}.{}", field.name), field.dimension, value);
         }
         let own_length = strut.length.map(|_| first + 6);
+        let mut ring = None;
+        if let Some((radius, axis)) = strut.ring {
+            if !(drive.is_none() || is_length) {
+                return error(
+                    "ring-on-carriage",
+                    place + ".ring_radius",
+                    "a strut whose platform joint slides on a ring must stand on the frame".into(),
+                );
+            }
+            let axis = unit(axis, || format!("{place}.ring_axis"))?;
+            ring = Some(Ring { axis, radius: self.nominal.len() });
+            let field = strut::RING_RADIUS;
+            self.add_parameter(format!("{place}.{}", field.name), field.dimension, radius);
+        }
+        let mut limits = strut.limits;
+        for (limit, end) in limits.iter_mut().zip(["base_axis", "platform_axis"]) {
+            if let Some(limit) = limit {
+                limit.axis = unit(limit.axis, || format!("{place}.{end}"))?;
+            }
+        }
         self.struts.push(Strut {
             name: strut.name.clone(),
             drive,
             first,
             own_length,
             length_parameter: own_length.unwrap_or(0),
+            ring,
+            limits,
         });
+        Ok(())
+    }
+
+    fn add_guide(&mut self, guide: &GuideDescription) -> Result<(), MachineError> {
+        let place = format!("guide.{}", guide.name);
+        if self.guides.iter().any(|other| other.name == guide.name) {
+            return error(
+                "duplicate-name",
+                place,
+                format!("two guides are named {:?}", guide.name),
+            );
+        }
+        let mut frames = GuideFrames::default();
+        let mut first = [None; 4];
+        for &(anchor, name) in guide.kind.fields() {
+            let field = guide.kind.table().fields.iter().find(|field| field.name == name);
+            let default = field.and_then(|field| field.default).map(|value| vec![value; 3]);
+            let Some(value) = guide.fields.get(name).cloned().or(default) else {
+                let message = "it needs 3 number(s)".into();
+                return error("missing-field", format!("{place}.{name}"), message);
+            };
+            let value = [value[0], value[1], value[2]];
+            let mut values = value.to_vec();
+            let turning = match anchor {
+                Anchor::FrameDirection => Some(&mut frames.frame),
+                Anchor::PlatformDirection => Some(&mut frames.platform),
+                _ => None,
+            };
+            if let Some(nominal) = turning {
+                *nominal = Direction::new(unit(value, || format!("{place}.{name}"))?);
+                values = vec![0.0; 2];
+            }
+            first[anchor as usize] = Some(self.nominal.len());
+            for (&(component, dimension), value) in anchor_parameters(anchor).iter().zip(values) {
+                self.add_parameter(format!("{place}.{name}.{component}"), dimension, value);
+            }
+        }
+        let number = self.guides.len();
+        self.guide_closures.extend((0..guide.kind.closures()).map(|which| (number, which)));
+        self.guides.push(MachineGuide {
+            name: guide.name.clone(),
+            kind: guide.kind,
+            frames,
+            first,
+        });
+        Ok(())
+    }
+
+    fn take_compliances(&mut self, description: &Description) -> Result<(), MachineError> {
+        let given = &description.closure_compliance;
+        if !given.is_empty() && given.len() != self.closure_count() {
+            let message =
+                format!("{} compliances for {} closures", given.len(), self.closure_count());
+            return error("compliance-count", "closure_compliance", message);
+        }
+        self.closure_compliance[..given.len()].copy_from_slice(given);
+        for (name, &value) in &description.parameter_compliance {
+            match self.parameters.iter().position(|parameter| &parameter.name == name) {
+                Some(index) => self.parameter_compliance.push((index, value)),
+                None => {
+                    let message = format!("there is no parameter {name:?}");
+                    return error("unknown-parameter", "parameter_compliance", message);
+                }
+            }
+        }
         Ok(())
     }
 
@@ -328,7 +245,7 @@ impl Machine {
             );
         }
         let table = drive.kind.table();
-        let mut frame = DriveFrame::default();
+        let mut nominal = Direction::default();
         let mut values = BTreeMap::new();
         for field in table.fields {
             let width = field.shape.max(1);
@@ -342,15 +259,7 @@ impl Machine {
             };
             if field.dimension == Dimension::Direction {
                 let direction = [value[0], value[1], value[2]];
-                let length = norm(direction);
-                if !(length > 0.0 && length.is_finite()) {
-                    return error(
-                        "zero-direction",
-                        format!("{place}.{}", field.name),
-                        "it points nowhere".into(),
-                    );
-                }
-                frame = DriveFrame::new(direction);
+                nominal = Direction::new(unit(direction, || format!("{place}.{}", field.name))?);
             }
             values.insert(field.name, value);
         }
@@ -372,7 +281,7 @@ impl Machine {
         self.drives.push(MachineDrive {
             name: drive.name.clone(),
             kind: drive.kind,
-            frame,
+            nominal,
             first,
             scale: scale.map(|place| first + place),
             travel: drive.travel,
@@ -398,6 +307,22 @@ impl Machine {
                     readers[drive.first + place].push((i, OWN + place));
                 }
             }
+            if let Some(ring) = strut.ring {
+                readers[ring.radius].push((i, RING));
+            }
+            for k in 0..3 {
+                readers[self.tool + k].push((i, DRIVE_END + k));
+            }
+        }
+        for (number, &(guide, _)) in self.guide_closures.iter().enumerate() {
+            let i = self.struts.len() + number;
+            for anchor in Anchor::ALL {
+                if let Some(first) = self.guides[guide].first[anchor as usize] {
+                    for k in 0..anchor_parameters(anchor).len() {
+                        readers[first + k].push((i, anchor.place() + k));
+                    }
+                }
+            }
             for k in 0..3 {
                 readers[self.tool + k].push((i, DRIVE_END + k));
             }
@@ -407,16 +332,21 @@ impl Machine {
 
     fn check_counts(&self) -> Result<(), MachineError> {
         let (closures, dof) = (self.closure_count(), self.dof_count());
-        if closures != dof {
-            let problem = if closures < dof {
-                "too few: the platform would be loose"
-            } else {
-                "too many: the platform would be over-constrained"
-            };
+        if closures < dof {
             return error(
                 "closure-count",
                 "strut",
-                format!("{closures} struts for {dof} degrees of freedom; {problem}"),
+                format!(
+                    "{closures} closures for {dof} degrees of freedom; too few: the platform would be \
+                     loose"
+                ),
+            );
+        }
+        if closures > CLOSURES {
+            return error(
+                "closure-count",
+                "strut",
+                format!("{closures} closures; at most {CLOSURES} can be had"),
             );
         }
         let (joints, commanded) = (self.drives.len(), self.commanded_count());
@@ -432,7 +362,7 @@ impl Machine {
             if drive.struts.is_empty() {
                 return error("idle-drive", place, "it carries no strut".into());
             }
-            if self.has_direct_inverse() && drive.struts.len() > 1 {
+            if self.has_direct_inverse() && !self.is_overconstrained() && drive.struts.len() > 1 {
                 return error(
                     "shared-drive",
                     place,
@@ -445,65 +375,15 @@ impl Machine {
         }
         Ok(())
     }
-
-    /// The root-mean-square distance of the platform joint centres from the tool point; where they
-    /// coincide with it (a point platform), the mean strut length at home.
-    fn geometric_length(&self) -> f64 {
-        let count = self.struts.len() as f64;
-        let mut square = 0.0;
-        let mut reach = 0.0;
-        let rotation = rotation_matrix(self.home.rotation);
-        for strut in &self.struts {
-            let arm = self.platform_arm(&self.nominal, strut);
-            square += arm.iter().map(|value| value * value).sum::<f64>() / count;
-            let centre = rotate(&rotation, arm);
-            let platform = [0, 1, 2].map(|k| centre[k] + self.home.position[k]);
-            let base: Vector<f64> = [0, 1, 2].map(|k| self.nominal[strut.first + k]);
-            let length = strut.own_length.map(|index| self.nominal[index]);
-            reach += length.unwrap_or_else(|| norm(subtract(platform, base))) / count;
-        }
-        let radius = square.sqrt();
-        if radius > 1e-6 * reach { radius } else { reach }
-    }
-
-    /// The platform-side joint centre relative to the tool point, platform axes.
-    pub fn platform_arm(&self, parameters: &[f64], strut: &Strut) -> Vector<f64> {
-        [0, 1, 2].map(|k| parameters[strut.first + 3 + k] - parameters[self.tool + k])
-    }
-
-    /// The branch whose root at home lies nearer to mid-travel.
-    fn nearest_mode(&self, index: usize) -> f64 {
-        let drive = &self.drives[index];
-        let strut = &self.struts[drive.struts[0]];
-        let rotation = rotation_matrix(self.home.rotation);
-        let centre = rotate(&rotation, self.platform_arm(&self.nominal, strut));
-        let platform = [0, 1, 2].map(|k| centre[k] + self.home.position[k]);
-        let base = [0, 1, 2].map(|k| self.nominal[strut.first + k]);
-        let length = strut.own_length.map_or(0.0, |own| self.nominal[own]);
-        let middle = 0.5 * (drive.travel[0] + drive.travel[1]);
-        let away = |mode: f64| {
-            let parameters = &self.nominal[drive.first..];
-            let joint =
-                drive.kind.inverse(&drive.frame, parameters, mode, base, length, platform).joint;
-            let joint = drive.wrapped(joint, drive.scale.map_or(1.0, |scale| self.nominal[scale]));
-            (joint - middle).abs()
-        };
-        if away(-1.0) < away(1.0) { -1.0 } else { 1.0 }
-    }
 }
 
-impl MachineDrive {
-    /// A crank's angle, moved by whole turns to the one nearest mid-travel; other coordinates as they
-    /// are.
-    #[inline(always)]
-    pub fn wrapped(&self, joint: f64, scale: f64) -> f64 {
-        if self.kind.table().coordinate != Dimension::Angle {
-            return joint;
-        }
-        let turn = std::f64::consts::TAU / scale;
-        let middle = 0.5 * (self.travel[0] + self.travel[1]);
-        joint + turn * ((middle - joint) / turn).round()
+/// The unit vector along `direction`; `place` is where it was given.
+fn unit(direction: Vector<f64>, place: impl Fn() -> String) -> Result<Vector<f64>, MachineError> {
+    let length = norm(direction);
+    if length > 0.0 && length.is_finite() {
+        return Ok(scale(direction, 1.0 / length));
     }
+    error("zero-direction", place(), "it points nowhere".into())
 }
 
 fn check_freedoms(description: &Description) -> Result<(), MachineError> {

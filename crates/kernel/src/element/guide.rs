@@ -1,0 +1,294 @@
+//! A passive limb: closures between the frame and the platform that no drive moves.
+//!
+//! A guide reads at most one point and one direction of the frame and one of each of the platform. How
+//! they move with the pose and with their own deviations is added here, once for all guides, as dual
+//! numbers through the guide's closures.
+
+use super::{DRIVE_END, Dimension, Direction, ElementTable, PLACES};
+use crate::scalar::{Dual, Scalar};
+use crate::spatial::{RotationMatrix, Vector, add, cross, rotate};
+
+/// The four things that a guide may read, in the order of their parameters' places in a gradient.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anchor {
+    /// A point of the frame: places 0 to 2.
+    FramePoint,
+    /// A point of the platform: places 3 to 5.
+    PlatformPoint,
+    /// A direction of the frame, with two tilts: places 6 and 7.
+    FrameDirection,
+    /// A direction of the platform, with two tilts: places 8 and 9.
+    PlatformDirection,
+}
+
+impl Anchor {
+    /// All four, in their order.
+    pub const ALL: [Anchor; 4] = [
+        Anchor::FramePoint,
+        Anchor::PlatformPoint,
+        Anchor::FrameDirection,
+        Anchor::PlatformDirection,
+    ];
+
+    /// Where its first parameter stands in a gradient.
+    pub fn place(self) -> usize {
+        match self {
+            Anchor::FramePoint => 0,
+            Anchor::PlatformPoint => 3,
+            Anchor::FrameDirection => 6,
+            Anchor::PlatformDirection => 8,
+        }
+    }
+}
+
+/// Parameters of the four anchors together.
+const OWN_PARAMETERS: usize = 10;
+
+/// What a guide's closures read at one pose, all in base axes. Directions come as a unit vector and two
+/// tangents; what the guide does not declare is zero.
+#[derive(Clone, Copy, Debug)]
+pub struct GuidePoints<S> {
+    /// A point of the frame.
+    pub frame_point: Vector<S>,
+    /// A point of the platform.
+    pub platform_point: Vector<S>,
+    /// A direction of the frame.
+    pub frame_direction: [Vector<S>; 3],
+    /// A direction of the platform.
+    pub platform_direction: [Vector<S>; 3],
+}
+
+/// A passive limb.
+pub trait Guide {
+    /// Kind, fields and parameters.
+    const TABLE: ElementTable;
+    /// The field that each anchor is given by.
+    const FIELDS: &'static [(Anchor, &'static str)];
+    /// How many closures it has.
+    const CLOSURES: usize;
+
+    /// Residual of one of its closures, m. `length` turns an angle into a length: the machine's
+    /// characteristic length.
+    fn closure<S: Scalar>(which: usize, at: &GuidePoints<S>, length: f64) -> S;
+}
+
+/// A guide's anchors in their own axes: what does not depend on the pose.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GuideLimb<S> {
+    /// A point of the frame, base axes.
+    pub frame_point: Vector<S>,
+    /// A point of the platform from the tool point, platform axes.
+    pub arm: Vector<S>,
+    /// Tilts of the frame's and of the platform's direction.
+    pub tilts: [[S; 2]; 2],
+}
+
+/// The nominal directions of a guide.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct GuideFrames {
+    /// Base axes.
+    pub frame: Direction,
+    /// Platform axes.
+    pub platform: Direction,
+}
+
+impl<S: Scalar> GuideLimb<S> {
+    fn map<T>(&self, to: impl Fn(S) -> T) -> GuideLimb<T> {
+        let vector = |v: Vector<S>| v.map(&to);
+        GuideLimb {
+            frame_point: vector(self.frame_point),
+            arm: vector(self.arm),
+            tilts: self.tilts.map(|tilt| tilt.map(&to)),
+        }
+    }
+
+    /// The anchors in base axes; `at` is the tool point.
+    #[inline(always)]
+    fn points(
+        &self,
+        frames: &GuideFrames,
+        rotation: &RotationMatrix<S>,
+        at: Vector<S>,
+    ) -> GuidePoints<S> {
+        let [frame, platform] = self.tilts;
+        GuidePoints {
+            frame_point: self.frame_point,
+            platform_point: add(rotate(rotation, self.arm), at),
+            frame_direction: frames.frame.tilted_triad(frame[0], frame[1]),
+            platform_direction: frames
+                .platform
+                .tilted_triad(platform[0], platform[1])
+                .map(|direction| rotate(rotation, direction)),
+        }
+    }
+}
+
+/// Residual of a closure and its row: derivatives to the platform's twist about the tool point.
+#[inline(always)]
+fn row_of<G: Guide>(
+    which: usize,
+    frames: &GuideFrames,
+    limb: &GuideLimb<f64>,
+    (rotation, position): (&RotationMatrix<f64>, Vector<f64>),
+    length: f64,
+) -> (f64, [f64; 6]) {
+    let still = limb.points(frames, rotation, position);
+    // A twist moves a point by t + w x arm and turns a direction by w x d.
+    let turned = |v: Vector<f64>, shift: f64| -> Vector<Dual<f64, 6>> {
+        let mut moved = v.map(Dual::constant);
+        for k in 0..3 {
+            let mut unit = [0.0; 3];
+            unit[k] = 1.0;
+            let along = cross(unit, v);
+            for i in 0..3 {
+                moved[i].parts[k] = shift * unit[i];
+                moved[i].parts[3 + k] = along[i];
+            }
+        }
+        moved
+    };
+    let arm = [0, 1, 2].map(|k| still.platform_point[k] - position[k]);
+    let arm = turned(arm, 1.0);
+    let point = [0, 1, 2].map(|k| arm[k] + Dual::constant(position[k]));
+    let closure = G::closure(
+        which,
+        &GuidePoints {
+            frame_point: still.frame_point.map(Dual::constant),
+            platform_point: point,
+            frame_direction: still.frame_direction.map(|v| v.map(Dual::constant)),
+            platform_direction: still.platform_direction.map(|v| turned(v, 0.0)),
+        },
+        length,
+    );
+    (closure.value, closure.parts)
+}
+
+/// Residual of a closure on any scalar.
+#[inline(always)]
+fn residual_of<S: Scalar, G: Guide>(
+    which: usize,
+    frames: &GuideFrames,
+    limb: &GuideLimb<S>,
+    (rotation, position): (&RotationMatrix<S>, Vector<S>),
+    length: f64,
+) -> S {
+    G::closure(which, &limb.points(frames, rotation, position), length)
+}
+
+/// The derivatives of a closure to its own parameters and to the tool point's, at their places.
+#[inline(always)]
+fn gradient_of<G: Guide>(
+    which: usize,
+    frames: &GuideFrames,
+    limb: &GuideLimb<f64>,
+    (rotation, position): (&RotationMatrix<f64>, Vector<f64>),
+    length: f64,
+    places: &mut [f64; PLACES],
+) {
+    let mut own = limb.map(Dual::<f64, OWN_PARAMETERS>::constant);
+    for k in 0..3 {
+        own.frame_point[k].parts[Anchor::FramePoint.place() + k] = 1.0;
+        own.arm[k].parts[Anchor::PlatformPoint.place() + k] = 1.0;
+    }
+    for k in 0..2 {
+        own.tilts[0][k].parts[Anchor::FrameDirection.place() + k] = 1.0;
+        own.tilts[1][k].parts[Anchor::PlatformDirection.place() + k] = 1.0;
+    }
+    let pose = (&rotation.map(|row| row.map(Dual::constant)), position.map(Dual::constant));
+    let closure = residual_of::<_, G>(which, frames, &own, pose, length);
+    places[..OWN_PARAMETERS].copy_from_slice(&closure.parts);
+    for k in 0..3 {
+        places[DRIVE_END + k] = -closure.parts[Anchor::PlatformPoint.place() + k];
+    }
+}
+
+/// Where a platform is: its rotation and its tool point.
+pub type Placement<'a, S> = (&'a RotationMatrix<S>, Vector<S>);
+
+/// Makes the closed set of guides from its list, with static dispatch.
+macro_rules! guides {
+    ($($name:ident => $type:path),+ $(,)?) => {
+        /// The kinds of guide.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[allow(missing_docs)] // each is described by its table
+        pub enum GuideKind { $($name),+ }
+
+        impl GuideKind {
+            /// Every kind, in the order of the list.
+            pub const ALL: &[GuideKind] = &[$(GuideKind::$name),+];
+
+            /// Kind, fields and parameters.
+            pub fn table(self) -> &'static ElementTable {
+                match self { $(GuideKind::$name => const { &<$type as Guide>::TABLE }),+ }
+            }
+
+            /// The field that each anchor is given by.
+            pub fn fields(self) -> &'static [(Anchor, &'static str)] {
+                match self { $(GuideKind::$name => <$type as Guide>::FIELDS),+ }
+            }
+
+            /// How many closures it has.
+            pub fn closures(self) -> usize {
+                match self { $(GuideKind::$name => <$type as Guide>::CLOSURES),+ }
+            }
+
+            /// Residual (m) of one closure and its row: derivatives to the platform's twist.
+            pub fn row(
+                self,
+                which: usize,
+                frames: &GuideFrames,
+                limb: &GuideLimb<f64>,
+                at: Placement<'_, f64>,
+                length: f64,
+            ) -> (f64, [f64; 6]) {
+                match self { $(GuideKind::$name => row_of::<$type>(which, frames, limb, at, length)),+ }
+            }
+
+            /// Residual (m) of one closure, on any scalar.
+            pub fn residual<S: Scalar>(
+                self,
+                which: usize,
+                frames: &GuideFrames,
+                limb: &GuideLimb<S>,
+                at: Placement<'_, S>,
+                length: f64,
+            ) -> S {
+                match self { $(GuideKind::$name => residual_of::<S, $type>(which, frames, limb, at, length)),+ }
+            }
+
+            /// The derivatives of one closure to its parameters and to the tool's, at their places.
+            pub fn gradient(
+                self,
+                which: usize,
+                frames: &GuideFrames,
+                limb: &GuideLimb<f64>,
+                at: Placement<'_, f64>,
+                length: f64,
+                places: &mut [f64; PLACES],
+            ) {
+                match self {
+                    $(GuideKind::$name => gradient_of::<$type>(which, frames, limb, at, length, places)),+
+                }
+            }
+        }
+    };
+}
+
+// The list: a new guide is its file, its `mod` line in `element/mod.rs` and one line here.
+guides! {
+    Plane => super::plane::Plane,
+    Line => super::line::Line,
+    Universal => super::universal::Universal,
+}
+
+/// The names and dimensions of the parameters of one anchor.
+pub fn anchor_parameters(anchor: Anchor) -> &'static [(&'static str, Dimension)] {
+    match anchor {
+        Anchor::FramePoint | Anchor::PlatformPoint => {
+            &[("x", Dimension::Length), ("y", Dimension::Length), ("z", Dimension::Length)]
+        }
+        Anchor::FrameDirection | Anchor::PlatformDirection => {
+            &[("u", Dimension::Angle), ("v", Dimension::Angle)]
+        }
+    }
+}

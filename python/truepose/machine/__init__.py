@@ -6,11 +6,11 @@ nothing here imports them.
 
 from __future__ import annotations
 
-from truepose.machine.condition import Condition
+from truepose.machine.condition import Condition, Envelope
 from truepose.machine.file_parts import ErrorSource, FileParts, SourceType
 from truepose.machine.loader import load
 from truepose.machine.model import Machine
-from truepose.machine.parts_of_machine import Drive, Strut
+from truepose.machine.parts_of_machine import Body, Drive, Guide, Joint, Strut
 from truepose.machine.tolerance import Band, Tolerance
 from truepose.machine.units import FileUnit
 from truepose.machine.workspace import Accuracy, GridAxis, Workspace
@@ -18,12 +18,16 @@ from truepose.machine.workspace import Accuracy, GridAxis, Workspace
 __all__ = [
     "Accuracy",
     "Band",
+    "Body",
     "Condition",
     "Drive",
+    "Envelope",
     "ErrorSource",
     "FileParts",
     "FileUnit",
     "GridAxis",
+    "Guide",
+    "Joint",
     "Machine",
     "SourceType",
     "Strut",

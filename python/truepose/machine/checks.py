@@ -10,19 +10,24 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from truepose.errors import Problem
+from truepose.machine.built_workspace import too_large
 from truepose.machine.condition import DEFAULT_PART
 from truepose.machine.dimensions import FREEDOMS
 from truepose.machine.document import ARRAY_TABLES, Document, Key, named_rows
-from truepose.machine.elements import drive_kinds
+from truepose.machine.elements import drive_kinds, guide_kinds
+from truepose.machine.parts_of_machine import BODIES
 from truepose.machine.suggestion import counted, did_you_mean, one_of
+from truepose.machine.tables.accuracy import AccuracyTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.strut import StrutTable
-from truepose.machine.tables.workspace import WorkspaceTable
+from truepose.machine.tables.workspace import Rows, WorkspaceTable
 from truepose.machine.units import shown_value
 from truepose.machine.validation import Validated
-from truepose.machine.workspace import LARGEST_GRID
 
 Check = Callable[[Document, Validated], Iterator[Problem]]
+
+MOST_CLOSURES = 12
+"""More closures the kernel cannot take."""
 
 
 def check(document: Document, validated: Validated) -> list[Problem]:
@@ -143,7 +148,7 @@ def _strut_lengths(document: Document, validated: Validated) -> Iterator[Problem
 def _telescopic_travel(document: Document, validated: Validated) -> Iterator[Problem]:
     """A strut whose length is a coordinate has one above zero over the whole travel."""
     for index, (row, model) in enumerate(
-        zip(_rows(document, "drive"), validated.geometry, strict=False)
+        zip(_rows(document, "drive"), validated.geometry.get("drive", ()), strict=False)
     ):
         kind = drive_kinds().get(row.get("kind", "")) if model is not None else None
         if kind is None or not kind.sets_length:
@@ -163,6 +168,12 @@ def _telescopic_travel(document: Document, validated: Validated) -> Iterator[Pro
             )
 
 
+def _guide_closures(document: Document) -> int:
+    kinds = guide_kinds()
+    named = (row.get("kind") for row in _rows(document, "guide"))
+    return sum(kinds[kind].closures for kind in named if isinstance(kind, str) and kind in kinds)
+
+
 def _counts(document: Document, validated: Validated) -> Iterator[Problem]:
     freedoms = _freedoms(document)
     if freedoms is None:
@@ -170,17 +181,21 @@ def _counts(document: Document, validated: Validated) -> Iterator[Problem]:
     dof, commanded = freedoms
     everything = "commanded" not in document.data["machine"]
     struts, drives = len(_rows(document, "strut")), len(_rows(document, "drive"))
-    if "strut" in document.data and struts != len(dof):
-        few = "few" if struts < len(dof) else "many"
+    closures = struts + _guide_closures(document)
+    few = closures < len(dof)
+    if "strut" in document.data and (few or closures > MOST_CLOSURES):
+        guides = len(_rows(document, "guide"))
+        listed = counted(struts, "strut") + (f" and {counted(guides, 'guide')}" if guides else "")
         yield document.problem(
             "closure-count",
-            f"too {few} closures for the platform's freedoms",
+            f"too {'few' if few else 'many'} closures for the platform's freedoms",
             ("machine", "dof"),
-            found=f"{counted(struts, 'strut')} for {counted(len(dof), 'freedom')} "
-            f"({' '.join(dof)})",
-            expected=counted(len(dof), "strut"),
-            hint="each strut is one closure and takes one freedom"
-            + ("" if few == "few" else "; over-constrained machines are not supported yet"),
+            found=f"{listed} ({counted(closures, 'closure')}) for "
+            f"{counted(len(dof), 'freedom')} ({' '.join(dof)})",
+            expected=counted(len(dof), "closure")
+            if few
+            else f"{counted(len(dof), 'closure')}; at most {MOST_CLOSURES}",
+            hint="each strut is one closure and takes one freedom; guides take the others",
         )
     where: Key = ("machine", "dof" if everything else "commanded")
     beyond = [freedom for freedom in commanded if freedom not in dof]
@@ -192,7 +207,7 @@ def _counts(document: Document, validated: Validated) -> Iterator[Problem]:
             found=" ".join(beyond),
             expected=one_of(dof),
         )
-    if everything and struts != len(dof):
+    if everything and few:
         return  # dof is wrong, and everything is commanded: one mistake
     if "drive" in document.data and drives != len(commanded):
         yield document.problem(
@@ -217,9 +232,20 @@ def _workspace_freedoms(document: Document, validated: Validated) -> Iterator[Pr
         return  # which freedoms there are is itself in doubt
     for name, allowed, said in (
         ("grid", commanded, "not commanded"),
+        ("box", commanded, "not commanded"),
+        ("cylinder", commanded, "not commanded"),
         ("home", dof, "no freedom of the platform"),
     ):
         table = workspace.get(name)
+        if name == "cylinder" and table is not None and not {"x", "y"} <= set(commanded):
+            yield document.problem(
+                "unknown-freedom",
+                "a cylinder needs x and y, which are not both commanded",
+                ("workspace", name),
+                found=" ".join(commanded),
+                expected="x and y among the commanded freedoms",
+                hint="box fills other freedoms",
+            )
         for freedom in table if isinstance(table, dict) else ():
             if freedom in FREEDOMS and freedom not in allowed:
                 yield document.problem(
@@ -236,6 +262,15 @@ def _grid_size(document: Document, validated: Validated) -> Iterator[Problem]:
     grid = workspace.get("grid") if isinstance(workspace, dict) else None
     if not isinstance(grid, dict):
         return
+    if not grid:
+        yield document.problem(
+            "missing-key",
+            "the grid names no freedom",
+            ("workspace", "grid"),
+            found="{}",
+            expected="a range, such as x = [200, 400, 5]",
+            hint="for one pose write poses = [[...]]",
+        )
     # From the raw counts, so that it is said along with what is wrong with the ends.
     counts = [
         entry[2]
@@ -246,59 +281,105 @@ def _grid_size(document: Document, validated: Validated) -> Iterator[Problem]:
         and not isinstance(entry[2], bool)
         and entry[2] >= 1
     ]
-    if math.prod(counts) > LARGEST_GRID:
-        size = math.prod(counts)
-        yield document.problem(
-            "grid-too-large",
-            "more poses than are allowed",
-            ("workspace", "grid"),
-            found=f"{size:.3g} poses" if size < 10**300 else "more than 1e300 poses",
-            expected=f"at most {LARGEST_GRID:.0e} poses".replace("e+0", "e"),
-        )
+    size = math.prod(counts)
+    problem = too_large(document, size, ("workspace", "grid"))
+    if problem is not None:
+        yield problem
 
 
 def _pose_rows(document: Document, validated: Validated) -> Iterator[Problem]:
     freedoms, workspace = _freedoms(document), validated.table(WorkspaceTable)
-    if freedoms is None or workspace is None or workspace.poses is None:
+    if freedoms is None or workspace is None:
         return
     _, commanded = freedoms
-    if not workspace.poses:
-        yield document.problem(
-            "missing-key",
-            "no pose in the list",
-            ("workspace", "poses"),
-            found="[]",
-            expected="at least one pose",
-        )
-    for index, pose in enumerate(workspace.poses):
-        if len(pose) != len(commanded):
+    lists: tuple[tuple[Key, Rows | str | None], ...] = (
+        (("workspace", "poses"), workspace.poses),
+        (
+            ("workspace", "path", "points"),
+            None if workspace.path is None else workspace.path.points,
+        ),
+    )
+    for key, rows in lists:
+        if rows is None or isinstance(rows, str):
+            continue
+        if not rows:
             yield document.problem(
-                "wrong-type",
-                f"a pose of {counted(len(pose), 'number')}",
-                ("workspace", "poses", index),
-                found=shown_value(pose),
-                expected=f"{counted(len(commanded), 'number')}: {', '.join(commanded)}",
+                "missing-key",
+                "no pose in the list",
+                key,
+                found="[]",
+                expected="at least one pose",
             )
+        for index, pose in enumerate(rows):
+            if len(pose) != len(commanded):
+                yield document.problem(
+                    "wrong-type",
+                    f"a pose of {counted(len(pose), 'number')}",
+                    (*key, index),
+                    found=shown_value(pose),
+                    expected=f"{counted(len(commanded), 'number')}: {', '.join(commanded)}",
+                )
 
 
 def _parts_with_temperatures(document: Document, validated: Validated) -> Iterator[Problem]:
     condition = validated.table(ConditionTable)
-    if condition is None or condition.temperature is None:
+    if condition is None:
         return
-    parts = [
-        f"{table}.{name}" for table in ARRAY_TABLES for _, name in named_rows(document.data, table)
+    rows = [
+        f"{table}.{name}"
+        for table in ("drive", "strut")
+        for _, name in named_rows(document.data, table)
     ]
-    known = [DEFAULT_PART, *parts]
-    for part in condition.temperature:
-        if part not in known:
+    growing = [*rows, *(body for body in BODIES if body != "tool")]
+    for key, given, known in (
+        ("temperature", condition.temperature, [DEFAULT_PART, *rows, *BODIES]),
+        ("gradient", condition.gradient, growing),
+    ):
+        for part in given or ():
+            if part not in known:
+                yield document.problem(
+                    "unknown-part",
+                    f'there is no part "{part}"'
+                    if part not in BODIES
+                    else f"a {key} along the {part} is not known",
+                    document.key(f"condition.{key}.{part}"),
+                    found=shown_value(part),
+                    expected=one_of(known),
+                    hint=did_you_mean(part, known),
+                )
+
+
+def _gradients(document: Document, validated: Validated) -> Iterator[Problem]:
+    """Along a strut or a drive there is one gradient; a body has three."""
+    condition = validated.table(ConditionTable)
+    for part in (condition.gradient or ()) if condition is not None else ():
+        key = document.key(f"condition.gradient.{part}")
+        value = document.value(key)
+        if isinstance(value, list) != (part in BODIES):
             yield document.problem(
-                "unknown-part",
-                f'there is no part "{part}"',
-                document.key(f"condition.temperature.{part}"),
-                found=shown_value(part),
-                expected=one_of(known),
-                hint=did_you_mean(part, known),
+                "wrong-type",
+                f"{part} has a gradient along each of its axes"
+                if part in BODIES
+                else f"{part} has one gradient, along itself",
+                key,
+                found=shown_value(value),
+                expected="[x, y, z]" if part in BODIES else "one temperature gradient",
             )
+
+
+def _angles_asked(document: Document, validated: Validated) -> Iterator[Problem]:
+    """An accuracy of the orientation is asked of a platform that turns."""
+    freedoms, accuracy = _freedoms(document), validated.table(AccuracyTable)
+    if freedoms is None or accuracy is None or accuracy.angle_target is None:
+        return
+    if not any(FREEDOMS[freedom] == "angle" for freedom in freedoms[0]):
+        yield document.problem(
+            "unknown-freedom",
+            "an accuracy of the orientation is asked of a platform that cannot turn",
+            ("accuracy", "angle_target"),
+            found=f"a platform that moves in {' '.join(freedoms[0])}",
+            expected="no angle_target, or a or b or c in dof",
+        )
 
 
 def _materials_and_outright(document: Document, validated: Validated) -> Iterator[Problem]:
@@ -326,5 +407,7 @@ _CHECKS: tuple[Check, ...] = (
     _grid_size,
     _pose_rows,
     _parts_with_temperatures,
+    _gradients,
+    _angles_asked,
     _materials_and_outright,
 )

@@ -1,35 +1,94 @@
-"""The state that a machine works in: temperatures and the wrench on the tool."""
+"""The state that a machine works in: temperatures, and what acts on the tool and by mass."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from truepose.errors import Problem, RequestError
+from truepose.machine.parts_of_machine import Vector
+
+if TYPE_CHECKING:
+    from truepose.machine.temperature_log import TemperatureLog
+
+Floats = NDArray[np.float64]
 
 ISO_1_REFERENCE_TEMPERATURE = 293.15
 """K: 20 degC, at which dimensions hold unless said otherwise (ISO 1)."""
 
+STANDARD_GRAVITY = 9.80665
+"""m/s^2 (3rd General Conference on Weights and Measures, 1901)."""
+
 DEFAULT_PART = "default"
 """The key, in a table of temperatures, of every part that the table does not name."""
 
-Vector = tuple[float, float, float]
+_MAPPINGS = ("part_temperatures", "gradients")
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """A force on the tool of known size (N) and unknown direction.
+
+    Any direction in space, or, where a unit `normal` is given, in the plane across it; base axes.
+    """
+
+    force: float
+    normal: Vector | None = None
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.force) and self.force >= 0.0):
+            raise _bad("envelope", str(self.force), "a force of zero or more, N")
+        if self.normal is None:
+            return
+        normal = _vector("envelope", self.normal)
+        size = math.hypot(*normal)
+        if not (math.isfinite(size) and size > 0.0):
+            raise _bad("envelope", str(normal), "a normal of a length above zero")
+        x, y, z = (component / size for component in normal)
+        object.__setattr__(self, "normal", (x, y, z))
+
+    @property
+    def directions(self) -> Floats:
+        """(3 or 2, 3) orthogonal unit vectors that span the directions, base axes."""
+        if self.normal is None:
+            return np.eye(3)
+        normal = np.array(self.normal)
+        # The base axis that leans least along the normal gives the steadiest first direction.
+        axis = np.eye(3)[np.argmin(np.abs(normal))]
+        first = axis - (axis @ normal) * normal
+        first /= np.linalg.norm(first)
+        return np.stack([first, np.cross(normal, first)])
 
 
 @dataclass(frozen=True)
 class Condition:
-    """Temperatures in K; force (N) and moment (N m) on the tool at the tool point, base axes."""
+    """Temperatures in K; force (N) and moment (N m) on the tool at the tool point, base axes.
+
+    `gradients`: K/m by part; along a strut from base to platform, or along a drive's coordinate
+    from where its scale is fixed, the first component counts; of frame and platform it is a vector
+    in their axes. `temperature_log`: measured temperatures over time of the parts that it names, if
+    `part_temperatures` does not, at `time` (s; None: its last) where a run is not over time itself.
+    `gravity` (m/s^2) acts on every mass, `acceleration` (m/s^2, base axes) is that of the platform.
+    """
 
     reference_temperature: float = ISO_1_REFERENCE_TEMPERATURE
     default_temperature: float = ISO_1_REFERENCE_TEMPERATURE
     part_temperatures: Mapping[str, float] = field(default_factory=dict)
     force: Vector = (0.0, 0.0, 0.0)
     moment: Vector = (0.0, 0.0, 0.0)
+    gradients: Mapping[str, Vector] = field(default_factory=dict)
+    temperature_log: TemperatureLog | None = None
+    time: float | None = None
+    gravity: float = STANDARD_GRAVITY
+    acceleration: Vector = (0.0, 0.0, 0.0)
+    envelope: Envelope | None = None
 
     def __post_init__(self) -> None:
         temperatures = {
@@ -40,20 +99,64 @@ class Condition:
         for name, value in temperatures.items():
             if not (math.isfinite(value) and value > 0.0):
                 raise _bad(name, str(value), "a temperature above absolute zero, K")
-        for name, vector in (("force", self.force), ("moment", self.moment)):
+        vectors = {
+            "force": self.force,
+            "moment": self.moment,
+            "acceleration": self.acceleration,
+            **{f"gradient.{part}": gradient for part, gradient in self.gradients.items()},
+        }
+        for name, vector in vectors.items():
             if len(vector) != 3 or not all(math.isfinite(component) for component in vector):
                 raise _bad(name, str(vector), "three finite components")
-        object.__setattr__(
-            self, "part_temperatures", MappingProxyType(dict(self.part_temperatures))
+        if not (math.isfinite(self.gravity) and self.gravity >= 0.0):
+            raise _bad("gravity", str(self.gravity), "an acceleration of zero or more, m/s^2")
+        if self.time is not None and not math.isfinite(self.time):
+            raise _bad("time", str(self.time), "a finite time, s")
+        for name in _MAPPINGS:
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @overload
+    def temperature(self, part: str, times: None = None) -> float: ...
+    @overload
+    def temperature(self, part: str, times: ArrayLike) -> float | Floats: ...
+    def temperature(self, part: str, times: ArrayLike | None = None) -> float | Floats:
+        """Temperature in K of a part by its path: `strut.1`.
+
+        (n,) at `times` (n,), s, where it comes from the log; else one number.
+        """
+        log = self.temperature_log
+        if part in self.part_temperatures:
+            return self.part_temperatures[part]
+        named = next(
+            (name for name in (part, DEFAULT_PART) if log and name in log.temperatures), None
         )
+        if log is None or named is None:
+            return self.default_temperature
+        if times is not None:
+            return np.asarray(log.at(named, np.asarray(times, np.float64)), np.float64)
+        moment = float(log.times[-1]) if self.time is None else self.time
+        return float(log.at(named, np.array([moment]))[0])
 
-    def temperature(self, part: str) -> float:
-        """Temperature in K of a part by its path: `strut.1`."""
-        return self.part_temperatures.get(part, self.default_temperature)
+    @overload
+    def temperature_rise(self, part: str, times: None = None) -> float: ...
+    @overload
+    def temperature_rise(self, part: str, times: ArrayLike) -> float | Floats: ...
+    def temperature_rise(self, part: str, times: ArrayLike | None = None) -> float | Floats:
+        """Temperature of a part above the reference temperature, K; (n,) as `temperature`."""
+        if times is None:
+            return self.temperature(part) - self.reference_temperature
+        return self.temperature(part, times) - self.reference_temperature
 
-    def temperature_rise(self, part: str) -> float:
-        """Temperature of a part above the reference temperature, K."""
-        return self.temperature(part) - self.reference_temperature
+    def gradient(self, part: str) -> Vector:
+        """Temperature gradient of a part, K/m; zero where none is given."""
+        return self.gradients.get(part, (0.0, 0.0, 0.0))
+
+    @property
+    def named_parts(self) -> tuple[str, ...]:
+        """Parts that the condition names, by its temperatures, gradients and log."""
+        logged = () if self.temperature_log is None else self.temperature_log.temperatures
+        named = dict.fromkeys([*self.part_temperatures, *self.gradients, *logged])
+        return tuple(part for part in named if part != DEFAULT_PART)
 
     @property
     def wrench(self) -> NDArray[np.float64]:
@@ -67,40 +170,71 @@ class Condition:
         temperature: float | Mapping[str, float] | None = None,
         force: Sequence[float] | None = None,
         moment: Sequence[float] | None = None,
+        gradient: Mapping[str, float | Sequence[float]] | None = None,
+        temperature_log: TemperatureLog | None = None,
+        time: float | None = None,
+        gravity: float | None = None,
+        acceleration: Sequence[float] | None = None,
+        envelope: Envelope | float | None = None,
     ) -> Condition:
         """This condition with other values; what is not given stays.
 
-        `temperature`: K, one number for all parts, or `{"default": ..., "strut.1": ...}`, where
-        parts that are not named stay as they are. Raises `RequestError` (bad-condition) for a
-        value that is not finite or of the wrong size.
+        `temperature`: K, one number for all parts (in place of a log, too), or
+        `{"default": ..., "strut.1": ...}`, where parts that are not named stay as they are.
+        `gradient`: K/m of parts, one number along a
+        strut or drive, three of frame and platform. `envelope`: a force of any direction, N; 0
+        takes it away. Raises `RequestError` (bad-condition) for a value that is not finite or of
+        the wrong size. Parts that a machine does not have are refused where it is known: by
+        `truepose.budget`, `truepose.compensate` and `Machine.with_condition`.
         """
-        default, parts = self.default_temperature, dict(self.part_temperatures)
+        changes: dict[str, object] = {}
         if isinstance(temperature, Mapping):
-            default = float(temperature.get(DEFAULT_PART, default))
-            parts |= {
+            changes["default_temperature"] = float(
+                temperature.get(DEFAULT_PART, self.default_temperature)
+            )
+            changes["part_temperatures"] = dict(self.part_temperatures) | {
                 part: float(value) for part, value in temperature.items() if part != DEFAULT_PART
             }
         elif temperature is not None:
-            default, parts = float(temperature), {}
-        reference = self.reference_temperature
-        return replace(
-            self,
-            reference_temperature=reference
-            if reference_temperature is None
-            else float(reference_temperature),
-            default_temperature=default,
-            part_temperatures=parts,
-            force=self.force if force is None else _vector("force", force),
-            moment=self.moment if moment is None else _vector("moment", moment),
-        )
+            changes |= {
+                "default_temperature": float(temperature),
+                "part_temperatures": {},
+                "temperature_log": None,
+            }
+        if gradient is not None:
+            changes["gradients"] = dict(self.gradients) | {
+                part: _along(part, value) for part, value in gradient.items()
+            }
+        for name, number in (
+            ("reference_temperature", reference_temperature),
+            ("time", time),
+            ("gravity", gravity),
+        ):
+            if number is not None:
+                changes[name] = float(number)
+        for name, vector in (("force", force), ("moment", moment), ("acceleration", acceleration)):
+            if vector is not None:
+                changes[name] = _vector(name, vector)
+        if temperature_log is not None:
+            changes["temperature_log"] = temperature_log
+        if envelope is not None:
+            given = envelope if isinstance(envelope, Envelope) else Envelope(float(envelope))
+            changes["envelope"] = given if given.force > 0.0 else None
+        return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
 
     def __getstate__(self) -> dict[str, object]:
-        return vars(self) | {"part_temperatures": dict(self.part_temperatures)}
+        return vars(self) | {name: dict(getattr(self, name)) for name in _MAPPINGS}
 
     def __setstate__(self, state: dict[str, object]) -> None:
-        parts = state["part_temperatures"]
-        assert isinstance(parts, dict)
-        vars(self).update(state | {"part_temperatures": MappingProxyType(parts)})
+        vars(self).update(state)
+        for name in _MAPPINGS:
+            object.__setattr__(self, name, MappingProxyType(getattr(self, name)))
+
+
+def _along(part: str, value: float | Sequence[float]) -> Vector:
+    if isinstance(value, (int, float)):
+        return (float(value), 0.0, 0.0)
+    return _vector(f"gradient.{part}", value)
 
 
 def _vector(name: str, values: Sequence[float]) -> Vector:

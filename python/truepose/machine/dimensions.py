@@ -39,6 +39,23 @@ _ALL = (
     Dimension(
         "expansion", "an expansion coefficient", "expansion coefficients", "1/K", "1.1e-5 1/K"
     ),
+    Dimension("mass", "a mass", "masses", "kg", "12 kg"),
+    Dimension("time", "a time", "times", "s", "1800 s"),
+    Dimension("acceleration", "an acceleration", "accelerations", "m/s^2", "9.81 m/s^2"),
+    Dimension(
+        "temperature_gradient",
+        "a temperature gradient",
+        "temperature gradients",
+        "K/m",
+        "2 K/m",
+    ),
+    Dimension(
+        "torsional_stiffness",
+        "a torsional stiffness",
+        "torsional stiffnesses",
+        "N m/rad",
+        "12 kN m/rad",
+    ),
     Dimension("ratio", "a plain number", "plain numbers", "1", "1.0"),
 )
 

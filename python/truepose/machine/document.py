@@ -7,17 +7,17 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from truepose import _kernel
 from truepose.errors import MachineFileError, Problem
+from truepose.machine.text_file import FileKind, read_text
 
 Key = tuple[str | int, ...]
 """Where a value stands: keys of tables and numbers of list items, from the top."""
 
-ARRAY_TABLES = ("drive", "strut")
+ARRAY_TABLES = ("drive", "strut", "guide")
 """The tables of which a file has several, told apart by their `name`."""
 
 
@@ -33,6 +33,8 @@ class Document:
     settings: dict[str, str] = field(default_factory=dict)
     set_keys: dict[Key, str] = field(default_factory=dict)
     """What a setting wrote: the key, and the setting as it was given."""
+    shared: dict[Key, Key] = field(default_factory=dict)
+    """Keys of rows that `[each.*]` gave, and where: `("strut", 0, "material")`."""
 
     def line(self, key: Key) -> int | None:
         """Line of `key`, or of the nearest table round it; None for what a setting wrote."""
@@ -53,6 +55,15 @@ class Document:
         # A table that the file does not have is there because of a setting inside it.
         inside = [at for at in self.set_keys if at[: len(key)] == key]
         return self.set_keys[inside[0]] if inside and key else None
+
+    def written(self, key: Key) -> Key:
+        """Where `key` is written: in its row, or in the table that every row shares."""
+        for length in range(len(key), 0, -1):
+            if key[:length] in self.set_keys:
+                return key
+            if key[:length] in self.shared:
+                return (*self.shared[key[:length]], *key[length:])
+        return key
 
     def path(self, key: Key) -> str:
         """`key` for people: rows of an array by their name, list items by their number."""
@@ -106,6 +117,7 @@ class Document:
         hint: str | None = None,
     ) -> Problem:
         """A problem at `key`, with its line, or with the setting that caused it."""
+        key = self.written(key)
         path = self.path(key) or None
         setting = self.setting(key)
         if path is not None:
@@ -149,45 +161,20 @@ def _step(value: Any, words: list[str]) -> tuple[str | int, int] | None:
     return None
 
 
+_KIND = FileKind("a machine file (TOML)", ".toml")
+
+
 def read(path: str | Path) -> Document:
     """Read a machine file. Raises `MachineFileError` for what is no readable TOML text."""
     file = str(path)
-    try:
-        content = Path(path).read_bytes()
-    except (FileNotFoundError, NotADirectoryError):
-        raise MachineFileError(_missing(Path(path))) from None
-    except IsADirectoryError:
-        raise MachineFileError(
-            Problem(
-                "file-is-directory",
-                f"{file} is a directory",
-                file,
-                found="a directory",
-                expected="a machine file (TOML)",
-                hint=_files_in(Path(path)),
-            )
-        ) from None
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise MachineFileError(
-            Problem(
-                "file-unreadable",
-                f"cannot read {file}: {reason}",
-                file,
-                found=reason,
-                expected="a file that may be read",
-            )
-        ) from None
-    text = _text(content, file)
+    content, text = read_text(Path(path), _KIND)
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise MachineFileError(_not_toml(str(error), file, text)) from None
     except RecursionError:
         raise MachineFileError(
-            Problem(
-                "not-toml", "the file is nested too deeply", file, expected="a machine file (TOML)"
-            )
+            Problem("not-toml", "the file is nested too deeply", file, expected=_KIND.phrase)
         ) from None
     return Document(file, Path(path).name, hashlib.sha256(content).hexdigest(), data, _lines(text))
 
@@ -198,43 +185,6 @@ def _lines(text: str) -> dict[Key, int]:
     except ValueError:
         # The two parsers differ in some corner of TOML. The file is still good, without lines.
         return {}
-
-
-def _missing(path: Path) -> Problem:
-    folder = sorted(path.parent.glob("*.toml")) if path.parent.is_dir() else []
-    others = {other.stem: other for other in folder}  # the ending makes no two names alike
-    near = get_close_matches(path.stem, others, n=1)
-    return Problem(
-        "file-missing",
-        f"there is no file {path}",
-        str(path),
-        found="nothing",
-        expected="a machine file (TOML)",
-        hint=f"did you mean {others[near[0]]}?" if near else None,
-    )
-
-
-def _files_in(path: Path) -> str | None:
-    names = sorted(other.name for other in path.glob("*.toml"))
-    return f"machine files in it: {', '.join(names[:10])}" if names else None
-
-
-def _text(content: bytes, file: str) -> str:
-    try:
-        return content.decode("utf-8").removeprefix("\N{ZERO WIDTH NO-BREAK SPACE}")
-    except UnicodeDecodeError as error:
-        utf16 = content.startswith((b"\xff\xfe", b"\xfe\xff"))
-        raise MachineFileError(
-            Problem(
-                "not-utf8",
-                "the file is not UTF-8 text",
-                file,
-                content.count(b"\n", 0, error.start) + 1,
-                found="UTF-16 text" if utf16 else f"the byte 0x{content[error.start]:02x}",
-                expected="UTF-8 text",
-                hint="save the file as UTF-8",
-            )
-        ) from None
 
 
 def _not_toml(reason: str, file: str, text: str) -> Problem:
@@ -252,7 +202,7 @@ def _not_toml(reason: str, file: str, text: str) -> Problem:
         file,
         line,
         found=found or None,
-        expected="a machine file (TOML)",
+        expected=_KIND.phrase,
     )
 
 

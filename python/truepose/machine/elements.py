@@ -5,6 +5,7 @@ Nothing here knows an element: names, dimensions, defaults and docs come from `_
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any
@@ -20,6 +21,8 @@ from truepose.machine.quantity import (
     Point,
     PositiveLength,
     Scale,
+    SeriesStiffness,
+    SeriesTorsionalStiffness,
     list_of,
     refuse,
 )
@@ -27,17 +30,31 @@ from truepose.machine.units import shown_value
 
 
 @dataclass(frozen=True)
-class DriveKind:
-    """One kind of drive: its model of the file, and what its joint coordinate is."""
+class ElementKind:
+    """One kind of a drive or guide: its model of the file."""
 
     kind: str
     doc: str
     drawing: str
+    model: type[FileTable]
+
+
+@dataclass(frozen=True)
+class DriveKind(ElementKind):
+    """One kind of drive, and what its joint coordinate is."""
+
     coordinate: str
     """Dimension of the joint coordinate: `length` or `angle`."""
     sets_length: bool
     """Whether the joint coordinate is the strut's length, which the file then does not give."""
-    model: type[FileTable]
+
+
+@dataclass(frozen=True)
+class GuideKind(ElementKind):
+    """One kind of guide."""
+
+    closures: int
+    """How many freedoms it takes from the platform."""
 
 
 def _ascending(value: Any, read: ValidatorFunctionWrapHandler) -> tuple[float, float]:
@@ -91,6 +108,18 @@ def drive_kinds() -> dict[str, DriveKind]:
             Annotated[tuple[one, one], list_of(2), WrapValidator(_ascending)],
             Field(description="First and last value of the joint coordinate."),
         )
+        fields["fixed_at"] = (
+            one,
+            Field(0.0, description="Joint coordinate at which screw, rack or scale is fixed."),
+        )
+        fields["stiffness"] = (
+            (SeriesTorsionalStiffness if coordinate == "angle" else SeriesStiffness) | None,
+            Field(
+                None,
+                description="Stiffness along the joint coordinate; or a table of what is in "
+                "series, such as `{ screw = ..., nut = ..., bearing = ... }`. Default: rigid.",
+            ),
+        )
         model: type[FileTable] = create_model(
             f"{entry['kind'].title()}Drive", __base__=FileTable, __doc__=entry["doc"], **fields
         )
@@ -98,12 +127,36 @@ def drive_kinds() -> dict[str, DriveKind]:
             entry["kind"],
             entry["doc"],
             entry["drawing"],
+            model,
             coordinate,
             # Such a drive has nothing to draw beyond its strut, for it is the strut.
             bool(entry["sets_length"]),
-            model,
         )
     return kinds
+
+
+@cache
+def guide_kinds() -> dict[str, GuideKind]:
+    """Every kind of guide, by the word that a file writes for it."""
+    kinds = {}
+    for entry in _kernel.elements()["guide"]:
+        fields = _fields(entry, "length")
+        model: type[FileTable] = create_model(
+            f"{entry['kind'].title()}Guide", __base__=FileTable, __doc__=entry["doc"], **fields
+        )
+        kinds[entry["kind"]] = GuideKind(
+            entry["kind"], entry["doc"], entry["drawing"], model, entry["closures"]
+        )
+    return kinds
+
+
+def kinds_of(table: str) -> Mapping[str, ElementKind]:
+    """The kinds of the rows of a table, by their word; none where they are all of one kind."""
+    of_table: dict[str, Callable[[], Mapping[str, ElementKind]]] = {
+        "drive": drive_kinds,
+        "guide": guide_kinds,
+    }
+    return of_table[table]() if table in of_table else {}
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar, Protocol, TypeAlias, TypeVar
 
 from pydantic import BaseModel
@@ -10,12 +10,13 @@ from pydantic import BaseModel
 from truepose import _kernel
 from truepose.errors import Problem, ReadingError
 from truepose.machine.condition import Condition
+from truepose.machine.data_file import Column, DataFiles, DataTable
 from truepose.machine.document import Document
-from truepose.machine.parts_of_machine import Drive, Strut
+from truepose.machine.parts_of_machine import Body, Drive, Guide, Strut
 from truepose.machine.suggestion import did_you_mean
 from truepose.machine.tolerance import Band, Tolerance, read_tolerance
 from truepose.machine.tolerance_standards import ToleranceClassError
-from truepose.machine.units import QuantityError, UnitSystem
+from truepose.machine.units import QuantityError
 from truepose.machine.validation import Validated
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -47,20 +48,26 @@ class FileParts:
         self,
         document: Document,
         validated: Validated,
-        units: UnitSystem,
         kernel: _kernel.Machine,
+        *,
         drives: tuple[Drive, ...],
         struts: tuple[Strut, ...],
+        bodies: tuple[Body, Body, Body],
+        guides: tuple[Guide, ...] = (),
         condition: Condition,
+        data_files: DataFiles,
     ) -> None:
         self.kernel = kernel
         self.drives = drives
         self.struts = struts
+        self.platform, self.frame, self.tool = bodies
+        self.guides = guides
         self.condition = condition
         self.problems: list[Problem] = []
         self._document = document
         self._validated = validated
-        self._units = units
+        self._units = validated.units
+        self._data_files = data_files
 
     def rows(self, model: type[Model]) -> tuple[Model, ...]:
         """What each drive or strut says in the keys of `model`, in the file's order."""
@@ -89,6 +96,28 @@ class FileParts:
         except ToleranceClassError as error:
             self._refuse_reading(error, path)
             return None
+
+    def data_file(self, name: str, columns: Sequence[Column], path: str) -> DataTable | None:
+        """The table in the data file `name` (relative to the machine file), SI.
+
+        `columns` are those that it may have; `path` is the key that names the file, as in
+        `drive.d1.actuator.table`. None, and every problem of the file with its line, where it is
+        not good. What only the source can judge (an order, a range) it says afterwards with
+        `parts.problems.append(table.problem(code, message, row=..., column=..., ...))`.
+
+            columns = (
+                Column("position", "length"),
+                Column("direction", None, words=("up", "down")),
+                Column("deviation", "length"),
+            )
+            table = parts.data_file(row.table, columns, f"drive.{drive.name}.actuator.table")
+            if table is not None:
+                positions = table.numbers["position"]  # (n_row,) m
+                directions = table.texts["direction"]  # n_row words
+
+        The file's hash goes into `Machine.data_files` and every result.
+        """
+        return self._data_files.read(name, columns, self._document.key(path))
 
     def _refuse_reading(self, error: ReadingError, path: str) -> None:
         self.refuse(

@@ -4,38 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from truepose import _kernel
-from truepose.errors import CATALOGUE, MachineFileError, Problem
-from truepose.machine import checks, validation
-from truepose.machine.condition import (
-    DEFAULT_PART,
-    ISO_1_REFERENCE_TEMPERATURE,
-    Condition,
-    Vector,
-)
-from truepose.machine.dimensions import FREEDOMS
+from truepose.errors import MachineFileError, Problem
+from truepose.machine import built_kernel, built_parts, built_workspace, checks, validation
+from truepose.machine.condition import Condition
+from truepose.machine.data_file import DataFiles
 from truepose.machine.document import Document, read
-from truepose.machine.elements import drive_kinds, strut_geometry
+from truepose.machine.each import share_each
 from truepose.machine.file_parts import ErrorSource, FileParts, SourceType
-from truepose.machine.materials import MATERIALS
 from truepose.machine.model import Machine
-from truepose.machine.parts_of_machine import Drive, Strut
+from truepose.machine.parts_of_machine import BODIES, Drive, Strut
 from truepose.machine.settings import apply
 from truepose.machine.tables import SCHEMA, owners
 from truepose.machine.tables.accuracy import AccuracyTable
-from truepose.machine.tables.condition import ConditionTable, CuttingTable
-from truepose.machine.tables.drive import DriveTable
+from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.machine import MachineTable
-from truepose.machine.tables.strut import StrutTable
-from truepose.machine.tables.workspace import HomeTable, WorkspaceTable
-from truepose.machine.units import QuantityError, UnitSystem, shown_value
+from truepose.machine.temperature_log import read_temperature_log
+from truepose.machine.units import shown_value
 from truepose.machine.validation import Validated
-from truepose.machine.workspace import Accuracy, GridAxis, Workspace
+from truepose.machine.workspace import Accuracy
 
 
 def load(
@@ -54,6 +41,7 @@ def load(
     """
     document = read(path)
     owned = owners(source.tables for source in registry)
+    share_each(document, settings, owned.free_tables)
     apply(document, settings, owned.free_tables)
     _require_schema(document)
     validated, problems = validation.validate(document, owned)
@@ -63,10 +51,10 @@ def load(
 
 
 def _raise(problems: Iterable[Problem]) -> None:
-    """All problems at once, in the file's order and each once."""
-    every = sorted(
-        dict.fromkeys(problems), key=lambda problem: (problem.line is None, problem.line or 0)
-    )
+    """All problems at once, each once: file by file, in each file's order."""
+    every = list(dict.fromkeys(problems))
+    files = list(dict.fromkeys(problem.file for problem in every))
+    every.sort(key=lambda p: (files.index(p.file), p.line is None, p.line or 0))
     if every:
         raise MachineFileError(*every)
 
@@ -105,15 +93,30 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
     machine = validated.table(MachineTable)
     assert machine is not None
     problems: list[Problem] = []
-    drives = _drives(validated)
-    workspace, home = _workspace(document, validated, machine, problems)
-    _raise(problems)
-    kernel = _kernel_machine(document, validated, machine, drives, home)
-    struts = tuple(map(_strut, validated.rows(StrutTable)))
-    condition = _condition(validated.table(ConditionTable))
-    parts = FileParts(document, validated, validated.units, kernel, drives, struts, condition)
+    data_files = DataFiles(document)
+    drives = built_parts.drives(validated)
+    struts = built_parts.struts(validated)
+    condition = _condition(validated, data_files, drives, struts)
+    workspace, home = built_workspace.workspace(document, validated, data_files, problems)
+    _raise([*problems, *data_files.problems])
+    guides = built_parts.guides(validated)
+    described = built_kernel.Described(document, validated, drives, struts, guides, home)
+    kernel = built_kernel.kernel(described)
+    _raise(built_kernel.problems(described, kernel))
+    platform, frame, tool = built_parts.bodies(validated)
+    parts = FileParts(
+        document,
+        validated,
+        kernel,
+        drives=drives,
+        struts=struts,
+        guides=guides,
+        bodies=(platform, frame, tool),
+        condition=condition,
+        data_files=data_files,
+    )
     built = [source.build(parts) for source in registry]
-    _raise(parts.problems)
+    _raise([*parts.problems, *data_files.problems])
     sources: tuple[ErrorSource, ...] = tuple(source for source in built if source is not None)
     accuracy = validated.table(AccuracyTable)
     return Machine(
@@ -131,186 +134,30 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         else Accuracy(accuracy.target, accuracy.angle_target),
         drives=drives,
         struts=struts,
+        guides=guides,
         sources=sources,
         file_units=validated.units.shown(),
+        platform=platform,
+        frame=frame,
+        tool=tool,
+        mounting=built_parts.mounting(validated),
+        data_files=data_files.hashes,
     )
 
 
-def _drives(validated: Validated) -> tuple[Drive, ...]:
-    drives = []
-    for common, geometry in zip(validated.rows(DriveTable), validated.geometry, strict=True):
-        kind = drive_kinds()[common.kind]
-        assert geometry is not None
-        fields: dict[str, Any] = dict(geometry)
-        travel = fields.pop("travel")
-        drives.append(
-            Drive(
-                common.name,
-                common.kind,
-                kind.coordinate,
-                travel,
-                common.working_mode,
-                fields,
-                kind.drawing,
-            )
-        )
-    return tuple(drives)
-
-
-def _strut(row: StrutTable) -> Strut:
-    material = MATERIALS.get(row.material or "")
-    modulus, expansion = row.modulus, row.expansion
-    if material is not None:
-        modulus = material.modulus if modulus is None else modulus
-        expansion = material.expansion if expansion is None else expansion
-    return Strut(
-        row.name, row.drive, row.section_area, modulus, expansion, row.stiffness, row.material
-    )
-
-
-def _condition(table: ConditionTable | None) -> Condition:
-    if table is None:
-        return Condition()
-    reference = table.reference_temperature or ISO_1_REFERENCE_TEMPERATURE
-    temperatures = dict(table.temperature or {})
-    default = temperatures.pop(DEFAULT_PART, reference)
-    force: Vector = (0.0, 0.0, 0.0)
-    moment: Vector = (0.0, 0.0, 0.0)
-    if table.cutting is not None:
-        force = cutting_force(table.cutting)
-    elif table.force is not None:
-        force = (table.force.x, table.force.y, table.force.z)
-    if table.moment is not None:
-        moment = (table.moment.x, table.moment.y, table.moment.z)
-    return Condition(reference, default, temperatures, force, moment)
-
-
-def cutting_force(cutting: CuttingTable) -> Vector:
-    """Force on the tool in N, base axes: each component is specific force x chip section.
-
-    Gojtan & Hess-Coelho (2005): the chip's thickness times the depth, and times the width, of cut.
-    """
-    per_length = cutting.specific_force * cutting.chip_thickness
-    x, y, z = (
-        per_length * (cutting.depth * along_depth + cutting.width * along_width)
-        for along_depth, along_width in zip(
-            cutting.depth_direction, cutting.width_direction, strict=True
-        )
-    )
-    return (x, y, z)
-
-
-def _workspace(
-    document: Document,
+def _condition(
     validated: Validated,
-    machine: MachineTable,
-    problems: list[Problem],
-) -> tuple[Workspace | None, dict[str, float]]:
-    """The workspace and the home pose by freedom; what home does not name is 0."""
-    table = validated.table(WorkspaceTable)
-    if table is None:
-        return None, {}
-    commanded = machine.commanded or machine.dof
-    line = document.line(("workspace",))
-    home = {} if table.home is None else _home(table.home)
-    if table.poses is not None:
-        listed = _listed(document, table.poses, commanded, validated.units, problems)
-        if table.home is None and len(listed):
-            middle = 0.5 * (listed.min(axis=0) + listed.max(axis=0))
-            home = dict(zip(commanded, middle.tolist(), strict=True))
-        return Workspace(listed=listed, line=line), home
-    axes = []
-    for freedom in commanded:
-        span = None if table.grid is None else getattr(table.grid, freedom)
-        if span is None:
-            stay = home.get(freedom, 0.0)
-            span = (stay, stay, 1)
-        axes.append(GridAxis(freedom, *span))
-    if table.home is None:
-        home = {axis.name: axis.centre for axis in axes}
-    return Workspace(tuple(axes), line=line), home
-
-
-def _home(table: HomeTable) -> dict[str, float]:
-    return {freedom: getattr(table, freedom) for freedom in FREEDOMS}
-
-
-def _listed(
-    document: Document,
-    poses: Sequence[Sequence[float | int | str]],
-    commanded: Sequence[str],
-    units: UnitSystem,
-    problems: list[Problem],
-) -> NDArray[np.float64]:
-    """(n_pose, n_commanded) of the listed poses, SI; each column by its freedom's dimension."""
-    result = np.zeros((len(poses), len(commanded)))
-    for row, pose in enumerate(poses):
-        for column, (value, freedom) in enumerate(zip(pose, commanded, strict=True)):
-            try:
-                result[row, column] = units.read(value, FREEDOMS[freedom])
-            except QuantityError as error:
-                problems.append(
-                    document.problem(
-                        error.code,
-                        error.message,
-                        ("workspace", "poses", row, column),
-                        found=error.found,
-                        expected=error.expected,
-                        hint=error.hint,
-                    )
-                )
-    return result
-
-
-def _kernel_machine(
-    document: Document,
-    validated: Validated,
-    machine: MachineTable,
+    data_files: DataFiles,
     drives: Sequence[Drive],
-    home: Mapping[str, float],
-) -> _kernel.Machine:
-    """The kernel's machine. What it alone can refuse becomes a problem of the file."""
-    struts = zip(validated.rows(StrutTable), validated.rows(strut_geometry()), strict=True)
-    description: dict[str, Any] = {
-        "dof": list(machine.dof),
-        "commanded": list(machine.commanded or machine.dof),
-        "home": {freedom: value for freedom, value in home.items() if freedom in machine.dof},
-        "tool": list(machine.tool),
-        "characteristic_length": machine.characteristic_length,
-        "drives": [
-            {
-                "name": drive.name,
-                "kind": drive.kind,
-                "travel": list(drive.travel),
-                "working_mode": drive.working_mode,
-                **{name: _plain(value) for name, value in drive.fields.items()},
-            }
-            for drive in drives
-        ],
-        "struts": [
-            {
-                "name": row.name,
-                "drive": row.drive,
-                **{name: _plain(value) for name, value in dict(geometry).items()},
-            }
-            for row, geometry in struts
-        ],
-    }
-    try:
-        return _kernel.Machine(description)
-    except _kernel.KernelError as error:
-        code, message, where = error.args
-        key = document.key(where) if where else ()
-        value = document.value(key)
-        raise MachineFileError(
-            document.problem(
-                code if code in CATALOGUE else "not-buildable",
-                message,
-                key,
-                found=None if isinstance(value, dict) else shown_value(value),
-            )
-        ) from None
-
-
-def _plain(value: float | tuple[float, ...] | None) -> float | list[float] | None:
-    return list(value) if isinstance(value, tuple) else value
+    struts: Sequence[Strut],
+) -> Condition:
+    """The condition with its temperature log."""
+    table = validated.table(ConditionTable)
+    found = built_parts.condition(table)
+    if table is None or table.temperature_log is None:
+        return found
+    parts = [*(drive.part for drive in drives), *(strut.part for strut in struts), *BODIES]
+    log = read_temperature_log(
+        data_files, table.temperature_log, parts, table.time, table.temperature or ()
+    )
+    return found if log is None else found.replace(temperature_log=log)

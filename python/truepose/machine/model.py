@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
@@ -12,9 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from truepose import _kernel
 from truepose.errors import PoseError, Problem, RequestError
-from truepose.machine.condition import Condition
-from truepose.machine.parts_of_machine import Drive, Strut
-from truepose.machine.suggestion import did_you_mean
+from truepose.machine.compliances import compliances, known
+from truepose.machine.condition import DEFAULT_PART, Condition
+from truepose.machine.parts_of_machine import BODIES, Body, Drive, Guide, Strut, Vector
+from truepose.machine.suggestion import did_you_mean, one_of
 from truepose.machine.units import FileUnit
 from truepose.machine.workspace import Accuracy, Workspace
 
@@ -32,6 +34,11 @@ _HANDED_THROUGH = (
     "conditioning",
     "forces",
 )
+
+_MAPPINGS = ("settings", "file_units", "data_files", "replaced")
+
+_NOT_HELD = "the struts do not hold the platform"
+_HELD = "guides and what has no stiffness are rigid: the stiffness is infinite, not the compliance"
 
 _POSITIVE = (".length", ".scale")
 """Endings of the parameters that make sense above zero only."""
@@ -55,8 +62,8 @@ class Machine:
       and rotation vector, base frame, per unit of each parameter
     * `jac_pose_joint(poses)`: (..., n_component, n_joint)
     * `conditioning(poses)`: (...), smallest to largest singular value of the scaled Jacobian
-    * `forces(poses, wrench)`: (..., n_closure), strut tension in N under the wrench (..., 6) on
-      the tool at the tool point, base axes
+    * `forces(poses, wrench)`: (..., n_closure), force of each closure in N, a strut's its tension,
+      under the wrench (..., 6) on the tool at the tool point, base axes
     """
 
     kernel: _kernel.Machine
@@ -73,6 +80,13 @@ class Machine:
     struts: tuple[Strut, ...]
     sources: tuple[ErrorSource, ...]
     file_units: Mapping[str, FileUnit]
+    platform: Body = field(default_factory=lambda: Body("platform"))
+    frame: Body = field(default_factory=lambda: Body("frame"))
+    tool: Body = field(default_factory=lambda: Body("tool"))
+    mounting: Vector = (0.0, 0.0, 0.0)
+    guides: tuple[Guide, ...] = ()
+    data_files: Mapping[str, str] = field(default_factory=dict)
+    """SHA-256 of each file of data that the machine file names."""
     replaced: Mapping[str, float] = field(default_factory=dict)
 
     forward: Callable[..., Any] = field(init=False, repr=False)
@@ -83,7 +97,7 @@ class Machine:
     forces: Callable[..., Any] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name in ("settings", "file_units", "replaced"):
+        for name in _MAPPINGS:
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
         for name in _HANDED_THROUGH:
             object.__setattr__(self, name, getattr(self.kernel, name))
@@ -93,7 +107,7 @@ class Machine:
 
     def __reduce__(self) -> tuple[Callable[..., Machine], tuple[dict[str, Any]]]:
         state = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
-        for name in ("settings", "file_units", "replaced"):
+        for name in _MAPPINGS:
             state[name] = dict(state[name])
         return _restored, (state,)
 
@@ -119,7 +133,7 @@ class Machine:
 
     @property
     def closures(self) -> tuple[str, ...]:
-        """Names of the closures: the struts'."""
+        """Names of the closures: the struts', then the guides'."""
         return self.kernel.closures
 
     @property
@@ -153,9 +167,23 @@ class Machine:
         return {name: unit.label for name, unit in self.file_units.items()}
 
     @property
-    def axial_stiffness_known(self) -> NDArray[np.bool_]:
-        """(n_closure,) whether the file says how stiff each strut is."""
-        return np.array([strut.axial_stiffness(1.0) is not None for strut in self.struts], np.bool_)
+    def stiffness_known(self) -> NDArray[np.bool_]:
+        """(n_strut,) whether the file says how stiff something is along each strut's limb."""
+        return known(self.drives, self.struts)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Paths of the parts that may have a temperature of their own: `strut.1`, `frame`, ..."""
+        rows: tuple[Drive | Strut | Guide, ...] = (*self.drives, *self.struts, *self.guides)
+        return (*(row.part for row in rows), *BODIES)
+
+    @property
+    def down(self) -> Floats:
+        """(3,) unit vector of gravity, base axes: R^T (0, 0, -1), R = Rz(c) Ry(b) Rx(a)."""
+        a, b, _ = self.mounting
+        return -np.array(
+            [-math.sin(b), math.cos(b) * math.sin(a), math.cos(b) * math.cos(a)], np.float64
+        )
 
     def poses(self) -> Floats:
         """(n_pose, n_commanded) the poses of the file's workspace, first axis fastest, SI.
@@ -174,19 +202,14 @@ class Machine:
             )
         return self.workspace.poses()
 
-    def axial_compliance(self, lengths: ArrayLike) -> Floats:
-        """m/N of every strut, for its length in m; both (..., n_closure).
+    def compliances(self, lengths: ArrayLike) -> tuple[NDArray[np.intp], Floats]:
+        """Parameters (k,) that may give way, and their compliance (n, k), m/N or rad/(N m).
 
-        0, a rigid strut, where the file says nothing.
+        `lengths` (n, n_strut): present length of each strut, m. The first n_strut columns are the
+        struts' lengths. In series along the limb; 0, rigid, where the file says nothing.
         """
-        given = np.asarray(lengths, np.float64)
-        result = np.zeros_like(given)
-        for index, strut in enumerate(self.struts):
-            if strut.stiffness is not None:
-                result[..., index] = 1.0 / strut.stiffness
-            elif strut.area is not None and strut.modulus is not None:
-                result[..., index] = given[..., index] / (strut.area * strut.modulus)
-        return result
+        given = np.atleast_2d(np.asarray(lengths, np.float64))
+        return compliances(self.kernel, self.drives, self.struts, given)
 
     @overload
     def stiffness(self, poses: ArrayLike, *, status: Literal[False] = False) -> Floats: ...
@@ -195,8 +218,9 @@ class Machine:
     def stiffness(self, poses: ArrayLike, *, status: bool = False) -> Floats | WithStatus:
         """Wrench on the tool per small displacement, (..., n_component, n_component), SI.
 
-        At the tool point, base axes, from the struts' axial stiffness. Raises `RequestError`
-        (no-stiffness) where a strut gives none, `PoseError` as all calls do.
+        At the tool point, base axes, from struts, joints, drives and what they stand on. Raises
+        `RequestError` (no-stiffness) where nothing along a limb gives one, `PoseError` as all
+        calls do.
         """
         return self._elastic(self.kernel.stiffness_at, poses, status)
 
@@ -218,9 +242,8 @@ class Machine:
         leading, size = given.shape[:-1], len(self.components)
         joints, placements, placed = self.kernel.place(given.reshape(-1, given.shape[-1]))
         lengths = self.kernel.lengths_at(joints, placements)
-        matrices, solved = block(
-            joints, placements, self.kernel.length_parameters, self.axial_compliance(lengths)
-        )
+        columns, compliance = self.compliances(lengths)
+        matrices, solved = block(joints, placements, columns, compliance)
         result = matrices.reshape(*leading, size, size)
         codes = np.where(placed == 0, solved, placed)
         if status:
@@ -229,13 +252,15 @@ class Machine:
         if failed.size:
             first = int(failed[0])
             name = _kernel.STATUS[codes[first]]
-            raise PoseError(int(failed.size), first, name, "the struts do not hold the platform")
+            # Placed, but not solved: a matrix of compliance that has no inverse.
+            reason = _HELD if block == self.kernel.stiffness_at and not placed[first] else _NOT_HELD
+            raise PoseError(int(failed.size), first, name, reason)
         return result
 
     def _require_stiffness(self) -> None:
         lacking = [
             strut.name
-            for strut, known in zip(self.struts, self.axial_stiffness_known, strict=True)
+            for strut, known in zip(self.struts, self.stiffness_known, strict=True)
             if not known
         ]
         if lacking:
@@ -291,8 +316,28 @@ class Machine:
         )
 
     def with_condition(self, condition: Condition) -> Machine:
-        """The machine in another condition."""
+        """The machine in another condition. Raises `RequestError` (unknown-part)."""
+        self.check_condition(condition)
         return replace(self, condition=condition)
+
+    def check_condition(self, condition: Condition) -> None:
+        """Raise `RequestError` (unknown-part) with every part that the machine does not have."""
+        known_parts = self.parts
+        problems = [
+            Problem(
+                "unknown-part",
+                f'the condition names a part "{part}", which the machine does not have',
+                self.file,
+                path=f"condition.{part}",
+                found=part,
+                expected=one_of((DEFAULT_PART, *known_parts)),
+                hint=did_you_mean(part, known_parts),
+            )
+            for part in condition.named_parts
+            if part not in known_parts
+        ]
+        if problems:
+            raise RequestError(*problems)
 
 
 def _restored(state: dict[str, Any]) -> Machine:

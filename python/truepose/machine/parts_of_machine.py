@@ -1,35 +1,55 @@
-"""The parts of a machine as its file says them: drives and struts with their properties, SI."""
+"""The parts of a machine as its file says them: drives, struts, joints and bodies, SI."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
+
+Vector = tuple[float, float, float]
+Fields = Mapping[str, float | tuple[float, ...]]
+
+BODIES = ("platform", "frame", "tool")
+"""Parts that every machine has once."""
+
+
+def in_series(*stiffnesses: float | None) -> float | None:
+    """Stiffness of springs in series; a spring that is None, or infinite, is rigid.
+
+    None where all of them are rigid.
+    """
+    compliance = sum(1.0 / stiffness for stiffness in stiffnesses if stiffness is not None)
+    return 1.0 / compliance if compliance > 0.0 else None
 
 
 @dataclass(frozen=True)
-class Drive:
-    """An actuated joint. `travel` and `coordinate`: m (`length`) or rad (`angle`).
+class Joint:
+    """The passive joint at one end of a strut.
 
-    `fields` are the element's own (origin, axis, offset, ...) as the file gives them, SI, base
-    frame; `drawing` is how the element is drawn (`line`, `circle`, `none`).
+    `kind`: spherical, universal, revolute or flexure. `stiffness`: N/m along the strut, or None,
+    rigid.
+    `clearance`, `axial_clearance` (m): total play of the pair, across and along a revolute's axis.
+    `axis`: of a revolute; of another, the direction from which `angle_limit` (rad, the largest
+    angle between it and the strut) counts. Axes of the carriage or frame at the base, of the
+    platform at the platform.
     """
 
-    name: str
-    kind: str
-    coordinate: str
-    travel: tuple[float, float]
-    working_mode: str | None
-    fields: Mapping[str, float | tuple[float, ...]]
-    drawing: str
+    kind: str = "spherical"
+    stiffness: float | None = None
+    clearance: float = 0.0
+    axial_clearance: float = 0.0
+    axis: Vector | None = None
+    angle_limit: float | None = None
+
+
+class _WithFields:
+    """What has `fields` of its element: read-only, and picklable all the same."""
+
+    fields: Fields
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fields", MappingProxyType(dict(self.fields)))
-
-    @property
-    def part(self) -> str:
-        """Its path: `drive.d1`."""
-        return f"drive.{self.name}"
 
     def __getstate__(self) -> dict[str, object]:
         return vars(self) | {"fields": dict(self.fields)}
@@ -41,11 +61,53 @@ class Drive:
 
 
 @dataclass(frozen=True)
+class Drive(_WithFields):
+    """An actuated joint. `travel` and `coordinate`: m (`length`) or rad (`angle`).
+
+    `fields` are the element's own (origin, axis, offset, ...) as the file gives them, SI, base
+    frame; `drawing` is how the element is drawn (`line`, `circle`, `none`).
+
+    `feedback`: the position is measured at the `motor`, so that screw, backlash and lead come
+    between it and the carriage, or `direct` on the carriage. `expansion` (1/K) is that of what the
+    position is measured by (screw, rack or scale), which is fixed at the joint coordinate
+    `fixed_at`. `stiffness`: N/m, or N m/rad of a crank, of all that the file names, in series;
+    None: rigid. `mass` (kg) is the carriage's.
+    """
+
+    name: str
+    kind: str
+    coordinate: str
+    travel: tuple[float, float]
+    working_mode: str | None
+    fields: Fields
+    drawing: str
+    feedback: str = "motor"
+    material: str | None = None
+    expansion: float | None = None
+    fixed_at: float = 0.0
+    stiffness: float | None = None
+    mass: float = 0.0
+
+    @property
+    def part(self) -> str:
+        """Its path: `drive.d1`."""
+        return f"drive.{self.name}"
+
+    @property
+    def held_stiffness(self) -> float | None:
+        """Stiffness between what is measured and what moves: a direct scale sees all the rest."""
+        return None if self.feedback == "direct" else self.stiffness
+
+
+@dataclass(frozen=True)
 class Strut:
     """A strut's properties: what it is made of, not where it is (that is in the parameters).
 
     `drive` is the drive that carries its base joint, None on the frame. `area` in m^2, `modulus` in
     Pa, `expansion` in 1/K, `stiffness` (axial, outright) in N/m; None where the file says nothing.
+    `mass` in kg, its centre at the fraction `centre_of_mass` of the way from the base joint to the
+    platform joint. `base_stiffness` (N/m, infinite where rigid) is that of the carriage or frame at
+    the base joint, along its x y z; None: rigid.
     """
 
     name: str
@@ -55,6 +117,11 @@ class Strut:
     expansion: float | None
     stiffness: float | None
     material: str | None
+    mass: float = 0.0
+    centre_of_mass: float = 0.5
+    base_joint: Joint = field(default_factory=Joint)
+    platform_joint: Joint = field(default_factory=Joint)
+    base_stiffness: Vector | None = None
 
     @property
     def part(self) -> str:
@@ -68,3 +135,52 @@ class Strut:
         if self.area is None or self.modulus is None:
             return None
         return self.modulus * self.area / length
+
+    @property
+    def stiffness_known(self) -> bool:
+        """Whether the file says how stiff the strut itself is."""
+        return self.axial_stiffness(1.0) is not None
+
+    @property
+    def joints(self) -> tuple[Joint, Joint]:
+        """At the base and at the platform."""
+        return self.base_joint, self.platform_joint
+
+    @property
+    def base_compliance(self) -> Vector:
+        """m/N of the carriage or frame at the base joint, along its x y z."""
+        if self.base_stiffness is None:
+            return (0.0, 0.0, 0.0)
+        x, y, z = (0.0 if math.isinf(k) else 1.0 / k for k in self.base_stiffness)
+        return (x, y, z)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body that the machine has once: the platform with the spindle, the frame, the tool.
+
+    `mass` in kg, `centre_of_mass` in platform axes, m. `expansion` in 1/K, None where the file says
+    nothing; it grows about `anchor` (m; base axes of the frame, else platform axes), and a tool
+    from its anchor to the tool point.
+    """
+
+    part: str
+    mass: float = 0.0
+    centre_of_mass: Vector = (0.0, 0.0, 0.0)
+    material: str | None = None
+    expansion: float | None = None
+    anchor: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Guide(_WithFields):
+    """A passive limb. `fields` are its element's own (origin, normal, ...), SI."""
+
+    name: str
+    kind: str
+    fields: Fields
+
+    @property
+    def part(self) -> str:
+        """Its path: `guide.g1`."""
+        return f"guide.{self.name}"

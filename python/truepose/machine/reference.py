@@ -14,11 +14,11 @@ from pydantic import BaseModel
 
 from truepose.machine.dimensions import DIMENSIONS
 from truepose.machine.document import ARRAY_TABLES
-from truepose.machine.elements import drive_kinds
+from truepose.machine.each import EACH
+from truepose.machine.elements import kinds_of
 from truepose.machine.file_parts import SourceType
 from truepose.machine.materials import MATERIALS
 from truepose.machine.tables import REQUIRED, SCHEMA, owners, takes_every_key
-from truepose.machine.tables.drive import DriveTable
 from truepose.machine.tolerance_standards import STANDARDS, designations_of
 
 Json = dict[str, Any]
@@ -34,6 +34,12 @@ def json_schema(registry: Sequence[SourceType]) -> Json:
             if table in ARRAY_TABLES
             else _merged(models)
         )
+    properties[EACH] = {
+        "type": "object",
+        "description": _EACH_DOC,
+        "properties": {table: _shared_schema(table, by_table[table]) for table in ARRAY_TABLES},
+        "additionalProperties": False,
+    }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "truepose machine file",
@@ -45,14 +51,33 @@ def json_schema(registry: Sequence[SourceType]) -> Json:
 
 
 def _row_schema(table: str, models: tuple[type[BaseModel], ...]) -> Json:
-    if table != "drive":
-        return _merged(models)
+    """A row. Only its name is required of it: `[each.*]` may give all the rest."""
+    choices = _choices(table, models)
+    for choice in choices:
+        choice["required"] = ["name"]
+    return choices[0] if len(choices) == 1 else {"anyOf": choices}
+
+
+def _shared_schema(table: str, models: tuple[type[BaseModel], ...]) -> Json:
+    """What all rows may share: everything but their name."""
+    choices = _choices(table, models)
+    for choice in choices:
+        choice.pop("required", None)
+        del choice["properties"]["name"]
+    return choices[0] if len(choices) == 1 else {"anyOf": choices}
+
+
+def _choices(table: str, models: tuple[type[BaseModel], ...]) -> list[Json]:
+    """The keys of a row, one object schema for each kind that there is of it."""
+    kinds = kinds_of(table)
+    if not kinds:
+        return [_merged(models)]
     choices = []
-    for kind in drive_kinds().values():
+    for kind in kinds.values():
         choice = _merged((*models, kind.model))
         choice["properties"]["kind"] = {"const": kind.kind, "description": kind.doc}
         choices.append(choice)
-    return {"oneOf": choices}
+    return choices
 
 
 def _merged(models: Iterable[type[BaseModel]]) -> Json:
@@ -114,7 +139,7 @@ def page(registry: Sequence[SourceType]) -> str:
     parts = [_INTRODUCTION]
     for table, models in by_table.items():
         parts.append(_section(table, models, registry, reader))
-    parts += [_materials(), _classes()]
+    parts += [_each(), _materials(), _classes()]
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -133,15 +158,23 @@ def _section(
         model = source.tables.get(table)
         if model is not None and takes_every_key(model):
             lines += [f"Any key; read by the source `{source.name}`: {source.doc}.", ""]
-    for key, below in schema["properties"].items():
-        if "properties" in below and below["properties"].keys():
-            lines += [f"### `{table}.{key}`", "", _sentence(below.get("description", "")), ""]
-            lines += _rows(below, {})
-    if models[0] is DriveTable:
-        for kind in drive_kinds().values():
-            lines += [f'### `kind = "{kind.kind}"`', "", kind.doc, ""]
-            lines += _rows(_merged((kind.model,)), {})
+    lines += _tables_below(table, schema)
+    for kind in kinds_of(table).values():
+        lines += [f'### `kind = "{kind.kind}"`', "", kind.doc, ""]
+        lines += _rows(_merged((kind.model,)), {})
     return "\n".join(lines)
+
+
+def _tables_below(path: str, schema: Json) -> list[str]:
+    """A section for every table inside a table, and inside those."""
+    lines = []
+    for key, value in schema["properties"].items():
+        below = value.get("items", value)
+        if below.get("properties"):
+            meaning = _sentence(value.get("description", ""))
+            lines += [f"### `{path}.{key}`", "", meaning, "", *_rows(below, {})]
+            lines += _tables_below(f"{path}.{key}", below)
+    return lines
 
 
 def _first_line(model: type[BaseModel]) -> str:
@@ -155,7 +188,7 @@ def _rows(schema: Json, reader: Mapping[str, str]) -> list[str]:
         meaning = _sentence(value.get("description", ""))
         if key in required:
             meaning = f"**Required.** {meaning}"
-        elif "default" in value and value["default"] not in ("", None):
+        elif "default" in value and value["default"] not in ("", None, []):
             meaning += f" Default: {_shown(value['default'])}."
         if key in reader:
             meaning += f" Read by the source `{reader[key]}`."
@@ -173,6 +206,8 @@ def _sentence(text: str) -> str:
 def _shown(value: Any) -> str:
     if isinstance(value, list | tuple):
         return "`[" + ", ".join(f"{each:g}" for each in value) + "]`"
+    if isinstance(value, bool):
+        return "`true`" if value else "`false`"
     return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
 
 
@@ -180,13 +215,19 @@ def _takes(schema: Json) -> str:
     """What a key takes, in words."""
     if "x-dimension" in schema:
         return _takes_quantity(schema, schema["x-dimension"])
+    if "x-poses" in schema:
+        return "list of lists, one per pose, or the name of a CSV file"
     if "enum" in schema:
         return " or ".join(f'`"{word}"`' for word in schema["enum"])
     if "properties" in schema:
         return "table, see below"
     if schema.get("type") == "array":
         return _takes_list(schema)
-    return {"string": "text", "integer": "whole number"}.get(schema.get("type", ""), "value")
+    named = schema.get("additionalProperties")
+    if isinstance(named, dict):
+        return f"table of any names, each a {_takes(named)}"
+    words = {"string": "text", "integer": "whole number", "boolean": "`true` or `false`"}
+    return words.get(schema.get("type", ""), "value")
 
 
 def _takes_quantity(schema: Json, name: str) -> str:
@@ -195,11 +236,25 @@ def _takes_quantity(schema: Json, name: str) -> str:
     dimension = DIMENSIONS[name]
     if "x-tolerance" in schema:
         a_class = ", or a class" if schema["x-tolerance"] else ""
-        return f"tolerance ({dimension.phrase}): `[lower, upper]`, ± one value{a_class}"
+        written = f"`[lower, upper]`, ± one value{a_class}"
+        return f"tolerance ({dimension.phrase}): {written}, or a table of them with more"
+    if "x-known" in schema:
+        return f"{dimension.name}, ± one or `[lower, upper]` where it is not known"
+    if "x-slope" in schema:
+        written = f"tolerance ({dimension.phrase}, or a rise over a length)"
+        return f"{written}: `[lower, upper]`, ± one value, or a table with `direction`"
     if schema.get("x-grid"):
         return f"`[from, to, count]`, {dimension.plural}"
+    if schema.get("x-series"):
+        return f"{dimension.name.replace('_', ' ')}, or a table of those in series"
+    if schema.get("x-per-axis"):
+        return f"{dimension.name}, or `[x, y, z]` of them; `inf` is rigid"
+    if schema.get("x-by-part"):
+        return f"table of {dimension.plural} per part"
     if schema.get("x-per-part"):
         return f"{dimension.phrase}, or a table of them per part"
+    if "x-angular" in schema:
+        return f"{dimension.name}; of a crank {DIMENSIONS[schema['x-angular']].name}"
     return dimension.name.replace("_", " ")
 
 
@@ -209,7 +264,12 @@ def _takes_list(schema: Json) -> str:
         dimension = DIMENSIONS[members[0]["x-dimension"]]
         return f"list of {len(members)} {dimension.plural}"
     item = schema.get("items", {})
-    return "list of " + (_takes(item) if "enum" in item else "lists, one per pose")
+    return "list of tables, see below" if "properties" in item else "list of " + _takes(item)
+
+
+def _each() -> str:
+    tables = ", ".join(f"`[{EACH}.{table}]`" for table in ARRAY_TABLES)
+    return f"## {tables}\n\n{_EACH_DOC}\n"
 
 
 def _materials() -> str:
@@ -249,6 +309,10 @@ def _classes() -> str:
     return "\n".join([*lines, ""])
 
 
+_EACH_DOC = """\
+Keys that every row of an array table has unless it writes its own; a row that writes one keeps all
+of its own value, tables within it included. Rows have a `name` each."""
+
 _INTRODUCTION = """\
 # The machine file
 
@@ -262,6 +326,9 @@ The file begins with `schema = 1`, above the first table.
 **Units.** A bare number has the unit that `[units]` declares for its dimension, or, where it
 declares none, is an error. Text carries its own unit: `"28.27 mm^2"`, `"210 GPa"`, `"1.1e-5 1/K"`,
 `"0.02 in"`. Dimensions are checked, and a temperature is not a temperature difference.
+
+**Data files.** Temperature logs, lists of poses and measured tables are CSV files beside the
+machine file, with the unit of every column in its header: [data_files.md](data_files.md).
 
 **Problems.** All of a file's problems are reported at once, each with its code, file and line. A
 key that nothing reads is one.

@@ -9,8 +9,9 @@ from typing import Any, TypeVar, cast, get_args
 from pydantic import BaseModel, ValidationError
 
 from truepose.errors import CATALOGUE, Problem
+from truepose.machine import each
 from truepose.machine.document import ARRAY_TABLES, Document, Key
-from truepose.machine.elements import drive_kinds
+from truepose.machine.elements import DriveKind, kinds_of
 from truepose.machine.file_table import FileTable
 from truepose.machine.suggestion import did_you_mean, nearest, one_of
 from truepose.machine.tables import REQUIRED, Owners, takes_every_key
@@ -40,8 +41,8 @@ class Validated:
     units: UnitSystem
     tables: dict[type[BaseModel], BaseModel] = field(default_factory=dict)
     every_row: dict[type[BaseModel], list[BaseModel | None]] = field(default_factory=dict)
-    geometry: list[FileTable | None] = field(default_factory=list)
-    """Per drive: the model of its kind."""
+    geometry: dict[str, list[FileTable | None]] = field(default_factory=dict)
+    """Per row of a table whose rows have a kind: the model of that."""
     misspelt: set[Key] = field(default_factory=set)
     """Keys that an unknown key was most likely meant to be: they are not missing as well."""
 
@@ -61,7 +62,8 @@ def validate(document: Document, owners: Owners) -> tuple[Validated, list[Proble
     for table in REQUIRED:
         if table not in data:
             problems.append(_missing_table(document, table))
-    known = {"schema", *owners.by_table}
+    known = {"schema", each.EACH, *owners.by_table}
+    problems += each.problems(document)
     problems += [_unknown_key(document, (key,), known) for key in data if key not in known]
     units = _units(document, problems)
     validated = Validated(units)
@@ -151,35 +153,39 @@ def _array(
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
         problems.append(_not_an_array(document, table, rows))
         return
+    kinds = kinds_of(table)
     for index, row in enumerate(rows):
         key: Key = (table, index)
         of_row = models
-        if table == "drive":
-            kind = drive_kinds().get(row["kind"]) if isinstance(row.get("kind"), str) else None
+        coordinate = None
+        if kinds:
+            kind = kinds.get(row["kind"]) if isinstance(row.get("kind"), str) else None
             if kind is not None:
                 of_row = (*models, kind.model)
+                coordinate = kind.coordinate if isinstance(kind, DriveKind) else None
             else:
-                problems += _unknown_kind(document, key, row)
+                problems += _unknown_kind(document, key, row, kinds)
                 # Which keys it may have is not known without its kind: check only the common ones.
                 common = {name for model in models for name in model.model_fields}
                 row = {name: value for name, value in row.items() if name in common}
-        filled, found = _share_out(document, key, of_row, row, validated)
+        filled, found = _share_out(document, key, of_row, row, validated, coordinate)
         problems += found
         for model in models:
             validated.every_row.setdefault(model, []).append(filled[model])
-        if table == "drive":
+        if kinds:
             one = filled[of_row[-1]] if of_row is not models else None
-            validated.geometry.append(cast("FileTable | None", one))
+            validated.geometry.setdefault(table, []).append(cast("FileTable | None", one))
 
 
-def _unknown_kind(document: Document, key: Key, row: Mapping[str, Any]) -> list[Problem]:
+def _unknown_kind(
+    document: Document, key: Key, row: Mapping[str, Any], kinds: Iterable[str]
+) -> list[Problem]:
     if not isinstance(row.get("kind"), str):
-        return []  # missing, or of a wrong type: the drive's own model says so
-    kinds = drive_kinds()
+        return []  # missing, or of a wrong type: the table's own model says so
     return [
         document.problem(
             "unknown-choice",
-            f"there is no drive of kind {shown_value(row['kind'])}",
+            f"there is no {key[0]} of kind {shown_value(row['kind'])}",
             (*key, "kind"),
             found=shown_value(row["kind"]),
             expected=one_of(f'"{kind}"' for kind in kinds),
@@ -194,8 +200,12 @@ def _share_out(
     models: tuple[type[BaseModel], ...],
     value: Mapping[str, Any],
     validated: Validated,
+    coordinate: str | None = None,
 ) -> tuple[dict[type[BaseModel], BaseModel | None], list[Problem]]:
-    """Give every model its keys of one table, and refuse the keys that are nobody's."""
+    """Give every model its keys of one table, and refuse the keys that are nobody's.
+
+    `coordinate`: the dimension of a drive's joint coordinate, which some of its quantities have.
+    """
     named = {name for model in models for name in model.model_fields}
     filled: dict[type[BaseModel], BaseModel | None] = {}
     found: list[tuple[Key, Problem]] = []
@@ -206,7 +216,7 @@ def _share_out(
             for name, entry in value.items()
             if name in model.model_fields or (free and name not in named)
         }
-        filled[model], of_model = _fill(document, key, model, share, validated.units)
+        filled[model], of_model = _fill(document, key, model, share, validated.units, coordinate)
         found += of_model
     problems = []
     if not any(takes_every_key(model) for model in models):
@@ -229,17 +239,34 @@ def _fill(
     model: type[BaseModel],
     value: Mapping[str, Any],
     units: UnitSystem | None,
+    coordinate: str | None = None,
 ) -> tuple[BaseModel | None, list[tuple[Key, Problem]]]:
     """One model from its keys; or None and what is wrong, each with where."""
+    context = {"units": units, "coordinate": coordinate}
     try:
-        return model.model_validate(dict(value), context={"units": units}), []
+        return model.model_validate(dict(value), context=context), []
     except ValidationError as error:
         found = []
         for entry in error.errors(include_url=False):
             where = _where(document, key, entry["loc"])
             problem = _problem(document, where, model, cast("dict[str, Any]", entry))
             found.append((where, problem))
-        return None, found
+        return None, _without_misspelt(found)
+
+
+def _without_misspelt(found: list[tuple[Key, Problem]]) -> list[tuple[Key, Problem]]:
+    """A misspelt "lenght" is one mistake: not also a missing "length" beside it."""
+    missing = [where for where, problem in found if problem.code == "missing-key"]
+    meant = set()
+    for where, problem in found:
+        if problem.code == "unknown-key":
+            beside = [str(each[-1]) for each in missing if each[:-1] == where[:-1]]
+            meant.add((*where[:-1], nearest(str(where[-1]), beside)))
+    return [
+        (where, problem)
+        for where, problem in found
+        if not (problem.code == "missing-key" and where in meant)
+    ]
 
 
 def _where(document: Document, key: Key, loc: Iterable[str | int]) -> Key:
@@ -340,15 +367,20 @@ def _model_at(model: type[BaseModel], loc: Iterable[str | int]) -> type[BaseMode
     """The model that a place inside `model` belongs to."""
     current: type[BaseModel] | None = model
     for part in loc:
+        if isinstance(part, int):
+            continue  # an entry of a list, whose model is found already
         if current is None or part not in current.model_fields:
             return None
-        annotation = current.model_fields[str(part)].annotation
-        choices = (annotation, *get_args(annotation))
-        current = next(
-            (each for each in choices if isinstance(each, type) and issubclass(each, BaseModel)),
-            None,
-        )
+        current = _model_in(current.model_fields[part].annotation)
     return current
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    """The model that a type is, holds in a list, or takes among others."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = (_model_in(each) for each in get_args(annotation))
+    return next((each for each in found if each is not None), None)
 
 
 def _unknown_key(document: Document, key: Key, known: Iterable[str]) -> Problem:

@@ -1,4 +1,4 @@
-"""The poses of a machine file: a grid over commanded freedoms, or a list."""
+"""The poses of a machine file: a grid over commanded freedoms, or one after the other."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 LARGEST_GRID = 10_000_000
-"""A grid of more poses is refused before anything is allocated."""
+"""More poses are refused before anything is allocated."""
+
+MOST_STEPS = 1e15
+"""More steps are not told apart: they are far too many."""
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -31,12 +36,14 @@ class GridAxis:
 class Workspace:
     """Either `axes`, one per commanded freedom in their order, or `listed` poses; SI.
 
-    `line` is where the machine file gives them.
+    `line` is where the machine file gives them. `is_path`: the poses are passed through in their
+    order, so that each is reached from the one before it.
     """
 
     axes: tuple[GridAxis, ...] = ()
-    listed: NDArray[np.float64] | None = None
+    listed: Floats | None = None
     line: int | None = None
+    is_path: bool = False
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -50,17 +57,66 @@ class Workspace:
         """How many poses there are."""
         return math.prod(self.shape)
 
-    def poses(self) -> NDArray[np.float64]:
+    def poses(self) -> Floats:
         """(n_pose, n_commanded): the first axis runs fastest."""
         if self.listed is not None:
             return self.listed.copy()
-        poses = np.empty((self.n_pose, len(self.axes)))
-        repeat = 1
-        for column, axis in enumerate(self.axes):
-            values = np.repeat(np.linspace(axis.start, axis.stop, axis.count), repeat)
-            repeat *= axis.count
-            poses[:, column] = np.tile(values, self.n_pose // repeat)
-        return poses
+        return grid(self.axes)
+
+
+def grid(axes: tuple[GridAxis, ...]) -> Floats:
+    """(product of counts, n_axis): every combination, the first axis runs fastest."""
+    poses = np.empty((math.prod(axis.count for axis in axes), len(axes)))
+    repeat = 1
+    for column, axis in enumerate(axes):
+        values = np.repeat(np.linspace(axis.start, axis.stop, axis.count), repeat)
+        repeat *= axis.count
+        poses[:, column] = np.tile(values, len(poses) // repeat)
+    return poses
+
+
+def steps(span: float, step: float) -> int:
+    """How many equal steps of at most `step` make up `span`; a rounding error is no step more."""
+    return math.ceil(min(abs(span) / step * (1.0 - 1e-12), MOST_STEPS))
+
+
+def disc(radius: float, step: float) -> Floats:
+    """(n, 2) points of a disc about the origin, its centre and rim included.
+
+    They lie on rings about the centre, at most `step` apart along the radius and along each ring.
+    """
+    n_ring = steps(radius, step)
+    rings = [np.zeros((1, 2))]
+    for ring in range(1, n_ring + 1):
+        at = radius * ring / n_ring
+        angles = np.linspace(0.0, 2.0 * np.pi, on_ring(at, step), endpoint=False)
+        rings.append(at * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+    return np.concatenate(rings)
+
+
+def on_ring(radius: float, step: float) -> int:
+    """How many points stand on one ring of a disc; a multiple of 4, so that the axes are met."""
+    return 4 * max(1, steps(0.5 * np.pi * radius, step))
+
+
+def disc_size(radius: float, step: float) -> float:
+    """At least as many points as `disc` has, without making them: sum over rings, bounded."""
+    n_ring = abs(radius) / step + 1.0
+    return 1.0 + n_ring * (np.pi * (n_ring + 1.0) + 4.0)
+
+
+def along(waypoints: Floats, counts: NDArray[np.intp]) -> Floats:
+    """(1 + sum of counts, n_commanded) poses on the straight lines between `waypoints`.
+
+    `counts` (n_waypoint - 1,): steps on each line; 0 where a waypoint repeats the one before it.
+    """
+    shares = np.concatenate([np.arange(1, count + 1) / max(count, 1) for count in counts])
+    line = np.repeat(np.arange(len(counts)), counts)
+    start, stop = waypoints[line], waypoints[line + 1]
+    between = start + shares[:, np.newaxis] * (stop - start)
+    # A waypoint is met as it was given.
+    between[np.cumsum(counts)[counts > 0] - 1] = waypoints[1:][counts > 0]
+    return np.concatenate([waypoints[:1], between])
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,12 @@ from pydantic import BaseModel
 
 from truepose.machine.elements import strut_geometry
 from truepose.machine.tables.accuracy import AccuracyTable
+from truepose.machine.tables.body import FrameTable, PlatformTable, ToolTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.drive import DriveTable
+from truepose.machine.tables.guide import GuideTable
 from truepose.machine.tables.machine import MachineTable
+from truepose.machine.tables.mounting import MountingTable
 from truepose.machine.tables.strut import StrutTable
 from truepose.machine.tables.units import UnitsTable
 from truepose.machine.tables.workspace import WorkspaceTable
@@ -58,6 +61,11 @@ def owners(added: Iterable[Mapping[str, type[BaseModel]]]) -> Owners:
         "units": [UnitsTable],
         "drive": [DriveTable],
         "strut": [StrutTable, strut_geometry()],
+        "guide": [GuideTable],
+        "platform": [PlatformTable],
+        "frame": [FrameTable],
+        "tool": [ToolTable],
+        "mounting": [MountingTable],
         "condition": [ConditionTable],
         "workspace": [WorkspaceTable],
         "accuracy": [AccuracyTable],

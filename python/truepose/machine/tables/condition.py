@@ -8,48 +8,23 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from truepose.machine.file_table import FileTable
 from truepose.machine.quantity import (
-    Direction,
-    Force,
-    Modulus,
-    Moment,
-    PositiveLength,
+    GradientValue,
+    NonNegativeAcceleration,
     Temperature,
+    Time,
     refuse,
 )
+from truepose.machine.tables.force import (
+    AccelerationTable,
+    CuttingTable,
+    EnvelopeTable,
+    ForceTable,
+    KienzleTable,
+    MomentTable,
+)
 
-
-class ForceTable(FileTable):
-    """Force on the tool at the tool point, base axes."""
-
-    x: Force = Field(0.0, description="Component along x.")
-    y: Force = Field(0.0, description="Component along y.")
-    z: Force = Field(0.0, description="Component along z.")
-
-
-class MomentTable(FileTable):
-    """Moment on the tool, base axes."""
-
-    x: Moment = Field(0.0, description="Component about x.")
-    y: Moment = Field(0.0, description="Component about y.")
-    z: Moment = Field(0.0, description="Component about z.")
-
-
-class CuttingTable(FileTable):
-    """Cutting data that give the force on the tool (Gojtan & Hess-Coelho 2005).
-
-    It is `specific_force * chip_thickness * (depth * depth_direction + width * width_direction)`.
-    """
-
-    specific_force: Modulus = Field(description="Specific cutting force.")
-    chip_thickness: PositiveLength = Field(description="Thickness of the chip.")
-    depth: PositiveLength = Field(description="Depth of cut.")
-    width: PositiveLength = Field(description="Width of cut.")
-    depth_direction: Direction = Field(
-        description="Where the force that goes with the depth acts, base axes."
-    )
-    width_direction: Direction = Field(
-        description="Where the force that goes with the width acts, base axes."
-    )
+_FORCES = ("force", "cutting", "kienzle")
+"""Keys of which one gives the force on the tool."""
 
 
 def flattened(table: dict[str, Any]) -> dict[str, Any]:
@@ -80,6 +55,19 @@ Temperatures = Annotated[
 ]
 
 
+def _flattened(value: Any) -> Any:
+    return flattened(value) if isinstance(value, dict) else value
+
+
+Gradients = Annotated[
+    dict[str, GradientValue],
+    BeforeValidator(_flattened),
+    WithJsonSchema(
+        {"type": "object", "x-dimension": "temperature_gradient", "x-by-part": True},
+    ),
+]
+
+
 class ConditionTable(FileTable):
     """The state that the machine works in."""
 
@@ -91,6 +79,18 @@ class ConditionTable(FileTable):
         description='Temperature of all parts, or a table, `{ default = 20, "strut.1" = 35 }`. '
         "Default: the reference temperature.",
     )
+    gradient: Gradients | None = Field(
+        None,
+        description='Temperature gradient of parts, `{ "strut.1" = "4 K/m" }`: one number '
+        "along a strut from base to platform, or along a drive's coordinate from `fixed_at`; "
+        "three of frame and platform.",
+    )
+    temperature_log: str | None = Field(
+        None, description="CSV file of measured temperatures over time, relative to this file."
+    )
+    time: Time | None = Field(
+        None, description="The time of the log that counts. Default: its last."
+    )
     force: ForceTable | None = Field(
         None, description="Force on the tool, such as `{ x = 1200, y = -1500 }`."
     )
@@ -100,14 +100,37 @@ class ConditionTable(FileTable):
     cutting: CuttingTable | None = Field(
         None, description="Cutting data that give the force on the tool, in place of `force`."
     )
+    kienzle: KienzleTable | None = Field(
+        None,
+        description="Cutting data after Kienzle that give the force on the tool, in place of "
+        "`force`.",
+    )
+    envelope: EnvelopeTable | None = Field(
+        None, description="A further force on the tool, of known size and unknown direction."
+    )
+    gravity: NonNegativeAcceleration | None = Field(
+        None, description="Acts on every mass. Default: 9.80665 m/s^2; 0 switches it off."
+    )
+    acceleration: AccelerationTable | None = Field(
+        None, description="Acceleration of the platform, whose mass resists it."
+    )
 
     @model_validator(mode="after")
     def _one_force(self) -> ConditionTable:
-        if self.force is not None and self.cutting is not None:
+        given = [key for key in _FORCES if getattr(self, key) is not None]
+        if len(given) > 1:
             refuse(
                 "excluding-keys",
-                "the force on the tool is given twice, by force and by cutting",
-                found="force and cutting",
+                f"the force on the tool is given {'twice' if len(given) == 2 else 'thrice'}, "
+                f"by {' and by '.join(given)}",
+                found=" and ".join(given),
                 expected="one of them",
+            )
+        if self.time is not None and self.temperature_log is None:
+            refuse(
+                "missing-key",
+                "a time, but no temperature_log to look it up in",
+                found="no temperature_log",
+                expected='temperature_log = "file.csv"',
             )
         return self

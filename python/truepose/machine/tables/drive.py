@@ -7,6 +7,8 @@ from typing import Literal
 from pydantic import Field
 
 from truepose.machine.file_table import FileTable, PartName
+from truepose.machine.quantity import Expansion, Mass
+from truepose.machine.tables.material import MaterialName
 
 
 class DriveTable(FileTable):
@@ -18,4 +20,20 @@ class DriveTable(FileTable):
         None,
         description="The branch of the inverse kinematics. "
         "Default: the root nearest mid-travel at home.",
+    )
+    feedback: Literal["motor", "direct"] = Field(
+        "motor",
+        description="Where the position is measured: at the motor, so that screw and backlash come "
+        "after it, or by a direct scale on what moves.",
+    )
+    material: MaterialName | None = Field(
+        None, description="Gives `expansion` where it is not written."
+    )
+    expansion: Expansion | None = Field(
+        None,
+        description="Coefficient of linear thermal expansion of what the position is measured by: "
+        "screw, rack or scale; of a crank that of its arm.",
+    )
+    mass: Mass = Field(
+        0.0, description="Mass of the carriage, shared by the struts that it carries."
     )

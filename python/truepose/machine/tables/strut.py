@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from pydantic import AfterValidator, Field, WithJsonSchema
+from pydantic import Field
 
 from truepose.machine.file_table import FileTable, PartName
-from truepose.machine.materials import MATERIALS
-from truepose.machine.quantity import Area, Expansion, Modulus, Stiffness, refuse
-from truepose.machine.suggestion import did_you_mean, one_of
-from truepose.machine.units import shown_value
-
-
-def _known_material(value: str) -> str:
-    if value not in MATERIALS:
-        refuse(
-            "unknown-material",
-            f"unknown material {shown_value(value)}",
-            found=shown_value(value),
-            expected=one_of(f'"{name}"' for name in MATERIALS),
-            hint=did_you_mean(value, MATERIALS) or "give modulus and expansion outright",
-        )
-    return value
-
-
-MaterialName = Annotated[
-    str,
-    AfterValidator(_known_material),
-    WithJsonSchema({"type": "string", "enum": list(MATERIALS)}),
-]
+from truepose.machine.quantity import (
+    Area,
+    AxisStiffness,
+    Expansion,
+    Fraction,
+    Mass,
+    Modulus,
+    Stiffness,
+)
+from truepose.machine.tables.joint import JointTable
+from truepose.machine.tables.material import MaterialName
 
 
 class StrutTable(FileTable):
@@ -51,4 +37,21 @@ class StrutTable(FileTable):
     )
     stiffness: Stiffness | None = Field(
         None, description="Axial stiffness outright, in place of `modulus * section_area / length`."
+    )
+    mass: Mass = Field(0.0, description="Mass of the strut, joints included.")
+    centre_of_mass: Fraction = Field(
+        0.5,
+        description="Where the mass has its centre, as a fraction of the way from the base joint "
+        "to the platform joint.",
+    )
+    base_joint: JointTable | None = Field(
+        None, description='The passive joint at the base, such as `{ stiffness = "120 N/um" }`.'
+    )
+    platform_joint: JointTable | None = Field(
+        None, description="The passive joint at the platform."
+    )
+    base_stiffness: AxisStiffness | None = Field(
+        None,
+        description="Stiffness of the carriage or frame at the base joint, along its x, y and z. "
+        "Default: rigid.",
     )

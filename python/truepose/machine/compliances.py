@@ -1,0 +1,70 @@
+"""What of a machine gives way under load, as compliances of its parameters.
+
+One rule: what is in series on one parameter adds up. Strut and both joints are on the strut's
+length; screw, nut and bearing on the drive's offset (a telescopic drive's offset is its strut's
+length, so all of them); carriage or frame on the base joint's x, y and z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truepose import _kernel
+from truepose.machine.parts_of_machine import Drive, Strut
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+
+def compliances(
+    kernel: _kernel.Machine, drives: Sequence[Drive], struts: Sequence[Strut], lengths: Floats
+) -> tuple[Indices, Floats]:
+    """Every parameter that may give way (k,), first the struts' lengths, and its compliance (n, k).
+
+    `lengths` (n, n_strut), m. Compliance in m/N, or rad/(N m) of a crank; 0 is rigid.
+    """
+    n_pose = len(lengths)
+    by_column: dict[int, Floats] = {}
+    for index, (strut, column) in enumerate(zip(struts, kernel.length_parameters, strict=True)):
+        own = np.zeros(n_pose)
+        if strut.stiffness is not None:
+            own += 1.0 / strut.stiffness
+        elif strut.area is not None and strut.modulus is not None:
+            own += lengths[:, index] / (strut.area * strut.modulus)
+        for joint in strut.joints:
+            own += 0.0 if joint.stiffness is None else 1.0 / joint.stiffness
+        by_column[int(column)] = own
+    names = {name: column for column, name in enumerate(kernel.parameters)}
+    others: dict[str, float] = {}
+    for drive in drives:
+        if drive.held_stiffness is not None:
+            others[f"{drive.part}.offset"] = 1.0 / drive.held_stiffness
+    for strut in struts:
+        for axis, compliance in zip("xyz", strut.base_compliance, strict=True):
+            if compliance > 0.0:
+                others[f"{strut.part}.base.{axis}"] = compliance
+    for name, compliance in others.items():
+        column = names[name]
+        by_column[column] = by_column.get(column, np.zeros(n_pose)) + compliance
+    return np.array(list(by_column), np.intp), np.stack(list(by_column.values()), axis=1)
+
+
+def known(drives: Sequence[Drive], struts: Sequence[Strut]) -> NDArray[np.bool_]:
+    """(n_strut,) whether something along each limb, drive to platform, has a stiffness.
+
+    What of such a limb says none is rigid; a limb that says nothing at all is not known.
+    """
+    of_drive = {drive.name: drive.held_stiffness for drive in drives}
+    return np.array(
+        [
+            strut.stiffness_known
+            or strut.base_stiffness is not None
+            or any(joint.stiffness is not None for joint in strut.joints)
+            or of_drive.get(strut.drive or "") is not None
+            for strut in struts
+        ],
+        np.bool_,
+    )

@@ -1,0 +1,31 @@
+"""The name of a material, wherever a table takes one."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, WithJsonSchema
+
+from truepose.machine.materials import MATERIALS
+from truepose.machine.quantity import refuse
+from truepose.machine.suggestion import did_you_mean, one_of
+from truepose.machine.units import shown_value
+
+
+def _known_material(value: str) -> str:
+    if value not in MATERIALS:
+        refuse(
+            "unknown-material",
+            f"unknown material {shown_value(value)}",
+            found=shown_value(value),
+            expected=one_of(f'"{name}"' for name in MATERIALS),
+            hint=did_you_mean(value, MATERIALS) or "give modulus and expansion outright",
+        )
+    return value
+
+
+MaterialName = Annotated[
+    str,
+    AfterValidator(_known_material),
+    WithJsonSchema({"type": "string", "enum": list(MATERIALS)}),
+]

@@ -9,15 +9,25 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, cast
 
 from truepose.sources._base import (
+    ARCSINE,
     OWN_GROUP,
+    TRIANGULAR,
+    TWO_POINT,
     UNIFORM,
-    Block,
     Deviation,
     Distribution,
     Source,
     normal,
 )
+from truepose.sources._block import Block
+from truepose.sources.actuator import Actuator
+from truepose.sources.backlash import Backlash
+from truepose.sources.clearance import Clearance
 from truepose.sources.elastic import Elastic
+from truepose.sources.guideway import Guideway
+from truepose.sources.loads import Loads
+from truepose.sources.screw_coupling import ScrewCoupling
+from truepose.sources.sensor import Sensor
 from truepose.sources.thermal import Thermal
 from truepose.sources.tolerance import Tolerance
 
@@ -28,6 +38,13 @@ REGISTRY: tuple[type[Source], ...] = (
     Tolerance,
     Thermal,
     Elastic,
+    Loads,
+    Backlash,
+    Clearance,
+    ScrewCoupling,
+    Sensor,
+    Actuator,
+    Guideway,
 )
 
 
@@ -39,13 +56,20 @@ def acting(machine: Machine, condition: Condition | None = None) -> tuple[Source
 
 
 __all__ = [
+    "ARCSINE",
     "OWN_GROUP",
     "REGISTRY",
+    "TRIANGULAR",
+    "TWO_POINT",
     "UNIFORM",
     "Block",
+    "Clearance",
     "Deviation",
     "Distribution",
+    "Elastic",
+    "Loads",
     "Source",
+    "Thermal",
     "acting",
     "normal",
 ]

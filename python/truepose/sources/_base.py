@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from truepose.errors import Problem
     from truepose.machine import Condition, FileParts, Machine
+    from truepose.sources._block import Block
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -39,24 +40,36 @@ class Distribution:
 
     `sigmas` is the half band in standard deviations: sqrt(3) for a uniform one, k for a normal
     one that was given by its standard deviation (the band is then k sigma, and values outside
-    it, though rare, exist).
+    it, though rare, exist). GUM (JCGM 100:2008) 4.3.5, 4.3.7, 4.3.9; JCGM 101:2008, 6.4.
     """
 
     name: str
     sigmas: float
 
     def __str__(self) -> str:
-        return self.name if self.name == "uniform" else f"{self.name}, {self.sigmas:g} sigma"
+        return f"{self.name}, {self.sigmas:g} sigma" if self.name == _NORMAL else self.name
 
+
+_NORMAL = "normal"
 
 UNIFORM = Distribution("uniform", math.sqrt(3.0))
+"""Anywhere in the band, as likely."""
+
+TRIANGULAR = Distribution("triangular", math.sqrt(6.0))
+"""Rather in the middle: the sum of two uniform ones of one width."""
+
+ARCSINE = Distribution("arcsine", math.sqrt(2.0))
+"""A sine of unknown phase: rather near the ends."""
+
+TWO_POINT = Distribution("two-point", 1.0)
+"""At either end of the band, as likely."""
 
 
 def normal(sigmas: float = 3.0) -> Distribution:
     """Normal distribution whose half band is taken as `sigmas` standard deviations."""
     if not (math.isfinite(sigmas) and sigmas > 0.0):
         raise ValueError(f"a band of {sigmas} standard deviations is no band")
-    return Distribution("normal", sigmas)
+    return Distribution(_NORMAL, sigmas)
 
 
 @dataclass(frozen=True)
@@ -127,7 +140,7 @@ class Deviation:
             raise ValueError(f"{len(self.distribution)} distributions, expected {count}")
         if (self.half < 0.0).any():
             raise ValueError("a half band is negative")
-        if not np.isin(self.sign, (-1.0, 1.0)).all():
+        if not (np.abs(self.sign) == 1.0).all():
             raise ValueError("a sign is neither +1 nor -1")
         shared: dict[int, Distribution] = {}
         for group, each in zip(self.groups.tolist(), self.distribution, strict=True):
@@ -148,7 +161,7 @@ class Deviation:
         named = np.where(own, above + np.arange(self.groups.size), self.groups)
         return np.asarray(np.unique(named, return_inverse=True)[1], np.intp)
 
-    @property
+    @cached_property
     def banded(self) -> Indices:
         """Columns whose band is not empty at some pose."""
         return np.flatnonzero((self.half > 0.0).any(axis=0))
@@ -168,27 +181,6 @@ def _table(values: ArrayLike, count: int) -> Floats:
     if table.ndim < 2:
         table = np.broadcast_to(table, (1, count))
     return np.ascontiguousarray(table)
-
-
-@dataclass(frozen=True)
-class Block:
-    """Some usable poses of a run, at nominal parameters: where a source looks.
-
-    `requested` (n_requested, n_commanded): all poses of the run, m or rad, usable or not, and
-    `indices` (n,): which of them these are, so that a source can find what belongs to a pose (its
-    neighbour on a path, its moment in a log).
-    `joints` (n, n_joint): commanded joint coordinates, m or rad.
-    `placements` (n, 7): tool point, m, and platform's unit quaternion w x y z, base frame.
-    `lengths` (n, n_closure): present length of each strut, m.
-    `tension` (n, n_closure): strut force under the condition's wrench, N, tension positive.
-    """
-
-    requested: Floats
-    indices: Indices
-    joints: Floats
-    placements: Floats
-    lengths: Floats
-    tension: Floats
 
 
 class Source(Protocol):

@@ -1,10 +1,11 @@
-"""Elastic deformation of the struts under the wrench on the tool.
+"""Elastic deformation under the wrench on the tool, of all that has a stiffness.
 
-    shift = tension * compliance,   compliance = length / (modulus * area)  or  1 / stiffness
+    shift = load on the parameter * compliance of the parameter
 
-The tension comes from the closures by virtual work, at nominal parameters and the commanded pose
-(the paper's way; the self-consistent equilibrium differs in the second order). It is known: there
-is no band. `docs/sources/elastic.md` has the reference.
+One rule for struts and their joints (on the strut's length), drives (on their offset) and what the
+base joints stand on (on their x, y, z). The load comes from the closures by virtual work, at
+nominal parameters and the commanded pose (the paper's way; the self-consistent equilibrium differs
+in the second order). It is known: there is no band. `docs/sources/elastic.md` has the reference.
 """
 
 from __future__ import annotations
@@ -15,23 +16,26 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
-from truepose.errors import Problem, TrueposeError
-from truepose.sources._base import Block, Deviation, refuse
+from truepose.errors import TrueposeError
+from truepose.sources._base import Deviation, refuse
+from truepose.sources._block import Block
+from truepose.sources._stiffness import lacking
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from truepose.machine import Condition, FileParts, Machine, Strut
+    from truepose.machine import Condition, FileParts, Machine
 
-_ASKED_BY = ("condition.force", "condition.moment", "condition.cutting")
+_ASKED_BY = ("condition.force", "condition.moment", "condition.cutting", "condition.kienzle")
+_CAUSE = "a force acts on the tool"
 
 
 @dataclass(frozen=True)
 class Elastic:
-    """Axial stretch of the struts, of given stiffness or of given section and modulus."""
+    """Deflection of struts, joints, drives, carriages and frame, of given stiffness."""
 
     name: ClassVar[str] = "elastic"
-    doc: ClassVar[str] = "elastic deformation of the struts under the wrench on the tool"
+    doc: ClassVar[str] = "elastic deformation under the wrench on the tool"
     tables: ClassVar[Mapping[str, type[BaseModel]]] = {}
     sets_overall_edges: ClassVar[bool] = False
 
@@ -41,10 +45,11 @@ class Elastic:
     @classmethod
     def build(cls, parts: FileParts) -> Self | None:
         """Always there, for a condition given later may have a force that the file has not."""
+        problems = lacking(parts.drives, parts.struts, _CAUSE)
         if np.any(parts.condition.wrench != 0.0):
-            for problem in filter(None, map(_no_stiffness, parts.struts)):
+            for problem in problems:
                 refuse(parts, problem)
-        known = any(_no_stiffness(strut) is None for strut in parts.struts)
+        known = len(problems) < len(parts.struts)
         return cls(requested=known and any(map(parts.says, _ASKED_BY)))
 
     def acts(self, condition: Condition) -> bool:
@@ -52,33 +57,15 @@ class Elastic:
         return self.requested or bool(np.any(condition.wrench != 0.0))
 
     def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
-        """Stretch of every strut's length, m, (n, n_closure), tension positive.
+        """Deflection of every parameter that gives way, m or rad, (n, k).
 
-        Raises `TrueposeError` (no-stiffness) for struts whose stiffness the machine does not
-        say; all of them at once.
+        Raises `TrueposeError` (no-stiffness) for limbs whose stiffness the machine does not say;
+        all of them at once.
         """
-        columns = machine.kernel.length_parameters
+        columns, compliance = block.compliances
         if not np.any(condition.wrench != 0.0):
             return Deviation.of(columns)
-        problems = [problem for problem in map(_no_stiffness, machine.struts) if problem]
+        problems = lacking(machine.drives, machine.struts, _CAUSE)
         if problems:
             raise TrueposeError(*problems)
-        return Deviation.of(columns, block.tension * machine.axial_compliance(block.lengths))
-
-
-def _no_stiffness(strut: Strut) -> Problem | None:
-    if strut.stiffness is not None or (strut.area is not None and strut.modulus is not None):
-        return None
-    lacking = [
-        name
-        for name, value in (("section_area", strut.area), ("modulus", strut.modulus))
-        if value is None
-    ]
-    return Problem(
-        code="no-stiffness",
-        message=f"a force acts on the tool, but nothing says how stiff strut {strut.name} is",
-        path=f"strut.{strut.name}",
-        found="no " + " and no ".join(lacking),
-        expected="section_area and modulus (or material), or an outright axial stiffness",
-        hint='for example section_area = "28.3 mm^2" and material = "steel"',
-    )
+        return Deviation.of(columns, block.loads(columns, "tool") * compliance)

@@ -1,79 +1,327 @@
-"""Thermal expansion: a strut that is warmer than the reference is longer.
+"""Thermal expansion of every part: what is warmer than the reference is longer.
 
-    shift = expansion * (temperature - reference temperature) * length
+    strut           length     expansion * (rise * L + gradient * L^2 / 2)
+    screw, scale    scale and offset, so that the point `fixed_at` stays
+    crank's arm     the base joints that it carries, about its axis
+    frame, platform, tool      u = expansion * [rise r + (g . r) r - |r|^2 g / 2]
 
-with the strut's length at the pose, so that a telescopic strut grows by what it is long there.
-The temperatures are known: there is no band. `docs/sources/thermal.md` has the reference.
+with L the strut's length at the pose and r the arm from a body's anchor. The temperatures are
+known: there is no band. `docs/sources/thermal.md` has the derivation and the references.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
 from truepose.errors import Problem, TrueposeError
-from truepose.sources._base import Block, Deviation, refuse
+from truepose.machine.parts_of_machine import BODIES, Body, Drive, Strut
+from truepose.sources._base import Deviation, refuse
+from truepose.sources._block import Block, Floats
+from truepose.sources._growth import Growth, along_line
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from truepose.machine import Condition, FileParts, Machine, Strut
+    from truepose import _kernel
+    from truepose.machine import Condition, FileParts, Machine
+
+_ASKED_BY = ("condition.temperature", "condition.gradient", "condition.temperature_log")
 
 
 @dataclass(frozen=True)
 class Thermal:
-    """Expansion of the struts; temperature and expansion may differ from strut to strut."""
+    """Expansion of struts, drives, frame, platform and tool, each at its own temperature."""
 
     name: ClassVar[str] = "thermal"
-    doc: ClassVar[str] = "thermal expansion of the struts"
+    doc: ClassVar[str] = "thermal expansion of struts, drives, frame, platform and tool"
     tables: ClassVar[Mapping[str, type[BaseModel]]] = {}
     sets_overall_edges: ClassVar[bool] = False
 
     requested: bool
-    """The file gives a temperature and an expansion, were it the reference temperature."""
+    """The file gives temperatures and an expansion, were all at the reference temperature."""
 
     @classmethod
     def build(cls, parts: FileParts) -> Self | None:
         """Always there, for a condition given later may have temperatures that the file has not."""
-        for strut in parts.struts:
-            if strut.expansion is None and parts.condition.temperature_rise(strut.part) != 0.0:
-                refuse(parts, _no_expansion(strut))
-        known = any(strut.expansion is not None for strut in parts.struts)
-        return cls(requested=known and parts.says("condition.temperature"))
+        bodies = (parts.platform, parts.frame, parts.tool)
+        for problem in _silent(parts.condition, parts.drives, parts.struts, bodies):
+            refuse(parts, _located(parts, problem))
+        for problem in _twice(parts.kernel, parts.drives, parts.struts):
+            refuse(parts, problem)
+        every: tuple[Drive | Strut | Body, ...] = (*parts.drives, *parts.struts, *bodies)
+        known = any(part.expansion is not None for part in every)
+        return cls(requested=known and any(map(parts.says, _ASKED_BY)))
 
     def acts(self, condition: Condition) -> bool:
         """Where the file asks for it, and in any condition that leaves the reference."""
         temperatures = (condition.default_temperature, *condition.part_temperatures.values())
-        return self.requested or any(t != condition.reference_temperature for t in temperatures)
+        return (
+            self.requested
+            or any(t != condition.reference_temperature for t in temperatures)
+            or any(np.any(gradient) for gradient in condition.gradients.values())
+            or condition.temperature_log is not None
+        )
 
     def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
-        """Growth of every strut's length, m, (n, n_closure).
+        """The lengths of all struts, and what else moves, m, (n or 1, k); scales are ratios.
 
-        Raises `TrueposeError` (no-expansion) for struts off the reference temperature whose
-        expansion the machine does not say; all of them at once.
+        Raises `TrueposeError` (no-expansion) for struts off the reference temperature, and other
+        parts whose temperature the condition names, whose expansion the machine does not say; all
+        of them at once.
         """
-        rises = np.array([condition.temperature_rise(strut.part) for strut in machine.struts])
-        silent = [
-            strut
-            for strut, rise in zip(machine.struts, rises, strict=True)
-            if rise != 0.0 and strut.expansion is None
-        ]
+        bodies = (machine.platform, machine.frame, machine.tool)
+        silent = list(_silent(condition, machine.drives, machine.struts, bodies))
         if silent:
-            raise TrueposeError(*map(_no_expansion, silent))
-        expansions = np.array([strut.expansion or 0.0 for strut in machine.struts])
-        return Deviation.of(machine.kernel.length_parameters, block.lengths * (expansions * rises))
+            raise TrueposeError(*silent)
+        moved = _Moved(machine, condition, block)
+        moved.struts()
+        for index, drive in enumerate(machine.drives):
+            moved.drive(index, drive)
+        moved.frame()
+        moved.platform_and_tool()
+        return moved.deviation()
 
 
-def _no_expansion(strut: Strut) -> Problem:
+@dataclass
+class _Moved:
+    """Gathers what happens to the parameters at the poses of one block, by their names."""
+
+    machine: Machine
+    condition: Condition
+    block: Block
+    columns: dict[int, Floats] = field(default_factory=dict)
+    """Parameter -> shift (n or 1, 1)."""
+
+    def __post_init__(self) -> None:
+        kernel = self.machine.kernel
+        self._at = {name: index for index, name in enumerate(kernel.parameters)}
+        self._nominal = kernel.nominal
+
+    def deviation(self) -> Deviation:
+        """All columns together."""
+        rows = max((len(values) for values in self.columns.values()), default=1)
+        shift = [np.broadcast_to(values, (rows, 1)) for values in self.columns.values()]
+        return Deviation.of(list(self.columns), np.hstack(shift) if shift else np.empty((1, 0)))
+
+    def struts(self) -> None:
+        """Every strut, were it at the reference, so that a condition's rows are always the same."""
+        for index, strut in enumerate(self.machine.struts):
+            length = self.block.lengths[:, [index]]
+            growth = along_line(
+                strut.expansion or 0.0,
+                self.block.rise(strut.part),
+                self.condition.gradient(strut.part)[0],
+                length,
+            )
+            self._add(int(self.machine.kernel.length_parameters[index]), growth)
+
+    def drive(self, index: int, drive: Drive) -> None:
+        """The screw or scale that a position is measured by, or the arm of a crank."""
+        rise, gradient = self.block.rise(drive.part), self.condition.gradient(drive.part)[0]
+        expansion = drive.expansion or 0.0
+        if expansion == 0.0 or not (np.any(rise) or gradient):
+            return
+        if drive.coordinate == "angle":
+            arm = Growth(expansion, rise, np.zeros(3), np.zeros(3))
+            for strut in self._carried(drive):
+                self._shift(f"{strut.part}.base", arm.displacement(self._point(strut, "base")))
+            return
+        scale = float(self._nominal[self._at[f"{drive.part}.scale"]])
+        strain = np.atleast_2d(scale * expansion * rise)
+        self._add(self._at[f"{drive.part}.scale"], strain)
+        fixed = -strain * drive.fixed_at
+        if gradient:
+            way = self.block.joints[:, [index]] - drive.fixed_at
+            fixed = fixed + scale * along_line(expansion, 0.0, gradient, way)
+        if fixed.any():
+            self._add(self._at[f"{drive.part}.offset"], fixed)
+
+    def frame(self) -> None:
+        """Where struts stand on the frame, where drives and guides have their origin on it."""
+        frame = self._growth(self.machine.frame)
+        if not frame.any:
+            return
+        origins = {drive.part for drive in self.machine.drives if self._has_origin(drive)}
+        for strut in self.machine.struts:
+            if strut.drive is None or f"drive.{strut.drive}" not in origins:
+                self._shift(f"{strut.part}.base", frame.displacement(self._point(strut, "base")))
+        for part in (*origins, *(guide.part for guide in self.machine.guides)):
+            if f"{part}.origin.x" in self._at:
+                self._shift(f"{part}.origin", frame.displacement(self._nominal_of(part, "origin")))
+        if frame.gradient.any():
+            for index, drive in enumerate(self.machine.drives):
+                if drive.part in origins:
+                    self._on_bent_frame(frame, index, drive)
+
+    def _on_bent_frame(self, frame: Growth, index: int, drive: Drive) -> None:
+        """A temperature gradient bends the frame: what moves along it, or turns on it, leans.
+
+        A carriage follows its guideway across the axis (along it, its own scale decides) and turns
+        with it; an arm turns with its bearing. Both move the base joints that they carry.
+        """
+        origin = self._nominal_of(drive.part, "origin")
+        axis = np.asarray(drive.fields["axis"], np.float64)
+        scale, offset = (self._nominal[self._at[f"{drive.part}.{key}"]] for key in _DRIVEN)
+        way = scale * self.block.joints[:, [index]] + offset
+        for strut in self._carried(drive):
+            base = self._point(strut, "base")
+            if drive.coordinate == "angle":
+                leaning = np.cross(frame.turn(origin), _turned(base, axis, way))
+                self._shift(f"{strut.part}.base", _turned(leaning, axis, -way))
+                continue
+            carriage = origin + way * axis
+            bending = frame.displacement(carriage) - frame.displacement(origin)
+            bending -= (bending @ axis)[:, np.newaxis] * axis
+            turning = np.cross(frame.turn(carriage), base)
+            self._shift(f"{strut.part}.base", bending + turning)
+
+    def platform_and_tool(self) -> None:
+        """The points of the platform, and the tool point on the tool that it holds."""
+        platform, tool = self._growth(self.machine.platform), self._growth(self.machine.tool)
+        if platform.any:
+            for strut in self.machine.struts:
+                centre = self._point(strut, "platform")
+                self._shift(f"{strut.part}.platform", platform.displacement(centre))
+                ring = self._at.get(f"{strut.part}.ring_radius")
+                if ring is not None:
+                    self._add(ring, platform.strain(centre) * self._nominal[ring])
+            for guide in self.machine.guides:
+                if f"{guide.part}.platform.x" in self._at:
+                    point = self._nominal_of(guide.part, "platform")
+                    self._shift(f"{guide.part}.platform", platform.displacement(point))
+        point = self._nominal_of("tool", None)
+        if self.machine.tool.expansion is None:
+            # Nobody says what the tool is made of: it is part of the platform.
+            if platform.any:
+                self._shift("tool", platform.displacement(point))
+            return
+        moved = tool.displacement(point) if tool.any else np.zeros((1, 3))
+        if platform.any:
+            held = tool.anchor
+            turned = np.cross(platform.turn(held), point - held)
+            moved = moved + platform.displacement(held) + turned
+        self._shift("tool", moved)
+
+    def _growth(self, body: Body) -> Growth:
+        return Growth(
+            body.expansion or 0.0,
+            self.block.rise(body.part),
+            np.array(self.condition.gradient(body.part)),
+            np.array(body.anchor),
+        )
+
+    def _carried(self, drive: Drive) -> Iterator[Strut]:
+        return (strut for strut in self.machine.struts if strut.drive == drive.name)
+
+    def _has_origin(self, drive: Drive) -> bool:
+        return f"{drive.part}.origin.x" in self._at
+
+    def _point(self, strut: Strut, end: str) -> Floats:
+        return self._nominal_of(strut.part, end)
+
+    def _nominal_of(self, part: str, point: str | None) -> Floats:
+        """(3,) nominal coordinates of a point, m."""
+        start = part if point is None else f"{part}.{point}"
+        return np.array([self._nominal[self._at[f"{start}.{axis}"]] for axis in "xyz"])
+
+    def _shift(self, point: str, displacement: Floats) -> None:
+        """Move a point by (n or 1, 3) m; a coordinate that stays gets no column."""
+        for axis, name in enumerate("xyz"):
+            values = displacement[:, [axis]]
+            if values.any():
+                self._add(self._at[f"{point}.{name}"], values)
+
+    def _add(self, parameter: int, values: Floats) -> None:
+        before = self.columns.get(parameter)
+        self.columns[parameter] = values if before is None else before + values
+
+
+_DRIVEN = ("scale", "offset")
+
+
+def _turned(vectors: Floats, axis: Floats, angle: Floats) -> Floats:
+    """(n, 3) `vectors` (3,) or (n, 3) turned about the unit `axis` (3,) by `angle` (n, 1), rad."""
+    given = np.atleast_2d(vectors)
+    along = (given @ axis)[:, np.newaxis] * axis
+    across = given - along
+    return np.asarray(along + np.cos(angle) * across + np.sin(angle) * np.cross(axis, given))
+
+
+def _silent(
+    condition: Condition,
+    drives: Iterable[Drive],
+    struts: Iterable[Strut],
+    bodies: Iterable[Body],
+) -> Iterator[Problem]:
+    """Parts off the reference of which nobody says how they expand.
+
+    Every strut, and of the others those whose temperature the condition names: that a machine is
+    warm does not yet say that its frame is to be looked at.
+    """
+    for strut in struts:
+        if strut.expansion is None and _is_off(condition, strut.part):
+            yield _no_expansion(strut.part, f"strut {strut.name}", "strut")
+    named = condition.named_parts
+    for drive in drives:
+        if drive.expansion is None and drive.part in named and _is_off(condition, drive.part):
+            measured = "the arm of " if drive.coordinate == "angle" else "what measures "
+            yield _no_expansion(drive.part, f"{measured}drive {drive.name}", "screw, scale or arm")
+    for body in bodies:
+        if body.expansion is None and body.part in named and _is_off(condition, body.part):
+            yield _no_expansion(body.part, f"the {body.part}", body.part)
+
+
+def _located(parts: FileParts, problem: Problem) -> Problem:
+    """A part that the file does not describe is wrong where the condition names it."""
+    part = str(problem.path)
+    named = (f"condition.temperature.{part}", f"condition.gradient.{part}", _ASKED_BY[2])
+    found = next((path for path in (part, *named) if parts.says(path)), part)
+    return replace(problem, path=found)
+
+
+def _is_off(condition: Condition, part: str) -> bool:
+    log = condition.temperature_log
+    rise: float | Floats = condition.temperature_rise(part)
+    if log is not None:
+        rise = condition.temperature_rise(part, log.times)
+    return bool(np.any(rise) or np.any(condition.gradient(part)))
+
+
+def _no_expansion(part: str, what: str, word: str) -> Problem:
     return Problem(
         code="no-expansion",
-        message=f"strut {strut.name} is not at the reference temperature, "
-        "but nothing says how much it expands",
-        path=f"strut.{strut.name}",
+        message=f"{what} is not at the reference temperature, but nothing says how much it expands",
+        path=part,
         found="neither expansion nor material",
-        expected='expansion = "1.1e-5 1/K", or a material',
-        hint="a strut that does not expand has expansion = 0",
+        expected='expansion = "1.1e-5 1/K", or a material'
+        + (f", under [{part}]" if part in BODIES else ""),
+        hint=f'a {word} that does not expand has expansion = "0 1/K"',
     )
+
+
+def _twice(
+    kernel: _kernel.Machine, drives: Iterable[Drive], struts: Iterable[Strut]
+) -> Iterator[Problem]:
+    """A telescopic strut whose length is measured by a scale grows by the scale or as a strut."""
+    carried = {strut.drive: strut for strut in struts}
+    for drive in drives:
+        strut = carried.get(drive.name)
+        sets_length = f"{drive.part}.origin.x" not in kernel.parameters
+        if strut is not None and sets_length and drive.expansion and strut.expansion:
+            yield Problem(
+                code="excluding-keys",
+                message=f"the length of strut {strut.name} would grow twice: with the strut, and "
+                f"with what measures drive {drive.name}",
+                path=f"{drive.part}.expansion",
+                found="an expansion of the drive and one of the strut",
+                expected="one of them",
+                hint='expansion = "0 1/K" for the strut, where a scale along it measures its '
+                "length; no expansion of the drive, where the strut itself is the measure",
+            )
+
+
+__all__ = ["Thermal"]

@@ -3,33 +3,47 @@
 A band [lower, upper] is the deviation `shift = (lower + upper) / 2` with
 `half = (upper - lower) / 2`; an asymmetric one thus has a part that can be compensated. It comes
 from `length_tolerance` of a strut, or from the `[tolerance]` table, whose keys are patterns over
-the parameter names. `docs/sources/tolerance.md` has the rules and references.
+the parameter names. What is made in one set-up varies together: members of one group share one
+variable. `docs/sources/tolerance.md` has the rules and references.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
-from truepose.machine.dimensions import BY_UNIT
+from truepose.machine.dimensions import BY_UNIT, DIMENSIONS
 from truepose.machine.quantity import LengthTolerance
-from truepose.sources._base import Block, Deviation
+from truepose.sources._base import (
+    OWN_GROUP,
+    TRIANGULAR,
+    UNIFORM,
+    Deviation,
+    Distribution,
+    normal,
+)
+from truepose.sources._block import Block
 
 if TYPE_CHECKING:
     from truepose.machine import Band, Condition, FileParts, Machine
+    from truepose.machine import tolerance as file_tolerance
 
 _EDGE_ENDINGS = (".length", ".offset")
+_WILDCARDS = frozenset("*?[")
+_RANKS = 3
 
 
 class StrutTolerance(BaseModel):
     """What a `[[strut]]` says about its tolerance."""
 
-    length_tolerance: LengthTolerance | None = None
+    length_tolerance: LengthTolerance | None = Field(
+        None, description="Tolerance of the length, or of a telescopic strut's offset."
+    )
 
 
 class ToleranceTable(BaseModel):
@@ -39,8 +53,22 @@ class ToleranceTable(BaseModel):
 
 
 @dataclass(frozen=True)
+class _Stated:
+    """What the file says of one parameter, and where."""
+
+    path: str
+    tolerance: file_tolerance.Tolerance
+    band: Band
+
+    @property
+    def distribution(self) -> Distribution:
+        named = {"uniform": UNIFORM, "triangular": TRIANGULAR}
+        return named.get(self.tolerance.distribution) or normal(self.tolerance.sigmas)
+
+
+@dataclass(frozen=True)
 class Tolerance:
-    """Bands of any parameters, the same at every pose, each by itself."""
+    """Bands of any parameters, the same at every pose; members of a group vary together."""
 
     name: ClassVar[str] = "tolerance"
     doc: ClassVar[str] = "dimensional tolerance of lengths, coordinates, offsets and directions"
@@ -55,17 +83,28 @@ class Tolerance:
     @classmethod
     def build(cls, parts: FileParts) -> Self | None:
         """From `length_tolerance` and `[tolerance]`; None where neither says anything."""
-        names = parts.kernel.parameters
-        bands = _strut_bands(parts) | _table_bands(parts)
-        if not bands:
+        stated = _of_struts(parts)
+        stated |= _of_table(parts, stated)
+        columns = sorted(stated)
+        entries = [stated[column] for column in columns]
+        if not stated or _mixed_groups(parts, entries):
             return None
-        columns = sorted(bands)
+        names = parts.kernel.parameters
+        groups = list(dict.fromkeys(each.tolerance.group for each in entries))
         return cls(
             Deviation.of(
                 columns,
-                [bands[column].shift for column in columns],
-                [bands[column].half for column in columns],
+                [each.band.shift for each in entries],
+                [each.band.half for each in entries],
+                groups=[
+                    OWN_GROUP
+                    if each.tolerance.group is None
+                    else groups.index(each.tolerance.group)
+                    for each in entries
+                ],
+                sign=[each.tolerance.sign for each in entries],
                 edge=[names[column].endswith(_EDGE_ENDINGS) for column in columns],
+                distribution=[each.distribution for each in entries],
             )
         )
 
@@ -78,8 +117,30 @@ class Tolerance:
         return self.bands
 
 
-def _strut_bands(parts: FileParts) -> dict[int, Band]:
-    bands: dict[int, Band] = {}
+def _mixed_groups(parts: FileParts, entries: Iterable[_Stated]) -> bool:
+    """Whether a group has two distributions though one variable; a problem, if so."""
+    first: dict[str, _Stated] = {}
+    refused = set()
+    for each in entries:
+        group = each.tolerance.group
+        if group is None or each.path in refused:
+            continue
+        other = first.setdefault(group, each)
+        if other.distribution != each.distribution:
+            refused.add(each.path)
+            parts.refuse(
+                "group-distributions",
+                f"the members of group {group!r} vary together, but have two distributions",
+                each.path,
+                found=f"{each.distribution}, and {other.distribution} of {other.path}",
+                expected="one distribution in one group",
+            )
+    return bool(refused)
+
+
+def _of_struts(parts: FileParts) -> dict[int, _Stated]:
+    """What the struts say of their lengths, by parameter."""
+    stated: dict[int, _Stated] = {}
     sizes: np.ndarray | None = None
     for index, row in enumerate(parts.rows(StrutTolerance)):
         if row.length_tolerance is None:
@@ -89,8 +150,9 @@ def _strut_bands(parts: FileParts) -> dict[int, Band]:
         path = f"strut.{parts.struts[index].name}.length_tolerance"
         band = parts.band(row.length_tolerance, float(sizes[index]), path)
         if band is not None:
-            bands[int(parts.kernel.length_parameters[index])] = band
-    return bands
+            column = int(parts.kernel.length_parameters[index])
+            stated[column] = _Stated(path, row.length_tolerance, band)
+    return stated
 
 
 def _strut_sizes(parts: FileParts) -> np.ndarray:
@@ -104,61 +166,108 @@ def _strut_sizes(parts: FileParts) -> np.ndarray:
     return sizes
 
 
-def _table_bands(parts: FileParts) -> dict[int, Band]:
-    """Bands of the `[tolerance]` table, by parameter.
+def _of_table(parts: FileParts, of_struts: Mapping[int, _Stated]) -> dict[int, _Stated]:
+    """What the `[tolerance]` table says, by parameter.
 
-    A full parameter name goes before a pattern, as does a strut's own `length_tolerance` (a
-    pattern is a default); two patterns, or two full names, for one parameter are refused.
+    A full parameter name goes before a pattern that names its part, and that before any other; a
+    strut's own `length_tolerance` counts as a full name. Two of one kind for one parameter are
+    refused.
     """
     table = parts.table(ToleranceTable)
-    if table is None:
-        return {}
+    entries = {} if table is None else table.model_extra or {}
     names = parts.kernel.parameters
-    taken = {
-        int(parts.kernel.length_parameters[index]): f"strut.{strut.name}.length_tolerance"
-        for index, (strut, row) in enumerate(
-            zip(parts.struts, parts.rows(StrutTolerance), strict=True)
+    stated: dict[int, _Stated] = {}
+    taken = {column: each.path for column, each in of_struts.items()}
+    decided: set[int] = set()
+    for rank in range(_RANKS):
+        for key in entries:
+            if _rank(key, names) != rank:
+                continue
+            matches = [i for i, name in enumerate(names) if name == key or fnmatchcase(name, key)]
+            if not _is_one_kind(parts, key, matches, entries[key]):
+                continue
+            columns = [column for column in matches if column not in decided]
+            if _is_twice(parts, key, columns, taken):
+                continue
+            taken |= dict.fromkeys(columns, f"tolerance.{key}")
+            stated |= _stated(parts, key, columns, entries[key])
+        decided = set(taken)
+    return stated
+
+
+def _rank(key: str, names: Iterable[str]) -> int:
+    """0: a full name, 1: a pattern that names its part, 2: any other; the lower goes first."""
+    if key in names:
+        return 0
+    part = key.split(".")[:2]
+    return 1 if len(part) == 2 and not _WILDCARDS & set("".join(part)) else 2
+
+
+def _is_one_kind(parts: FileParts, key: str, matches: list[int], value: object) -> bool:
+    """Whether a key stands for parameters of one dimension, at least one; a problem, if not."""
+    names = parts.kernel.parameters
+    path = f"tolerance.{key}"
+    if not matches:
+        nested = isinstance(value, dict) and not _WILDCARDS & set(key) and "." not in key
+        parts.refuse(
+            "tolerance-matches-nothing",
+            f"no parameter of this machine matches {key!r}",
+            path,
+            found=key,
+            expected='a parameter name, or a pattern such as "strut.*.base.x"',
+            hint='a name with points stands in quotation marks: "strut.1.base.x" = 0.05'
+            if nested
+            else parts.suggest(key, _patterns(names) if "*" in key else names),
         )
-        if row.length_tolerance is not None
-    }
-    own = set(taken)
-    bands: dict[int, Band] = {}
-    entries = sorted((table.model_extra or {}).items(), key=lambda entry: entry[0] not in names)
-    exact = own | {names.index(key) for key, _ in entries if key in names}
-    for key, value in entries:
-        path = f"tolerance.{key}"
-        matches = [i for i, name in enumerate(names) if name == key or fnmatchcase(name, key)]
-        if not matches:
-            parts.refuse(
-                "tolerance-matches-nothing",
-                f"no parameter of this machine matches {key!r}",
-                path,
-                found=key,
-                expected='a parameter name, or a pattern such as "strut.*.base.x"',
-                hint=parts.suggest(key, _patterns(names) if "*" in key else names),
-            )
-        for column in matches:
-            if key not in names and column in exact:
-                continue
-            if column in taken:
-                parts.refuse(
-                    "tolerance-twice",
-                    f"parameter {names[column]} is given a tolerance twice",
-                    path,
-                    found=f"{path} and {taken[column]}",
-                    expected="one tolerance for one parameter",
-                    hint="a full parameter name goes before a pattern",
-                )
-                continue
-            taken[column] = path
-            dimension = BY_UNIT[parts.kernel.units[column]]
-            tolerance = parts.tolerance(value, dimension, path)
-            if tolerance is None:
-                break
-            band = parts.band(tolerance, float(parts.kernel.nominal[column]), path)
-            if band is not None:
-                bands[column] = band
-    return bands
+        return False
+    kinds: dict[str, str] = {}
+    for column in matches:
+        kinds.setdefault(BY_UNIT[parts.kernel.units[column]], names[column])
+    if len(kinds) > 1:
+        parts.refuse(
+            "tolerance-mixes-kinds",
+            f"{key!r} matches {' and '.join(DIMENSIONS[kind].plural for kind in kinds)}",
+            path,
+            found=", ".join(kinds.values()),
+            expected="one tolerance for parameters of one kind",
+            hint='a pattern for each kind, such as "drive.*.offset"',
+        )
+        return False
+    return True
+
+
+def _is_twice(parts: FileParts, key: str, columns: list[int], taken: Mapping[int, str]) -> bool:
+    """Whether another key of the same rank has one of the parameters; a problem, if so."""
+    doubled = [column for column in columns if column in taken]
+    for column in doubled[:1]:
+        more = f", as are {len(doubled) - 1} more" if len(doubled) > 1 else ""
+        parts.refuse(
+            "tolerance-twice",
+            f"parameter {parts.kernel.parameters[column]} is given a tolerance twice{more}",
+            f"tolerance.{key}",
+            found=f"tolerance.{key} and {taken[column]}",
+            expected="one tolerance for one parameter",
+            hint="a full parameter name goes before a pattern, "
+            "and a pattern that names a part before one that does not",
+        )
+    return bool(doubled)
+
+
+def _stated(parts: FileParts, key: str, columns: list[int], value: object) -> dict[int, _Stated]:
+    """One entry of the table for each of its parameters; nothing, and a problem, if it is wrong."""
+    path = f"tolerance.{key}"
+    if not columns:
+        return {}
+    tolerance = parts.tolerance(value, BY_UNIT[parts.kernel.units[columns[0]]], path)
+    stated: dict[int, _Stated] = {}
+    for column in columns:
+        if tolerance is None:
+            break
+        band = parts.band(tolerance, float(parts.kernel.nominal[column]), path)
+        if band is None:
+            break
+        stated[column] = _Stated(path, tolerance, band)
+    return stated
 
 
 def _patterns(names: tuple[str, ...]) -> list[str]:

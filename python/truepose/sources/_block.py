@@ -1,0 +1,191 @@
+"""Some poses of a run as the sources see them; what costs anything is computed when asked for."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from truepose.machine import Condition, Machine
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+
+Cause = Literal["tool", "own", "all"]
+"""What loads come from: the wrench on the tool, weight and inertia of the machine, or both."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Some usable poses of a run, at nominal parameters: where a source looks.
+
+    `requested` (n_requested, n_commanded): all poses of the run, m or rad, usable or not, and
+    `indices` (n,): which of them these are.
+    `joints` (n, n_joint): commanded joint coordinates, m or rad.
+    `placements` (n, 7): tool point, m, and platform's unit quaternion w x y z, base frame.
+    `travel` (n, n_joint): direction, -1 or +1, in which each joint last moved on its way along the
+    path into the pose, 0 where it has not moved yet; None where the poses are no path.
+    `times` (n,): s, where the run is over a temperature log; else None.
+    """
+
+    machine: Machine
+    condition: Condition
+    requested: Floats
+    indices: Indices
+    joints: Floats
+    placements: Floats
+    travel: Floats | None = None
+    times: Floats | None = None
+
+    def select(self, usable: Flags) -> Block:
+        """The poses where `usable` (n,); the block itself where all are."""
+        if usable.all():
+            return self
+        return dataclasses.replace(
+            self,
+            indices=self.indices[usable],
+            joints=self.joints[usable],
+            placements=self.placements[usable],
+            travel=None if self.travel is None else self.travel[usable],
+            times=None if self.times is None else self.times[usable],
+        )
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """(n, n_strut) present length of each strut, m."""
+        return self.machine.kernel.lengths_at(self.joints, self.placements)
+
+    @cached_property
+    def centres(self) -> Floats:
+        """(n, n_strut, 2, 3) base-side and platform-side joint centre, base frame, m."""
+        return self.machine.kernel.joint_centres(self.joints, self.placements)
+
+    @cached_property
+    def directions(self) -> Floats:
+        """(n, n_strut, 3) unit vectors from base-side to platform-side joint centre."""
+        along = self.centres[:, :, 1] - self.centres[:, :, 0]
+        unit: Floats = along / np.linalg.norm(along, axis=2, keepdims=True)
+        return unit
+
+    @cached_property
+    def rotations(self) -> Floats:
+        """(n, 3, 3) platform axes -> base axes."""
+        return rotations_of(self.placements)
+
+    @cached_property
+    def tool_wrench(self) -> Floats:
+        """(1, 6) the condition's force and moment on the tool at the tool point, base axes."""
+        return np.asarray(self.condition.wrench, np.float64)[np.newaxis, :]
+
+    @cached_property
+    def weight(self) -> Floats:
+        """(3,) of one kilogram, N, base axes."""
+        weight: Floats = self.condition.gravity * self.machine.down
+        return weight
+
+    @cached_property
+    def own_wrench(self) -> Floats:
+        """(n or 1, 6) weight and inertia of the platform and the struts' share of it, at the tool.
+
+        A strut's weight acts at its joint centres, by the lever rule about its centre of mass.
+        """
+        platform, struts = self.machine.platform, self.machine.struts
+        shares = np.array([strut.mass * strut.centre_of_mass for strut in struts])
+        on_platform = platform.mass * (self.weight - np.array(self.condition.acceleration))
+        on_struts = shares[:, np.newaxis] * self.weight
+        if not (on_platform.any() or on_struts.any()):
+            return np.zeros((1, 6))
+        names = self.machine.parameters
+        tool = self.machine.nominal[[names.index(f"tool.{axis}") for axis in "xyz"]]
+        arm = self.rotations @ (np.array(platform.centre_of_mass) - tool)
+        wrench = np.empty((self.indices.size, 6))
+        wrench[:, :3] = on_platform + on_struts.sum(axis=0)
+        wrench[:, 3:] = np.cross(arm, on_platform)
+        if on_struts.any():
+            arms = self.centres[:, :, 1] - self.placements[:, np.newaxis, :3]
+            wrench[:, 3:] += np.cross(arms, on_struts).sum(axis=1)
+        return wrench
+
+    @cached_property
+    def base_forces(self) -> Floats | None:
+        """(1, n_strut, 3) weight at the base-side joint centres, N, base axes; None: no mass there.
+
+        The struts' other share, and the carriages', in equal parts on the struts that they carry.
+        """
+        struts = self.machine.struts
+        masses = np.array([strut.mass * (1.0 - strut.centre_of_mass) for strut in struts])
+        for drive in self.machine.drives:
+            carried = np.array([strut.drive == drive.name for strut in struts])
+            masses += carried * (drive.mass / carried.sum())
+        forces: Floats = masses[np.newaxis, :, np.newaxis] * self.weight
+        return forces if forces.any() else None
+
+    @cached_property
+    def balance(self) -> tuple[Floats, NDArray[np.uint8]]:
+        """Tension (n, n_strut), N, under everything that acts, and the status (n,) of each pose."""
+        kernel = self.machine.kernel
+        wrench = self.tool_wrench + self.own_wrench
+        return kernel.loads_at(self.joints, self.placements, wrench, kernel.length_parameters)
+
+    @property
+    def tension(self) -> Floats:
+        """(n, n_strut) strut force under everything that acts, N, tension positive."""
+        return self.balance[0]
+
+    @cached_property
+    def forces(self) -> Floats:
+        """(n, n_closure) force of every closure under everything that acts, N.
+
+        A strut's is its tension; a universal guide's its moment over the characteristic length.
+        """
+        kernel = self.machine.kernel
+        if len(kernel.closures) == self.tension.shape[1]:
+            return self.tension
+        wrench = self.tool_wrench + self.own_wrench
+        return kernel.forces(self.requested[self.indices], wrench, status=True)[0]
+
+    def loads(self, columns: Indices, cause: Cause) -> Floats:
+        """(n, k) load on parameters by virtual work: N, of an angle N m; it drives them up."""
+        kernel = self.machine.kernel
+        wrench = {"tool": self.tool_wrench, "own": self.own_wrench}.get(cause)
+        if wrench is None:
+            wrench = self.tool_wrench + self.own_wrench
+        loads = self.loads_of(wrench, columns)
+        if cause != "tool" and self.base_forces is not None:
+            flat = self.base_forces.reshape(len(self.base_forces), -1)
+            loads = loads + kernel.base_loads_at(self.joints, self.placements, flat, columns)
+        return loads
+
+    def loads_of(self, wrenches: Floats, columns: Indices) -> Floats:
+        """(n, k) the same under any wrenches (n or 1, 6) on the tool."""
+        kernel = self.machine.kernel
+        return kernel.loads_at(self.joints, self.placements, wrenches, columns)[0]
+
+    @cached_property
+    def compliances(self) -> tuple[Indices, Floats]:
+        """Parameters (k,) that may give way, and their compliance (n, k), m/N or rad/(N m)."""
+        return self.machine.compliances(self.lengths)
+
+    def rise(self, part: str) -> float | Floats:
+        """Temperature of a part above the reference, K: one number, or (n, 1) at `times`."""
+        if self.times is None:
+            return self.condition.temperature_rise(part)
+        rise = self.condition.temperature_rise(part, self.times)
+        return rise if isinstance(rise, float) else rise[:, np.newaxis]
+
+
+def rotations_of(placements: Floats) -> Floats:
+    """(n, 3, 3) platform axes -> base axes, of the unit quaternions in `placements` (n, 7)."""
+    w, x, y, z = placements[:, 3:].T
+    rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)

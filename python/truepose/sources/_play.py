@@ -1,0 +1,50 @@
+"""Play: to which of its two sides a joint is pressed by what acts, where that is certain."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truepose.sources._block import Block, Flags, Floats, Indices
+
+NO_LOAD = 1e-9
+"""Load, in all that acts on the machine, at or below which a part carries nothing but rounding."""
+
+
+def pressed(
+    block: Block, columns: Indices, loads: Floats, threshold: ArrayLike, lever: ArrayLike = 1.0
+) -> tuple[Floats, Flags]:
+    """To which side the known `loads` (n, k) on parameters `columns` (k,) press each, -1 or +1.
+
+    0 where they are at or below the `threshold` (k,), or where a force of unknown direction could
+    bring them there. And where no direction of that force could take them above it: (n, k) both.
+    Loads and threshold in N, or N m of a parameter that is an angle, whose `lever` (k,) is the
+    machine's size, m; 1 otherwise.
+    """
+    least = np.maximum(threshold, NO_LOAD * _acting(block) * np.asarray(lever, np.float64))
+    unknown = _of_any_direction(block, columns)
+    side = np.where(np.abs(loads) - unknown > least, np.sign(loads), 0.0)
+    return side, np.abs(loads) + unknown <= least
+
+
+def _acting(block: Block) -> Floats:
+    """(n or 1, 1) N: the size of all that acts, moments by the machine's size."""
+    wrench = np.abs(block.tool_wrench) + np.abs(block.own_wrench)
+    size = block.machine.characteristic_length
+    acting = wrench[:, :3].sum(axis=1) + wrench[:, 3:].sum(axis=1) / size
+    if block.base_forces is not None:
+        acting = acting + np.abs(block.base_forces).sum(axis=(1, 2))
+    if block.condition.envelope is not None:
+        acting = acting + block.condition.envelope.force
+    return np.asarray(acting[:, np.newaxis])
+
+
+def _of_any_direction(block: Block, columns: Indices) -> Floats | float:
+    """(n, k) the most that a force of unknown direction can load parameters: Cauchy-Schwarz."""
+    envelope = block.condition.envelope
+    if envelope is None:
+        return 0.0
+    wrenches = np.zeros((len(envelope.directions), 1, 6))
+    wrenches[:, 0, :3] = envelope.force * envelope.directions
+    squares = sum(np.square(block.loads_of(wrench, columns)) for wrench in wrenches)
+    return np.asarray(np.sqrt(squares))

@@ -1,0 +1,227 @@
+"""Actuator of a drive: its screw's lead, what repeats with every turn, or a measured table.
+
+    lead      scale  moves by   nominal scale * error
+              offset moves by  -nominal scale * error * zero_at
+    periodic  shift of offset = amplitude * sin(2 pi q / period + phase)
+              half of offset  = amplitude, where the phase is not known
+    table     shift of offset = mean deviation
+              half of offset  = 2 * spread, and half the reversal where the way is not known
+
+at the joint coordinate q. `docs/sources/actuator.md` has the reference.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from pydantic import BaseModel, Field, model_validator
+
+from truepose.machine.file_table import FileTable
+from truepose.machine.known import RatioWithin
+from truepose.machine.quantity import (
+    Angle,
+    Coordinate,
+    NonNegativeCoordinate,
+    PositiveCoordinate,
+    refuse,
+)
+from truepose.machine.tolerance import Band
+from truepose.sources._base import ARCSINE, TWO_POINT, Deviation, Floats, normal
+from truepose.sources._block import Block
+from truepose.sources._columns import Columns
+from truepose.sources._positioning import COVERAGE, PositioningTable, read_positioning
+from truepose.sources._scale_error import add_scale_error
+
+if TYPE_CHECKING:
+    from truepose.machine import Condition, Drive, FileParts, Machine
+
+_OF_THE_SCREW = ("lead_error", "periodic")
+"""Keys of what a direct scale does not let through."""
+
+_IN_A_TABLE = ("backlash", "sensor.scale_error")
+"""Keys of a drive for what measured positions already show."""
+
+
+class PeriodicTable(FileTable):
+    """An error that repeats along the travel, as with every turn of a screw."""
+
+    amplitude: NonNegativeCoordinate = Field(description="Half of what it swings in all.")
+    period: PositiveCoordinate = Field(description="After which it repeats: the lead, say.")
+    phase: Angle | None = Field(
+        None, description="Of the sine at joint coordinate 0. Default: not known."
+    )
+
+
+class ActuatorTable(FileTable):
+    """What moves a drive."""
+
+    lead_error: RatioWithin | None = Field(
+        None,
+        description="True travel per nominal travel, less one, such as `20 um / 300 mm`.",
+    )
+    zero_at: Coordinate | None = Field(
+        None,
+        description="Joint coordinate at which `lead_error` has no effect. "
+        "Default: the drive's `fixed_at`.",
+    )
+    periodic: PeriodicTable | None = Field(
+        None, description="An error that repeats, such as with every turn of the screw."
+    )
+    table: str | None = Field(
+        None,
+        description="CSV file of measured positions, after ISO 230-2, relative to this file: "
+        "columns target, direction (`+` or `-`) and deviation, a row for each run.",
+    )
+
+    @model_validator(mode="after")
+    def _one_way_to_say_it(self) -> ActuatorTable:
+        given = [key for key in _OF_THE_SCREW if getattr(self, key) is not None]
+        if not given and self.table is None:
+            refuse(
+                "missing-key",
+                "an actuator of no error",
+                found="none of lead_error, periodic and table",
+                expected='lead_error = "20 um / 300 mm", periodic, or table = "d1.csv"',
+            )
+        if given and self.table is not None:
+            refuse(
+                "excluding-keys",
+                "a measured table has all of the actuator's errors in it",
+                found=" and ".join([*given, "table"]),
+                expected="table, or what is known of the screw",
+            )
+        return self
+
+
+class DriveActuator(BaseModel):
+    """What a `[[drive]]` says about its actuator."""
+
+    actuator: ActuatorTable | None = Field(
+        None,
+        description='Errors of what moves the drive, such as `{ lead_error = "20 um / 300 mm" }`, '
+        'or measured, `{ table = "d1.csv" }`.',
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Actuation:
+    """One drive's actuator: its path and number, and what is known of it; `zero_at` in m or rad."""
+
+    drive: str
+    joint: int
+    lead_error: Band | None
+    zero_at: float
+    periodic: PeriodicTable | None
+    table: PositioningTable | None
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator:
+    """Lead errors, periodic errors and measured positioning tables of the drives."""
+
+    name: ClassVar[str] = "actuator"
+    doc: ClassVar[str] = "lead errors, periodic errors and measured positioning of the drives"
+    tables: ClassVar[Mapping[str, type[BaseModel]]] = {"drive": DriveActuator}
+    sets_overall_edges: ClassVar[bool] = False
+
+    actuations: tuple[Actuation, ...]
+
+    @classmethod
+    def build(cls, parts: FileParts) -> Self | None:
+        """From `actuator` of the drives; None where no drive has it."""
+        rows = zip(parts.drives, parts.rows(DriveActuator), strict=True)
+        actuations = tuple(
+            _actuation(parts, joint, drive, row.actuator)
+            for joint, (drive, row) in enumerate(rows)
+            if row.actuator is not None
+        )
+        return cls(actuations) if actuations else None
+
+    def acts(self, condition: Condition) -> bool:
+        """In every condition."""
+        return True
+
+    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+        """Of offsets, m or rad, and scales, (n or 1, k)."""
+        columns = Columns()
+        for each in self.actuations:
+            if each.lead_error is not None:
+                add_scale_error(columns, machine, each.drive, each.lead_error, each.zero_at)
+            offset = machine.parameters.index(f"{each.drive}.offset")
+            if each.periodic is not None:
+                _add_periodic(columns, offset, each.periodic, block.joints[:, each.joint])
+            if each.table is not None:
+                travel = None if block.travel is None else block.travel[:, each.joint]
+                _add_table(columns, offset, each.table, block.joints[:, each.joint], travel)
+        return columns.deviation()
+
+
+def _actuation(parts: FileParts, joint: int, drive: Drive, row: ActuatorTable) -> Actuation:
+    path = f"{drive.part}.actuator"
+    for key in _OF_THE_SCREW:
+        if drive.feedback == "direct" and getattr(row, key) is not None:
+            parts.refuse(
+                "unwanted-lead-error",
+                "a drive that is measured directly on its carriage has no such error to see",
+                f"{path}.{key}",
+                found=f'{key}, and feedback = "direct"',
+                expected=f'no {key}, or feedback = "motor"',
+                hint="the errors of a direct scale are those of sensor",
+            )
+    found = None
+    if row.table is not None:
+        for key in _IN_A_TABLE:
+            if parts.says(f"{drive.part}.{key}"):
+                parts.refuse(
+                    "excluding-keys",
+                    f"the measured positions have the drive's {key} in them",
+                    f"{path}.table",
+                    found=f"actuator.table and {key}",
+                    expected="one of them",
+                )
+        found = read_positioning(parts, drive, row.table, f"{path}.table")
+    return Actuation(
+        drive.part,
+        joint,
+        row.lead_error,
+        drive.fixed_at if row.zero_at is None else row.zero_at,
+        row.periodic,
+        found,
+    )
+
+
+def _add_periodic(columns: Columns, offset: int, periodic: PeriodicTable, joint: Floats) -> None:
+    if periodic.phase is None:
+        columns.add(offset, swing=periodic.amplitude, distribution=ARCSINE)
+    else:
+        turns = math.tau * joint / periodic.period
+        columns.add(offset, periodic.amplitude * np.sin(turns + periodic.phase))
+
+
+def _add_table(
+    columns: Columns,
+    offset: int,
+    table: PositioningTable,
+    joint: Floats,
+    travel: Floats | None,
+) -> None:
+    """`travel` (n,): direction in which the joint comes to each pose, -1, 0 or +1; None unknown.
+
+    Where the direction is known, that of the table counts, to 2 spreads. Where it is not, the
+    middle of both counts; the reversal, at either end as likely, is a variable of its own.
+    """
+    means, spreads = table.at(joint)
+    way = np.zeros(joint.size) if travel is None else np.sign(travel)
+    known = [way < 0.0, way > 0.0]
+    columns.add(
+        offset,
+        np.select(known, list(means), 0.5 * (means[0] + means[1])),
+        COVERAGE * np.select(known, list(spreads), spreads.max(axis=0)),
+        distribution=normal(COVERAGE),
+    )
+    reversal = np.where(way == 0.0, 0.5 * (means[1] - means[0]), 0.0)
+    columns.add(offset, swing=reversal, distribution=TWO_POINT)

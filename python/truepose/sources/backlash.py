@@ -1,0 +1,111 @@
+"""Backlash: within its play, a carriage stands where the load, or else the motion, has put it.
+
+    shift = sign(load) * play / 2              where |load| exceeds the threshold
+    shift = -sign(travel) * play / 2           below it, on a path: the carriage lags behind
+    half  = play / 2                           else
+
+The load is that of all that acts, on the drive's offset, by virtual work.
+`docs/sources/backlash.md` has the reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from truepose.machine.file_table import FileTable
+from truepose.machine.quantity import NonNegativeCoordinate, NonNegativeDriveLoad
+from truepose.sources._base import Deviation
+from truepose.sources._block import Block
+from truepose.sources._play import pressed
+
+if TYPE_CHECKING:
+    from truepose.machine import Condition, Drive, FileParts, Machine
+
+
+class BacklashTable(FileTable):
+    """Play between what a drive's position is measured on and what it moves."""
+
+    play: NonNegativeCoordinate = Field(description="Total play, from flank to flank.")
+    threshold: NonNegativeDriveLoad = Field(
+        0.0, description="Load on the drive up to which the play stays open, by friction."
+    )
+
+
+class DriveBacklash(BaseModel):
+    """What a `[[drive]]` says about its backlash."""
+
+    backlash: BacklashTable | None = Field(
+        None, description='Play of the drive, such as `{ play = "10 um", threshold = "20 N" }`.'
+    )
+
+
+@dataclass(frozen=True)
+class Backlash:
+    """Play of drives whose position is measured at the motor.
+
+    `joints` (k): number of each such drive; `plays` in m or rad; `thresholds` in N or N m.
+    """
+
+    name: ClassVar[str] = "backlash"
+    doc: ClassVar[str] = "backlash of the drives"
+    tables: ClassVar[Mapping[str, type[BaseModel]]] = {"drive": DriveBacklash}
+    sets_overall_edges: ClassVar[bool] = False
+
+    joints: tuple[int, ...]
+    plays: tuple[float, ...]
+    thresholds: tuple[float, ...]
+
+    @classmethod
+    def build(cls, parts: FileParts) -> Self | None:
+        """From `backlash` of the drives; None where no drive has it."""
+        found = []
+        for index, (drive, row) in enumerate(
+            zip(parts.drives, parts.rows(DriveBacklash), strict=True)
+        ):
+            if row.backlash is None:
+                continue
+            if drive.feedback == "direct":
+                _refuse_direct(parts, drive)
+            found.append((index, row.backlash.play, row.backlash.threshold))
+        if not found:
+            return None
+        joints, plays, thresholds = zip(*found, strict=True)
+        return cls(joints, plays, thresholds)
+
+    def acts(self, condition: Condition) -> bool:
+        """In every condition."""
+        return True
+
+    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+        """Where the carriages stand in their play, m or rad, (n, k)."""
+        drives = [machine.drives[joint] for joint in self.joints]
+        columns = np.array(
+            [machine.parameters.index(f"{drive.part}.offset") for drive in drives], np.intp
+        )
+        # A moment on a crank goes by the machine's size, as the moments on the tool do.
+        lever = [
+            machine.characteristic_length if drive.coordinate == "angle" else 1.0
+            for drive in drives
+        ]
+        loads = block.loads(columns, "all")
+        side, free = pressed(block, columns, loads, self.thresholds, lever)
+        if block.travel is not None:
+            side = np.where(free, -np.sign(block.travel[:, self.joints]), side)
+        reach = 0.5 * np.array(self.plays)
+        return Deviation.of(columns, side * reach, np.where(side == 0.0, reach, 0.0))
+
+
+def _refuse_direct(parts: FileParts, drive: Drive) -> None:
+    parts.refuse(
+        "unwanted-backlash",
+        "a drive that is measured directly on its carriage has no backlash to see",
+        f"{drive.part}.backlash",
+        found='backlash, and feedback = "direct"',
+        expected='no backlash, or feedback = "motor"',
+        hint="the control closes its loop round the play",
+    )

@@ -1,0 +1,125 @@
+"""Clearance of passive joints: a loaded strut takes up the play at both its ends.
+
+    reach = clearance / 2                                       spherical, universal
+    reach = (clearance * |u across| + axial_clearance * |u along|) / 2       revolute
+
+with u the strut's direction, across and along the joint's axis. Each joint of a strut in tension
+lets it grow by its reach, in compression it shrinks by it; a strut that carries no more than the
+threshold has a half band of the reach. `docs/sources/clearance.md` has the reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from pydantic import Field
+
+from truepose.machine.file_table import FileTable
+from truepose.machine.quantity import quantity
+from truepose.sources._base import Deviation
+from truepose.sources._block import Block, Floats
+from truepose.sources._directions import of_base_side
+from truepose.sources._play import pressed
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+    from truepose.machine import Condition, FileParts, Machine
+    from truepose.machine.parts_of_machine import Joint
+
+_ENDS = ("base_joint", "platform_joint")
+
+
+class ClearanceTable(FileTable):
+    """What holds for the clearance of every passive joint."""
+
+    threshold: quantity("force", sign="not negative") = Field(  # type: ignore[valid-type]
+        0.0, description="Force in a strut up to which its joints' play stays open, by friction."
+    )
+
+
+@dataclass(frozen=True)
+class JointOfStrut:
+    """A passive joint with play: the number of its strut, and the end (0 base, 1 platform)."""
+
+    strut: int
+    end: int
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """Play of the joints at the struts' ends. `threshold` in N."""
+
+    name: ClassVar[str] = "clearance"
+    doc: ClassVar[str] = "clearance of the passive joints"
+    tables: ClassVar[Mapping[str, type[BaseModel]]] = {"clearance": ClearanceTable}
+    sets_overall_edges: ClassVar[bool] = False
+
+    joints: tuple[JointOfStrut, ...]
+    threshold: float
+
+    @classmethod
+    def build(cls, parts: FileParts) -> Self | None:
+        """From the joints of the struts; None where none has play."""
+        table = parts.table(ClearanceTable)
+        found = []
+        for index, strut in enumerate(parts.struts):
+            for end, joint in enumerate(strut.joints):
+                if not (joint.clearance or joint.axial_clearance):
+                    continue
+                found.append(JointOfStrut(index, end))
+                if joint.kind == "revolute" and joint.axis is None:
+                    parts.refuse(
+                        "missing-key",
+                        "a revolute joint has play across its axis, which is not given",
+                        f"{strut.part}.{_ENDS[end]}.axis",
+                        found="nothing",
+                        expected="axis, three plain numbers such as [0, 0, 1]",
+                    )
+        if not found and table is None:
+            return None
+        return cls(tuple(found), 0.0 if table is None else table.threshold)
+
+    def acts(self, condition: Condition) -> bool:
+        """In every condition."""
+        return True
+
+    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+        """What each joint adds to the distance of its strut's joint centres, m, (n, k)."""
+        struts = [joint.strut for joint in self.joints]
+        reach = np.ones((block.indices.size, len(struts)))
+        for column, joint in enumerate(self.joints):
+            reach[:, column] = _reach(machine, block, joint)
+        columns = machine.kernel.length_parameters[struts]
+        side, _ = pressed(block, columns, block.tension[:, struts], self.threshold)
+        return Deviation.of(columns, side * reach, np.where(side == 0.0, reach, 0.0))
+
+
+def half_clearances(block: Block) -> Floats:
+    """(n, n_strut) m: how far the play of both its joints lets each strut give way, either side."""
+    struts = block.machine.struts
+    half = np.zeros((block.indices.size, len(struts)))
+    for index in range(len(struts)):
+        for end in range(len(_ENDS)):
+            half[:, index] += _reach(block.machine, block, JointOfStrut(index, end))
+    return half
+
+
+def _reach(machine: Machine, block: Block, at: JointOfStrut) -> Floats | float:
+    """(n,) m: how far the joint gives way along its strut."""
+    strut = machine.struts[at.strut]
+    joint: Joint = strut.joints[at.end]
+    if joint.kind != "revolute" or joint.axis is None:
+        return 0.5 * joint.clearance
+    if at.end == 1:
+        axis = block.rotations @ np.array(joint.axis)
+    else:
+        drive = next((drive for drive in machine.drives if drive.name == strut.drive), None)
+        axis = of_base_side(machine.kernel, drive, block.joints, joint.axis)
+    direction = block.directions[:, at.strut]
+    along = np.abs((axis * direction).sum(axis=1))
+    across = np.linalg.norm(np.cross(axis, direction), axis=1)
+    return np.asarray(0.5 * (joint.clearance * across + joint.axial_clearance * along))

@@ -42,6 +42,8 @@ __all__ = [
     "compensate",
     "errors",
     "load",
+    "over_time",
+    "strain",
     "threads",
 ]
 
@@ -82,6 +84,33 @@ def compensate(
     from truepose.compensation.compensate import compensate as correct
 
     return correct(machine, poses, condition, progress=progress)
+
+
+def over_time(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    times: ArrayLike | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The error from a temperature log over time; see `truepose.budget.over_time.over_time`."""
+    from truepose.budget.over_time import over_time as evaluate
+
+    return evaluate(machine, poses, condition, times, progress=progress)
+
+
+def strain(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Internal forces of an over-constrained machine; see `truepose.budget.strain.strain`."""
+    from truepose.budget.strain import strain as evaluate
+
+    return evaluate(machine, poses, condition, progress=progress)
 
 
 def __getattr__(name: str) -> Any:

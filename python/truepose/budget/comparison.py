@@ -61,7 +61,8 @@ class NormStatistics:
         """`worst` (n, n_source, n_component) of more poses."""
         self._count += len(worst)
         for index, columns in enumerate(self._kinds.values()):
-            squares = np.square(worst[:, :, columns]).sum(axis=2)
+            of_kind = worst[:, :, columns]
+            squares = np.einsum("nsc,nsc->ns", of_kind, of_kind)
             self._squares[:, index] += squares.sum(axis=0)
             highest = np.sqrt(squares.max(axis=0, initial=0.0))
             np.maximum(self.highest[:, index], highest, out=self.highest[:, index])

@@ -59,12 +59,20 @@ class Rows:
         self._solved = np.empty((sizes["pose"], len(self._parasitic)))
         self.count = 0
 
+    def room(self, n_pose: int) -> dict[str, np.ndarray]:
+        """Where the next `n_pose` poses go, by name: what is filled in there need not be copied."""
+        return {
+            name: array[self.count : self.count + n_pose] for name, array in self._arrays.items()
+        }
+
     def append(self, block: Block, values: Mapping[str, np.ndarray], usable: Flags) -> None:
         """Write the poses of `block` where `usable` (n,), with `values` (n, ...) of each name."""
         rows = slice(self.count, self.count + int(usable.sum()))
         every = bool(usable.all())
         for name, array in self._arrays.items():
-            array[rows] = values[name] if every else values[name][usable]
+            given = values[name] if every else values[name][usable]
+            if not np.may_share_memory(given, array):
+                array[rows] = given
         self._indices[rows] = block.indices if every else block.indices[usable]
         if self._parasitic:
             solved = self._kernel.pose_of(block.placements)
@@ -167,7 +175,7 @@ def _machine_coords(machine: Machine, schema: Schema) -> dict[str, xr.Variable]:
         "component_units": label("component", component_units(machine), "unit of the component"),
         joint: label("joint", list(machine.joints), "actuated joint"),
         "joint_units": label("joint", joint_units(machine), "unit of the joint coordinate"),
-        "closure": label("closure", list(machine.closures), "closure, named by its strut"),
+        "closure": label("closure", list(machine.closures), "closure, named by its strut or guide"),
     }
 
 
@@ -207,19 +215,10 @@ def _provenance(
         "machine": machine.name,
         "machine_file": machine.file,
         "machine_hash": machine.file_hash,
+        "data_files": json.dumps(dict(machine.data_files)),
         "settings": "; ".join(f"{key}={value}" for key, value in machine.settings.items()),
         "replaced": "; ".join(f"{key}={value!r}" for key, value in machine.replaced.items()),
-        "condition": json.dumps(
-            {
-                "reference_temperature_K": condition.reference_temperature,
-                "temperature_K": {
-                    "default": condition.default_temperature,
-                    **condition.part_temperatures,
-                },
-                "force_N": list(condition.force),
-                "moment_Nm": list(condition.moment),
-            }
-        ),
+        "condition": json.dumps(_condition(condition)),
         "seed": "none",
         "poses_used": rows.count,
         "poses_left_out": asked - rows.count,
@@ -229,3 +228,24 @@ def _provenance(
     if machine.accuracy.angle_target is not None:
         attrs["accuracy_angle_target"] = machine.accuracy.angle_target
     return attrs
+
+
+def _condition(condition: Condition) -> dict[str, object]:
+    """Everything of a condition, SI; a temperature log is among the data files."""
+    envelope = condition.envelope
+    return {
+        "reference_temperature_K": condition.reference_temperature,
+        "temperature_K": {
+            "default": condition.default_temperature,
+            **condition.part_temperatures,
+        },
+        "gradient_K_per_m": {part: list(each) for part, each in condition.gradients.items()},
+        "temperature_log": condition.temperature_log is not None,
+        "time_s": condition.time,
+        "force_N": list(condition.force),
+        "moment_Nm": list(condition.moment),
+        "envelope_N": None if envelope is None else envelope.force,
+        "envelope_normal": None if envelope is None else envelope.normal,
+        "gravity_m_per_s2": condition.gravity,
+        "acceleration_m_per_s2": list(condition.acceleration),
+    }

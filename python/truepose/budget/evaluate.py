@@ -19,7 +19,14 @@ from truepose.budget.dataset import (
     label,
     sizes,
 )
-from truepose.budget.poses import OK, Progress, Walk, no_pose_left, requested_poses
+from truepose.budget.poses import (
+    OK,
+    Progress,
+    Walk,
+    is_path,
+    no_pose_left,
+    requested_poses,
+)
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, Deviation, Source, acting
@@ -57,7 +64,9 @@ SCHEMA: Schema = {
         _ALL, "1", "whether the coordinate is large enough for a percent of it", np.bool_
     ),
     "joint_nominal": Variable(("pose", "joint"), "joint", "joint coordinate, nominal command"),
-    "force": Variable(("pose", "closure"), "N", "strut force, tension positive"),
+    "force": Variable(
+        ("pose", "closure"), "N", "closure force under all that acts, a strut's tension positive"
+    ),
     "highest_lower": Variable(_OVER, "component", "highest |error_lower| over poses"),
     "highest_upper": Variable(_OVER, "component", "highest |error_upper| over poses"),
     "highest_percent_lower": Variable(_OVER, "%", "highest percent_lower over poses"),
@@ -126,12 +135,13 @@ def budget(
     statistics = comparison.NormStatistics(len(sources), kinds)
     distributions: list[dict[str, None]] = [{} for _ in sources]
 
-    walk = Walk(machine, table, given, progress)
+    walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
     for block in walk:
         deviations = [source.deviation(machine, given, block) for source in sources]
         for found, deviation in zip(distributions, deviations, strict=True):
             found.update((str(deviation.distribution[k]), None) for k in deviation.banded)
-        values, statuses = _evaluate(machine, block, sources, deviations)
+        room = rows.room(block.indices.size)
+        values, statuses = _evaluate(machine, block, sources, deviations, room)
         usable = walk.keep(block.indices, *statuses)
         rows.append(block, values, usable)
         if usable.any():
@@ -185,16 +195,19 @@ def required_sources(machine: Machine, condition: Condition) -> tuple[Source, ..
 
 
 def _evaluate(
-    machine: Machine, block: Block, sources: Sequence[Source], deviations: Sequence[Deviation]
+    machine: Machine,
+    block: Block,
+    sources: Sequence[Source],
+    deviations: Sequence[Deviation],
+    room: dict[str, np.ndarray],
 ) -> tuple[dict[str, np.ndarray], list[np.ndarray]]:
-    """Every variable over poses for one block, and all statuses (n,) met on the way."""
-    n_pose, n_component = block.indices.size, len(machine.components)
+    """Every variable over poses for one block, and all statuses (n,) met on the way.
+
+    Those of each source are written into `room`.
+    """
     coordinate, defined = percent.coordinates(machine, block.placements)
-    values: dict[str, np.ndarray] = {
-        name: np.empty((n_pose, len(sources), n_component))
-        for name, variable in SCHEMA.items()
-        if variable.dims == _EACH
-    }
+    per_error = percent.per_error(coordinate, defined)
+    values = {name: room[name] for name, variable in SCHEMA.items() if variable.dims == _EACH}
     statuses: list[np.ndarray] = []
     for at, deviation in enumerate(deviations):
         edges = exact.source_edges(machine, block, deviation)
@@ -204,8 +217,8 @@ def _evaluate(
         values["error_upper"][:, at] = edges.upper
         values["worst"][:, at] = worst.worst(edges.error, half)
         values["uncertainty"][:, at] = spread
-        values["percent_lower"][:, at] = percent.percent(edges.lower, coordinate, defined)
-        values["percent_upper"][:, at] = percent.percent(edges.upper, coordinate, defined)
+        percent.percent(edges.lower, per_error, out=values["percent_lower"][:, at])
+        percent.percent(edges.upper, per_error, out=values["percent_upper"][:, at])
         statuses += [*edges.status, status]
     overall = exact.overall_edges(
         machine,
@@ -217,11 +230,11 @@ def _evaluate(
         "overall_error": overall.error,
         "overall_error_lower": overall.lower,
         "overall_error_upper": overall.upper,
-        "overall_percent_lower": percent.percent(overall.lower, coordinate, defined),
-        "overall_percent_upper": percent.percent(overall.upper, coordinate, defined),
+        "overall_percent_lower": percent.percent(overall.lower, per_error),
+        "overall_percent_upper": percent.percent(overall.upper, per_error),
         "percent_defined": defined,
         "joint_nominal": block.joints,
-        "force": block.tension,
+        "force": block.forces,
     }
     return values, statuses
 
@@ -235,8 +248,9 @@ def _band(
         return nothing, nothing, np.full(block.indices.size, OK, np.uint8)
     effects, sigmas, status = worst.variable_effects(machine, block, deviation)
     return (
-        worst.linear_half(effects),
-        uncertainty.standard_uncertainty(effects, sigmas),
+        # Sizes first, then their squares, in the one place.
+        worst.linear_half(effects, scratch=effects),
+        uncertainty.standard_uncertainty(effects, sigmas, scratch=effects),
         status,
     )
 

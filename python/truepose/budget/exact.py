@@ -49,6 +49,19 @@ def together(parts: Iterable[Moved]) -> Moved:
     return np.asarray(columns, np.intp), total
 
 
+def further(moved: Moved, parts: Iterable[Moved]) -> Moved:
+    """What is `moved` already, moved on by `parts` of the same parameters."""
+    columns, values = moved
+    place = {int(column): at for at, column in enumerate(columns)}
+    total = values.copy()
+    for given, added in parts:
+        if len(added) > len(total):
+            total = np.repeat(total, len(added), axis=0)
+        for at, column in enumerate(given):
+            total[:, place[int(column)]] += added[:, at]
+    return columns, total
+
+
 def displacement(
     machine: Machine, joints: Floats, placements: Floats, moved: Moved
 ) -> tuple[Floats, np.ndarray]:
@@ -93,13 +106,13 @@ def overall_edges(machine: Machine, block: Block, parts: Iterable[tuple[Deviatio
     minimum and maximum (the tolerance does); all others stay at their shift.
     """
     listed = list(parts)
-    return edges(
-        machine,
-        block,
-        together([(d.parameters, d.shift) for d, _ in listed]),
-        together([(d.parameters, d.at_edge(-1.0) if moves else d.shift) for d, moves in listed]),
-        together([(d.parameters, d.at_edge(+1.0) if moves else d.shift) for d, moves in listed]),
-    )
+    centre = together([(d.parameters, d.shift) for d, _ in listed])
+    bands = [d for d, moves in listed if moves]
+
+    def at(side: float) -> Moved:
+        return further(centre, [(d.parameters, d.at_edge(side) - d.shift) for d in bands])
+
+    return edges(machine, block, centre, at(-1.0), at(+1.0))
 
 
 def _error(machine: Machine, block: Block, moved: Moved) -> tuple[Floats, np.ndarray]:

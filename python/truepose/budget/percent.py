@@ -30,8 +30,14 @@ def coordinates(machine: Machine, placements: Floats) -> tuple[Floats, Flags]:
     return values, np.abs(values) >= SMALLEST * machine.characteristic_length
 
 
-def percent(error: Floats, coordinate: Floats, defined: Flags) -> Floats:
-    """(n, n_component) percent of `coordinate`; NaN where it is not `defined`."""
-    result = np.full(error.shape, np.nan)
-    np.divide(100.0 * np.abs(error), np.abs(coordinate), out=result, where=defined)
+def per_error(coordinate: Floats, defined: Flags) -> Floats:
+    """(n, n_component) percent of `coordinate` per m of error; NaN where it is not `defined`."""
+    result = np.full(coordinate.shape, np.nan)
+    np.divide(100.0, np.abs(coordinate), out=result, where=defined)
+    return result
+
+
+def percent(error: Floats, per_error: Floats, out: Floats | None = None) -> Floats:
+    """(n, n_component) the size of `error` in percent, from what one metre of it is."""
+    result: Floats = np.multiply(np.abs(error), per_error, out=out)
     return result

@@ -24,6 +24,9 @@ BLOCK = 8192
 EXPLAINED = 200
 """Poses that are looked into when none can be used, evenly spaced over all of them."""
 
+STILL = 1e-12
+"""Step of a joint, in its travel, that is rounding and no motion."""
+
 Progress = Callable[[int, int], None]
 """Called with (poses done, poses in all), between blocks."""
 
@@ -51,6 +54,11 @@ def requested_poses(machine: Machine, poses: ArrayLike | None) -> Floats:
     if unfit.size:
         raise _bad_poses(machine, f"{unfit.size} poses with a value not finite, first {unfit[0]}")
     return table
+
+
+def is_path(machine: Machine) -> bool:
+    """Whether the file's poses are passed through in their order."""
+    return machine.workspace is not None and machine.workspace.is_path
 
 
 def _bad_poses(machine: Machine, found: str) -> RequestError:
@@ -96,12 +104,19 @@ class Walk:
         poses: Floats,
         condition: Condition,
         progress: Progress | None = None,
+        *,
+        path: bool = False,
+        times: Floats | None = None,
     ) -> None:
+        """`path`: the poses are passed through in their order. `times` (n_pose,): s, of each."""
+        machine.check_condition(condition)
         self.machine = machine
         self.poses = poses
         self.left_out = LeftOut()
-        self._wrench = np.asarray(condition.wrench, np.float64)[np.newaxis, :]
+        self._condition = condition
         self._progress = progress
+        self._times = times
+        self._travel = Travel(machine) if path else None
 
     def __iter__(self) -> Iterator[Block]:
         total = len(self.poses)
@@ -113,20 +128,23 @@ class Walk:
                 self._progress(min(start + BLOCK, total), total)
 
     def _block(self, start: int, poses: Floats) -> Block:
-        kernel = self.machine.kernel
-        joints, placements, status = kernel.place(poses)
+        joints, placements, status = self.machine.kernel.place(poses)
         indices = np.arange(start, start + len(poses), dtype=np.intp)
-        usable = self.keep(indices, status)
-        indices, joints, placements = indices[usable], joints[usable], placements[usable]
-        if not indices.size:
-            empty = np.empty((0, len(kernel.closures)))
-            return Block(self.poses, indices, joints, placements, empty, empty)
-        tension, status = kernel.loads_at(
-            joints, placements, self._wrench, kernel.length_parameters
+        block = Block(
+            self.machine,
+            self._condition,
+            self.poses,
+            indices,
+            joints,
+            placements,
+            None if self._travel is None else self._travel.into(joints),
+            None if self._times is None else self._times[start : start + len(poses)],
         )
-        lengths = kernel.lengths_at(joints, placements)
-        usable = self.keep(indices, status)
-        return select(Block(self.poses, indices, joints, placements, lengths, tension), usable)
+        block = block.select(self.keep(indices, status))
+        if not block.indices.size:
+            return block
+        _, status = block.balance
+        return block.select(self.keep(block.indices, status))
 
     def keep(self, indices: Indices, *statuses: np.ndarray) -> Flags:
         """(n,) whether every status of a pose is ok; the first that is not says why it is out."""
@@ -138,18 +156,34 @@ class Walk:
         return usable
 
 
-def select(block: Block, usable: Flags) -> Block:
-    """The poses of `block` where `usable` (n,); the block itself where all are."""
-    if usable.all():
-        return block
-    return Block(
-        block.requested,
-        block.indices[usable],
-        block.joints[usable],
-        block.placements[usable],
-        block.lengths[usable],
-        block.tension[usable],
-    )
+class Travel:
+    """Direction in which each joint of a machine last moved, along a path."""
+
+    def __init__(self, machine: Machine) -> None:
+        spans = [drive.travel[1] - drive.travel[0] for drive in machine.drives]
+        self._still = STILL * np.array(spans)
+        self._at = np.full((1, len(spans)), np.nan)
+        self._direction = np.zeros((1, len(spans)))
+
+    def into(self, joints: Floats) -> Floats:
+        """(n, n_joint) of -1, 0 (not moved yet) and +1 into the next poses, of `joints` there.
+
+        A joint that stands keeps its direction, as the flank on which it lies stays; a pose
+        without joints (NaN) is passed over.
+        """
+        at = _carried_on(np.concatenate([self._at, joints]), np.isfinite)
+        steps = np.diff(at, axis=0)
+        moved = np.where(np.abs(steps) > self._still, np.sign(steps), 0.0)  # NaN: no step yet
+        found = _carried_on(np.concatenate([self._direction, moved]), np.abs)
+        self._at, self._direction = at[-1:], found[-1:]
+        return found[1:]
+
+
+def _carried_on(rows: Floats, counts: Callable[[Floats], np.ndarray]) -> Floats:
+    """(n, k) each value that does not count replaced by the last one above it that does."""
+    own = np.where(counts(rows), np.arange(len(rows))[:, np.newaxis], 0)
+    carried: Floats = np.take_along_axis(rows, np.maximum.accumulate(own, axis=0), axis=0)
+    return carried
 
 
 def no_pose_left(
@@ -206,6 +240,10 @@ def _fault(machine: Machine, fault: dict[str, object]) -> str:
     if what == "travel":
         coordinate = next((d.coordinate for d in machine.drives if d.name == name), "length")
         return f"drive {name} is {_in_file_units(machine, abs(amount), coordinate)} out of travel"
+    if what in ("base_joint", "platform_joint"):
+        joint = str(what).replace("_", " ")
+        angle = _in_file_units(machine, amount, "angle")
+        return f"strut {name} leans {angle} beyond the limit of its {joint}"
     return f"strut {name} misses by {_in_file_units(machine, abs(amount), 'length')}"
 
 

@@ -14,7 +14,10 @@ import numpy as np
 from truepose.sources._base import Floats
 
 
-def standard_uncertainty(effects: Floats, sigmas: Floats) -> Floats:
-    """(n, n_component) from effects (n, n_component, n_variable) and sigmas (n_variable,)."""
-    combined: Floats = np.sqrt(np.square(effects) @ sigmas**-2.0)
+def standard_uncertainty(effects: Floats, sigmas: Floats, scratch: Floats | None = None) -> Floats:
+    """(n, n_component) from effects (n, n_component, n_variable) and sigmas (n_variable,).
+
+    `scratch`: where what is on the way may go, such as `effects` itself.
+    """
+    combined: Floats = np.sqrt(np.square(effects, out=scratch) @ sigmas**-2.0)
     return combined

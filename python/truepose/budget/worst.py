@@ -12,7 +12,7 @@ import numpy as np
 
 from truepose.machine import Machine
 from truepose.sources import Block, Deviation
-from truepose.sources._base import Floats
+from truepose.sources._base import Floats, Indices
 
 
 def variable_effects(
@@ -28,20 +28,39 @@ def variable_effects(
     sensitivity, status = machine.kernel.sensitivity_at(
         block.joints, block.placements, deviation.parameters[banded]
     )
-    effects: Floats = sensitivity * deviation.signed_half[:, np.newaxis, banded]
-    numbers, variable = np.unique(deviation.variables[banded], return_inverse=True)
-    sigmas = np.empty(numbers.size)
+    effects, variable = by_variable(deviation, sensitivity)
+    sigmas = np.empty(effects.shape[2])
     sigmas[variable] = [deviation.distribution[column].sigmas for column in banded]
+    return effects, sigmas, status
+
+
+def by_variable(deviation: Deviation, slopes: Floats) -> tuple[Floats, Indices]:
+    """What each variable does at +1, from `slopes` (n, m, n_banded) per unit of a banded column.
+
+    `slopes` are written over: there is seldom room for two of them in the cache.
+
+    Returns effects (n, m, n_variable), and the variable of each banded column (n_banded,).
+    """
+    banded = deviation.banded
+    half = deviation.signed_half
+    if banded.size < half.shape[1]:
+        half = half[:, banded]
+    effects: Floats = np.multiply(slopes, half[:, np.newaxis], out=slopes)
+    numbers, variable = np.unique(deviation.variables[banded], return_inverse=True)
     if numbers.size < banded.size:
         member = np.zeros((banded.size, numbers.size))
         member[np.arange(banded.size), variable] = 1.0
         effects = effects @ member
-    return effects, sigmas, status
+    return effects, np.asarray(variable, np.intp)
 
 
-def linear_half(effects: Floats) -> Floats:
-    """(n, n_component) half width of the first-order error: every variable at its worst."""
-    width: Floats = np.abs(effects).sum(axis=-1)
+def linear_half(effects: Floats, scratch: Floats | None = None) -> Floats:
+    """(n, n_component) half width of the first-order error: every variable at its worst.
+
+    `scratch`: where what is on the way may go, such as `effects` itself.
+    """
+    # A product with ones, which is several times as quick as a sum along a short axis.
+    width: Floats = np.abs(effects, out=scratch) @ np.ones(effects.shape[-1])
     return width
 
 

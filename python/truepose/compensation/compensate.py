@@ -12,7 +12,7 @@ from truepose.budget import worst
 from truepose.budget.dataset import Rows, Schema, Variable, assemble, sizes
 from truepose.budget.evaluate import required_sources
 from truepose.budget.exact import Moved, displacement, together
-from truepose.budget.poses import Progress, Walk, no_pose_left, requested_poses
+from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, requested_poses
 from truepose.compensation.second_order import SecondOrder, Step
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, Deviation
@@ -64,7 +64,7 @@ def compensate(
     sources = required_sources(machine, given)
     rows = Rows(machine, SCHEMA, sizes(machine, len(table)))
     second_order = SecondOrder(machine)
-    walk = Walk(machine, table, given, progress)
+    walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
     for block in walk:
         deviations = [source.deviation(machine, given, block) for source in sources]
         values, statuses = _correct(machine, block, deviations, second_order)

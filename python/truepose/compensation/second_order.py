@@ -6,7 +6,11 @@ unknown t[j] in [-1, 1] times the steps of its variables. Taylor's series of the
 nominal machine, with the linear part solved for the platform, leaves the remainder, by which the
 residual exceeds the linear bound:
 
-    residual[C] - bound[C]  <=  sum over struts i of |sensitivity[C, length i]| * r[i]
+    residual[C] - bound[C]  <=  sum over closures i of |sensitivity[C, i]| * r[i]
+
+with the sensitivity to a residual of the closure, for a strut to its length; the r of guides stands
+in `second_order_guides.py`, what more closures than freedoms add in `second_order_strain.py`. For
+struts
 
     r = (eta delta + delta^2 / 2) / |v|
       + turn_c reach + turn reach_c + turn reach                             (base side)
@@ -18,7 +22,11 @@ bound the second differentials of A and B: a point that a rotation or a stretch 
 and that moves by `reach` to first order moves by no more than the products to second. On the
 platform the arm from the tool point is carried, and `own` is the motion of the joint centre in it.
 Where a drive's scale multiplies the strut's length, its deviation times the joint correction is
-added.
+added. Where the platform-side joint slides on a ring of radius rho about a point at the distance D
+from A's foot in its plane, it slides so that |v| stays least; by the second differential of a
+minimum that adds
+
+    rho / D |v| (kappa_c + kappa / 2) kappa,   kappa = delta / |v| + turn
 
 The movements are of first order; the term is evaluated twice, the second time with the platform
 moved by the first result as well and |v| shortened by all of it. What is left out is smaller by
@@ -27,13 +35,15 @@ the deviation over the strut's length.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from truepose import _kernel
 from truepose.budget.percent import POSITIONS
+from truepose.compensation.second_order_guides import Guides, Movement, PlatformStep
+from truepose.compensation.second_order_strain import Strain
 from truepose.machine import Machine
 from truepose.sources import Block, Deviation
 from truepose.sources._base import Floats, Indices
@@ -120,6 +130,13 @@ class _Geometry:
     unit: Floats
     length: Floats
     arm_length: Floats
+    slide: Floats
+    """(n, n_strut, 3, 3) how a platform-side joint slides on its ring as its base joint moves."""
+
+    @property
+    def slide_share(self) -> Floats:
+        """(n, n_strut) radius of the ring over the distance of the base joint; 0 without a ring."""
+        return np.asarray(np.trace(self.slide, axis1=2, axis2=3))
 
 
 class SecondOrder:
@@ -145,6 +162,12 @@ class SecondOrder:
         self._scales = np.array(
             [abs(float(machine.nominal[at])) if at >= 0 else 1.0 for at in self._scale_of]
         )
+        self._ring_bases = [
+            [names.index(f"{strut.part}.base.{axis}") for axis in "xyz"]
+            if f"{strut.part}.ring_radius" in names
+            else []
+            for strut in machine.struts
+        ]
         self._linear = [machine.components.index(c) for c in machine.components if c in POSITIONS]
         self._into_linear = [POSITIONS.index(c) for c in machine.components if c in POSITIONS]
         self._angular = [machine.components.index(c) for c in machine.components if c in _ROTATIONS]
@@ -185,12 +208,77 @@ class SecondOrder:
         )
         influence = np.abs(lengths)
         arm, corrections = geometry.arm_length, self._corrections(centre, n_pose, n_closure)
-        moved = _through(influence, _remainder(geometry.length, arm, known, first, corrections))
-        second = first.with_platform(*self._norms(moved), arm)
+        slide = geometry.slide_share
+        guided = self._guided(block, centre, band)
+        strained = self._strained(geometry, centre, band)
+
+        def remainder(length: Floats, band: _Bounds) -> Floats:
+            return _remainder(length, arm, known, band, corrections, slide)
+
+        moved = _through(influence, remainder(geometry.length, first)) + guided(None)
+        moved += strained(geometry.length, known, first)
+        further = self._norms(moved)
+        second = first.with_platform(*further, arm)
         # A band that outgrows its strut has no bound: infinite.
         shortened = np.maximum(geometry.length - known.across - second.across, 0.0)
         with np.errstate(divide="ignore"):
-            return _through(influence, _remainder(shortened, arm, known, second, corrections))
+            result = _through(influence, remainder(shortened, second)) + guided(further)
+            return result + strained(shortened, known, second)
+
+    def _strained(
+        self, geometry: _Geometry, centre: Step, band: Sequence[Step]
+    ) -> Callable[[Floats, _Bounds, _Bounds], Floats]:
+        """A function to what strain adds, (n, n_component), m and rad.
+
+        It takes the struts' lengths and the movements by the known step and by the band.
+        """
+        block = geometry.block
+        nothing = np.zeros((len(block.placements), len(self._machine.components)))
+        if not self._kernel.overconstrained:
+            return lambda length, known, unknown: nothing
+        strain = Strain(self._machine, block)
+        by_known = strain.forces(centre.columns, centre.values, centre.joints)
+        by_band = np.zeros_like(by_known)
+        for step in band:
+            by_band += strain.forces(step.columns, step.values, step.joints)
+
+        def added(length: Floats, known: _Bounds, unknown: _Bounds) -> Floats:
+            arm = geometry.arm_length
+            known_tilt, tilt = known.across / length, unknown.across / length
+            known_lever, lever = (
+                bounds.turn_platform * arm + bounds.own_platform + arm * leaned
+                for bounds, leaned in ((known, known_tilt), (unknown, tilt))
+            )
+            return strain.added((by_known, by_band), (known_tilt, tilt), (known_lever, lever))
+
+        return added
+
+    def _guided(
+        self, block: Block, centre: Step, band: Sequence[Step]
+    ) -> Callable[[tuple[Floats, Floats] | None], Floats]:
+        """A function to what the guides add, (n, n_component), m and rad.
+
+        It takes by how much the platform moves further, (n, 1) m and rad.
+        """
+        nothing = np.zeros((len(block.placements), len(self._machine.components)))
+        if not self._machine.guides:
+            return lambda further: nothing
+        guides = Guides(self._machine, block)
+
+        def movement(step: Step) -> Movement:
+            platform = PlatformStep(*self._platform(step.platform, len(block.placements)))
+            return guides.movement(step.columns, step.values, platform)
+
+        known, unknown = movement(centre).norms(), movement(band[0])
+        for step in band[1:]:
+            unknown.add(movement(step))
+        first, influence = unknown.norms(), guides.influence()
+
+        def added(further: tuple[Floats, Floats] | None) -> Floats:
+            sizes = first if further is None else guides.with_platform(first, *further)
+            return _through(influence, guides.remainder(known, sizes))
+
+        return added
 
     def _geometry(self, block: Block) -> _Geometry:
         centres = self._kernel.joint_centres(block.joints, block.placements)
@@ -199,13 +287,32 @@ class SecondOrder:
         length = np.linalg.norm(along, axis=2)
         arm = platform - block.placements[:, np.newaxis, :3]
         unit = along / length[:, :, np.newaxis]
-        return _Geometry(block, base, platform, arm, unit, length, np.linalg.norm(arm, axis=2))
+        arm_length = np.linalg.norm(arm, axis=2)
+        slide = np.zeros((*length.shape, 3, 3))
+        geometry = _Geometry(block, base, platform, arm, unit, length, arm_length, slide)
+        for strut, columns in enumerate(self._ring_bases):
+            for axis, column in enumerate(columns):
+                _, of_platform, small = self._centres_moved(geometry, column)
+                slide[:, strut, :, axis] = of_platform[:, strut] / small
+        return geometry
 
     def _moved(self, geometry: _Geometry, column: int) -> tuple[Floats, Floats, float]:
         """Moves (n, n_closure, 3) of base and platform centres by a small step of one parameter.
 
-        And that step, m or rad or 1: together a difference quotient.
+        And that step, m or rad or 1: together a difference quotient. On a ring the platform-side
+        joint is the ring's own point here, which does not slide: of what is seen, p = m + slide
+        (a - m), the motion m, where a is that of the base joint.
         """
+        of_base, of_platform, small = self._centres_moved(geometry, column)
+        slide = geometry.slide
+        if slide.any():
+            carried = np.eye(3) + slide / (1.0 - geometry.slide_share)[:, :, np.newaxis, np.newaxis]
+            seen = of_platform - np.einsum("nsij,nsj->nsi", slide, of_base)
+            of_platform = np.einsum("nsij,nsj->nsi", carried, seen)
+        return of_base, of_platform, small
+
+    def _centres_moved(self, geometry: _Geometry, column: int) -> tuple[Floats, Floats, float]:
+        """As `_moved`, of the joint centres as they are: a joint on a ring slides."""
         if column not in self._stepped:
             nominal = float(self._machine.nominal[column])
             size = {"m": self._machine.characteristic_length, "rad": 1.0}
@@ -296,9 +403,18 @@ def _through(influence: Floats, remainder: Floats) -> Floats:
 
 
 def _remainder(
-    length: Floats, arm: Floats, known: _Bounds, band: _Bounds, corrections: Floats
+    length: Floats,
+    arm: Floats,
+    known: _Bounds,
+    band: _Bounds,
+    corrections: Floats,
+    slide: Floats,
 ) -> Floats:
     """(n, n_closure) second-order remainder of each closure, m."""
+    # Times |v|, so that a strut without a ring that a wide band shortens to nothing gives no 0 / 0.
+    known_swing = known.across + known.turn_platform * length
+    swing = band.across + band.turn_platform * length
+    sliding = slide * (known_swing + 0.5 * swing) * swing
     return (
         (known.across + 0.5 * band.across) * band.across / length
         + known.turn_base * band.reach_base
@@ -307,4 +423,5 @@ def _remainder(
         + band.turn_platform * (known.own_platform + band.own_platform)
         + (known.turn_platform + 0.5 * band.turn_platform) * band.turn_platform * arm
         + band.scale * corrections
+        + np.divide(sliding, length, out=np.zeros_like(sliding), where=slide > 0.0)
     )

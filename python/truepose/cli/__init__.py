@@ -14,9 +14,11 @@ import click
 from truepose.cli._guard import INTERRUPTED, GuardedGroup
 
 COMMANDS: dict[str, str] = {
+    "init": "truepose.cli.init",
     "check": "truepose.cli.check",
     "budget": "truepose.cli.budget",
     "compensate": "truepose.cli.compensate",
+    "strain": "truepose.cli.strain",
     "report": "truepose.cli.report",
 }
 """Command name -> module that holds it, in the order of `truepose --help`."""

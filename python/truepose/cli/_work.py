@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -21,7 +22,7 @@ from truepose.errors import Problem, RequestError
 from truepose.machine.suggestion import counted
 from truepose.machine.workspace import Accuracy
 from truepose.report import formats
-from truepose.report.display import pose_text
+from truepose.report.display import nearest_middle, pose_text, where_highest
 from truepose.report.result import Result
 from truepose.report.study import Study
 from truepose.report.tables import Table
@@ -76,9 +77,38 @@ def correct(request: Request, machine: Machine) -> xr.Dataset:
     return found
 
 
+def strain(request: Request, machine: Machine) -> xr.Dataset:
+    """The internal forces over the file's workspace."""
+    with progress("internal forces") as report:
+        found = truepose.strain(machine, progress=report)
+    _refuse_left_out_of(request, machine, found)
+    return found
+
+
 def study_of(request: Request, machine: Machine) -> Study:
     """The machine with both results."""
     return Study(machine, evaluate(request, machine), correct(request, machine))
+
+
+def with_time(study: Study) -> Study:
+    """The study with the error over time, where the file has a temperature log.
+
+    At two poses: the one nearest the middle, and the one where the logged temperatures do most.
+    """
+    machine = study.machine
+    if machine.condition.temperature_log is None:
+        return study
+    middle = int(nearest_middle(study.poses)[0])
+    thermal = study.position_norm(study.values("error")[:, study.sources.index("thermal")])
+    chosen = list(dict.fromkeys([middle, where_highest(thermal)]))
+    return replace(study, over_time=truepose.over_time(machine, study.poses[chosen]))
+
+
+def with_strain(request: Request, study: Study) -> Study:
+    """The study with the internal forces, where the machine is over-constrained."""
+    if not study.machine.kernel.overconstrained:
+        return study
+    return replace(study, strain=strain(request, study.machine))
 
 
 def deliver(request: Request, result: Result, tables: Iterable[Table | None]) -> None:

@@ -49,7 +49,8 @@ def command(**options: Any) -> int:
     assert request.output is not None
     page = _work.report_page()
     machine = _work.read_machine(request, [".html"])
-    study = _work.study_of(request, machine)
+    study = _work.with_time(_work.study_of(request, machine))
+    study = _work.with_strain(request, study)
     text = request.machine_file.read_text(encoding="utf-8")
     page.write(study, request.output, text)
     answers = accuracy.answers(study)
@@ -58,6 +59,7 @@ def command(**options: Any) -> int:
         tables.highest_absolute(study),
         tables.highest_percent(study),
         tables.compensation(study),
+        *tables.strain(study),
         tables.answers(answers),
         tables.poses_left_out(study),
     ]

@@ -1,0 +1,43 @@
+"""`truepose strain`: internal forces of an over-constrained machine."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from truepose.cli._options import (
+    Request,
+    format_option,
+    machine_argument,
+    output_option,
+    set_option,
+    strict_option,
+    takes,
+)
+
+
+@click.command("strain")
+@takes(machine_argument, set_option, format_option, output_option, strict_option)
+def command(**options: Any) -> int:
+    """Find which errors force an over-constrained machine.
+
+    With more closures than freedoms not every error moves the platform: what does not fit is
+    taken up by the joints' clearances, or strains the parts. Shows the internal forces from each
+    source alone and from all together under load, with the clearances as dead zones.
+    """
+    from truepose.cli import _work
+    from truepose.report import tables
+    from truepose.report.result import Result
+    from truepose.report.study import Study
+
+    request = Request(**options)
+    machine = _work.read_machine(request)
+    found = _work.strain(request, machine)
+    study = Study(machine, found, strain=found)  # of its first result only the poses are read
+    _work.deliver(
+        request,
+        Result("strain", machine, found),
+        [*tables.strain(study), tables.poses_left_out(study)],
+    )
+    return 0

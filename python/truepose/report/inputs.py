@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
+from truepose.machine.parts_of_machine import BODIES
 from truepose.report.display import MICRO, MILLI, MISSING, nearest_middle, number, pose_text
 from truepose.report.result import in_file_units
 from truepose.report.tables import Table
 
 if TYPE_CHECKING:
-    from truepose.machine import Machine
+    from truepose.machine import Condition, Machine
     from truepose.sources._base import Deviation, Source
 
 KELVIN = 273.15
@@ -39,7 +40,7 @@ def machine(it: Machine) -> Table:
 
 
 def condition(of: Machine) -> Table:
-    """Temperatures, the force on the tool, the accuracy asked and what `--set` changed."""
+    """Temperatures, what acts on the tool, the accuracy asked and what `--set` changed."""
     it, asked = of.condition, of.accuracy
     rows = [
         ("reference temperature", f"{_celsius(it.reference_temperature)} °C"),
@@ -48,16 +49,42 @@ def condition(of: Machine) -> Table:
             (f"temperature of {part}", f"{_celsius(value)} °C")
             for part, value in it.part_temperatures.items()
         ),
+        *_log(it),
+        *(
+            (f"temperature gradient of {part}", _gradient(part, value))
+            for part, value in it.gradients.items()
+        ),
         ("force on the tool", _vector(it.force, "N")),
     ]
     if any(it.moment):
         rows.append(("moment on the tool", _vector(it.moment, "N m")))
+    if it.envelope is not None:
+        across = "" if it.envelope.normal is None else f" across {_vector(it.envelope.normal, '')}"
+        force = f"{it.envelope.force:.6g} N in any direction{across.rstrip()}"
+        rows.append(("further force on the tool", force))
+    if any(it.acceleration):
+        rows.append(("acceleration of the platform", _vector(it.acceleration, "m/s²")))
     if asked.target is not None:
         rows.append(("accuracy asked", f"{asked.target * MICRO:.6g} µm"))
     if asked.angle_target is not None:
         rows.append(("accuracy of angle asked", f"{asked.angle_target * MICRO:.6g} µrad"))
     rows += [(f"--set {key}", value) for key, value in of.settings.items()]
     return Table("condition", "Condition", ("", ""), tuple(rows), words=2)
+
+
+def _log(it: Condition) -> list[tuple[str, str]]:
+    """The temperature log, and the moment in it that a budget is for."""
+    log = it.temperature_log
+    if log is None:
+        return []
+    moment = "its last moment" if it.time is None else f"at {it.time:.10g} s"
+    return [("temperature log", f"{log.name or 'given by the call'}, {moment}")]
+
+
+def _gradient(part: str, value: tuple[float, float, float]) -> str:
+    if part in BODIES:
+        return _vector(value, "K/m")
+    return f"{value[0]:.6g} K/m along it".replace("-", "\N{MINUS SIGN}")
 
 
 def sources(it: Machine) -> Table:
@@ -88,6 +115,7 @@ def machine_data(it: Machine) -> dict[str, object]:
         "name": it.name,
         "file": it.file,
         "hash": it.file_hash,
+        "data_files": dict(it.data_files),
         "settings": dict(it.settings),
         "dof": list(it.dof),
         "commanded": list(it.commanded),

@@ -38,6 +38,7 @@ def render(study: Study, machine_text: str = "") -> str:
     results = [tables.ranking(study), tables.highest_absolute(study), tables.highest_percent(study)]
     if study.compensation is not None:
         results.append(tables.compensation(study))
+    results += tables.strain(study)
     left_out = tables.poses_left_out(study)
     if left_out is not None:
         results.append(left_out)

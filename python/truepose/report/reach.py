@@ -24,8 +24,9 @@ EXPLAINED = 2000
 class Reason:
     """One cause for leaving poses out: which part, in how many poses, at most by how much.
 
-    `amount` in m for a strut, m or rad for a travel, a ratio for a singularity. It is negative
-    where a strut would have to be shorter, or a joint coordinate is below its travel.
+    `amount` in m for a strut, m or rad for a travel, rad for a strut that leans at its base_joint
+    or platform_joint, a ratio for a singularity. It is negative where a strut would have to be
+    shorter, or a joint coordinate is below its travel.
     """
 
     what: str
@@ -42,6 +43,9 @@ class Reason:
         if self.what == "travel":
             side = "below" if self.amount < 0.0 else "above"
             return f"drive {self.name}: up to {by} {side} its travel"
+        if self.what in ("base_joint", "platform_joint"):
+            joint = self.what.replace("_", " ")
+            return f"strut {self.name}: leans up to {by} beyond the limit of its {joint}"
         side = "near" if self.amount < 0.0 else "far"
         return f"strut {self.name}: up to {by} too {side} to reach"
 
@@ -88,22 +92,21 @@ def reach(machine: Machine) -> Reach:
 
 def _reasons(machine: Machine, poses: NDArray[np.float64]) -> tuple[Reason, ...]:
     """Causes by part and side, the one that stops most poses first."""
-    found: dict[tuple[str, str, bool], list[float]] = {}
+    found: dict[tuple[str, str, str, bool], list[float]] = {}
     for pose in poses[:: max(1, -(-len(poses) // EXPLAINED))]:
         for cause in machine.kernel.explain(pose):
             amount = float(cause["amount"])
-            key = (str(cause["what"]), str(cause["name"]), amount < 0.0)
-            found.setdefault(key, []).append(amount)
-    angles = {drive.name for drive in machine.drives if drive.coordinate == "angle"}
+            what, name, unit = (str(cause[key]) for key in ("what", "name", "unit"))
+            found.setdefault((what, name, unit, amount < 0.0), []).append(amount)
     reasons = [
         Reason(
             what,
             name,
             len(amounts),
             min(amounts) if what == "singular" else max(amounts, key=abs),
-            {"singular": "1", "strut": "m"}.get(what, "rad" if name in angles else "m"),
+            unit,
         )
-        for (what, name, _), amounts in found.items()
+        for (what, name, unit, _), amounts in found.items()
     ]
     return tuple(sorted(reasons, key=lambda reason: -reason.count))
 

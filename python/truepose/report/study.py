@@ -24,12 +24,28 @@ class Study:
     """A machine, its error budget and, where it was asked for, its compensation.
 
     `budget` and `compensation` are the Datasets of `truepose.budget` and `truepose.compensate`
-    over the same poses. All values here are SI.
+    over the same poses, `over_time` that of `truepose.over_time`, where there is a temperature
+    log, `strain` that of `truepose.strain`, where the machine is over-constrained. All values here
+    are SI.
     """
 
     machine: Machine
     budget: xr.Dataset
     compensation: xr.Dataset | None = None
+    over_time: xr.Dataset | None = None
+    strain: xr.Dataset | None = None
+
+    @property
+    def strained(self) -> xr.Dataset:
+        """The internal forces, where the machine has any."""
+        assert self.strain is not None
+        return self.strain
+
+    @property
+    def time(self) -> xr.Dataset:
+        """The results over time, where there are any."""
+        assert self.over_time is not None
+        return self.over_time
 
     @cached_property
     def components(self) -> tuple[str, ...]:

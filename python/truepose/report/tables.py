@@ -130,6 +130,90 @@ def compensation(study: Study) -> Table:
     )
 
 
+def strain(study: Study) -> list[Table]:
+    """The tables of the internal forces; none where the machine has none."""
+    if study.strain is None:
+        return []
+    return [internal_forces(study), closure_forces(study)]
+
+
+def internal_forces(study: Study) -> Table:
+    """What each source's misfit makes of force inside the structure, and what clearances take."""
+    found = study.strained
+    order = np.argsort(-found["highest_force_rigid"].values, kind="stable")
+    commanded = study.machine.commanded
+    poses = np.stack([found[f"pose_{name}"].values for name in commanded], axis=-1)
+    closures, places = [], []
+    for source in order:
+        force = np.abs(found["force"].values[:, source])
+        if not force.any():
+            force = np.abs(found["force_rigid"].values[:, source])
+        pose, closure = divmod(where_highest(force.ravel()), force.shape[1])
+        closures.append(str(found["closure"].values[closure]))
+        places.append(pose_text(poses[pose], commanded))
+
+    def highest(name: str) -> Array:
+        return np.asarray(np.abs(found[name].values[:, order]).max(axis=(0, 2)))
+
+    columns = [
+        [str(name) for name in found["source"].values[order]],
+        [str(verdict) for verdict in found["verdict"].values[order]],
+        closures,
+        places,
+        column(highest("force")),
+        column(highest("force_rigid")),
+        column(found["remaining"].values[order] * 100, 1),
+        column(highest("absorbed") * MICRO),
+        column(highest("strain") * MICRO),
+    ]
+    return Table(
+        "internal_forces",
+        "Internal forces from each source",
+        (
+            "source",
+            "verdict",
+            "closure",
+            "at",
+            "highest force, N",
+            "without clearances, N",
+            "remains, %",
+            "absorbed, µm",
+            "strain, µm",
+        ),
+        tuple(zip(*columns, strict=True)),
+        words=4,
+        note="Each source alone and without load, where it loads a closure most. Fits: no force "
+        "even without clearances. Absorbed: the clearances take all of it; partly: some of it; "
+        "strains: next to nothing.",
+    )
+
+
+def closure_forces(study: Study) -> Table:
+    """What each closure carries with all sources at their shifts and all loads."""
+    found = study.strained
+    force = found["overall_force"].values
+    absorbed, strain = (
+        np.abs(found[f"overall_{name}"].values).max(axis=0) * MICRO
+        for name in ("absorbed", "strain")
+    )
+    return Table(
+        "closure_forces",
+        "Forces in the closures",
+        ("closure", "lowest, N", "highest, N", "absorbed, µm", "strain, µm"),
+        tuple(
+            zip(
+                [str(name) for name in found["closure"].values],
+                column(force.min(axis=0), decimals_for(force)),
+                column(force.max(axis=0), decimals_for(force)),
+                column(absorbed),
+                column(strain),
+                strict=True,
+            )
+        ),
+        note="Over all poses: all sources at their shifts, under all loads. Tension is positive.",
+    )
+
+
 def answers(found: Sequence[Answer]) -> Table:
     """What the machine can do at its worst pose against the accuracy asked."""
     rows = [

@@ -63,6 +63,19 @@ def require_writable(path: Path, endings: Collection[str], inputs: Collection[Pa
         )
 
 
+def require_new(path: Path) -> None:
+    """Refuse a path where something stands. Raises `RequestError` (code `output-exists`)."""
+    if path.exists() or path.is_symlink():
+        raise _refusal(
+            "output-exists",
+            "there is such a file already, and it is not touched",
+            path,
+            found=str(path),
+            expected="a name that is free",
+            hint="give another name: --output FILE",
+        )
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary file beside `path` that takes its place when the block ends well.

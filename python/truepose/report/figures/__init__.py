@@ -2,7 +2,8 @@
 
 A figure's module has `TITLE`, `caption(study)` and `figure(study)`. To add one: write the module
 and name it in `FIGURES`, where the order is that of the report. A figure that shows what
-compensation does sets `NEEDS_COMPENSATION = True` and is left out where there is none.
+compensation does sets `NEEDS_COMPENSATION = True` and is left out where there is none, one over
+time sets `NEEDS_TIME = True`, one of internal forces `NEEDS_STRAIN = True`.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import plotly.graph_objects as go
 
 from truepose.report.figures import (
     before_after,
+    error_over_time,
+    internal_forces,
     machine_drawing,
     overall_error,
     ranking,
@@ -29,6 +32,8 @@ FIGURES: tuple[ModuleType, ...] = (
     source_errors,
     overall_error,
     workspace_maps,
+    error_over_time,
+    internal_forces,
     before_after,
 )
 
@@ -47,6 +52,10 @@ def draw(study: Study) -> Iterator[Drawn]:
     """Every registered figure of a study, in the order of the report."""
     for module in FIGURES:
         if getattr(module, "NEEDS_COMPENSATION", False) and study.compensation is None:
+            continue
+        if getattr(module, "NEEDS_TIME", False) and study.over_time is None:
+            continue
+        if getattr(module, "NEEDS_STRAIN", False) and study.strain is None:
             continue
         yield Drawn(
             name=module.__name__.rpartition(".")[2],

@@ -18,12 +18,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from reference_kinematics import Reference, tangents
+
 Description = dict[str, Any]
 
 SPATIAL = ["x", "y", "z", "a", "b", "c"]
 POSITION = ("x", "y", "z")
 PER_METRE = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 PER_RADIAN = {"rad": 1.0, "deg": math.pi / 180.0}
+NEWTON_PER_METRE = {"N/um": 1e6, "N/mm": 1e3, "N/m": 1.0}
+# Fields of drives, struts and guides by what they measure. Directions are numbers without a unit.
+POINTS = ("origin", "base", "platform")
+DIRECTIONS = ("axis", "ring_axis", "normal", "base_axis", "platform_axis")
 MACHINES = Path(__file__).parent.parent / "machines"
 
 
@@ -62,6 +68,8 @@ def described(
             {"name": str(i), "drive": None, "length": None, **strut}
             for i, strut in enumerate(struts, start=1)
         ],
+        "guides": [],
+        "closure_compliance": None,
     }
     unknown = set(others) - set(description)
     if unknown:
@@ -103,47 +111,69 @@ def description_of(path: Path) -> Description:
     def lengths(value: Any) -> list[float]:
         return [float(component) * metre for component in value]
 
+    def rows(table: str) -> list[dict[str, Any]]:
+        every = file.get("each", {}).get(table, {})
+        return [every | row for row in file.get(table, [])]
+
     def home_value(name: str) -> float:
         grid = workspace["grid"].get(name, [0, 0, 1])
         value = workspace.get("home", {}).get(name, (grid[0] + grid[1]) / 2)
         return float(value) * (metre if name in POSITION else radian)
 
+    def geometry(entry: Mapping[str, Any]) -> Description:
+        points = {name: lengths(entry[name]) for name in POINTS if name in entry}
+        return points | {name: list(entry[name]) for name in DIRECTIONS if name in entry}
+
     def drive(entry: Mapping[str, Any]) -> Description:
-        unit = radian if entry["kind"] == "crank" else metre
-        found: Description = {
+        one = radian if entry["kind"] == "crank" else metre
+        return {
             "name": entry["name"],
             "kind": entry["kind"],
-            "travel": [float(end) * unit for end in entry["travel"]],
+            "travel": [float(end) * one for end in entry["travel"]],
             "working_mode": entry.get("working_mode"),
-            "offset": float(entry.get("offset", 0.0)) * unit,
+            "offset": float(entry.get("offset", 0.0)) * one,
             "scale": float(entry.get("scale", 1.0)),
+            **geometry(entry),
         }
-        for field in ("origin", "base"):
-            if field in entry:
-                found[field] = lengths(entry[field])
-        if "axis" in entry:
-            found["axis"] = [float(component) for component in entry["axis"]]
-        return found
 
     def strut(entry: Mapping[str, Any]) -> Description:
+        ring = {"ring_radius": entry["ring_radius"] * metre} if "ring_radius" in entry else {}
+        limits = {}
+        for end in ("base", "platform"):
+            joint = entry.get(f"{end}_joint", {})
+            if "angle_limit" in joint:
+                limits[f"{end}_axis"] = joint["axis"]
+                limits[f"{end}_angle_limit"] = joint["angle_limit"] * radian
         return {
             "name": entry["name"],
             "drive": entry.get("drive"),
-            "base": lengths(entry["base"]),
-            "platform": lengths(entry["platform"]),
             "length": float(entry["length"]) * metre if "length" in entry else None,
+            **geometry(entry),
+            **ring,
+            **limits,
         }
 
     named = [*machine["dof"], *workspace.get("home", {})]
-    return {
+    description: Description = {
         "dof": machine["dof"],
         "commanded": machine.get("commanded", machine["dof"]),
         "home": {name: home_value(name) for name in dict.fromkeys(named)},
         "tool": lengths(machine.get("tool", [0, 0, 0])),
         "characteristic_length": None,
-        "drives": [drive(entry) for entry in file["drive"]],
-        "struts": [strut(entry) for entry in file["strut"]],
+        "drives": [drive(entry) for entry in rows("drive")],
+        "struts": [strut(entry) for entry in rows("strut")],
+        "guides": [{**g, **geometry(g)} for g in rows("guide")],
+        "closure_compliance": None,
     }
+    if Reference(description).overconstrained:
+        description["closure_compliance"] = [compliance(entry) for entry in rows("strut")]
+    return description
+
+
+def compliance(strut: Mapping[str, Any]) -> float:
+    """m/N of a strut whose file gives an outright stiffness, as in "30 N/um"."""
+    value, name = strut["stiffness"].split()
+    return 1.0 / (float(value) * NEWTON_PER_METRE[name])
 
 
 def grid_of(path: Path, commanded: Sequence[str]) -> NDArray[np.float64]:
@@ -180,6 +210,15 @@ def moved(
         on_carriage = strut["drive"] and with_drive[strut["drive"]]["kind"] != "telescopic"
         base = rotation @ np.array(strut["base"])
         strut["base"] = (base if on_carriage else base + shift).tolist()
+        if "base_axis" in strut:
+            strut["base_axis"] = (rotation @ np.array(strut["base_axis"])).tolist()
+    for guide in result["guides"]:
+        if guide["kind"] != "universal":
+            origin = rotation @ np.array(guide.get("origin", [0, 0, 0])) + shift
+            guide["origin"] = origin.tolist()
+        for field in ("normal", "base_axis"):
+            if field in guide:
+                guide[field] = (rotation @ np.array(guide[field])).tolist()
     return result
 
 
@@ -196,36 +235,39 @@ def scaled(description: Description, factor: float) -> Description:
         for field in ("origin", "travel", "offset"):
             if field in drive and (field == "origin" or length_coordinate):
                 drive[field] = (factor * np.array(drive[field])).tolist()
-    for strut in result["struts"]:
-        for field in ("base", "platform", "length"):
-            if strut[field] is not None:
-                strut[field] = (factor * np.array(strut[field])).tolist()
+    for limb in (*result["struts"], *result["guides"]):
+        for field in (*POINTS, "length", "ring_radius"):
+            if limb.get(field) is not None:
+                limb[field] = (factor * np.array(limb[field])).tolist()
     return result
 
 
-def deviated(
-    description: Description,
-    deviation: Mapping[str, float],
-    tangents: Mapping[str, NDArray[np.float64]] | None = None,
-) -> Description:
+def deviated(description: Description, deviation: Mapping[str, float]) -> Description:
     """The machine whose parameters are moved by `deviation`, by the kernel's parameter names.
 
-    `drive.D.axis.u` and `.v` move the unit axis along `tangents[D]` (2, 3), unit vectors.
+    A direction's `u` and `v` move its unit vector along its tangents.
     """
     result = copy.deepcopy(description)
-    tables = {
-        "strut": {strut["name"]: strut for strut in result["struts"]},
-        "drive": {drive["name"]: drive for drive in result["drives"]},
+    nominal = {
+        (table, row["name"]): row
+        for table in ("strut", "drive", "guide")
+        for row in description[f"{table}s"]
+    }
+    rows = {
+        (table, row["name"]): row
+        for table in ("strut", "drive", "guide")
+        for row in result[f"{table}s"]
     }
     for name, change in deviation.items():
         table, *path = name.split(".")
-        row = result if table == "tool" else tables[table][path.pop(0)]
-        field, *part = path if table != "tool" else ["tool", *path]
-        if field == "axis":
-            nominal = next(d["axis"] for d in description["drives"] if d["name"] == row["name"])
-            tangent = (tangents or {})[row["name"]]["uv".index(part[0])]
-            tilt = change * np.linalg.norm(nominal) * tangent
-            row["axis"] = (np.array(row["axis"], float) + tilt).tolist()
+        key = (table, path.pop(0)) if table != "tool" else None
+        row = result if key is None else rows[key]
+        field, *part = path if key is not None else ["tool", *path]
+        if key is not None and field in DIRECTIONS:
+            direction = np.array(nominal[key][field], float)
+            along = tangents(direction)["uv".index(part[0])]
+            tilted = np.array(row[field]) + change * np.linalg.norm(direction) * along
+            row[field] = tilted.tolist()
         elif part:
             value = list(row.get(field, [0.0, 0.0, 0.0]))
             value["xyz".index(part[0])] += change
@@ -273,5 +315,6 @@ def file_text(description: Description, *, strut: str = "", more: str = "") -> s
         head
         + rows("drive", description["drives"], "")
         + rows("strut", description["struts"], strut)
+        + rows("guide", description["guides"], "")
         + [more, ""]
     )

@@ -81,6 +81,20 @@ class MachineUnderTest:
         return np.arange(len(self.kernel.parameters))
 
     @cached_property
+    def soft_columns(self) -> NDArray[np.intp]:
+        """Parameters that give way so that the platform does in all its freedoms.
+
+        The struts' lengths, and of each guide what it is held by on the frame.
+        """
+        names = self.kernel.parameters
+        held = [
+            i
+            for i, name in enumerate(names)
+            if name.startswith("guide.") and name.split(".")[-2] in ("origin", "base_axis")
+        ]
+        return np.array([*self.kernel.length_parameters, *held], dtype=np.intp)
+
+    @cached_property
     def unit_of_component(self) -> NDArray[np.float64]:
         """(n_component,) the unit of a component: the characteristic length, or 1 rad."""
         length = self.kernel.characteristic_length

@@ -83,6 +83,7 @@ def _machine(name: str, dof: str, kernel: Any, drives: list[Any], **others: Any)
         origin="",
         file=f"{name}.toml",
         file_hash="0123456789abcdef" * 4,
+        data_files={"log.csv": "fedcba9876543210" * 4},
         settings={},
         replaced={},
         dof=tuple(dof),
@@ -105,6 +106,11 @@ def _machine(name: str, dof: str, kernel: Any, drives: list[Any], **others: Any)
             part_temperatures={"strut.1": 303.15},
             force=(1200.0, -1500.0, 0.0),
             moment=(0.0, 0.0, 0.0),
+            temperature_log=SimpleNamespace(name="log.csv", names=lambda part: part != "tool"),
+            time=None,
+            gradients={"strut.1": (4.0, 0.0, 0.0), "frame": (0.0, 0.0, -5.0)},
+            envelope=SimpleNamespace(force=300.0, normal=(0.0, 0.0, 1.0)),
+            acceleration=(0.0, 2.0, 0.0),
         ),
         accuracy=SimpleNamespace(target=5e-4, angle_target=None),
         sources=tuple(
@@ -231,7 +237,56 @@ def _study(machine: Any, poses: Array) -> Study:
     }
     kept = {name: coords[name] for name in coords if name not in ("source", "quantity", "joint")}
     kept["joint_name"] = ("joint", list(machine.joints))
-    return Study(machine, budget, _dataset(remaining, kept, attrs))
+    return Study(
+        machine,
+        budget,
+        _dataset(remaining, kept, attrs),
+        _over_time(machine, poses),
+        _strain(coords, attrs),
+    )
+
+
+def _strain(coords: dict[str, Any], attrs: Any) -> xr.Dataset:
+    """Half of every force is left by the clearances: of the first source, nothing."""
+    names = ("source", "quantity", "component", "component_units", "joint")
+    kept = {name: each for name, each in coords.items() if name not in names}
+    sources, closures = list(SOURCES[:2]), len(coords["closure"])
+    phase = np.arange(len(coords["pose"]))[:, None, None] + np.arange(closures)
+    rigid = np.array([800.0, 300.0])[:, None] * np.cos(0.3 * phase)
+    force = np.array([0.5, 0.0])[:, None] * rigid
+    each, every = ("pose", "source", "closure"), ("pose", "closure")
+    overall = force[:, 0] + 50.0
+    data: dict[str, tuple[tuple[str, ...], Any, str]] = {
+        "force": (each, force, "N"),
+        "force_rigid": (each, rigid, "N"),
+        "absorbed": (each, (rigid - force) / 5e7, "m"),
+        "strain": (each, force / 5e7, "m"),
+        "overall_force": (every, overall, "N"),
+        "overall_absorbed": (every, overall / 5e7, "m"),
+        "overall_strain": (every, overall / 5e7, "m"),
+        "highest_force": (("source",), np.abs(force).max(axis=(0, 2)), "N"),
+        "highest_force_rigid": (("source",), np.abs(rigid).max(axis=(0, 2)), "N"),
+        "remaining": (("source",), np.array([0.5, 0.0]), "1"),
+        "verdict": (("source",), np.array(["partly", "absorbed"]), "1"),
+    }
+    return _dataset(data, kept | {"source": sources}, attrs)
+
+
+def _over_time(machine: Any, poses: Array) -> xr.Dataset:
+    """A first-order heat-up of 1 h, at the first and the last pose."""
+    times = np.arange(0.0, 3601.0, 10.0)
+    share = 1.0 - np.exp(-times / 900.0)
+    parts = ["strut.1", "strut.2", "frame", "tool"]
+    size = 1e-5 * np.arange(1, 2 * len(machine.components) + 1).reshape(2, -1)
+    rises = np.array([15.0, 11.0, 11.0, 0.0])
+    data = {
+        "error": (("time", "pose", "component"), share[:, None, None] * size, "m"),
+        "temperature": (("time", "part"), 293.15 + share[:, None] * rises, "K"),
+    }
+    coords: dict[str, Any] = {"time": times, "part": parts, "component": list(machine.components)}
+    for index, name in enumerate(machine.commanded):
+        coords[f"pose_{name}"] = ("pose", poses[[0, -1], index])
+    return _dataset(data, coords, {})
 
 
 def _dataset(

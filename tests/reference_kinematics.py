@@ -1,9 +1,10 @@
 """A machine's kinematics in plain NumPy and SciPy: the second road of the tests.
 
 Nothing here is shared with the kernel. It takes the same description (tests/build_machine.py),
-writes the strut's closure by its formula, finds the inverse in closed form, or by MINPACK where the
-platform has parasitic freedoms, and the forward solution by MINPACK with a numerical Jacobian. Slow
-and plain. All in SI and the base frame, R = Rz(c) Ry(b) Rx(a).
+writes the closures of struts and guides by their formulas, finds the inverse in closed form, or by
+MINPACK where the platform has parasitic freedoms, and the forward solution by MINPACK with a
+numerical Jacobian; where there are more closures than freedoms, the pose of least elastic energy by
+Gauss and Newton. Slow and plain. All in SI and the base frame, R = Rz(c) Ry(b) Rx(a).
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ POSITION = ("x", "y", "z")
 ANGLES = ("a", "b", "c")
 # Far below every tolerance asked of the kernel, well above what rounding leaves of a metre.
 CLOSED = 1e-11
+# Of a central difference of closures, m or rad: cut-off and rounding both leave about 1e-11.
+STEP = 1e-5
 
 
 def rotation_of(angles: ArrayLike) -> Vector:
@@ -98,8 +101,26 @@ def vector_of(rotation: Vector) -> Vector:
     return twice_sine / 2 * (angle / sine if sine > 0 else 1.0)
 
 
+def unit(direction: ArrayLike) -> Vector:
+    """(3,) of length 1."""
+    vector = np.asarray(direction, float)
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def tangents(direction: ArrayLike) -> Vector:
+    """(2, 3) unit vectors across a direction, by the rule that the kernel documents.
+
+    The first is the base axis that the direction is least along, made perpendicular to it; the
+    second completes the right-handed frame.
+    """
+    axis = unit(direction)
+    first = np.eye(3)[np.abs(axis).argmin()]
+    first = unit(first - (first @ axis) * axis)
+    return np.array([first, np.cross(axis, first)])
+
+
 class Reference:
-    """The machine of a description, with its struts' closures written out."""
+    """The machine of a description, with the closures of its struts and guides written out."""
 
     def __init__(self, description: Mapping[str, Any]) -> None:
         self.dof: list[str] = list(description["dof"])
@@ -109,12 +130,34 @@ class Reference:
         self.tool = np.array(description["tool"], float)
         self.drives: list[dict[str, Any]] = list(description["drives"])
         self.struts: list[dict[str, Any]] = list(description["struts"])
+        self.guides: list[dict[str, Any]] = list(description.get("guides", []))
         self.index = {drive["name"]: i for i, drive in enumerate(self.drives)}
+        self.characteristic_length = float(
+            description["characteristic_length"] or self._geometric_length()
+        )
+        compliance = description.get("closure_compliance")
+        self.stiffness = None if compliance is None else 1.0 / np.array(compliance, float)
 
     def placement(self, names: Sequence[str], values: ArrayLike) -> tuple[Vector, Vector]:
         """Tool point (3,) and rotation (3, 3); freedoms not named in `names` are at home."""
         pose = self.home | dict(zip(names, np.asarray(values, float), strict=True))
         return np.array([pose[n] for n in POSITION]), rotation_of([pose[n] for n in ANGLES])
+
+    def _geometric_length(self) -> float:
+        """Root mean square of the platform joints' distances from the tool point, m.
+
+        Where they all lie in the tool point: the mean length of the struts, at home.
+        """
+        arms = np.array([strut["platform"] for strut in self.struts], float) - self.tool
+        spread = math.sqrt((arms**2).sum(1).mean())
+        point, rotation = self.placement([], [])
+        lengths = [
+            np.linalg.norm(self.platform_point(s["platform"], point, rotation) - s["base"])
+            if s["length"] is None
+            else s["length"]
+            for s in self.struts
+        ]
+        return float(spread if spread > 0 else np.mean(lengths))
 
     def base_joint(self, strut: Mapping[str, Any], joints: Vector) -> Vector:
         """Base-side joint centre (3,) of a strut, m."""
@@ -133,8 +176,20 @@ class Reference:
         return np.asarray(origin + turned_about(axis, moved) @ base)
 
     def platform_joint(self, strut: Mapping[str, Any], point: Vector, rotation: Vector) -> Vector:
-        """Platform-side joint centre (3,) of a strut, base frame, m."""
-        return np.asarray(point + rotation @ (np.array(strut["platform"], float) - self.tool))
+        """Platform-side joint centre (3,) of a strut, base frame, m.
+
+        On a ring it stands where the ring comes nearest to the base joint.
+        """
+        centre = self.platform_point(strut["platform"], point, rotation)
+        if not strut.get("ring_radius"):
+            return centre
+        axis = rotation @ unit(strut["ring_axis"])
+        away = np.array(strut["base"], float) - centre
+        return np.asarray(centre + strut["ring_radius"] * unit(away - (away @ axis) * axis))
+
+    def platform_point(self, own: ArrayLike, point: Vector, rotation: Vector) -> Vector:
+        """A point of the platform's axes in the base frame, m."""
+        return np.asarray(point + rotation @ (np.asarray(own, float) - self.tool))
 
     def length(self, strut: Mapping[str, Any], joints: Vector) -> float:
         """The length that a strut closes at, m."""
@@ -145,16 +200,55 @@ class Reference:
         return float(drive.get("scale", 1.0) * coordinate + drive.get("offset", 0.0))
 
     def closures(self, joints: Vector, point: Vector, rotation: Vector) -> Vector:
-        """(n_strut,) distance between each strut's joint centres less its length, m."""
-        return np.array(
-            [
-                np.linalg.norm(
-                    self.platform_joint(strut, point, rotation) - self.base_joint(strut, joints)
-                )
-                - self.length(strut, joints)
-                for strut in self.struts
-            ]
-        )
+        """(n_closure,) residuals, m: of struts distance less length, then those of guides."""
+        struts = [
+            np.linalg.norm(
+                self.platform_joint(strut, point, rotation) - self.base_joint(strut, joints)
+            )
+            - self.length(strut, joints)
+            for strut in self.struts
+        ]
+        return np.concatenate([struts, *(self.guided(g, point, rotation) for g in self.guides)])
+
+    def guided(self, guide: Mapping[str, Any], point: Vector, rotation: Vector) -> Vector:
+        """Residuals (1,) or (2,) of a guide, m."""
+        if guide["kind"] == "universal":
+            across = unit(guide["base_axis"]) @ rotation @ unit(guide["platform_axis"])
+            return np.array([self.characteristic_length * across])
+        origin = np.array(guide.get("origin", [0.0, 0.0, 0.0]), float)
+        own = self.platform_point(guide.get("platform", [0.0, 0.0, 0.0]), point, rotation)
+        if guide["kind"] == "plane":
+            return np.array([unit(guide["normal"]) @ (own - origin)])
+        return np.asarray((rotation @ tangents(guide["axis"]).T).T @ (origin - own))
+
+    def rows(self, joints: Vector, point: Vector, rotation: Vector) -> Vector:
+        """(n_closure, 6) derivatives of the closures to the platform's twist at the tool point.
+
+        They are also the wrenches by which a unit of each closure's tension holds the platform.
+        """
+        rows = []
+        for strut in self.struts:
+            platform = self.platform_joint(strut, point, rotation)
+            along = unit(platform - self.base_joint(strut, joints))
+            rows.append([*along, *np.cross(platform - point, along)])
+        for guide in self.guides:
+            rows += self._rows_of_guide(guide, point, rotation)
+        return np.array(rows)
+
+    def _rows_of_guide(
+        self, guide: Mapping[str, Any], point: Vector, rotation: Vector
+    ) -> list[list[float]]:
+        if guide["kind"] == "universal":
+            cross = np.cross(rotation @ unit(guide["platform_axis"]), unit(guide["base_axis"]))
+            return [[0.0, 0.0, 0.0, *(self.characteristic_length * cross)]]
+        if guide["kind"] == "plane":
+            normal = unit(guide["normal"])
+            arm = self.platform_point(guide["platform"], point, rotation) - point
+            return [[*normal, *np.cross(arm, normal)]]
+        # The platform's line slides on the frame's point: that is where the force acts.
+        arm = np.array(guide.get("origin", [0.0, 0.0, 0.0]), float) - point
+        across = (rotation @ tangents(guide["axis"]).T).T
+        return [[*-one, *-np.cross(arm, one)] for one in across]
 
     def roots(self, drive: Mapping[str, Any], point: Vector, rotation: Vector) -> list[float]:
         """Joint coordinates [in working mode "-", in "+"] that close a drive's first strut.
@@ -220,17 +314,51 @@ class Reference:
             whole[moves] = small
             return point + whole[:3], rotation_by_vector(whole[3:]) @ rotation
 
-        solved = self._solved(
-            lambda s: self.closures(coordinates, *placed(s)), np.zeros(len(moves))
-        )
-        return placed(solved)
+        def closures(small: Vector) -> Vector:
+            return self.closures(coordinates, *placed(small))
+
+        if self.overconstrained:
+            return placed(self._relaxed(closures, np.zeros(len(moves))))
+        return placed(self._solved(closures, np.zeros(len(moves))))
+
+    @property
+    def overconstrained(self) -> bool:
+        """Whether there are more closures than freedoms."""
+        per_guide = {"line": 2}
+        count = len(self.struts) + sum(per_guide.get(g["kind"], 1) for g in self.guides)
+        return count > len(self.dof)
 
     def _with_parasitic(self, pose: ArrayLike, parasitic: Vector) -> tuple[Vector, Vector]:
         names = [*self.commanded, *self.parasitic]
         return self.placement(names, np.concatenate([np.asarray(pose, float), parasitic]))
 
-    @staticmethod
-    def _solved(closures: Any, start: Vector) -> Vector:
+    def _relaxed(self, closures: Any, start: Vector) -> Vector:
+        """The unknowns at which the closures' elastic energy, stiffness times square, is least."""
+        assert self.stiffness is not None
+        weight = np.sqrt(self.stiffness / self.stiffness.max())
+        at = start
+        for _ in range(100):
+            sides = [
+                [closures(at + sign * STEP * one) for sign in (1, -1)] for one in np.eye(len(at))
+            ]
+            jacobian = np.array([(after - before) / (2 * STEP) for after, before in sides]).T
+            step, *_ = np.linalg.lstsq(
+                weight[:, None] * jacobian, -weight * closures(at), rcond=None
+            )
+            at = at + step
+            if np.abs(step).max() < 1e-14:
+                return np.asarray(at)
+        if np.abs(step).max() > CLOSED:
+            raise ValueError("the reference found no pose of least energy")
+        return np.asarray(at)
+
+    def _solved(self, closures: Any, start: Vector) -> Vector:
+        """The root near `start`; with more closures than unknowns they must agree."""
+        if self.overconstrained:
+            solved = self._relaxed(closures, start)
+            if np.abs(closures(solved)).max() > CLOSED:
+                raise ValueError("the reference found no root")
+            return solved
         solved, found, _, message = fsolve(closures, start, xtol=1e-14, full_output=True)
         # MINPACK calls "no further progress" a failure even where it stands on the root.
         if np.abs(found["fvec"]).max() > CLOSED:

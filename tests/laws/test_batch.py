@@ -27,8 +27,8 @@ def everything(machine: MachineUnderTest, poses: NDArray) -> Results:
     start = kernel.pose_of(placements)
     random = np.random.default_rng(machine.seed + 9)
     values = 1e-3 * machine.unit_of_parameter * random.uniform(-1, 1, (1, len(kernel.parameters)))
-    columns, lengths = machine.all_columns, np.asarray(kernel.length_parameters)
-    soft = np.full((1, len(lengths)), 1e-8)
+    columns, flexible = machine.all_columns, machine.soft_columns
+    soft = np.full((1, len(flexible)), 1e-8)
     wrench = np.array([[100.0, -50.0, 30.0, 4.0, 5.0, -6.0]])
     with_status = {
         "inverse": kernel.inverse(poses, status=True),
@@ -42,8 +42,8 @@ def everything(machine: MachineUnderTest, poses: NDArray) -> Results:
         "conditioning": kernel.conditioning(poses, status=True),
         "forces": kernel.forces(poses, wrench[0], status=True),
         "loads": kernel.loads_at(joints, placements, wrench, columns),
-        "compliance": kernel.compliance_at(joints, placements, lengths, soft),
-        "stiffness": kernel.stiffness_at(joints, placements, lengths, soft),
+        "compliance": kernel.compliance_at(joints, placements, flexible, soft),
+        "stiffness": kernel.stiffness_at(joints, placements, flexible, soft),
     }
     results: Results = {
         "joints": joints,

@@ -28,7 +28,7 @@ def elsewhere(
     description = moved(machine.description, rotation, shift)
     point, home = machine.reference.placement([], [])
     # A point platform is not turned: nothing shows its orientation.
-    names = "xyz" if planar else "xyzabc"
+    names = "xyzabc" if "c" in machine.kernel.dof and not planar else "xyz"
     values = np.r_[rotation @ point + shift, angles_of(rotation @ home)]
     description["home"] = dict(zip(names, values, strict=False))
     return _kernel.Machine(description), rotation, shift
@@ -40,7 +40,7 @@ def test_a_rigid_move_of_the_base_only_moves_the_result(
 ) -> None:
     kernel, (joints, placements) = machine.kernel, machine.placed
     other, rotation, shift = elsewhere(machine, 20 + seed)
-    turned = machine.kernel.dof != ("x", "y")
+    turned = "c" in machine.kernel.dof
 
     points = placements[:, :3] @ rotation.T + shift
     angles = [angles_of(rotation @ rotation_of_quaternion(p[3:])) for p in placements]
@@ -63,7 +63,7 @@ def test_a_rigid_move_of_the_base_only_moves_the_result(
     columns = np.asarray(kernel.length_parameters)
     before = displaced(kernel, joints, placements, columns)
     after = displaced(other, joints, found_placements, columns)
-    assert np.abs(after - before @ np.kron(np.eye(2), rotation).T).max() < 1e-11
+    assert np.abs(after - before @ np.kron(np.eye(2), rotation).T).max() < 1e-10
     assert np.abs(other.conditioning(poses) - kernel.conditioning(machine.poses)).max() < 1e-9
 
 

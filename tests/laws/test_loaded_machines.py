@@ -30,7 +30,8 @@ def test_almost_every_pose_of_the_workspace_is_usable(shipped: MachineUnderTest)
 def test_a_shipped_file_is_ready_for_a_report(shipped: MachineUnderTest) -> None:
     loaded = truepose.load(shipped.path)
     assert len(loaded.origin) > 200  # where its numbers come from, a paragraph
+    assert 0 < len(loaded.description) <= 88  # one line of `truepose init --list`
     assert loaded.accuracy.target is not None
     assert {source.name for source in loaded.sources} >= {"tolerance", "thermal", "elastic"}
-    assert loaded.axial_stiffness_known.all()
+    assert loaded.stiffness_known.all()
     assert all(strut.expansion is not None for strut in loaded.struts)

@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 import truepose
 from build_machine import MACHINES
 from machine_under_test import OK, MachineUnderTest
-from reference_kinematics import rotation_of_quaternion
+from reference_kinematics import rotation_of_quaternion, vector_of
 from truepose import _kernel
 
-OUT_OF_TRAVEL, UNREACHABLE, SINGULAR = (
-    _kernel.STATUS.index(name) for name in ("out_of_travel", "unreachable", "singular")
+OUT_OF_TRAVEL, UNREACHABLE, SINGULAR, NOT_CONVERGED, JOINT_LIMIT = (
+    _kernel.STATUS.index(name)
+    for name in ("out_of_travel", "unreachable", "singular", "not_converged", "joint_limit")
 )
 CLOSED = 1e-9
+# Parasitic freedoms are found by iteration from home: so far from its attitude at least.
+CERTAIN = np.radians(30)
 
 
 def test_statuses_have_these_names() -> None:
@@ -28,6 +31,7 @@ def test_statuses_have_these_names() -> None:
         "singular",
         "not_converged",
         "branch_lost",
+        "joint_limit",
     )
 
 
@@ -47,20 +51,64 @@ def test_out_of_travel_still_has_its_joints(machine: MachineUnderTest) -> None:
     assert (status[joints[:, -1] > middle] == OK).all()
 
 
+def leaning(machine: MachineUnderTest, strut: int, end: str, axis: NDArray) -> NDArray[np.float64]:
+    """(37,) rad between a direction at a strut's joint and the strut, on the reference's road."""
+    reference = machine.reference
+    row = reference.struts[strut]
+    angles = []
+    for joints, placement in zip(*machine.placed, strict=True):
+        rotation = rotation_of_quaternion(placement[3:])
+        base = reference.base_joint(row, joints)
+        along = reference.platform_joint(row, placement[:3], rotation) - base
+        if end == "platform":
+            carried = rotation @ axis
+        else:
+            # The axes of a carriage, a crank or the frame: where two points of it are.
+            ends = [reference.base_joint({**row, "base": at}, joints) for at in (axis, 0 * axis)]
+            carried = ends[0] - ends[1]
+        angles.append(np.arccos(carried @ along / np.linalg.norm(carried) / np.linalg.norm(along)))
+    return np.array(angles)
+
+
+@pytest.mark.parametrize("end", ["base", "platform"])
+def test_a_strut_that_leans_too_far_is_told(machine: MachineUnderTest, end: str) -> None:
+    random = np.random.default_rng(machine.seed + 12)
+    number = int(random.integers(len(machine.description["struts"])))
+    axis = random.normal(size=3)
+    angles = leaning(machine, number, end, axis)
+    limit = float(np.median(angles)) + 1e-9
+    limited = copy.deepcopy(machine.description)
+    limited["struts"][number] |= {f"{end}_axis": axis.tolist(), f"{end}_angle_limit": limit}
+    kernel = _kernel.Machine(limited)
+    joints, status = kernel.inverse(machine.poses, status=True)
+    assert (status == np.where(angles > limit, JOINT_LIMIT, OK)).all()
+    assert (angles > limit).any()
+    # Such a pose still has its joints.
+    assert np.array_equal(joints, machine.kernel.inverse(machine.poses))
+
+
 def test_far_away_is_not_reached(machine: MachineUnderTest) -> None:
+    commanded = machine.kernel.commanded
     away = machine.poses.copy()
-    # Across every guideway: along one, a carriage would follow.
-    away[:, [machine.kernel.commanded.index(name) for name in "xy"]] += 50.0
+    # Across every guideway, for along one a carriage would follow; up where nothing goes across.
+    across = [name for name in "xy" if name in commanded] or ["z"]
+    away[:, [commanded.index(name) for name in across]] += 50.0
     joints, status = machine.kernel.inverse(away, status=True)
     telescopic = {drive["kind"] for drive in machine.description["drives"]} == {"telescopic"}
-    assert (status == (OUT_OF_TRAVEL if telescopic else UNREACHABLE)).all()
-    if telescopic:
+    follows = telescopic or across == ["z"]
+    tilts = any(guide["kind"] == "line" for guide in machine.description["guides"])
+    if tilts:
+        # The tube would have to lie level: the solution, if there is one, is far from home.
+        assert np.isin(status, [OUT_OF_TRAVEL, UNREACHABLE, NOT_CONVERGED]).all()
+    else:
+        assert (status == (OUT_OF_TRAVEL if follows else UNREACHABLE)).all()
+    if follows and not tilts:
         expected = [machine.reference.inverse(pose)[0] for pose in away]
         assert np.abs(joints - expected).max() < 1e-9
     with pytest.raises(truepose.errors.PoseError) as caught:
         machine.kernel.inverse(away[:5])
     assert (caught.value.count, caught.value.index) == (5, 0)
-    assert caught.value.status == ("out_of_travel" if telescopic else "unreachable")
+    assert caught.value.status == _kernel.STATUS[status[0]]
 
 
 def test_the_first_pose_that_fails_is_told(machine: MachineUnderTest) -> None:
@@ -181,10 +229,14 @@ def test_where_the_reference_finds_no_inverse_the_kernel_says_unreachable(
 ) -> None:
     poses = machine.wild_poses
     _, status = machine.kernel.inverse(poses, status=True)
+    home = [machine.reference.home[name] for name in machine.kernel.commanded]
+    _, _, attitude = machine.reference.inverse(home)
     for pose, code in zip(poses, status, strict=True):
         try:
-            machine.reference.inverse(pose)
+            _, _, rotation = machine.reference.inverse(pose)
         except ValueError:
             assert code not in (OK, OUT_OF_TRAVEL)
         else:
-            assert code in (OK, OUT_OF_TRAVEL)
+            tilt = np.linalg.norm(vector_of(rotation @ attitude.T))
+            direct = not machine.reference.parasitic
+            assert code in (OK, OUT_OF_TRAVEL) or (tilt > CERTAIN and not direct)

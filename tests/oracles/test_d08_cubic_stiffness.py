@@ -33,6 +33,10 @@ def one(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[truepose.Machin
     return truepose.load(path), data
 
 
+def test_there_are_seven() -> None:
+    assert "".join(CASES) == "abcdefg"
+
+
 def test_stiffness(one: tuple[truepose.Machine, Any]) -> None:
     machine, data = one
     (pose,) = machine.poses()

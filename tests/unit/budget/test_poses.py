@@ -12,6 +12,7 @@ import truepose as tp
 from build_machine import MACHINES
 from machine_texts import PLANAR, edited, load_text
 from made_source import MadeSource, with_sources
+from truepose.budget.poses import Travel, Walk
 from truepose.errors import RequestError
 from truepose.sources import Block, Deviation
 
@@ -154,3 +155,37 @@ def test_the_package_answers_the_call_however_it_was_imported() -> None:
     machine = tp.load(MACHINES / "planar_two_slider.toml")
     assert truepose.budget(machine).sizes["pose"] == 25
     assert callable(truepose.budget)
+
+
+def test_the_direction_in_which_a_joint_last_moved(machine: tp.Machine) -> None:
+    nan = np.nan
+    path = [[0.1, 0.5], [0.1, 0.4], [0.2, 0.4], [nan, nan], [0.1, 0.4], [0.1 + 1e-15, 0.5]]
+    expected = [[0, 0], [0, -1], [1, -1], [1, -1], [-1, -1], [-1, 1]]
+    assert Travel(machine).into(np.array(path)).tolist() == expected
+    # Wherever a block ends.
+    for cut in range(1, len(path)):
+        travel = Travel(machine)
+        parts = [travel.into(np.array(part)) for part in (path[:cut], path[cut:])]
+        assert np.concatenate(parts).tolist() == expected
+
+
+def test_travel_and_times_are_those_of_the_poses_that_are_left(machine: tp.Machine) -> None:
+    poses = np.array([GOOD, HIGH, [0.3, 0.25], WIDE, GOOD])
+    times = np.arange(5.0)
+    (block,) = Walk(machine, poses, machine.condition, path=True, times=times)
+    assert block.indices.tolist() == [0, 2, 4]
+    assert block.travel is not None
+    assert block.times is not None
+    assert block.times.tolist() == [0.0, 2.0, 4.0]
+    assert block.travel.tolist() == [[0, 0], [-1, -1], [-1, -1]], "the way down from HIGH counts"
+    (plain,) = Walk(machine, poses, machine.condition)
+    assert plain.travel is None
+    assert plain.times is None
+
+
+def test_a_condition_of_parts_that_are_not_there_is_refused(machine: tp.Machine) -> None:
+    condition = machine.condition.replace(temperature={"strut.7": 300.0})
+    for run in (tp.budget, tp.compensate):
+        with pytest.raises(RequestError) as caught:
+            run(machine, condition=condition)  # type: ignore[operator]
+        assert [problem.code for problem in caught.value.problems] == ["unknown-part"]

@@ -6,13 +6,17 @@ import re
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 
 import truepose as tp
 from build_machine import MACHINES
 from truepose.budget import SCHEMA as BUDGET
+from truepose.budget.over_time import SCHEMA as OVER_TIME
+from truepose.budget.strain import SCHEMA as STRAIN
 from truepose.compensation import SCHEMA as COMPENSATION
+from truepose.machine.temperature_log import TemperatureLog
 
 PAGE = (Path(__file__).parents[3] / "docs" / "results.md").read_text(encoding="utf-8")
 ROW = re.compile(r"^\| (?P<name>[^|]+) \| (?P<dims>[^|]+) \| (?P<units>[^|]+) \| (?P<text>.+) \|$")
@@ -31,21 +35,44 @@ def section(title: str) -> dict[str, tuple[str, str]]:
 
 @cache
 def datasets(name: str) -> dict[str, xr.Dataset]:
-    """Both results of a machine whose platform turns and one whose platform does not."""
+    """All results of a machine whose platform turns and one whose platform does not."""
     machine = tp.load(MACHINES / f"{name}.toml")
     poses = machine.poses()[:3]
-    return {"Budget": tp.budget(machine, poses), "Compensation": tp.compensate(machine, poses)}
+    log = TemperatureLog(np.array([0.0, 60.0]), {"default": np.array([293.15, 303.15])})
+    warm = machine.condition.replace(temperature_log=log)
+    found = {
+        "Budget": tp.budget(machine, poses),
+        "Compensation": tp.compensate(machine, poses),
+        "Over time": tp.over_time(machine, poses, warm),
+    }
+    if machine.kernel.overconstrained:
+        found["Internal forces"] = tp.strain(machine, poses)
+    return found
 
 
-@pytest.mark.parametrize(("title", "schema"), [("Budget", BUDGET), ("Compensation", COMPENSATION)])
+SCHEMAS = {
+    "Budget": BUDGET,
+    "Compensation": COMPENSATION,
+    "Over time": OVER_TIME,
+    "Internal forces": STRAIN,
+}
+MACHINES_OF = {"Internal forces": ["overconstrained"]}
+CASES = [
+    (title, name)
+    for title in SCHEMAS
+    for name in MACHINES_OF.get(title, ["linear_delta", "planar_two_slider", "hexapod"])
+]
+FIRST = dict(reversed(CASES))
+
+
+@pytest.mark.parametrize(("title", "schema"), SCHEMAS.items())
 def test_the_page_has_the_schema(title: str, schema: dict[str, object]) -> None:
     assert section(title) == {
         name: (", ".join(variable.dims), variable.units) for name, variable in schema.items()
     }
 
 
-@pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "linear_delta"])
-@pytest.mark.parametrize("title", ["Budget", "Compensation"])
+@pytest.mark.parametrize(("title", "name"), CASES)
 def test_the_dataset_has_what_the_page_says(title: str, name: str) -> None:
     dataset = datasets(name)[title]
     variables = section(title)
@@ -62,34 +89,33 @@ def test_the_dataset_has_what_the_page_says(title: str, name: str) -> None:
         assert ", ".join(dataset[key].dims) == named[generic][0]
 
 
-@pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "linear_delta"])
-@pytest.mark.parametrize("title", ["Budget", "Compensation"])
+@pytest.mark.parametrize(("title", "name"), CASES)
 def test_everything_carries_its_unit_and_name(title: str, name: str) -> None:
     dataset = datasets(name)[title]
     for variable in {**dataset.data_vars, **dataset.coords}.values():
         assert variable.attrs["long_name"]
         units = variable.attrs["units"].split(", ")
-        assert set(units) <= {"m", "rad", "N", "%", "1"}
+        assert set(units) <= {"m", "rad", "N", "%", "1", "K", "s"}
         if len(units) > 1:
             by = dataset[variable.attrs["units_by"]]
             assert set(by.values) == set(units)
             assert by.dims[0] in variable.dims
 
 
-@pytest.mark.parametrize("title", ["Budget", "Compensation"])
-def test_provenance(title: str) -> None:
-    attributes = datasets("hexapod")[title].attrs
+@pytest.mark.parametrize(("title", "name"), FIRST.items())
+def test_provenance(title: str, name: str) -> None:
+    attributes = datasets(name)[title].attrs
     page = PAGE.split("\n## Attributes\n")[1]
     assert all(re.search(rf"\b{name}\b", page) for name in attributes)
-    assert attributes["machine_file"] == "hexapod.toml"
+    assert attributes["machine_file"] == f"{name}.toml"
     assert re.fullmatch("[0-9a-f]{64}", attributes["machine_hash"])
     assert attributes["truepose_version"] == tp.__version__
     assert attributes["seed"] == "none"
 
 
-@pytest.mark.parametrize("title", ["Budget", "Compensation"])
-def test_a_dataset_is_written_and_read_again(title: str, tmp_path: Path) -> None:
-    dataset = datasets("linear_delta")[title]
+@pytest.mark.parametrize(("title", "name"), FIRST.items())
+def test_a_dataset_is_written_and_read_again(title: str, name: str, tmp_path: Path) -> None:
+    dataset = datasets(name)[title]
     dataset.to_netcdf(tmp_path / "result.nc", engine="h5netcdf")
     with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as read:
         for name in dataset.variables:

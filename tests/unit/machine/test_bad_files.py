@@ -41,6 +41,19 @@ CUTTING = (
     "depth_direction = [1, 0, 0], width_direction = [0, -1, 0] }"
 )
 
+KIENZLE = (
+    'kienzle = { specific_force = "1500 N/mm^2", exponent = 0.25, chip_thickness = 0.2, width = 3, '
+    "direction = [1, 0, 0] }"
+)
+STRUT = "length_tolerance = [-0.3, 0.3]"
+DRIVE = "working_mode"
+
+
+def said(key: str, value: str, where: str = STRUT) -> tuple[str, str]:
+    """An edit that writes one more key."""
+    return where, f"{key} = {value}\n{where}"
+
+
 CASES = [
     # keys
     bad("unknown-key", "length = 500", "lenght = 500", "lenght", 'did you mean "length"?'),
@@ -54,7 +67,7 @@ CASES = [
     bad("missing-key", "length = 500\nlength_t", "length_t", "[[strut]]", "strut.1.length"),
     bad("missing-key", 'kind = "slider"\n', "", "[[drive]]", "drive.d1.kind"),
     bad("missing-key", 'modulus = "210 GPa"\n', "", "[[strut]]", "modulus", "material"),
-    bad("missing-key", f"{GRID}\n", "", "[workspace]", "grid or poses"),
+    bad("missing-key", f"{GRID}\n", "", "[workspace]", "grid, box, cylinder, poses or path"),
     bad("missing-key", GRID, "poses = []", "poses", "at least one pose"),
     # types
     bad("wrong-type", "length = 500", "length = [500]", "length = [", "a length, found a list"),
@@ -71,7 +84,7 @@ CASES = [
     bad("wrong-type", GRID, "grid = { x = [200, 400] }", "grid", "found a list of 2"),
     bad("wrong-type", GRID, "poses = [[200, 100], [1]]", "poses", "a pose of 1", "2 numbers: x, y"),
     bad("wrong-type", "[-0.3, 0.3]", "[-0.3]", "length_tolerance", "found a list of 1"),
-    bad("wrong-type", "[-0.3, 0.3]", "{ a = 1 }", "length_tolerance", "found a table"),
+    bad("wrong-type", "[-0.3, 0.3]", "true", "length_tolerance", "found true or false"),
     bad("wrong-type", "[accuracy]", "[[accuracy]]", "[[accuracy]]", "only one [accuracy]"),
     bad("unknown-choice", '"slider"', '"slyder"', "slyder", 'did you mean "slider"?'),
     bad("unknown-choice", '"+"', '"@"', "@", "'+' or '-'"),
@@ -121,9 +134,9 @@ CASES = [
     bad("not-positive", "travel = [-200, 400]", "travel = [-700, 400]", "-700",
         "from -100 to 1000 mm", text=HEXAPOD),
     bad("closure-count", 'dof = ["x", "y"]', 'dof = ["x", "y", "c"]\ncommanded = ["x", "y"]', "dof",
-        "too few closures", "2 struts for 3 freedoms"),
-    bad("closure-count", 'dof = ["x", "y", "z", "a", "b", "c"]',
-        'dof = ["x", "y", "z"]', "dof", "too many closures",
+        "too few closures", "2 struts (2 closures) for 3 freedoms"),
+    bad("drive-count", 'dof = ["x", "y", "z", "a", "b", "c"]',
+        'dof = ["x", "y", "z"]', "dof", "6 drives for 3 commanded",
         text=HEXAPOD),
     bad("drive-count", 'dof = ["x", "y"]', 'dof = ["x", "y"]\ncommanded = ["x"]', "commanded",
         "too many drives", "2 drives for 1 commanded"),
@@ -156,6 +169,62 @@ CASES = [
     bad("grid-too-large", "[200, 400, 5], y = [100, 300, 3]",
         "[200, 400, 1000000], y = [100, 300, 1000000]", "grid", "1e+12 poses", "at most 1e7"),
     bad("wrong-dimension", GRID, 'poses = [[200, "100 N"]]', "poses", "poses[0][1]"),
+    bad("missing-key", GRID, "grid = {}", "grid", "names no freedom"),
+    # stiffnesses, joints and masses
+    bad("not-positive", *said("stiffness", '"0 N/um"'), "stiffness", "would carry nothing",
+        "leave the key away"),
+    bad("not-positive", *said("stiffness", '"-3 N/um"'), "stiffness", "a stiffness above zero"),
+    bad("not-positive", *said("stiffness", '{ nut = "9 N/um", screw = "0 N/um" }', DRIVE),
+        "stiffness", "screw: a stiffness of zero would carry nothing"),
+    bad("missing-key", *said("stiffness", "{}", DRIVE), "stiffness", "no stiffness in the table"),
+    bad("wrong-dimension", *said("stiffness", '"12 N m/rad"', DRIVE), "stiffness", "a stiffness"),
+    bad("not-positive", *said("base_joint", '{ stiffness = "0 N/um" }'), "base_joint",
+        "strut.1.base_joint.stiffness", "would carry nothing"),
+    bad("unknown-choice", *said("base_joint", '{ kind = "ball" }'), "base_joint", "'spherical'"),
+    bad("unknown-key", *said("platform_joint", "{ clearence = 1 }"), "platform_joint",
+        'did you mean "clearance"?'),
+    bad("unwanted-clearance", *said("base_joint", '{ kind = "flexure", clearance = 0.1 }'),
+        "base_joint", "has no play"),
+    bad("unwanted-clearance", *said("base_joint", "{ axis = [0, 0, 1], axial_clearance = 0.1 }"),
+        "base_joint", "a spherical joint has no axis"),
+    bad("missing-key", *said("base_joint", "{ angle_limit = 30 }"), "base_joint", "no axis"),
+    bad("not-positive", *said("base_stiffness", '["9 N/um", "0 N/um", inf]'), "base_stiffness",
+        "would carry nothing"),
+    bad("wrong-type", *said("base_stiffness", '["9 N/um", "9 N/um"]'), "base_stiffness",
+        "found a list of 2", "inf is a rigid one"),
+    bad("not-finite", *said("stiffness", "inf"), "stiffness", "not finite"),
+    bad("negative", *said("mass", '"-1 kg"'), "mass", "a mass of zero or more"),
+    bad("not-a-fraction", *said("centre_of_mass", "1.2"), "centre_of_mass", "from 0 to 1"),
+    bad("unknown-choice", *said("feedback", '"encoder"', DRIVE), "feedback", "'motor' or 'direct'"),
+    # rows that share
+    bad("unknown-key", "[condition]", "[each.struts]\nlength = 500\n[condition]", "[each",
+        "no [[struts]]", 'did you mean "strut"?'),
+    bad("unknown-key", "[condition]", "[each.strut]\nlenght = 500\n[condition]", "lenght",
+        "each.strut.lenght", 'did you mean "length"?'),
+    bad("unknown-key", "[condition]", '[each.drive]\nname = "d"\n[condition]', '"d"\n',
+        "cannot share a name"),
+    bad("wrong-type", "[condition]", "[each]\nstrut = 3\n[condition]", "strut = 3", "each.strut"),
+    # conditions
+    bad("excluding-keys", FORCE, f"{FORCE}\n{KIENZLE}", "[condition]", "force and kienzle"),
+    bad("excluding-keys", FORCE, f"{FORCE}\n{CUTTING}\n{KIENZLE}", "[condition]", "thrice"),
+    bad("not-a-fraction", FORCE, KIENZLE.replace("0.25", "1"), "kienzle", "exponent", "below 1"),
+    bad("not-positive", FORCE, 'envelope = { force = "0 N" }', "envelope", "a force above zero"),
+    bad("unknown-part", *said("gradient", '{ "strut.3" = "2 K/m" }', FORCE), "gradient",
+        'no part "strut.3"'),
+    bad("unknown-part", *said("gradient", '{ tool = ["2 K/m", "0 K/m", "0 K/m"] }', FORCE),
+        "gradient", "along the tool is not known"),
+    bad("unknown-part", "temperature = 35", "temperature = { fraem = 40 }", "fraem", '"frame"?'),
+    bad("wrong-type", *said("gradient", '{ frame = "2 K/m" }', FORCE), "gradient",
+        "along each of its axes", "[x, y, z]"),
+    bad("wrong-type", *said("gradient", '{ "strut.1" = ["2 K/m", "0 K/m", "0 K/m"] }', FORCE),
+        "gradient", "one gradient, along itself"),
+    bad("missing-key", *said("time", '"60 s"', FORCE), "[condition]", "no temperature_log"),
+    bad("no-mass", *said("gravity", '"9.81 m/s^2"', FORCE), "gravity", "nothing has a mass"),
+    bad("no-mass", *said("acceleration", '{ x = "5 m/s^2" }', FORCE), "acceleration",
+        "a mass of [platform]"),
+    bad("negative", *said("gravity", '"-9.81 m/s^2"', FORCE), "gravity", "zero or more"),
+    bad("unknown-freedom", 'target = "0.5 mm"', 'target = "0.5 mm"\nangle_target = 1',
+        "angle_target", "cannot turn"),
 ]  # fmt: skip
 
 

@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from build_machine import MACHINES
 from machine_texts import HEXAPOD, PLANAR, edited, load_text
 from truepose.errors import PoseError, RequestError
-from truepose.machine import Condition, Machine
+from truepose.machine import Condition, Envelope, Machine, load
+from truepose.machine.temperature_log import TemperatureLog
+from truepose.sources import REGISTRY
 
 STIFF = ("platform = [90, 80, 0]", 'platform = [90, 80, 0]\nstiffness = "100 N/um"')
 
@@ -113,6 +116,13 @@ def test_conditions(planar: Machine) -> None:
         {"force": (0.0, float("inf"), 0.0)},
         {"force": (0.0, 1.0)},
         {"moment": (0.0, 1.0, 2.0, 3.0)},
+        {"acceleration": (0.0, 1.0)},
+        {"gravity": -9.81},
+        {"gradient": {"strut.1": (1.0, 2.0)}},
+        {"gradient": {"strut.1": float("inf")}},
+        {"envelope": -1.0},
+        {"envelope": float("nan")},
+        {"time": float("nan")},
     ],
 )
 def test_a_condition_that_cannot_be(wrong: dict) -> None:
@@ -121,10 +131,43 @@ def test_a_condition_that_cannot_be(wrong: dict) -> None:
     assert caught.value.problems[0].code == "bad-condition"
 
 
-def test_axial_compliance(planar: Machine) -> None:
-    found = planar.axial_compliance(np.array([[0.5, 0.25], [1.0, 2.0]]))
+def test_an_envelope_is_a_plane_or_all_directions() -> None:
+    with pytest.raises(RequestError):
+        Envelope(10.0, (0.0, 0.0, 0.0))
+    assert np.array_equal(Envelope(10.0).directions, np.eye(3))
+    given = Condition().replace(envelope=Envelope(10.0, (0, 0, 2)))
+    assert given.envelope == Envelope(10.0, (0.0, 0.0, 1.0))
+    assert given.replace(force=(1, 0, 0)).envelope == given.envelope
+
+
+def test_gradients_and_logs(planar: Machine) -> None:
+    log = TemperatureLog(
+        np.array([0.0, 10.0]),
+        {"strut.1": np.array([300.0, 310.0]), "default": np.array([295.0, 297.0])},
+    )
+    given = planar.condition.replace(
+        temperature_log=log, gradient={"strut.1": 4, "frame": (0, 0, 2)}
+    )
+    assert given.gradient("strut.1") == (4.0, 0.0, 0.0)
+    assert (given.gradient("frame"), given.gradient("tool")) == ((0, 0, 2), (0, 0, 0))
+    assert given.temperature("strut.1") == 310.0, "the last of the log"
+    assert given.replace(time=5.0).temperature("strut.1") == 305.0
+    assert given.temperature("strut.1", [0.0, 2.5]) == pytest.approx([300.0, 302.5])
+    assert given.temperature_rise("frame", [5.0]) == pytest.approx([296.0 - 293.15])
+    own = given.replace(temperature={"strut.2": 280.0})
+    assert own.temperature("strut.2") == 280.0, "what the condition names goes before the log"
+    assert own.temperature("strut.2", [0.0]) == 280.0
+    assert given.replace(temperature=280.0).temperature("strut.1") == 280.0
+    assert planar.with_condition(given).condition is given
+    again = pickle.loads(pickle.dumps(given))  # noqa: S301
+    assert again.temperature("strut.1") == 310.0
+
+
+def test_compliances(planar: Machine) -> None:
+    columns, found = planar.compliances(np.array([[0.5, 0.25], [1.0, 2.0]]))
+    assert columns.tolist() == planar.kernel.length_parameters.tolist()
     assert found == pytest.approx(np.array([[0.5, 0.25], [1.0, 2.0]]) / (28e-6 * 210e9))
-    assert planar.axial_stiffness_known.tolist() == [True, True]
+    assert planar.stiffness_known.tolist() == [True, True]
 
 
 def test_stiffness_of_a_single_strut_direction(planar: Machine) -> None:
@@ -165,9 +208,19 @@ def test_poses_that_cannot_be_used(hexapod: Machine) -> None:
 
 def test_no_stiffness_without_a_strut_that_gives_it(tmp_path: Path) -> None:
     machine = load_text(tmp_path, edited(HEXAPOD, STIFF))
-    assert machine.axial_stiffness_known.tolist() == [True] + [False] * 5
-    assert machine.axial_compliance(np.ones(6)) == pytest.approx([1e-8, 0, 0, 0, 0, 0])
+    assert machine.stiffness_known.tolist() == [True] + [False] * 5
+    _, compliance = machine.compliances(np.ones(6))
+    assert compliance[0] == pytest.approx([1e-8, 0, 0, 0, 0, 0])
     with pytest.raises(RequestError) as caught:
         machine.stiffness(machine.poses())
     assert caught.value.problems[0].code == "no-stiffness"
     assert "2, 3, 4, 5, 6" in caught.value.problems[0].message
+
+
+def test_a_platform_that_a_guide_holds_has_a_compliance_but_no_stiffness() -> None:
+    machine = load(MACHINES / "tricept.toml", registry=REGISTRY)
+    poses = machine.poses()[:2]
+    assert np.isfinite(machine.compliance(poses)).all()
+    with pytest.raises(PoseError) as caught:
+        machine.stiffness(poses)
+    assert "the stiffness is infinite" in caught.value.reason

@@ -12,6 +12,8 @@ from truepose.report.figures import (
     FIGURES,
     _style,
     draw,
+    error_over_time,
+    internal_forces,
     machine_drawing,
     overall_error,
     ranking,
@@ -50,9 +52,10 @@ def test_every_figure_has_traces_a_title_and_a_caption(study: Study) -> None:
         assert each.figure.layout.height > 100
 
 
-def test_figures_of_the_compensation_need_one(study: Study) -> None:
+def test_figures_of_results_that_not_every_study_has_need_one(study: Study) -> None:
     names = {each.name for each in draw(Study(study.machine, study.budget))}
-    assert names == {module.__name__.rpartition(".")[2] for module in FIGURES} - {"before_after"}
+    every = {module.__name__.rpartition(".")[2] for module in FIGURES}
+    assert names == every - {"before_after", "error_over_time", "internal_forces"}
 
 
 def trace(figure: go.Figure, name: str, nth: int = 0) -> go.Scatter:
@@ -81,6 +84,23 @@ def test_bars_are_the_highest_with_the_largest_on_top(study: Study) -> None:
     assert list(bars.y) == ["elastic", "thermal", "tolerance"]
     expected = study.budget["highest"].sel(quantity="position", source=list(bars.y)).values
     np.testing.assert_allclose(bars.x, expected * 1e6, rtol=1e-6)
+
+
+def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: Study) -> None:
+    figure = internal_forces.figure(study)
+    for name, variable in (
+        ("with clearances", "highest_force"),
+        ("without clearances", "highest_force_rigid"),
+    ):
+        bars = trace(figure, name)
+        assert list(bars.y) == ["thermal", "tolerance"], "the largest on top"
+        expected = study.strained[variable].sel(source=list(bars.y)).values
+        np.testing.assert_allclose(bars.x, expected, rtol=1e-6)
+    for closure in study.strained["closure"].values:
+        line = trace(figure, str(closure))
+        expected = study.strained["overall_force"].sel(closure=closure).values
+        np.testing.assert_allclose(line.y, expected, rtol=1e-6)
+    assert "more closures than freedoms" in internal_forces.caption(study)
 
 
 def test_maps_share_one_colour_scale(study: Study) -> None:
@@ -158,3 +178,31 @@ def test_values_are_kept_in_single_precision(study: Study) -> None:
             for values in (one.y, getattr(one, "z", None)):
                 if isinstance(values, np.ndarray) and values.dtype.kind == "f":
                     assert values.dtype == np.float32, (each.name, one.name)
+
+
+def test_the_error_over_time_is_drawn_at_each_pose_and_over_the_temperatures(study: Study) -> None:
+    drawn = error_over_time.figure(study)
+    errors = study.time["error"].values * 1e6
+    lines = [each for each in drawn.data if each.line.color == _style.source_colour(0)]
+    assert len(lines) == errors.shape[1] * errors.shape[2]
+    assert np.allclose(lines[0].y, errors[:, 0, 0], rtol=1e-5)
+    assert np.allclose(lines[0].x, study.time["time"].values / 60.0)
+    assert lines[0].line.dash != lines[-1].line.dash
+    others = [each for each in drawn.data if each.line.color != _style.source_colour(0)]
+    # Strut 2 and frame go by one temperature, the tool is not in the log.
+    assert [each.name for each in others] == ["strut.1", "strut.2 and 1 more"]
+    temperatures = study.time["temperature"].values[:, 0] - 273.15
+    assert np.allclose(others[0].y, temperatures, atol=1e-4)
+    titles = {axis.title.text for axis in drawn.select_yaxes()}
+    assert {"error in x, µm", "temperature, °C"} <= titles
+    assert "time, min" in {axis.title.text for axis in drawn.select_xaxes()}
+    assert "log.csv" in error_over_time.caption(study)
+
+
+def test_many_times_are_thinned_and_the_last_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = STUDIES["planar"]
+    monkeypatch.setattr(error_over_time, "MOST_DRAWN", 50)
+    x = np.asarray(error_over_time.figure(study).data[0].x)
+    assert len(x) <= 51
+    assert x[-1] == pytest.approx(60.0)
+    assert "of 361 times" in error_over_time.caption(study)

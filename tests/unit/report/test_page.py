@@ -58,6 +58,8 @@ def test_a_hostile_name_stays_a_name() -> None:
 def test_provenance_is_on_the_page(planar: str) -> None:
     study = planar_study()
     assert study.machine.file_hash in planar
+    for name, digest in study.machine.data_files.items():
+        assert f"Data file {name} · SHA-256 <code>{digest}" in planar
     assert "truepose 0.0.0" in planar
     assert "SHA-256" in planar
     assert page.LIMITS.partition(".")[0] in planar

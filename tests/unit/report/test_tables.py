@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from made_study import hexapod_study, planar_study
-from truepose.report import accuracy, tables
+from truepose.report import accuracy, inputs, tables
 from truepose.report.display import column, number, pose_text, where_highest
 from truepose.report.study import Study
 
@@ -135,3 +135,13 @@ def test_numbers() -> None:
 def test_the_highest_is_the_first_of_equals() -> None:
     assert where_highest([1.0, 2.0 * (1 - 1e-13), 2.0, np.nan]) == 1
     assert where_highest([-3.0, -1.0, -1.0 + 1e-15]) == 1
+
+
+def test_the_condition_says_all_that_acts() -> None:
+    rows = dict(inputs.condition(planar_study().machine).rows)
+    assert rows["temperature of strut.1"] == "30 °C"
+    assert rows["temperature log"] == "log.csv, its last moment"
+    assert rows["temperature gradient of strut.1"] == "4 K/m along it"
+    assert rows["temperature gradient of frame"] == "x 0, y 0, z −5 K/m"
+    assert rows["further force on the tool"] == "300 N in any direction across x 0, y 0, z 1"
+    assert rows["acceleration of the platform"] == "x 0, y 2, z 0 m/s²"

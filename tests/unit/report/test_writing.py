@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from truepose.errors import RequestError
-from truepose.report.writing import replacing, require_writable
+from truepose.report.writing import replacing, require_new, require_writable
 
 
 def test_the_file_takes_its_place_at_the_end(tmp_path: Path) -> None:
@@ -54,3 +54,14 @@ def test_a_folder_that_goes_away_meanwhile(tmp_path: Path) -> None:
 
 def test_what_can_be_written_is_not_refused(tmp_path: Path) -> None:
     require_writable(tmp_path / "new.JSON", [".json"], [tmp_path / "input.toml"])
+
+
+def test_what_must_be_new_is_refused_where_something_stands(tmp_path: Path) -> None:
+    require_new(tmp_path / "free.toml")
+    (tmp_path / "taken.toml").write_text("mine")
+    (tmp_path / "broken.toml").symlink_to(tmp_path / "nowhere.toml")
+    for name in ("taken.toml", "broken.toml"):
+        with pytest.raises(RequestError) as caught:
+            require_new(tmp_path / name)
+        assert caught.value.problems[0].code == "output-exists"
+    assert (tmp_path / "taken.toml").read_text() == "mine"

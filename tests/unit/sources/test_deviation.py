@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from truepose.sources import OWN_GROUP, UNIFORM, Deviation, normal
+from truepose.sources import (
+    ARCSINE,
+    OWN_GROUP,
+    TRIANGULAR,
+    TWO_POINT,
+    UNIFORM,
+    Deviation,
+    Distribution,
+    normal,
+)
 
 
 def test_numbers_stand_for_every_pose_and_column() -> None:
@@ -55,6 +64,32 @@ def test_a_distribution_says_how_many_sigmas_its_band_is() -> None:
     assert normal(2.0).sigmas == 2.0
     with pytest.raises(ValueError, match="no band"):
         normal(0.0)
+
+
+EVENLY = (np.arange(1_000_000) + 0.5) / 1_000_000
+"""Probabilities: what a distribution's quantiles have there is a sample without chance."""
+
+
+@pytest.mark.parametrize(
+    ("distribution", "quantiles"),
+    [
+        (UNIFORM, 2 * EVENLY - 1),
+        (
+            TRIANGULAR,
+            np.where(EVENLY < 0.5, np.sqrt(2 * EVENLY) - 1, 1 - np.sqrt(2 * (1 - EVENLY))),
+        ),
+        (ARCSINE, np.sin(np.pi * (EVENLY - 0.5))),
+        (TWO_POINT, np.where(EVENLY < 0.5, -1.0, 1.0)),
+    ],
+    ids=str,
+)
+def test_a_half_band_is_so_many_standard_deviations(
+    distribution: Distribution, quantiles: np.ndarray
+) -> None:
+    assert quantiles.min() >= -1
+    assert quantiles.max() <= 1
+    assert np.std(quantiles) == pytest.approx(1 / distribution.sigmas, rel=1e-6)
+    assert str(distribution) == distribution.name
 
 
 @pytest.mark.parametrize(

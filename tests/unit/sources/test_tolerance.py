@@ -8,11 +8,14 @@ from typing import cast
 import numpy as np
 import pytest
 
+import truepose as tp
+from build_machine import machine_files
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
-from truepose.sources import UNIFORM, Deviation
+from truepose.sources import OWN_GROUP, TRIANGULAR, UNIFORM, Deviation, normal
 from truepose.sources.tolerance import Tolerance
+from two_slider import displaced
 
 TABLE = "[condition]"
 
@@ -94,6 +97,126 @@ def test_a_class_goes_by_the_size_of_the_parameter(tmp_path: Path) -> None:
     assert found["drive.d2.origin.x"] == (0.0, 0.3)  # 600 mm
 
 
+def test_a_pattern_that_names_its_part_goes_before_one_that_does_not(tmp_path: Path) -> None:
+    lines = ('"strut.*.base.*" = 0.05', '"strut.2.base.*" = 0.2', '"strut.2.base.z" = 0.4')
+    for order in (lines, lines[::-1]):
+        found = by_name(load_text(tmp_path, with_table(*order)))
+        assert found.pop("strut.1.length") == (0.0, 0.3)
+        assert found == {
+            **{f"strut.1.base.{axis}": (0.0, 0.05) for axis in "xyz"},
+            "strut.2.base.x": (0.0, 0.2),
+            "strut.2.base.y": (0.0, 0.2),
+            "strut.2.base.z": (0.0, 0.4),
+        }
+
+
+@pytest.mark.parametrize(
+    ("written", "half", "distribution"),
+    [
+        ("{ band = 0.05 }", 0.05, UNIFORM),
+        ('{ band = [-0.05, 0.05], distribution = "uniform" }', 0.05, UNIFORM),
+        ('{ band = "+-50 um", distribution = "triangular" }', 0.05, TRIANGULAR),
+        ('{ band = 0.05, distribution = "normal" }', 0.05, normal(3)),
+        ('{ band = 0.05, distribution = "normal", sigmas = 2 }', 0.05, normal(2)),
+        ('{ standard_deviation = "4 um" }', 0.012, normal(3)),
+        ('{ standard_deviation = "4 um", sigmas = 2 }', 0.008, normal(2)),
+        ('{ standard_deviation = 0.004, distribution = "normal" }', 0.012, normal(3)),
+    ],
+)
+def test_a_table_says_how_a_tolerance_is_distributed(
+    tmp_path: Path, written: str, half: float, distribution: object
+) -> None:
+    machine = load_text(tmp_path, with_table(f'"drive.d2.offset" = {written}'))
+    assert by_name(machine)["drive.d2.offset"] == (0.0, half)
+    at = machine.parameters.index("drive.d2.offset")
+    column = bands(machine).parameters.tolist().index(at)
+    assert bands(machine).distribution[column] == distribution
+
+
+def test_a_strut_s_tolerance_and_a_class_may_be_tables_too(tmp_path: Path) -> None:
+    given = '{ band = "IT14", distribution = "triangular" }'
+    machine = load_text(tmp_path, edited(PLANAR, ("[-0.3, 0.3]", given)))
+    assert by_name(machine) == {"strut.1.length": (0.0, 1.55 / 2)}
+    assert bands(machine).distribution == (TRIANGULAR,)
+
+
+def test_what_is_distributed_otherwise_is_as_wide_but_not_as_uncertain(tmp_path: Path) -> None:
+    found = [
+        tp.budget(load_text(tmp_path, edited(PLANAR, ("[-0.3, 0.3]", given)))).sel(
+            source="tolerance"
+        )
+        for given in ("0.3", '{ band = 0.3, distribution = "triangular" }')
+    ]
+    assert np.array_equal(found[0].worst, found[1].worst)
+    assert np.allclose(found[0].uncertainty, 2**0.5 * found[1].uncertainty, rtol=1e-12)
+
+
+def test_what_is_made_in_one_set_up_varies_together(tmp_path: Path) -> None:
+    """Both rails' carriages off by one y move the tool by just that y; by opposite ones, not."""
+    group = 'group = "one set-up"'
+    text = edited(PLANAR, ("length_tolerance = [-0.3, 0.3]\n", ""))
+    table = with_table(f'"drive.*.origin.y" = {{ band = 0.05, {group} }}', text=text)
+    machine = load_text(tmp_path, table)
+    assert len(set(bands(machine).variables.tolist())) == 1
+    found = tp.budget(machine).sel(source="tolerance")
+    assert np.allclose(found.worst, [0.0, 50e-6], rtol=1e-9, atol=1e-18)
+    assert np.allclose(found.uncertainty, [0.0, 50e-6 / 3**0.5], rtol=1e-9, atol=1e-18)
+    apart = with_table(
+        f'"drive.d1.origin.y" = {{ band = 0.05, {group} }}',
+        f'"drive.d2.origin.y" = {{ band = 0.05, {group}, sign = -1 }}',
+        text=text,
+    )
+    machine = load_text(tmp_path, apart)
+    assert bands(machine).signed_half[0].tolist() == pytest.approx([50e-6, -50e-6])
+    most = np.abs(displaced(machine, machine.poses(), joints=np.array([50e-6, -50e-6])))
+    found = tp.budget(machine).sel(source="tolerance")
+    assert np.abs(found.worst - most).max() < 1e-3 * most.max()
+    each = tp.budget(load_text(tmp_path, with_table('"drive.*.origin.y" = 0.05', text=text)))
+    assert (each.sel(source="tolerance").worst >= found.worst - 1e-12).all()
+
+
+def test_a_group_may_have_members_of_several_kinds_and_edges_of_its_lengths(tmp_path: Path) -> None:
+    length = '{ band = 0.2, group = "a", sign = -1 }'
+    machine = load_text(
+        tmp_path,
+        with_table(
+            '"drive.d1.axis.u" = { band = "20 urad", group = "a" }',
+            '"drive.d1.offset" = { band = 0.1, group = "a" }',
+            '"tool.x" = { band = 0.3, group = "b" }',
+            '"tool.y" = 0.3',
+            text=edited(PLANAR, ("[-0.3, 0.3]", length)),
+        ),
+    )
+    found = bands(machine)
+    names = [machine.parameters[column] for column in found.parameters]
+    groups = dict(zip(names, found.groups.tolist(), strict=True))
+    assert groups["drive.d1.axis.u"] == groups["drive.d1.offset"] == groups["strut.1.length"]
+    assert groups["tool.x"] not in (groups["strut.1.length"], OWN_GROUP)
+    assert groups["tool.y"] == OWN_GROUP
+    at_edge = dict(zip(names, found.at_edge(1.0)[0].tolist(), strict=True))
+    assert at_edge["strut.1.length"] == pytest.approx(-0.2e-3)
+    assert at_edge["drive.d1.offset"] == pytest.approx(0.1e-3)
+    assert at_edge["drive.d1.axis.u"] == 0.0
+
+
+@pytest.mark.parametrize("file", machine_files(), ids=lambda file: file.stem)
+def test_every_parameter_of_every_machine_can_have_a_tolerance(file: Path) -> None:
+    machine = tp.load(file)
+    small = {"m": "1 um", "rad": "1 urad", "1": "1 ppm"}
+    named = dict(zip(machine.parameters, machine.units, strict=True))
+    own = {f"strut.{strut.name}.length" for strut in machine.struts} | {
+        f"{drive.part}.offset" for drive in machine.drives
+    }
+    settings = [
+        f"tolerance.{name}={small[unit]}" for name, unit in named.items() if name not in own
+    ]
+    found = bands(tp.load(file, settings=settings))
+    shown = {machine.parameters[column] for column in found.parameters}
+    assert shown >= named.keys() - own
+    given = [machine.parameters[column] in named.keys() - own for column in found.parameters]
+    assert np.allclose(found.half[:, given], 1e-6, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("lines", "code", "at", "words"),
     [
@@ -105,8 +228,42 @@ def test_a_class_goes_by_the_size_of_the_parameter(tmp_path: Path) -> None:
         (('"drive.d1.axis.u" = "ISO 2768-f"',), None, 0, "ISO 2768-f"),
         (('"strut.1.base.x" = "IT7"',), "tolerance-out-of-range", 0, "0 mm"),
         (('"strut.1.base.x" = [0.2, 0.1]',), "tolerance-reversed", 0, "0.2"),
+        (("strut.1.base.x = 0.2",), "tolerance-matches-nothing", 0, "in quotation marks"),
+        (('"drive.d1.*" = 0.1',), "tolerance-mixes-kinds", 0, "lengths and angles"),
+        (('"drive.d1.origin.*" = 0.1', '"drive.d1.*.x" = 1'), "tolerance-twice", 1, "origin.x"),
+        (('"tool.x" = { bnd = 0.1 }',), "unknown-key", 0, 'did you mean "band"?'),
+        (('"tool.x" = {}',), "missing-key", 0, "one of band, standard_deviation"),
+        (('"tool.x" = { band = 1, standard_deviation = 1 }',), "excluding-keys", 0, "band and st"),
+        (('"tool.x" = { band = 1, sigmas = 2 }',), "excluding-keys", 0, "normal"),
+        (('"tool.x" = { standard_deviation = 1, distribution = "uniform" }',), "excluding-keys", 0,
+         "of a normal distribution"),
+        (('"tool.x" = { standard_deviation = -1 }',), "negative", 0, "standard_deviation: "),
+        (('"tool.x" = { standard_deviation = "1 N" }',), "wrong-dimension", 0, "found a force"),
+        (('"tool.x" = { band = "1 N" }',), "wrong-dimension", 0, "band: expected a length"),
+        (('"tool.x" = { band = 1, distribution = "triangle" }',), "unknown-choice", 0,
+         'did you mean "triangular"?'),
+        (('"tool.x" = { band = 1, distribution = 3 }',), "wrong-type", 0, "distribution"),
+        (('"tool.x" = { band = 1, distribution = "normal", sigmas = 0 }',), "not-positive", 0,
+         "above zero"),
+        (('"tool.x" = { band = 1, distribution = "normal", sigmas = inf }',), "not-finite", 0,
+         "found:    inf"),
+        (('"tool.x" = { band = 1, distribution = "normal", sigmas = "2" }',), "wrong-type", 0,
+         "a plain number"),
+        (('"tool.x" = { band = { band = 1 } }',), "wrong-type", 0, "band: expected a tolerance"),
+        (('"tool.x" = { band = 1, sign = -1 }',), "missing-key", 0, "there is no group"),
+        (('"tool.x" = { band = 1, group = "a", sign = 2 }',), "unknown-choice", 0, "1 or -1"),
+        (('"tool.x" = { band = 1, group = " " }',), "bad-name", 0, "not empty"),
+        (('"tool.x" = { band = 1, group = 3 }',), "wrong-type", 0, "group"),
+        (('"tool.x" = { band = 1, group = "a" }',
+          '"tool.y" = { band = 1, group = "a", distribution = "triangular" }'),
+         "group-distributions", 1, "uniform of tolerance.tool.x"),
+        (('"tool.x" = { standard_deviation = 1, group = "a" }',
+          '"tool.y" = { standard_deviation = 1, sigmas = 2, group = "a" }'),
+         "group-distributions", 1, "normal, 3 sigma"),
+        (('"tool.x" = { band = "ISO 2768-q" }',), "unknown-tolerance-class", 0, "2768"),
+        (('"drive.d2.origin.x" = { band = "IT0" }',), "tolerance-out-of-range", 0, "600 mm"),
     ],
-)
+)  # fmt: skip
 def test_what_the_table_may_not_say(
     tmp_path: Path, lines: tuple[str, ...], code: str | None, at: int, words: str
 ) -> None:

@@ -13,5 +13,7 @@ BENCHMARKS = (
     Benchmark("forward_call"),
     Benchmark("two_threads", cores=2),
     Benchmark("start_up"),
+    Benchmark("all_sources"),
     Benchmark("million_poses", cores=2),
+    Benchmark("over_time"),
 )

@@ -92,6 +92,9 @@ SCHEMA: Schema = {
     "verdict": Variable(("source",), "1", "negligible, relevant or dominant", str),
 }
 
+FEW = 1024
+"""Poses whose sensitivities to every parameter stay in the cache together."""
+
 # What is highest over poses, and of which variable.
 _HIGHEST = {
     "highest_lower": "error_lower",
@@ -243,16 +246,20 @@ def _band(
     machine: Machine, block: Block, deviation: Deviation
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Half width and standard uncertainty (n, n_component) of a source, and a status (n,)."""
-    if not deviation.banded.size:
-        nothing = np.zeros((block.indices.size, len(machine.components)))
-        return nothing, nothing, np.full(block.indices.size, OK, np.uint8)
-    effects, sigmas, status = worst.variable_effects(machine, block, deviation)
-    return (
-        # Sizes first, then their squares, in the one place.
-        worst.linear_half(effects, scratch=effects),
-        uncertainty.standard_uncertainty(effects, sigmas, scratch=effects),
-        status,
-    )
+    n_pose = block.indices.size
+    half = np.zeros((n_pose, len(machine.components)))
+    spread = np.zeros_like(half)
+    status = np.full(n_pose, OK, np.uint8)
+    if deviation.banded.size:
+        for start in range(0, n_pose, FEW):
+            poses = slice(start, start + FEW)
+            effects, sigmas, status[poses] = worst.variable_effects(
+                machine, block, deviation, poses
+            )
+            # Sizes first, then their squares, in the one place.
+            half[poses] = worst.linear_half(effects, scratch=effects)
+            spread[poses] = uncertainty.standard_uncertainty(effects, sigmas, scratch=effects)
+    return half, spread, status
 
 
 __all__ = ["SCHEMA", "budget", "required_sources"]

@@ -91,6 +91,16 @@ class LeftOut:
         return indices[order], names[order]
 
 
+def _keep_freed_memory() -> None:
+    """Let the arrays of one block be made of those of the block before.
+
+    glibc hands freed memory back to the system beyond twice the largest array freed so far (its
+    dynamic thresholds, mallopt(3)), and every block would fetch its pages anew: up to a third of
+    the time of a budget. One array of the most that it looks at, freed at once, stops that.
+    """
+    np.empty(31 << 20, np.uint8)
+
+
 class Walk:
     """Iterates over blocks of usable poses; keeps account of those left out.
 
@@ -120,6 +130,7 @@ class Walk:
 
     def __iter__(self) -> Iterator[Block]:
         total = len(self.poses)
+        _keep_freed_memory()
         for start in range(0, total, BLOCK):
             block = self._block(start, self.poses[start : start + BLOCK])
             if block.indices.size:
@@ -222,7 +233,10 @@ def no_pose_left(
             path="workspace" if of_file else None,
             found=found + (f"; {nearest[1]}" if nearest else ""),
             expected="poses that the machine can reach, within travel and off singularities",
-            hint="move the workspace, or check lengths, travel and working_mode",
+            hint="move the workspace, or check lengths, travel and working_mode"
+            if nearest
+            else "the nominal machine reaches them, but not as the error sources move it: look for "
+            "a number of the wrong size or unit, or leave more travel for the correction",
         )
     )
 

@@ -14,11 +14,14 @@ from truepose.machine import Machine
 from truepose.sources import Block, Deviation
 from truepose.sources._base import Floats, Indices
 
+EVERY = slice(None)
+"""All poses of a block."""
+
 
 def variable_effects(
-    machine: Machine, block: Block, deviation: Deviation
+    machine: Machine, block: Block, deviation: Deviation, poses: slice = EVERY
 ) -> tuple[Floats, Floats, np.ndarray]:
-    """First-order error of each variable at +1, about the shift.
+    """First-order error of each variable at +1, about the shift, at some poses of the block.
 
     Returns effects (n, n_component, n_variable) over the variables that have a band, m and rad,
     the half band of each in standard deviations (n_variable,), and a kernel status (n,). The
@@ -26,23 +29,28 @@ def variable_effects(
     """
     banded = deviation.banded
     sensitivity, status = machine.kernel.sensitivity_at(
-        block.joints, block.placements, deviation.parameters[banded]
+        block.joints[poses], block.placements[poses], deviation.parameters[banded]
     )
-    effects, variable = by_variable(deviation, sensitivity)
+    effects, variable = by_variable(deviation, sensitivity, poses)
     sigmas = np.empty(effects.shape[2])
     sigmas[variable] = [deviation.distribution[column].sigmas for column in banded]
     return effects, sigmas, status
 
 
-def by_variable(deviation: Deviation, slopes: Floats) -> tuple[Floats, Indices]:
+def by_variable(
+    deviation: Deviation, slopes: Floats, poses: slice = EVERY
+) -> tuple[Floats, Indices]:
     """What each variable does at +1, from `slopes` (n, m, n_banded) per unit of a banded column.
 
-    `slopes` are written over: there is seldom room for two of them in the cache.
+    `poses` are those of the deviation that the slopes belong to. `slopes` are written over: there
+    is seldom room for two of them in the cache.
 
     Returns effects (n, m, n_variable), and the variable of each banded column (n_banded,).
     """
     banded = deviation.banded
     half = deviation.signed_half
+    if len(half) > 1:
+        half = half[poses]
     if banded.size < half.shape[1]:
         half = half[:, banded]
     effects: Floats = np.multiply(slopes, half[:, np.newaxis], out=slopes)

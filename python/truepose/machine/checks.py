@@ -145,6 +145,24 @@ def _strut_lengths(document: Document, validated: Validated) -> Iterator[Problem
             )
 
 
+def _rings(document: Document, validated: Validated) -> Iterator[Problem]:
+    """A ring has a radius and an axis."""
+    for index, row in enumerate(_rows(document, "strut")):
+        given, lacking, such = "ring_radius", "ring_axis", "[0, 0, 1], in platform axes"
+        if "ring_radius" not in row:
+            given, lacking, such = "ring_axis", "ring_radius", '"80 mm"'
+        key: Key = ("strut", index, lacking)
+        if given in row and lacking not in row and key not in validated.misspelt:
+            yield document.problem(
+                "missing-key",
+                f"a ring has a radius and an axis, but there is only {given}",
+                ("strut", index, given),
+                found=f"no {lacking}",
+                expected=f"{lacking} as well, such as {such}",
+                hint=f"without a ring, leave {given} away",
+            )
+
+
 def _telescopic_travel(document: Document, validated: Validated) -> Iterator[Problem]:
     """A strut whose length is a coordinate has one above zero over the whole travel."""
     for index, (row, model) in enumerate(
@@ -401,6 +419,7 @@ _CHECKS: tuple[Check, ...] = (
     _distinct_names,
     _drives_of_struts,
     _strut_lengths,
+    _rings,
     _telescopic_travel,
     _counts,
     _workspace_freedoms,

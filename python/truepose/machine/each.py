@@ -63,15 +63,16 @@ def problems(document: Document) -> list[Problem]:
     found = []
     for table, common in tables.items():
         key: Key = (EACH, table)
-        if table not in ARRAY_TABLES:
+        if table not in ARRAY_TABLES or table not in document.data:
+            known = table in ARRAY_TABLES
             found.append(
                 document.problem(
                     "unknown-key",
                     f"there is no [[{table}]] whose rows could share keys",
                     key,
                     found=table,
-                    expected=one_of(ARRAY_TABLES),
-                    hint=did_you_mean(table, ARRAY_TABLES),
+                    expected=f"a [[{table}]] too" if known else one_of(ARRAY_TABLES),
+                    hint=None if known else did_you_mean(table, ARRAY_TABLES),
                 )
             )
         elif not isinstance(common, dict):

@@ -51,6 +51,19 @@ def read_ratio(value: object, units: UnitSystem) -> float:
     return units.read(value, "ratio") if quotient is None else quotient
 
 
+def _read_error(value: object, units: UnitSystem) -> float:
+    ratio = read_ratio(value, units)
+    if abs(ratio) >= 1.0:
+        raise QuantityError(
+            "not-a-fraction",
+            "an error as large as what it is an error of",
+            found=shown_value(value),
+            expected='a ratio between -1 and 1, such as "12 ppm"',
+            hint="a bare number is a plain ratio, neither ppm nor um/m",
+        )
+    return ratio
+
+
 def read_slope(value: object, units: UnitSystem) -> float:
     """An angle, rad, or what rises over a length: `"20 um/m"`, `"20 um / 300 mm"`.
 
@@ -72,10 +85,10 @@ def read_slope(value: object, units: UnitSystem) -> float:
 
 @dataclass(frozen=True)
 class _Ratio(FileType):
-    """A ratio that is known, or known within limits."""
+    """A ratio that is known, or known within limits; an error, so less than the whole."""
 
     def read(self, value: Any, units: UnitSystem) -> Band:
-        return read_within(value, lambda each: read_ratio(each, units), "a ratio", known=True)
+        return read_within(value, lambda each: _read_error(each, units), "a ratio", known=True)
 
     def json_schema(self) -> JsonSchemaValue:
         return one_or_limits(self.dimension) | {"x-known": True}

@@ -158,6 +158,6 @@ def _condition(
         return found
     parts = [*(drive.part for drive in drives), *(strut.part for strut in struts), *BODIES]
     log = read_temperature_log(
-        data_files, table.temperature_log, parts, table.time, table.temperature or ()
+        data_files, table.temperature_log, parts, table.time, found.part_temperatures
     )
     return found if log is None else found.replace(temperature_log=log)

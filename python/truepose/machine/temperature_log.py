@@ -135,8 +135,8 @@ def read_temperature_log(
 ) -> TemperatureLog | None:
     """The log in the data file `name`, whose columns are `time`, `default` and `parts`.
 
-    `time`, s, must be within it; parts (or `default`) of a `fixed` temperature must not be in it.
-    None, and problems in `data_files`, where it is not good.
+    `time`, s, must be within it; parts of a `fixed` temperature must not be in it. None, and
+    problems in `data_files`, where it is not good.
     """
     columns = [Column(TIME, "time")]
     columns += [Column(part, "temperature", required=False) for part in (DEFAULT_PART, *parts)]
@@ -144,7 +144,9 @@ def read_temperature_log(
     if table is None:
         return None
     found = [*_not_ascending(table), *_too_cold(table)]
-    found += [_twice(data_files.document, part, name) for part in fixed if part in table.numbers]
+    document = data_files.document
+    given = [*fixed, DEFAULT_PART] if _default_is_set(document) else fixed
+    found += [_twice(document, part, name) for part in given if part in table.numbers]
     if len(table.columns) == 1:
         found.append(
             table.problem(
@@ -192,6 +194,17 @@ def _too_cold(table: DataTable) -> Iterable[Problem]:
                 found=table.shown(part, row),
                 expected="a temperature above absolute zero",
             )
+
+
+def _default_is_set(document: Document) -> bool:
+    """Whether a setting gives the temperature of all other parts, and none gives the log.
+
+    In a file, or beside a log that a setting names, it is what the log's own default goes before; a
+    setting that the file's log goes before would do nothing.
+    """
+    key = document.key(f"condition.temperature.{DEFAULT_PART}")
+    given = document.value(key) is not None and document.setting(key) is not None
+    return given and document.setting(_KEY) is None
 
 
 def _twice(document: Document, part: str, name: str) -> Problem:

@@ -1,6 +1,6 @@
 """Sensor of a drive: it resolves only so much, and its scale is a little too long or too short.
 
-    half of offset  = resolution / 2
+    half of offset  = nominal scale * resolution / 2
     scale  moves by   nominal scale * error
     offset moves by  -nominal scale * error * zero_at
 
@@ -110,7 +110,9 @@ class Sensor:
         for reading in self.readings:
             offset = machine.parameters.index(f"{reading.drive}.offset")
             if reading.resolution > 0.0:
-                columns.add(offset, swing=0.5 * reading.resolution)
+                # Of the joint coordinate, as the command is: the drive makes `scale` of it.
+                scale = machine.nominal[machine.parameters.index(f"{reading.drive}.scale")]
+                columns.add(offset, swing=0.5 * scale * reading.resolution)
             if reading.scale_error is not None:
                 add_scale_error(
                     columns, machine, reading.drive, reading.scale_error, reading.zero_at

@@ -85,6 +85,15 @@ def test_none_left_names_the_strut(machine: tp.Machine) -> None:
     assert "strut 2 misses by 100 mm" in found
 
 
+def test_none_left_by_an_error_source_is_not_laid_to_the_workspace(machine: tp.Machine) -> None:
+    hot = machine.condition.replace(temperature=1e9)
+    with pytest.raises(RequestError) as caught:
+        tp.budget(machine, [GOOD], condition=hot)
+    (problem,) = caught.value.problems
+    assert problem.code == "no-pose-left"
+    assert "a number of the wrong size or unit" in str(problem.hint)
+
+
 def test_none_left_of_a_singular_pose(machine: tp.Machine) -> None:
     # Both struts in one line: a machine 1 m wide, so that two of 0.5 m just meet.
     wide = machine.replace({"drive.d2.origin.x": 1.0})

@@ -13,16 +13,18 @@ from truepose.sources import OWN_GROUP, UNIFORM, Deviation, normal
 
 RANDOM = np.random.default_rng(20051)
 SENSITIVITY = RANDOM.normal(size=(5, 3, 8))
-BLOCK: Any = SimpleNamespace(joints=None, placements=None)
+POSES = np.arange(5.0)[:, np.newaxis]  # the number of each, for the kernel to know it by
+BLOCK: Any = SimpleNamespace(joints=POSES, placements=POSES)
 
 
 class Kernel:
     """Knows its sensitivities, and nothing else."""
 
     def sensitivity_at(
-        self, joints: None, placements: None, columns: np.ndarray
+        self, joints: np.ndarray, placements: np.ndarray, columns: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        return SENSITIVITY[:, :, columns], np.zeros(5, np.uint8)
+        found = SENSITIVITY[joints[:, 0].astype(int)]
+        return found[:, :, columns], np.zeros(len(joints), np.uint8)
 
 
 MACHINE: Any = SimpleNamespace(kernel=Kernel())
@@ -37,6 +39,14 @@ def grouped() -> Deviation:
         sign=RANDOM.choice([-1.0, 1.0], size=(5, 7)),
         distribution=(UNIFORM, normal(2.0), UNIFORM, normal(3.0), UNIFORM, normal(3.0), UNIFORM),
     )
+
+
+def test_some_poses_of_a_block_have_the_effects_that_they_have_in_the_whole() -> None:
+    deviation = grouped()
+    whole, sigmas, _ = worst.variable_effects(MACHINE, BLOCK, deviation)
+    some, of_some, _ = worst.variable_effects(MACHINE, BLOCK, deviation, slice(1, 4))
+    assert np.array_equal(some, whole[1:4])
+    assert np.array_equal(of_some, sigmas)
 
 
 def test_worst_is_the_most_over_all_corners_of_the_variables() -> None:

@@ -196,9 +196,13 @@ CASES = [
     bad("negative", *said("mass", '"-1 kg"'), "mass", "a mass of zero or more"),
     bad("not-a-fraction", *said("centre_of_mass", "1.2"), "centre_of_mass", "from 0 to 1"),
     bad("unknown-choice", *said("feedback", '"encoder"', DRIVE), "feedback", "'motor' or 'direct'"),
+    bad("missing-key", *said("ring_axis", "[0, 0, 1]"), "ring_axis", "no ring_radius"),
+    bad("missing-key", *said("ring_radius", "80"), "ring_radius", "no ring_axis", "[0, 0, 1]"),
     # rows that share
     bad("unknown-key", "[condition]", "[each.struts]\nlength = 500\n[condition]", "[each",
         "no [[struts]]", 'did you mean "strut"?'),
+    bad("unknown-key", "[condition]", '[each.guide]\nkindd = "plane"\n[condition]', "[each",
+        "no [[guide]]", "a [[guide]] too"),
     bad("unknown-key", "[condition]", "[each.strut]\nlenght = 500\n[condition]", "lenght",
         "each.strut.lenght", 'did you mean "length"?'),
     bad("unknown-key", "[condition]", '[each.drive]\nname = "d"\n[condition]', '"d"\n',

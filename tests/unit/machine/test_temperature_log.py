@@ -133,22 +133,25 @@ def test_a_part_has_one_temperature(tmp_path: Path) -> None:
     assert machine.condition.temperature("frame") == pytest.approx(298.15)
 
 
-@pytest.mark.parametrize("written", ["28", '{ default = 28, "strut.2" = 31 }'])
-def test_all_other_parts_have_one_temperature(written: str, tmp_path: Path) -> None:
-    text = edited(LOGGED, ("[workspace]", f"temperature = {written}\n[workspace]"))
-    with pytest.raises(MachineFileError) as caught:
-        load(tmp_path, LOG, text=text)
-    (problem,) = caught.value.problems
+@pytest.mark.parametrize("key", ["temperature", "temperature.default"])
+def test_a_setting_that_the_log_goes_before_is_refused(key: str, tmp_path: Path) -> None:
+    (problem,) = problems_of(tmp_path, LOG, f"condition.{key}=28")
     assert problem.code == "excluding-keys"
-    assert problem.line == line_of(text, f"temperature = {written}")
+    assert f"given by --set condition.{key}=28" in str(problem)
     assert "the column default of log.csv" in str(problem)
-    # A setting would otherwise do nothing, and not say so.
-    (problem,) = problems_of(tmp_path, LOG, "condition.temperature=28")
-    assert problem.code == "excluding-keys"
     # Beside a log of some parts it is that of the others.
-    machine = load(tmp_path, "time (min), strut.1 (degC)\n0, 20\n20, 44\n", text=text)
+    some = "time (min), strut.1 (degC)\n0, 20\n20, 44\n"
+    machine = load(tmp_path, some, f"condition.{key}=28")
     assert machine.condition.temperature("strut.1") == pytest.approx(317.15)
     assert machine.condition.temperature("frame") == pytest.approx(301.15)
+
+
+def test_the_default_of_a_log_goes_before_that_of_the_file(tmp_path: Path) -> None:
+    settings = [[], ["condition.temperature_log=log.csv"]]
+    texts = [edited(LOGGED, ("[workspace]", "temperature = 28\n[workspace]")), PLANAR]
+    for text, given in zip(texts, settings, strict=True):
+        machine = load(tmp_path, LOG, *given, text=text)
+        assert machine.condition.temperature("frame") == pytest.approx(298.15)
 
 
 @pytest.mark.parametrize(

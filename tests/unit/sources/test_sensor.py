@@ -69,6 +69,14 @@ def test_a_step_is_half_to_either_side(tmp_path: Path) -> None:
     assert np.abs(found.uncertainty - most / 3**0.5).max() < 1e-5 * most.max()
 
 
+def test_a_step_of_the_joint_coordinate_goes_through_a_gear(tmp_path: Path) -> None:
+    geared = edited(
+        with_sensor('{ resolution = "10 um" }'),
+        ("travel = [0, 900]", "travel = [0, 1800]\nscale = 0.5"),
+    )
+    assert columns_of(load_text(tmp_path, geared)) == {"drive.d1.offset": (0.0, 2.5e-6)}
+
+
 def test_a_known_scale_error_grows_from_the_sensor_s_zero(tmp_path: Path) -> None:
     machine = load_text(tmp_path, with_sensor('{ scale_error = "40 um/m", zero_at = 150 }'))
     joints = machine.inverse(machine.poses())
@@ -158,11 +166,13 @@ def test_a_sensor_without_error_changes_nothing(tmp_path: Path, given: str) -> N
         ("{ resolutio = 1 }", "unknown-key", 'did you mean "resolution"?'),
         ('{ resolution = "1 deg" }', "wrong-dimension", "a length, found an angle"),
         ('{ scale_error = "3 um" }', "wrong-dimension", "a plain number, found a length"),
-        ("{ scale_error = [2, 1] }", "tolerance-reversed", "[2, 1]"),
+        ("{ scale_error = [0.2, 0.1] }", "tolerance-reversed", "[0.2, 0.1]"),
         ("{ scale_error = [1, 2, 3] }", "wrong-type", "a list of 3"),
         ("{ scale_error = true }", "wrong-type", "true or false"),
         ('{ scale_error = "+- -1 ppm" }', "unknown-unit", "-1 ppm"),
         ('{ scale_error = "3 um / 0 m" }', "not-positive", "divided by zero"),
+        ("{ scale_error = 12 }", "not-a-fraction", "neither ppm nor um/m"),
+        ('{ scale_error = ["-2 m/m", "2 ppm"] }', "not-a-fraction", "between -1 and 1"),
     ],
 )
 def test_what_a_sensor_may_not_say(tmp_path: Path, given: str, code: str, words: str) -> None:

@@ -191,8 +191,9 @@ def required_sources(machine: Machine, condition: Condition) -> tuple[Source, ..
             message="nothing moves the machine off its nominal parameters",
             file=machine.file,
             found="no error source in the machine file or the condition",
-            expected="a tolerance, a temperature or a force",
-            hint="give a strut length_tolerance, or [condition] temperature or force",
+            expected="an error source, such as a tolerance, a temperature or a force",
+            hint="give a strut length_tolerance, or [condition] temperature or force; "
+            "docs/sources lists all sources",
         )
     )
 

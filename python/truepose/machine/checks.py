@@ -255,6 +255,15 @@ def _workspace_freedoms(document: Document, validated: Validated) -> Iterator[Pr
         ("home", dof, "no freedom of the platform"),
     ):
         table = workspace.get(name)
+        if name == "box" and isinstance(table, dict) and not FREEDOMS.keys() & table.keys():
+            yield document.problem(
+                "missing-key",
+                "the box names no freedom",
+                ("workspace", name),
+                found=", ".join(table) or "{}",
+                expected="a range, such as x = [200, 400]",
+                hint="for one pose write poses = [[...]]",
+            )
         if name == "cylinder" and table is not None and not {"x", "y"} <= set(commanded):
             yield document.problem(
                 "unknown-freedom",

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truepose.errors import Problem, RequestError
-from truepose.machine.parts_of_machine import Vector
+from truepose.machine.parts_of_machine import BODIES, Vector
 
 if TYPE_CHECKING:
     from truepose.machine.temperature_log import TemperatureLog
@@ -28,6 +28,9 @@ STANDARD_GRAVITY = 9.80665
 
 DEFAULT_PART = "default"
 """The key, in a table of temperatures, of every part that the table does not name."""
+
+_ALONG = ("strut.", "drive.")
+"""How parts begin that have a gradient along themselves."""
 
 _MAPPINGS = ("part_temperatures", "gradients")
 
@@ -108,6 +111,9 @@ class Condition:
         for name, vector in vectors.items():
             if len(vector) != 3 or not all(math.isfinite(component) for component in vector):
                 raise _bad(name, str(vector), "three finite components")
+        for part, gradient in self.gradients.items():
+            if part.startswith(_ALONG) and any(gradient[1:]):
+                raise _bad(f"gradient.{part}", str(gradient), "one number, along itself, K/m")
         if not (math.isfinite(self.gravity) and self.gravity >= 0.0):
             raise _bad("gravity", str(self.gravity), "an acceleration of zero or more, m/s^2")
         if self.time is not None and not math.isfinite(self.time):
@@ -181,14 +187,17 @@ class Condition:
 
         `temperature`: K, one number for all parts (in place of a log, too), or
         `{"default": ..., "strut.1": ...}`, where parts that are not named stay as they are.
-        `gradient`: K/m of parts, one number along a
-        strut or drive, three of frame and platform. `envelope`: a force of any direction, N; 0
-        takes it away. Raises `RequestError` (bad-condition) for a value that is not finite or of
-        the wrong size. Parts that a machine does not have are refused where it is known: by
+        A default takes the place of the log's. `gradient`: K/m of parts, one number along a strut
+        or drive, three of frame and platform. `envelope`: a force of any direction, N; 0 takes it
+        away. Raises `RequestError` (bad-condition) for a value that is not finite or of the wrong
+        size. Parts that a machine does not have are refused where it is known: by
         `truepose.budget`, `truepose.compensate` and `Machine.with_condition`.
         """
         changes: dict[str, object] = {}
         if isinstance(temperature, Mapping):
+            if DEFAULT_PART in temperature and self.temperature_log is not None:
+                # What a condition names goes before the log, and so does its default.
+                changes["temperature_log"] = self.temperature_log.without(DEFAULT_PART)
             changes["default_temperature"] = float(
                 temperature.get(DEFAULT_PART, self.default_temperature)
             )
@@ -233,6 +242,8 @@ class Condition:
 
 def _along(part: str, value: float | Sequence[float]) -> Vector:
     if isinstance(value, (int, float)):
+        if part in BODIES:
+            raise _bad(f"gradient.{part}", str(value), "three numbers, along its axes, K/m")
         return (float(value), 0.0, 0.0)
     return _vector(f"gradient.{part}", value)
 

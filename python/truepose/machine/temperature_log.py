@@ -65,6 +65,11 @@ class TemperatureLog:
         """Whether the log has a temperature for a part, be it that of `default`."""
         return part in self.temperatures or DEFAULT_PART in self.temperatures
 
+    def without(self, part: str) -> TemperatureLog | None:
+        """The log without the temperature of one part; None where it has no other."""
+        others = {name: values for name, values in self.temperatures.items() if name != part}
+        return TemperatureLog(self.times, others, self.name) if others else None
+
     def covers(self, times: ArrayLike) -> NDArray[np.bool_]:
         """Whether each time is within the log."""
         given = np.asarray(times, np.float64)

@@ -280,7 +280,9 @@ def _designation(text: str, dimension: str) -> str:
             f"a tolerance class for {DIMENSIONS[dimension].phrase}",
             found=shown_value(text),
             expected="[lower limit, upper limit] or one half band",
-            hint="ISO 2768-1 goes by the length of an angle's shorter side, which no key says",
+            hint="ISO 2768-1 goes by the length of an angle's shorter side, which no key says"
+            if dimension == "angle"
+            else None,
         )
     try:
         return tolerance_standards.canonical(text, dimension)

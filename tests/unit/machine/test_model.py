@@ -120,6 +120,8 @@ def test_conditions(planar: Machine) -> None:
         {"gravity": -9.81},
         {"gradient": {"strut.1": (1.0, 2.0)}},
         {"gradient": {"strut.1": float("inf")}},
+        {"gradient": {"strut.1": (1.0, 2.0, 0.0)}},
+        {"gradient": {"frame": 3.0}},
         {"envelope": -1.0},
         {"envelope": float("nan")},
         {"time": float("nan")},
@@ -158,6 +160,13 @@ def test_gradients_and_logs(planar: Machine) -> None:
     assert own.temperature("strut.2") == 280.0, "what the condition names goes before the log"
     assert own.temperature("strut.2", [0.0]) == 280.0
     assert given.replace(temperature=280.0).temperature("strut.1") == 280.0
+    others = given.replace(temperature={"default": 280.0})
+    assert others.temperature("strut.2") == others.temperature("strut.2", [0.0]) == 280.0
+    assert others.temperature("strut.1") == 310.0, "still that of the log"
+    assert log.without("strut.1") is not None
+    bare = TemperatureLog(log.times, {"default": log.temperatures["default"]})
+    alone = given.replace(temperature_log=bare).replace(temperature={"default": 280.0})
+    assert (alone.temperature_log, alone.temperature("strut.1")) == (None, 280.0)
     assert planar.with_condition(given).condition is given
     again = pickle.loads(pickle.dumps(given))  # noqa: S301
     assert again.temperature("strut.1") == 310.0

@@ -154,6 +154,7 @@ def test_points_are_met_exactly() -> None:
     [
         ("excluding-keys", f"{PLANAR_GRID}\nbox = {{ x = [0, 1], step = 1 }}", "grid and box"),
         ("missing-key", "box = { x = [200, 400], y = [1, 1] }", "x without step"),
+        ("missing-key", "box = { step = 20 }", "the box names no freedom"),
         ("missing-key", "cylinder = { radius = 40 }", "workspace.cylinder.step"),
         ("missing-key", "path = { points = [[200, 100]] }", "at least two points"),
         ("missing-key", "path = { points = [] }", "no pose in the list"),

@@ -7,7 +7,7 @@ use super::samples::{Group, Rows, Samples};
 use super::threads::for_chunks;
 use crate::dispatch::{Work, dispatch};
 use crate::kinematics::{
-    Limbs, Linearisation, SINGULAR, Sample, condition, internal_forces, limbs,
+    Limbs, Linearisation, SINGULAR, Sample, condition, internal_forces, limbs, place_limbs,
 };
 use crate::linear::{CLOSURES, Order, SIX, factor_pivoting};
 use crate::machine::{Machine, chosen};
@@ -85,7 +85,7 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
         for (number, (out, status)) in groups.enumerate() {
             let place = Place { first: first + number * S::WIDTH, size: status.len() };
             if group.load(machine, samples, place.first, place.size) {
-                at = limbs(machine, &group.p, &group.q);
+                place_limbs(machine, &group.p, &group.q, &mut at);
             }
             let mut proven = S::splat(-1.0);
             if S::WIDTH > 1 {

@@ -3,7 +3,7 @@
 use super::samples::{Group, Samples};
 use super::threads::for_chunks;
 use crate::dispatch::{Work, dispatch};
-use crate::kinematics::{Limbs, Sample, descend, forward, limbs, start_order};
+use crate::kinematics::{Limbs, Sample, descend, forward, place_limbs, start_order};
 use crate::machine::{Machine, chosen};
 use crate::scalar::Real;
 use crate::spatial::{Pose, relative_rotation};
@@ -75,7 +75,7 @@ impl Work for Chunk<'_> {
         for (number, (out, status)) in groups.enumerate() {
             let size = status.len();
             if group.load(machine, samples, first + number * S::WIDTH, size) {
-                at = limbs(machine, &group.p, &group.q);
+                place_limbs(machine, &group.p, &group.q, &mut at);
             }
             if S::WIDTH == 1 {
                 alone(machine, &group, &at, 0, kept, out, &mut status[0]);

@@ -30,10 +30,9 @@ pub type Residuals = [f64; CLOSURES];
 
 /// Places every strut's joint centres for parameters `p` and joint coordinates `q`.
 #[inline(always)]
-pub fn limbs<S: Real>(machine: &Machine, p: &[S], q: &[S]) -> Limbs<S> {
-    let mut result = [Limb::default(); CLOSURES];
+pub fn place_limbs<S: Real>(machine: &Machine, p: &[S], q: &[S], limbs: &mut Limbs<S>) {
     let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
-    for (limb, strut) in result.iter_mut().zip(&machine.struts) {
+    for (limb, strut) in limbs.iter_mut().zip(&machine.struts) {
         let own = &p[strut.first..];
         let base = [own[0], own[1], own[2]];
         let length = match strut.own_length {
@@ -49,6 +48,12 @@ pub fn limbs<S: Real>(machine: &Machine, p: &[S], q: &[S]) -> Limbs<S> {
             }
         };
     }
+}
+
+/// The placed struts of one sample.
+pub fn limbs(machine: &Machine, p: &[f64], q: &[f64]) -> Limbs<f64> {
+    let mut result = Limbs::default();
+    place_limbs(machine, p, q, &mut result);
     result
 }
 
@@ -216,8 +221,12 @@ impl Sample<'_> {
     /// Residuals and rows on which Newton's iteration runs, as a square system: struts squared, identity
     /// rows for the freedoms that the frame holds. Only for as many closures as freedoms.
     pub fn squared(&self, pose: &Pose<f64>) -> (Matrix6<f64>, [f64; SIX]) {
-        let (rows, residuals) = self.system::<true>(pose);
         let (mut square, mut values) = ([[0.0; SIX]; SIX], [0.0; SIX]);
+        if self.machine.plain {
+            squared_rows(self.machine, self.limbs, pose, &IN_ORDER, &mut square, &mut values);
+            return (square, values);
+        }
+        let (rows, residuals) = self.system::<true>(pose);
         square.copy_from_slice(&rows[..SIX]);
         values.copy_from_slice(&residuals[..SIX]);
         let count = self.machine.closure_count();
@@ -225,6 +234,16 @@ impl Sample<'_> {
             square[count + number] = held_row(self.machine, number);
         }
         (square, values)
+    }
+
+    /// The residuals of [`Sample::squared`] alone.
+    pub fn squared_residuals(&self, pose: &Pose<f64>) -> [f64; SIX] {
+        if !self.machine.plain {
+            return self.squared(pose).1;
+        }
+        let mut values = [0.0; SIX];
+        squared_residuals(self.machine, self.limbs, pose, &IN_ORDER, &mut values);
+        values
     }
 
     /// Residuals (m) and rows (unit wrenches) of the closures themselves.

@@ -134,7 +134,7 @@ fn settle(
         pose.step_back(&twist);
         if size < CHORD {
             for _ in 0..CHORD_STEPS {
-                let twist = step(sample.squared(pose).1);
+                let twist = step(sample.squared_residuals(pose));
                 pose.step_back(&twist);
                 if relative_size(sample.machine, &twist) * size < SETTLED {
                     return Ending::Settled(determinant);

@@ -6,7 +6,7 @@ mod inverse;
 mod linearisation;
 mod overconstrained;
 
-pub use closures::{Limb, Limbs, Sample, limbs, ring_arm};
+pub use closures::{Limb, Limbs, Sample, limbs, place_limbs, ring_arm};
 pub use forward::{Descent, descend, forward, start_order};
 pub use inverse::{
     Inverse, Obstacle, commanded_pose, condition, free_motions, inverse, lane_inverse, obstacles,

@@ -45,11 +45,7 @@ def of_one_material(machine: Machine) -> Machine:
     return dataclasses.replace(grown, condition=dataclasses.replace(warm, gradients={}))
 
 
-# An over-constrained machine's pose is that of least energy, at the stiffness it has at home.
-ISOSTATIC = [path for path in machine_files() if path.stem != "overconstrained"]
-
-
-@pytest.mark.parametrize("path", ISOSTATIC, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", machine_files(), ids=lambda path: path.stem)
 def test_a_warm_machine_of_one_material_is_a_larger_one(path: Path) -> None:
     machine = of_one_material(tp.load(path))
     poses = machine.poses()[:: max(1, len(machine.poses()) // 20)]

@@ -18,6 +18,7 @@ COMMANDS: dict[str, str] = {
     "check": "truepose.cli.check",
     "budget": "truepose.cli.budget",
     "compensate": "truepose.cli.compensate",
+    "over-time": "truepose.cli.over_time",
     "strain": "truepose.cli.strain",
     "report": "truepose.cli.report",
 }

@@ -85,6 +85,14 @@ def strain(request: Request, machine: Machine) -> xr.Dataset:
     return found
 
 
+def over_time(request: Request, machine: Machine) -> xr.Dataset:
+    """The error over the file's temperature log, at home."""
+    with progress("error over time") as report:
+        found = truepose.over_time(machine, progress=report)
+    _refuse_left_out_of(request, machine, found)
+    return found
+
+
 def study_of(request: Request, machine: Machine) -> Study:
     """The machine with both results."""
     return Study(machine, evaluate(request, machine), correct(request, machine))

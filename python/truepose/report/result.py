@@ -16,8 +16,11 @@ if TYPE_CHECKING:
 
     from truepose.machine import Machine
 
-DIMENSION_OF = {"m": "length", "rad": "angle", "N": "force"}
+DIMENSION_OF = {"m": "length", "rad": "angle", "N": "force", "K": "temperature", "s": "time"}
 """SI unit of a result -> dimension of the unit that the machine file declares for it."""
+
+_OVER_TIME = ("temperature", "time")
+"""Dimensions that only some results have."""
 
 
 def in_file_units(machine: Machine, value: float, unit: str) -> tuple[float, str]:
@@ -67,7 +70,11 @@ class Result:
 
     def units(self) -> dict[str, str]:
         """Unit of every dimension that appears in results: {"length": "mm", ...}."""
-        return {name: self.machine.file_units[name].label for name in DIMENSION_OF.values()}
+        return {
+            name: self.machine.file_units[name].label
+            for name in DIMENSION_OF.values()
+            if name not in _OVER_TIME or name in self.dataset.variables
+        }
 
     def values(self, name: str) -> Values:
         """One variable or coordinate in the units of the machine file."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,11 +19,17 @@ from truepose.report.display import (
     column,
     decimals_for,
     error_unit,
+    is_position,
     number,
     pose_text,
     where_highest,
 )
 from truepose.report.study import Study
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
 
 MOST_LISTED = 20
 """Rows of a list of poses shown to people; files for programs hold them all."""
@@ -127,6 +134,37 @@ def compensation(study: Study) -> Table:
         tuple(zip([name for name, _ in rows], *cells, strict=True)),
         note="After: the corrected command driven through the actual machine. The bound is "
         "linear in the deviations and holds up to a term of second order in them.",
+    )
+
+
+MOMENTS = 9
+"""Moments of an error over time shown to people, evenly spaced."""
+
+
+def over_time(machine: Machine, found: xr.Dataset) -> Table:
+    """The error at the first of the poses, at some moments of the temperature log and the worst."""
+    times, error = found["time"].values, found["error"].values[:, 0]
+    components = [str(name) for name in found["component"].values]
+    size = np.linalg.norm(error[:, [is_position(name) for name in components]], axis=1)
+    worst = where_highest(size)
+    shown = np.unique(np.linspace(0, len(times) - 1, min(MOMENTS, len(times))).astype(int))
+    rows = [*shown, worst]
+    pose = np.array([found[f"pose_{name}"].values[0] for name in machine.commanded])
+    columns = [
+        [*(number(times[row] / 60.0, 2) for row in shown), f"{times[worst] / 60.0:.2f} (worst)"],
+        *(column(error[rows, index] * MICRO) for index in range(len(components))),
+        column(size[rows] * MICRO),
+    ]
+    return Table(
+        "over_time",
+        "Error over time",
+        (
+            "time, min",
+            *(f"{name}, {error_unit(name)}" for name in components),
+            "position, µm",
+        ),
+        tuple(zip(*columns, strict=True)),
+        note=f"From the logged temperatures alone, exact, at {pose_text(pose, machine.commanded)}.",
     )
 
 

@@ -1,5 +1,7 @@
 """CSV: one row for each pose and source, in the units of the machine file, named in the header.
 
+An error over time has one row for each moment and pose, with the temperatures of the moment.
+
 Where there are sources, a further row of the source "overall" has what all do together. Poses
 that cannot be used have one row with their status and nothing else. What is not over poses (the
 comparison of the sources) is in the JSON and NetCDF forms.
@@ -37,6 +39,9 @@ class Column:
 
 def text(result: Result) -> Iterator[str]:
     """The file in pieces of some thousand rows."""
+    if "time" in result.dataset.sizes:
+        yield from _over_time(result)
+        return
     columns = _columns(result)
     poses = [_single(result, f"pose_{name}") for name in result.machine.commanded]
     sources = result.labels("source") if "source" in result.dataset.sizes else []
@@ -67,6 +72,38 @@ def write(result: Result, path: Path) -> None:
     """Write the file to `path`."""
     with path.open("w", encoding="utf-8", newline="") as file:
         file.writelines(text(result))
+
+
+def _over_time(result: Result) -> Iterator[str]:
+    """One row for each moment and pose: error of every component, temperature of every part."""
+    poses = [_single(result, f"pose_{name}") for name in result.machine.commanded]
+    error, heat = result.values("error"), result.values("temperature")
+    moments = _single(result, "time")
+    yield _lines(
+        [
+            [
+                moments.header,
+                "pose",
+                *(pose.header for pose in poses),
+                *(
+                    f"error_{label} [{error.unit(index)}]"
+                    for index, label in enumerate(result.labels("component"))
+                ),
+                *(f"temperature_{part} [{heat.unit()}]" for part in result.labels("part")),
+            ]
+        ]
+    )
+    numbers = result.dataset["pose"].values.tolist()
+    at = list(zip(numbers, *(pose.values.tolist() for pose in poses), strict=True))
+    for moment, errors, temperatures in zip(
+        moments.values.tolist(), error.array, heat.array.tolist(), strict=True
+    ):
+        yield _lines(
+            [
+                [moment, *where, *map(_cell, row), *temperatures]
+                for where, row in zip(at, errors.tolist(), strict=True)
+            ]
+        )
 
 
 def _interleaved(

@@ -1,0 +1,36 @@
+"""`truepose over-time`: the error over a temperature log."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from truepose.cli._options import (
+    Request,
+    format_option,
+    machine_argument,
+    output_option,
+    set_option,
+    strict_option,
+    takes,
+)
+
+
+@click.command("over-time")
+@takes(machine_argument, set_option, format_option, output_option, strict_option)
+def command(**options: Any) -> int:
+    """Follow the error through a temperature log.
+
+    The machine file names the log (`[condition] temperature_log`). Shows the tool's error at home
+    at some moments; `--format csv` and `--output` have a row for every moment of the log.
+    """
+    from truepose.cli import _work
+    from truepose.report import tables
+    from truepose.report.result import Result
+
+    request = Request(**options)
+    machine = _work.read_machine(request)
+    found = _work.over_time(request, machine)
+    _work.deliver(request, Result("over-time", machine, found), [tables.over_time(machine, found)])
+    return 0

@@ -145,7 +145,8 @@ class _Moved:
         frame = self._growth(self.machine.frame)
         if not frame.any:
             return
-        origins = {drive.part for drive in self.machine.drives if self._has_origin(drive)}
+        # A list, for the order of the columns is that of the results.
+        origins = [drive.part for drive in self.machine.drives if self._has_origin(drive)]
         for strut in self.machine.struts:
             if strut.drive is None or f"drive.{strut.drive}" not in origins:
                 self._shift(f"{strut.part}.base", frame.displacement(self._point(strut, "base")))

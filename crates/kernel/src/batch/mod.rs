@@ -7,6 +7,7 @@ mod base_loads;
 mod first_order;
 mod forward;
 mod inverse;
+mod moved;
 mod samples;
 mod threads;
 
@@ -18,8 +19,9 @@ pub use first_order::{
 };
 pub use forward::{displacement, displacements, forward_poses};
 pub use inverse::inverses;
+pub use moved::moved_sensitivities;
 pub use samples::{Deviations, Rows, Samples};
-pub use threads::{set_threads, threads};
+pub use threads::{set_threads, share_out, threads};
 
 /// Samples of one chunk.
 const CHUNK: usize = 256;

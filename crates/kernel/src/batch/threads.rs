@@ -3,6 +3,7 @@
 use super::CHUNK;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
 static POOL: RwLock<Option<Arc<ThreadPool>>> = RwLock::new(None);
@@ -68,4 +69,28 @@ pub fn for_chunks<C: Send>(
             pieces.into_par_iter().for_each(|(first, a, b, c)| work(first, a, b, c));
         });
     }
+}
+
+/// Shares `count` pieces of work, each with `width` of the `results`, out to the threads in runs of
+/// neighbours; returns what each run made, in order.
+pub fn share_out<R: Send, T: Send>(
+    results: &mut [R],
+    count: usize,
+    width: usize,
+    work: impl Fn(Range<usize>, &mut [R]) -> T + Sync,
+) -> Vec<T> {
+    let runs = threads().min(count).max(1);
+    let mut parts = Vec::with_capacity(runs);
+    let mut rest = results;
+    for run in 0..runs {
+        let pieces = run * count / runs..(run + 1) * count / runs;
+        let (head, tail) = rest.split_at_mut(pieces.len() * width);
+        parts.push((pieces, head));
+        rest = tail;
+    }
+    if runs == 1 {
+        return parts.into_iter().map(|(pieces, results)| work(pieces, results)).collect();
+    }
+    pool()
+        .install(|| parts.into_par_iter().map(|(pieces, results)| work(pieces, results)).collect())
 }

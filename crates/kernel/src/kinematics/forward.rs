@@ -9,7 +9,10 @@ use super::SINGULAR;
 use super::closures::{Limbs, Sample, squared_residuals, squared_rows, start_rows};
 use super::linearisation::proven_regular;
 use super::overconstrained::{Surroundings, least_energy};
-use crate::linear::{Order, Pivoted, SIX, condition_index, factor, factor_pivoting, solve};
+use crate::linear::{
+    IN_ORDER, Matrix6, Order, Pivoted, SIX, condition_index, factor, factor_pivoting, inverse_of,
+    solve,
+};
 use crate::machine::Machine;
 use crate::scalar::Real;
 use crate::spatial::Pose;
@@ -89,6 +92,59 @@ pub fn descend<S: Real>(
                 }
             }
         }
+    }
+    Descent { pose, proof: S::splat(-1.0) }
+}
+
+/// Chord steps of [`chord`] before it gives up.
+const CHORD_LIMIT: usize = 10;
+/// [`chord`] is trusted while each step is shorter than this share of the one before.
+const CONTRACTION: f64 = 0.1;
+/// Relative step that may be rounding alone.
+const ROUNDING: f64 = 1e-13;
+/// [`chord`] is settled where what is left is below this, relative.
+const CHORD_SETTLED: f64 = 1e-15;
+
+/// The inverse of the squared rows of a plain machine at a pose, for [`chord`].
+pub fn chord_inverse(sample: &Sample<'_>, pose: &Pose<f64>) -> Matrix6<f64> {
+    inverse_of(&sample.squared(pose).0)
+}
+
+/// Newton's iteration on all lanes with the inverse of a nearby pose all the way: no elimination, and
+/// more steps, each shorter than the one before by the relative change of the rows.
+///
+/// While steps shrink tenfold each, the rows of every pose on the way differ from those of the start by
+/// less than a singular one would, so the pose found is on the branch of the start.
+#[inline(always)]
+pub fn chord<S: Real>(
+    machine: &Machine,
+    limbs: &Limbs<S>,
+    start: &Pose<S>,
+    inverse: &Matrix6<f64>,
+) -> Descent<S> {
+    let mut pose = *start;
+    let mut proof = S::splat(if machine.plain { 1.0 } else { -1.0 });
+    let mut last = S::splat(LONG_STEP / CONTRACTION);
+    let mut residuals = [S::default(); SIX];
+    let mut twist = [S::default(); SIX];
+    let count = if machine.plain { machine.struts.len() } else { 0 };
+    for _ in 0..CHORD_LIMIT {
+        squared_residuals(machine, limbs, &pose, &IN_ORDER, &mut residuals);
+        for k in 0..SIX {
+            twist[k] = S::splat(inverse[k][0]) * residuals[0];
+            for i in 1..count {
+                twist[k] = S::splat(inverse[k][i]).mul_add(residuals[i], twist[k]);
+            }
+        }
+        pose.step_back(&twist);
+        let size = relative_size(machine, &twist);
+        proof = proof.min(last.mul_add(S::splat(CONTRACTION), S::splat(ROUNDING)) - size);
+        // What is left is size * (size / last), and a little more.
+        let left = size.mul_add(size, -(last * S::splat(CHORD_SETTLED)));
+        if left.all_below(0.0) {
+            return Descent { pose, proof };
+        }
+        last = size + S::splat(f64::MIN_POSITIVE);
     }
     Descent { pose, proof: S::splat(-1.0) }
 }

@@ -6,8 +6,8 @@ mod inverse;
 mod linearisation;
 mod overconstrained;
 
-pub use closures::{Limb, Limbs, Sample, limbs, place_limbs, ring_arm};
-pub use forward::{Descent, descend, forward, start_order};
+pub use closures::{Limb, Limbs, Sample, guide_limb, limbs, place_limbs, ring_arm};
+pub use forward::{Descent, chord, chord_inverse, descend, forward, start_order};
 pub use inverse::{
     Inverse, Obstacle, commanded_pose, condition, free_motions, inverse, lane_inverse, obstacles,
     permitted,

@@ -54,6 +54,14 @@ impl Real for f64 {
         *self = value;
     }
     #[inline(always)]
+    fn load(values: &[f64]) -> f64 {
+        values[0]
+    }
+    #[inline(always)]
+    fn store(self, values: &mut [f64]) {
+        values[0] = self;
+    }
+    #[inline(always)]
     fn abs(self) -> f64 {
         f64::abs(self)
     }

@@ -118,6 +118,16 @@ impl<const LEVEL: u8> Real for Lanes<LEVEL> {
         self.0[lane] = value;
     }
     #[inline(always)]
+    fn load(values: &[f64]) -> Self {
+        let mut result = [0.0; LANES];
+        result.copy_from_slice(&values[..LANES]);
+        Lanes(result)
+    }
+    #[inline(always)]
+    fn store(self, values: &mut [f64]) {
+        values[..LANES].copy_from_slice(&self.0);
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         let mut result = self.0;
         for k in 0..LANES {

@@ -64,6 +64,10 @@ pub trait Real: Scalar + Default + PartialEq {
     fn lane(&self, lane: usize) -> f64;
     /// Sets the value of one lane, `lane < WIDTH`.
     fn set_lane(&mut self, lane: usize, value: f64);
+    /// The first `WIDTH` of these, one a lane.
+    fn load(values: &[f64]) -> Self;
+    /// The value of each lane into the first `WIDTH` of these.
+    fn store(self, values: &mut [f64]);
     /// Absolute value.
     fn abs(self) -> Self;
     /// The smaller of two, lane by lane; NaN where either is NaN.

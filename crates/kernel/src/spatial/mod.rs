@@ -5,6 +5,6 @@ mod vector;
 
 pub use pose::{
     Pose, Quaternion, RotationMatrix, euler_angles, euler_axes, quaternion_from_euler,
-    relative_rotation, rotate, rotate_back, rotation_matrix,
+    relative_quaternion, relative_rotation, rotate, rotate_back, rotation_matrix,
 };
 pub use vector::{Vector, add, cross, dot, norm, scale, subtract, tangents};

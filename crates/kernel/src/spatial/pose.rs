@@ -185,21 +185,26 @@ pub fn euler_axes(angles: [f64; 3]) -> [Vector<f64>; 3] {
     [[cc * cb, sc * cb, -sb], [-sc, cc, 0.0], [0.0, 0.0, 1.0]]
 }
 
+/// `to` times the conjugate of `from`: what turns `from` into `to`, of the product of their lengths.
+#[inline(always)]
+pub fn relative_quaternion<S: Scalar>(from: Quaternion<S>, to: Quaternion<S>) -> Quaternion<S> {
+    let [fw, fx, fy, fz] = from;
+    let [tw, tx, ty, tz] = to;
+    [
+        tw * fw + tx * fx + ty * fy + tz * fz,
+        tx * fw - tw * fx + (tz * fy - ty * fz),
+        ty * fw - tw * fy + (tx * fz - tz * fx),
+        tz * fw - tw * fz + (ty * fx - tx * fy),
+    ]
+}
+
 /// The rotation vector (axis times angle, rad, base frame) that turns `from` into `to`.
 ///
 /// With the relative quaternion (w, v) it is `2 atan(|v| / w) v / |v|`. Below 0.06 rad the series of
 /// the arc tangent is exact to rounding and needs no branch per lane.
 #[inline(always)]
 pub fn relative_rotation<S: Real>(from: Quaternion<S>, to: Quaternion<S>) -> Vector<S> {
-    let [fw, fx, fy, fz] = from;
-    let [tw, tx, ty, tz] = to;
-    // to * conjugate(from)
-    let w = tw * fw + tx * fx + ty * fy + tz * fz;
-    let v = [
-        tx * fw - tw * fx + (tz * fy - ty * fz),
-        ty * fw - tw * fy + (tx * fz - tz * fx),
-        tz * fw - tw * fz + (ty * fx - tx * fy),
-    ];
+    let [w, v @ ..] = relative_quaternion(from, to);
     let length2 = v[0].square() + v[1].square() + v[2].square();
     let x2 = length2 / w.square();
     if x2.all_below(1e-3) {

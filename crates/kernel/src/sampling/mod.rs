@@ -1,0 +1,16 @@
+//! Monte Carlo: machines drawn at random, their exact poses, and what is kept of them.
+//!
+//! Random numbers are counter-based: the value of a variable in a sample follows from the seed and the
+//! variable's identity alone, whatever threads, lanes or calls the samples are shared out to.
+
+mod monte_carlo;
+mod random;
+mod tally;
+mod variables;
+
+pub use monte_carlo::{Columns, Study, StudyPose, Whitening, sample};
+pub use tally::Tally;
+pub use variables::{Copula, Shape, Variable, Variables};
+
+/// Samples that are drawn and evaluated together: their variables stay in the cache.
+const SEGMENT: usize = 256;

@@ -1,0 +1,380 @@
+//! Monte Carlo as Python classes: variables, a study of a machine at poses, and the tallies of its samples.
+
+use crate::arrays::{Array, Input, output};
+use crate::evaluate::codes;
+use crate::machine::Machine;
+use numpy::{PyArray1, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use truepose_kernel::Status;
+use truepose_kernel::machine::chosen;
+use truepose_kernel::sampling::{
+    self, Columns, Copula, Shape, StudyPose, Tally, Variable, Whitening,
+};
+use truepose_kernel::spatial::Pose;
+
+fn required<'py, T>(entry: &Bound<'py, PyDict>, key: &str) -> PyResult<T>
+where
+    T: FromPyObjectOwned<'py>,
+{
+    match entry.get_item(key)? {
+        Some(value) => value.extract().map_err(Into::into),
+        None => Err(PyValueError::new_err(format!("a variable has no {key:?}"))),
+    }
+}
+
+fn variable(entry: &Bound<'_, PyDict>) -> PyResult<Variable> {
+    let kind: String = required(entry, "kind")?;
+    let sigmas: f64 = required(entry, "sigmas")?;
+    let shape = match kind.as_str() {
+        "uniform" => Shape::Uniform,
+        "triangular" => Shape::Triangular,
+        "arcsine" => Shape::Arcsine,
+        "two-point" => Shape::TwoPoint,
+        "normal" => Shape::Normal(1.0 / sigmas),
+        "student-t" => {
+            let dof: f64 = required(entry, "dof")?;
+            Shape::StudentT { dof, scale: ((dof - 2.0) / dof).sqrt() / sigmas }
+        }
+        "discrete" => {
+            let mut sum = 0.0;
+            let mut cumulative: Vec<f64> = required(entry, "probabilities")?;
+            for value in &mut cumulative {
+                sum += *value;
+                *value = sum;
+            }
+            Shape::Discrete { values: required(entry, "values")?, cumulative }
+        }
+        _ => return Err(PyValueError::new_err(format!("{kind:?} is no distribution"))),
+    };
+    Ok(Variable { shape, stream: required(entry, "stream")?, number: required(entry, "number")? })
+}
+
+/// Independent or correlated variables, each of a distribution.
+#[pyclass(frozen, module = "truepose._kernel")]
+pub struct Variables {
+    inner: sampling::Variables,
+}
+
+#[pymethods]
+impl Variables {
+    #[new]
+    #[pyo3(signature = (variables, members=vec![], factor=vec![]))]
+    fn new(
+        variables: Vec<Bound<'_, PyDict>>,
+        members: Vec<usize>,
+        factor: Vec<f64>,
+    ) -> PyResult<Self> {
+        let count = variables.len();
+        if factor.len() != members.len() * members.len() || members.iter().any(|&m| m >= count) {
+            return Err(PyValueError::new_err("members and factor do not fit the variables"));
+        }
+        let variables = variables.iter().map(variable).collect::<PyResult<Vec<_>>>()?;
+        let copula = (!members.is_empty()).then_some(Copula { members, factor });
+        Ok(Variables { inner: sampling::Variables::new(variables, copula) })
+    }
+
+    /// (count, n_variable) the samples from number `first` on.
+    fn draw<'py>(
+        &self,
+        py: Python<'py>,
+        seed: u64,
+        first: u64,
+        count: usize,
+    ) -> PyResult<Array<'py>> {
+        let out = output(py, &[count], &[self.inner.count()])?;
+        self.inner.rows(seed, first, count, out.readwrite().as_slice_mut()?);
+        Ok(out)
+    }
+}
+
+/// What is kept of the samples at some poses: columns, the first of which have a covariance.
+#[pyclass(module = "truepose._kernel")]
+pub struct Tallies {
+    inner: Vec<Tally>,
+}
+
+impl Tallies {
+    fn table<'py>(
+        &self,
+        py: Python<'py>,
+        further: &[usize],
+        row: impl Fn(&Tally) -> Vec<f64>,
+    ) -> PyResult<Array<'py>> {
+        let out = output(py, &[self.inner.len()], further)?;
+        let rows: Vec<f64> = self.inner.iter().flat_map(row).collect();
+        out.readwrite().as_slice_mut()?.copy_from_slice(&rows);
+        Ok(out)
+    }
+
+    fn columns(&self) -> usize {
+        self.inner.first().map_or(0, Tally::columns)
+    }
+}
+
+#[pymethods]
+impl Tallies {
+    #[new]
+    fn new(
+        origins: &Bound<'_, PyAny>,
+        widths: &Bound<'_, PyAny>,
+        columns: usize,
+        covariant: usize,
+    ) -> PyResult<Self> {
+        let origins = Input::new(origins, &[columns], "origins")?;
+        let widths = Input::new(widths, &[columns], "widths")?;
+        if widths.count != origins.count || covariant > columns {
+            return Err(PyValueError::new_err("origins, widths and columns do not fit"));
+        }
+        if !widths.data().iter().all(|width| *width > 0.0 && width.is_finite()) {
+            return Err(PyValueError::new_err("a width is not above 0"));
+        }
+        let rows = origins.data().chunks(columns).zip(widths.data().chunks(columns));
+        Ok(Tallies { inner: rows.map(|(o, w)| Tally::new(o, w, covariant)).collect() })
+    }
+
+    /// The same without samples.
+    fn blank(&self) -> Self {
+        Tallies { inner: self.inner.iter().map(Tally::blank).collect() }
+    }
+
+    /// Adds samples (count, n_column) to the first pose.
+    fn add(&mut self, py: Python<'_>, values: &Bound<'_, PyAny>) -> PyResult<()> {
+        let values = Input::new(values, &[self.columns()], "values")?;
+        let rows = values.data();
+        let width = values.width;
+        let Some(tally) = self.inner.first_mut() else { return Ok(()) };
+        py.detach(|| rows.chunks(width).for_each(|row| tally.add(row)));
+        Ok(())
+    }
+
+    /// Counts samples of the first pose that have no result.
+    fn fail(&mut self, count: u64) {
+        if let Some(tally) = self.inner.first_mut() {
+            tally.failed[Status::NotConverged as usize] += count;
+        }
+    }
+
+    /// Adds the samples of other tallies of the same origins and widths.
+    fn merge(&mut self, other: &Tallies) -> PyResult<()> {
+        if other.inner.len() != self.inner.len() || other.columns() != self.columns() {
+            return Err(PyValueError::new_err("the tallies are of other columns or poses"));
+        }
+        for (one, more) in self.inner.iter_mut().zip(&other.inner) {
+            one.merge(more.clone());
+        }
+        Ok(())
+    }
+
+    /// (n_pose,) samples with a result.
+    #[getter]
+    fn count<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        PyArray1::from_iter(py, self.inner.iter().map(|tally| tally.count() as i64))
+    }
+
+    /// (n_pose,) samples without a result.
+    #[getter]
+    fn failed<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
+        let sums = self.inner.iter().map(|tally| tally.failed.iter().sum::<u64>() as i64);
+        PyArray1::from_iter(py, sums)
+    }
+
+    /// (n_pose, n_column).
+    #[getter]
+    fn mean<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let columns = self.columns();
+        self.table(py, &[columns], |tally| (0..columns).map(|c| tally.mean(c)).collect())
+    }
+
+    /// (n_pose, n, n) of the n columns that have one.
+    #[getter]
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let n = self.inner.first().map_or(0, Tally::covariant);
+        self.table(py, &[n, n], |tally| {
+            (0..n * n).map(|k| tally.covariance(k / n, k % n)).collect()
+        })
+    }
+
+    /// (n_pose, n_column, n_share) the values below which lie the shares of the samples.
+    fn quantiles<'py>(&self, py: Python<'py>, shares: Vec<f64>) -> PyResult<Array<'py>> {
+        let columns = self.columns();
+        self.table(py, &[columns, shares.len()], |tally| {
+            (0..columns).flat_map(|column| tally.quantiles(column, &shares)).collect()
+        })
+    }
+
+    /// (n_pose, n_column, 2) the narrowest interval that holds a share of the samples.
+    fn shortest<'py>(&self, py: Python<'py>, share: f64) -> PyResult<Array<'py>> {
+        let columns = self.columns();
+        self.table(py, &[columns, 2], |tally| {
+            (0..columns).flat_map(|column| tally.shortest(column, share)).collect()
+        })
+    }
+
+    /// (n_pose, n_column, 2) smallest and largest value.
+    #[getter]
+    fn extremes<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let columns = self.columns();
+        self.table(py, &[columns, 2], |tally| {
+            (0..columns).flat_map(|column| tally.extremes(column)).collect()
+        })
+    }
+}
+
+/// A machine at poses, ready for sampling.
+#[pyclass(frozen, module = "truepose._kernel")]
+pub struct Study {
+    machine: truepose_kernel::Machine,
+    columns: Columns,
+    poses: Vec<StudyPose>,
+}
+
+#[pymethods]
+impl Study {
+    /// `joints` (n, n_joint), `placements` (n, 7) of the commands; `shifted` (k0,) parameters and their
+    /// `shift` (n or 1, k0); `parameters` and `variables` (k,) of the columns and their `swing` (n or 1, k);
+    /// `whitening` (n, 12): centre (3) and matrix (3 x 3) of the position error, or None.
+    #[new]
+    #[allow(clippy::too_many_arguments)] // Python's signature
+    #[pyo3(signature = (machine, joints, placements, shifted, shift, parameters, variables, swing, whitening=None))]
+    fn new(
+        py: Python<'_>,
+        machine: &Machine,
+        joints: &Bound<'_, PyAny>,
+        placements: &Bound<'_, PyAny>,
+        shifted: &Bound<'_, PyAny>,
+        shift: &Bound<'_, PyAny>,
+        parameters: &Bound<'_, PyAny>,
+        variables: Vec<usize>,
+        swing: &Bound<'_, PyAny>,
+        whitening: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let shifted = machine.columns(shifted)?;
+        let parameters = machine.columns(parameters)?;
+        let machine = &machine.inner;
+        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
+        let placements = Input::new(placements, &[7], "placements")?;
+        let shift = Input::new(shift, &[shifted.len()], "shift")?;
+        let swing = Input::new(swing, &[parameters.len()], "swing")?;
+        let whitening = whitening.map(|rows| Input::new(rows, &[12], "whitening")).transpose()?;
+        let count = placements.count;
+        if variables.len() != parameters.len() {
+            return Err(PyValueError::new_err("as many variables as parameters are needed"));
+        }
+        let commands = joints.rows(0, joints.serves(count, "joints")?);
+        let shifts = (!shifted.is_empty())
+            .then(|| Ok::<_, PyErr>(shift.rows(0, shift.serves(count, "shift")?)))
+            .transpose()?;
+        let swings = (!parameters.is_empty())
+            .then(|| Ok::<_, PyErr>(swing.rows(0, swing.serves(count, "swing")?)))
+            .transpose()?;
+        let given = whitening.as_ref().map(Input::data);
+        let places = placements.data();
+        let poses = py.detach(|| {
+            let pose = |i: usize| {
+                let mut centre = machine.nominal.clone();
+                if let Some(shifts) = &shifts {
+                    for (&parameter, value) in shifted.iter().zip(shifts.row(i)) {
+                        centre[parameter] += value;
+                    }
+                }
+                let swing = swings.as_ref().map_or(Vec::new(), |swings| swings.row(i).to_vec());
+                let nominal = Pose::from_row(&places[7 * i..7 * i + 7]);
+                let whitening = given.map(|rows| {
+                    let row = &rows[12 * i..12 * i + 12];
+                    Whitening {
+                        centre: [row[0], row[1], row[2]],
+                        matrix: [0, 1, 2].map(|k| [0, 1, 2].map(|j| row[3 + 3 * k + j])),
+                    }
+                });
+                StudyPose::new(machine, commands.row(i), &nominal, centre, swing, whitening)
+            };
+            (0..count).map(pose).collect()
+        });
+        let columns = Columns::new(&parameters, &variables);
+        Ok(Study { machine: machine.clone(), columns, poses })
+    }
+
+    /// (n,) what became of the machine with its parameters at their shifts.
+    #[getter]
+    fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let status: Vec<_> = self.poses.iter().map(|pose| pose.status).collect();
+        codes(py, &[status.len()], &status)
+    }
+
+    /// (n, n_component) error at the shifts.
+    #[getter]
+    fn shift_error<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
+        let components = chosen(&self.machine.dof);
+        let out = output(py, &[self.poses.len()], &[components.len()])?;
+        let rows: Vec<f64> = self
+            .poses
+            .iter()
+            .flat_map(|pose| components.iter().map(|&k| pose.shift_error[k]))
+            .collect();
+        out.readwrite().as_slice_mut()?.copy_from_slice(&rows);
+        Ok(out)
+    }
+
+    /// Evaluates samples at every pose into `tallies`, one a pose.
+    fn sample(
+        &self,
+        py: Python<'_>,
+        variables: &Variables,
+        seed: u64,
+        first: u64,
+        count: usize,
+        tallies: &mut Tallies,
+    ) -> PyResult<()> {
+        self.check(tallies, variables.inner.count())?;
+        let study = self.study(&variables.inner, seed, None);
+        py.detach(|| sampling::sample(&study, first, count, &mut tallies.inner));
+        Ok(())
+    }
+
+    /// Evaluates samples of given variables (count, n_variable) at every pose into `tallies`.
+    fn sample_given(
+        &self,
+        py: Python<'_>,
+        variables: &Variables,
+        values: &Bound<'_, PyAny>,
+        tallies: &mut Tallies,
+    ) -> PyResult<()> {
+        self.check(tallies, variables.inner.count())?;
+        let values = Input::new(values, &[variables.inner.count()], "values")?;
+        let (count, rows) = (values.count, values.data());
+        let study = self.study(&variables.inner, 0, Some(rows));
+        py.detach(|| sampling::sample(&study, 0, count, &mut tallies.inner));
+        Ok(())
+    }
+}
+
+impl Study {
+    fn study<'a>(
+        &'a self,
+        variables: &'a sampling::Variables,
+        seed: u64,
+        given: Option<&'a [f64]>,
+    ) -> sampling::Study<'a> {
+        let (machine, columns) = (&self.machine, &self.columns);
+        sampling::Study { machine, variables, columns, poses: &self.poses, given, seed }
+    }
+
+    fn check(&self, tallies: &Tallies, variables: usize) -> PyResult<()> {
+        let components = chosen(&self.machine.dof);
+        let parts = (0..2).filter(|part| components.iter().any(|k| k / 3 == *part)).count();
+        let whitened = self.poses.iter().all(|pose| pose.is_whitened());
+        let columns = components.len() + parts + usize::from(whitened);
+        if tallies.inner.len() != self.poses.len()
+            || tallies.columns() != columns
+            || self.columns.variables() > variables
+        {
+            return Err(PyValueError::new_err(format!(
+                "expected {} tallies of {columns} columns, and a variable for every column",
+                self.poses.len()
+            )));
+        }
+        Ok(())
+    }
+}

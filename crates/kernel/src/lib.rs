@@ -11,6 +11,8 @@ pub mod element;
 pub mod kinematics;
 pub mod linear;
 pub mod machine;
+pub mod proof;
+pub mod sampling;
 pub mod scalar;
 pub mod spatial;
 pub mod statics;

@@ -7,6 +7,8 @@ mod elements;
 mod evaluate;
 mod failure;
 mod machine;
+mod proof;
+mod sampling;
 mod toml_lines;
 
 use pyo3::prelude::*;
@@ -79,6 +81,9 @@ fn _kernel(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("STATUS", PyTuple::new(py, Status::ALL.map(Status::name))?)?;
     module.add("KernelError", py.get_type::<failure::KernelError>())?;
     module.add_class::<machine::Machine>()?;
+    module.add_class::<sampling::Variables>()?;
+    module.add_class::<sampling::Tallies>()?;
+    module.add_class::<sampling::Study>()?;
     module.add_function(wrap_pyfunction!(threads, module)?)?;
     module.add_function(wrap_pyfunction!(instruction_set, module)?)?;
     module.add_function(wrap_pyfunction!(use_instruction_set, module)?)?;

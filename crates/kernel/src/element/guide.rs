@@ -125,31 +125,33 @@ impl<S: Scalar> GuideLimb<S> {
 
 /// Residual of a closure and its row: derivatives to the platform's twist about the tool point.
 #[inline(always)]
-fn row_of<G: Guide>(
+fn row_of<S: Scalar, G: Guide>(
     which: usize,
     frames: &GuideFrames,
-    limb: &GuideLimb<f64>,
-    (rotation, position): (&RotationMatrix<f64>, Vector<f64>),
+    limb: &GuideLimb<S>,
+    (rotation, position): Placement<'_, S>,
     length: f64,
-) -> (f64, [f64; 6]) {
+) -> (S, [S; 6]) {
     let still = limb.points(frames, rotation, position);
+    let zero = position[0].lift(0.0);
     // A twist moves a point by t + w x arm and turns a direction by w x d.
-    let turned = |v: Vector<f64>, shift: f64| -> Vector<Dual<f64, 6>> {
+    let turned = |v: Vector<S>, shift: f64| -> Vector<Dual<S, 6>> {
         let mut moved = v.map(Dual::constant);
         for k in 0..3 {
-            let mut unit = [0.0; 3];
-            unit[k] = 1.0;
+            let mut unit = [zero; 3];
+            unit[k] = zero.lift(1.0);
             let along = cross(unit, v);
             for i in 0..3 {
-                moved[i].parts[k] = shift * unit[i];
+                moved[i].parts[k] = if i == k { zero.lift(shift) } else { zero };
                 moved[i].parts[3 + k] = along[i];
             }
         }
         moved
     };
-    let arm = [0, 1, 2].map(|k| still.platform_point[k] - position[k]);
-    let arm = turned(arm, 1.0);
-    let point = [0, 1, 2].map(|k| arm[k] + Dual::constant(position[k]));
+    let mut point = turned(rotate(rotation, limb.arm), 1.0);
+    for k in 0..3 {
+        point[k].value = still.platform_point[k];
+    }
     let closure = G::closure(
         which,
         &GuidePoints {
@@ -177,22 +179,23 @@ fn residual_of<S: Scalar, G: Guide>(
 
 /// The derivatives of a closure to its own parameters and to the tool point's, at their places.
 #[inline(always)]
-fn gradient_of<G: Guide>(
+fn gradient_of<S: Scalar, G: Guide>(
     which: usize,
     frames: &GuideFrames,
-    limb: &GuideLimb<f64>,
-    (rotation, position): (&RotationMatrix<f64>, Vector<f64>),
+    limb: &GuideLimb<S>,
+    (rotation, position): Placement<'_, S>,
     length: f64,
-    places: &mut [f64; PLACES],
+    places: &mut [S; PLACES],
 ) {
-    let mut own = limb.map(Dual::<f64, OWN_PARAMETERS>::constant);
+    let one = position[0].lift(1.0);
+    let mut own = limb.map(Dual::<S, OWN_PARAMETERS>::constant);
     for k in 0..3 {
-        own.frame_point[k].parts[Anchor::FramePoint.place() + k] = 1.0;
-        own.arm[k].parts[Anchor::PlatformPoint.place() + k] = 1.0;
+        own.frame_point[k].parts[Anchor::FramePoint.place() + k] = one;
+        own.arm[k].parts[Anchor::PlatformPoint.place() + k] = one;
     }
     for k in 0..2 {
-        own.tilts[0][k].parts[Anchor::FrameDirection.place() + k] = 1.0;
-        own.tilts[1][k].parts[Anchor::PlatformDirection.place() + k] = 1.0;
+        own.tilts[0][k].parts[Anchor::FrameDirection.place() + k] = one;
+        own.tilts[1][k].parts[Anchor::PlatformDirection.place() + k] = one;
     }
     let pose = (&rotation.map(|row| row.map(Dual::constant)), position.map(Dual::constant));
     let closure = residual_of::<_, G>(which, frames, &own, pose, length);
@@ -233,15 +236,15 @@ macro_rules! guides {
             }
 
             /// Residual (m) of one closure and its row: derivatives to the platform's twist.
-            pub fn row(
+            pub fn row<S: Scalar>(
                 self,
                 which: usize,
                 frames: &GuideFrames,
-                limb: &GuideLimb<f64>,
-                at: Placement<'_, f64>,
+                limb: &GuideLimb<S>,
+                at: Placement<'_, S>,
                 length: f64,
-            ) -> (f64, [f64; 6]) {
-                match self { $(GuideKind::$name => row_of::<$type>(which, frames, limb, at, length)),+ }
+            ) -> (S, [S; 6]) {
+                match self { $(GuideKind::$name => row_of::<S, $type>(which, frames, limb, at, length)),+ }
             }
 
             /// Residual (m) of one closure, on any scalar.
@@ -257,17 +260,17 @@ macro_rules! guides {
             }
 
             /// The derivatives of one closure to its parameters and to the tool's, at their places.
-            pub fn gradient(
+            pub fn gradient<S: Scalar>(
                 self,
                 which: usize,
                 frames: &GuideFrames,
-                limb: &GuideLimb<f64>,
-                at: Placement<'_, f64>,
+                limb: &GuideLimb<S>,
+                at: Placement<'_, S>,
                 length: f64,
-                places: &mut [f64; PLACES],
+                places: &mut [S; PLACES],
             ) {
                 match self {
-                    $(GuideKind::$name => gradient_of::<$type>(which, frames, limb, at, length, places)),+
+                    $(GuideKind::$name => gradient_of::<S, $type>(which, frames, limb, at, length, places)),+
                 }
             }
         }

@@ -1,0 +1,48 @@
+//! Guaranteed bounds: enclosures that hold for every deviation in a box, rounding included.
+//!
+//! Interval Newton (Krawczyk's operator; Neumaier, "Interval Methods for Systems of Equations", 1990,
+//! chapter 5) on the same closures as everywhere proves that for every deviation in the box, and every
+//! pose of a region, there is exactly one platform pose near the commanded one, and encloses it. How
+//! far it moves per unit of each deviation is then enclosed by implicit differentiation.
+
+mod affine;
+mod at_pose;
+mod closures;
+mod directions;
+mod over_region;
+mod pose_box;
+mod root;
+
+pub use affine::Affine;
+pub use at_pose::{Extent, PoseBound, bound_at_pose};
+pub use over_region::{Region, RegionBound, bound_over_region, can_be_enclosed};
+
+use crate::scalar::Interval;
+
+/// What the variables of a box of deviations move: column c moves `parameters[c]` by `swing[c]` times
+/// variable `variables[c]`, which lies in [-1, 1].
+#[derive(Clone, Debug, Default)]
+pub struct Deviating {
+    /// Which parameter.
+    pub parameters: Vec<usize>,
+    /// Which variable.
+    pub variables: Vec<usize>,
+    /// By how much, SI.
+    pub swing: Vec<f64>,
+    /// How many variables.
+    pub count: usize,
+}
+
+/// Why nothing was proven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unproven {
+    /// The closures are close to singular.
+    NearSingular,
+    /// The deviations are too large for a proof, or the region was left too large.
+    TooWide,
+}
+
+/// `[1, 1]` and its like.
+fn point(value: f64) -> Interval {
+    Interval::point(value)
+}

@@ -1,0 +1,238 @@
+//! Krawczyk's operator: that there is exactly one root in a box, and where; and what divides by the
+//! derivatives over it.
+
+use super::closures::{Six, Square};
+use super::{Unproven, point};
+use crate::linear::{Matrix6, SIX, inverse_of};
+use crate::scalar::Interval;
+
+/// Boxes that are tried before giving up.
+const TRIALS: usize = 12;
+/// Times that a proven box is made tighter.
+const REFINEMENTS: usize = 3;
+/// A box grows by this share of itself between trials.
+const INFLATION: f64 = 0.1;
+/// Smallest half width of a box, m: far below anything and far above rounding.
+const FINEST: f64 = 1e-13;
+/// Beyond what size of |I - Y J| the inverse is not enclosed.
+const CONTRACTING: f64 = 0.97;
+/// Steps towards a vector that a matrix shrinks.
+const SHRINKING: usize = 100;
+
+/// The inverse of every matrix in an interval matrix: `(I - E)^-1 Y`, |E| small.
+#[derive(Clone, Debug)]
+pub struct Inverse {
+    approximate: Matrix6<f64>,
+    /// `(I - |E|)^-1 |E|`, from above.
+    excess: Matrix6<f64>,
+}
+
+/// The middles of an interval matrix.
+fn middles(matrix: &Square) -> Matrix6<f64> {
+    matrix.map(|row| row.map(Interval::midpoint))
+}
+
+/// `Y w`.
+fn times(matrix: &Matrix6<f64>, w: &Six) -> Six {
+    let mut result = [point(0.0); SIX];
+    for (value, row) in result.iter_mut().zip(matrix) {
+        for k in 0..SIX {
+            if row[k] != 0.0 {
+                *value = *value + point(row[k]) * w[k];
+            }
+        }
+    }
+    result
+}
+
+/// |I - Y J|, entry by entry from above.
+fn distance(approximate: &Matrix6<f64>, jacobian: &Square) -> Matrix6<f64> {
+    let mut result = [[0.0; SIX]; SIX];
+    for j in 0..SIX {
+        let mut column = [point(0.0); SIX];
+        for i in 0..SIX {
+            column[i] = jacobian[i][j];
+        }
+        let product = times(approximate, &column);
+        for i in 0..SIX {
+            let unit = if i == j { 1.0 } else { 0.0 };
+            result[i][j] = (point(unit) - product[i]).magnitude();
+        }
+    }
+    result
+}
+
+/// A positive vector x that a non-negative matrix B shrinks, and by how much at least: B x <= size x.
+///
+/// x = 1 + (B / s) x gives B x = s (x - 1) < s x: for any s above the spectral radius such an x exists, and
+/// the iteration finds it. Whether it did is then checked. The unknowns are of different kinds, so that the
+/// plain sums of rows say little.
+fn shrunk(matrix: &Matrix6<f64>) -> Option<([f64; SIX], f64)> {
+    for share in [0.25, 0.5, 0.75, 0.95] {
+        let mut vector = [1.0; SIX];
+        for _ in 0..SHRINKING {
+            let before = vector;
+            for i in 0..SIX {
+                let sum: f64 = (0..SIX).map(|k| matrix[i][k] * before[k]).sum();
+                vector[i] = 1.0 + sum / share;
+            }
+        }
+        if !vector.iter().all(|value| value.is_finite()) {
+            continue;
+        }
+        let mut size = 0.0_f64;
+        for i in 0..SIX {
+            let sum = sum_above((0..SIX).map(|k| (matrix[i][k], vector[k])));
+            size = size.max((point(sum) / point(vector[i])).upper);
+        }
+        if size < CONTRACTING {
+            return Some((vector, size));
+        }
+    }
+    None
+}
+
+/// The sum of non-negative products, from above.
+fn sum_above(values: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let mut sum = point(0.0);
+    for (a, b) in values {
+        sum = sum + point(a) * point(b);
+    }
+    sum.upper
+}
+
+impl Inverse {
+    /// Of an interval matrix; `None` where that is not certain to hold regular matrices alone.
+    pub fn of(matrix: &Square) -> Option<Self> {
+        let approximate = inverse_of(&middles(matrix));
+        if !approximate.iter().flatten().all(|value| value.is_finite()) {
+            return None;
+        }
+        let first = distance(&approximate, matrix);
+        let (weights, size) = shrunk(&first)?;
+        // B + B^2 + ... + B^8, and B^9 (I + B + ...) by the norm.
+        let mut excess = first;
+        for _ in 0..7 {
+            let mut next = first;
+            for i in 0..SIX {
+                for j in 0..SIX {
+                    let products = (0..SIX).map(|k| (first[i][k], excess[k][j]));
+                    let sum = point(sum_above(products)) + point(first[i][j]);
+                    next[i][j] = sum.upper;
+                }
+            }
+            excess = next;
+        }
+        let mut power = point(size);
+        for _ in 0..3 {
+            power = power * power;
+        }
+        let tail = power * point(size) / (point(1.0) - point(size));
+        for i in 0..SIX {
+            for j in 0..SIX {
+                let more = tail * point(weights[i]) / point(weights[j]);
+                excess[i][j] = (point(excess[i][j]) + more).upper;
+            }
+        }
+        Some(Inverse { approximate, excess })
+    }
+
+    /// The products of the inverses with a vector.
+    pub fn times(&self, vector: &Six) -> Six {
+        let nearly = times(&self.approximate, vector);
+        let mut result = nearly;
+        for i in 0..SIX {
+            let more = sum_above((0..SIX).map(|k| (self.excess[i][k], nearly[k].magnitude())));
+            result[i] = nearly[i] + Interval::symmetric(more);
+        }
+        result
+    }
+
+    /// The products of a row vector with the inverses.
+    pub fn row_times(&self, vector: &Six) -> Six {
+        // v (I - E)^-1 Y: v is spread by the excess first.
+        let mut spread = [point(0.0); SIX];
+        for j in 0..SIX {
+            let more = sum_above((0..SIX).map(|i| (vector[i].magnitude(), self.excess[i][j])));
+            spread[j] = vector[j] + Interval::symmetric(more);
+        }
+        let mut result = [point(0.0); SIX];
+        for j in 0..SIX {
+            for k in 0..SIX {
+                result[j] = result[j] + spread[k] * point(self.approximate[k][j]);
+            }
+        }
+        result
+    }
+}
+
+/// Exactly one root for every value of what else varies.
+#[derive(Clone, Debug)]
+pub struct Root {
+    /// Where the roots are.
+    pub enclosure: Six,
+    /// Where there is no other.
+    pub unique_in: Six,
+}
+
+/// What else varies: how the residuals change with it, and by how much it does.
+pub type Varying = (Six, Interval);
+
+/// Proves a root near `middle` for all that else varies: `value` are the residuals there where nothing does,
+/// `jacobian` encloses the derivatives over a box and all that else varies.
+pub fn prove(
+    middle: &[f64; SIX],
+    value: &Six,
+    varying: &[Varying],
+    jacobian: impl Fn(&Six) -> Square,
+) -> Result<Root, Unproven> {
+    let at_middle = middle.map(point);
+    let first = jacobian(&at_middle);
+    let approximate = inverse_of(&middles(&first));
+    if !approximate.iter().flatten().all(|entry| entry.is_finite()) {
+        return Err(Unproven::NearSingular);
+    }
+    // Where the root goes to first order, either way.
+    let mut shift = times(&approximate, value).map(|v| -v);
+    for (change, extent) in varying {
+        // The product first, where what all closures have in common cancels, then the extent.
+        let change = times(&approximate, change);
+        for k in 0..SIX {
+            shift[k] = shift[k] - change[k] * *extent;
+        }
+    }
+    let krawczyk = |tried: &Six| {
+        let spread = distance(&approximate, &jacobian(tried));
+        let mut found = *tried;
+        for i in 0..SIX {
+            let more =
+                sum_above((0..SIX).map(|k| (spread[i][k], (tried[k] - at_middle[k]).magnitude())));
+            found[i] = at_middle[i] + shift[i] + Interval::symmetric(more);
+        }
+        found
+    };
+    let widened = |one: Interval| one + Interval::symmetric(INFLATION * one.radius() + FINEST);
+    let mut tried = [point(0.0); SIX];
+    for i in 0..SIX {
+        tried[i] = widened((at_middle[i] + shift[i]).hull(at_middle[i]));
+    }
+    for _ in 0..TRIALS {
+        if !tried.iter().all(|one| one.is_finite()) {
+            return Err(Unproven::TooWide);
+        }
+        let found = krawczyk(&tried);
+        if found.iter().zip(&tried).all(|(found, tried)| found.is_inside(*tried)) {
+            let mut enclosure = found;
+            for _ in 0..REFINEMENTS {
+                let tighter = krawczyk(&enclosure);
+                for i in 0..SIX {
+                    enclosure[i] = enclosure[i].intersection(tighter[i]).unwrap_or(enclosure[i]);
+                }
+            }
+            return Ok(Root { enclosure, unique_in: tried });
+        }
+        // Not the hull of both: what is wide enough already must not drive the others on.
+        tried = found.map(widened);
+    }
+    Err(Unproven::TooWide)
+}

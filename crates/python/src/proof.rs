@@ -1,0 +1,258 @@
+//! Guaranteed bounds, as methods of the machine.
+
+use crate::arrays::{Input, output};
+use crate::evaluate::codes;
+use crate::machine::Machine;
+use numpy::PyArrayMethods;
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use truepose_kernel::batch::{self, Deviations, Samples, share_out};
+use truepose_kernel::machine::chosen;
+use truepose_kernel::proof::{
+    self, Affine, Deviating, Extent, PoseBound, Region, RegionBound, Unproven,
+};
+use truepose_kernel::spatial::Pose;
+
+fn word(unproven: Unproven) -> &'static str {
+    match unproven {
+        Unproven::NearSingular => "near_singular",
+        Unproven::TooWide => "box_too_wide",
+    }
+}
+
+/// Numbers of both parts of an error that the platform can move in.
+fn parts(machine: &truepose_kernel::Machine) -> Vec<usize> {
+    (0..2).filter(|part| chosen(&machine.dof).iter().any(|k| k / 3 == *part)).collect()
+}
+
+#[pymethods]
+impl Machine {
+    /// Whether bounds can be proven over a region: no more closures than freedoms, and parasitic freedoms
+    /// that can be enclosed.
+    #[getter]
+    fn can_be_enclosed(&self) -> bool {
+        proof::can_be_enclosed(&self.inner)
+    }
+
+    /// Bounds of the error at n poses over every deviation in a box: (lower, upper (n, n_component),
+    /// magnitudes (n, n_quantity), status (n,) of "proven", "near_singular", "box_too_wide").
+    ///
+    /// `shifted` (k0,) parameters and their `shift` (n or 1, k0); `parameters`, `variables` (k,) of the
+    /// columns and their `swing` (n or 1, k), the variables in [-1, 1].
+    #[allow(clippy::too_many_arguments)] // Python's signature
+    fn bounds_at<'py>(
+        &self,
+        py: Python<'py>,
+        joints: &Bound<'py, PyAny>,
+        placements: &Bound<'py, PyAny>,
+        shifted: &Bound<'py, PyAny>,
+        shift: &Bound<'py, PyAny>,
+        parameters: &Bound<'py, PyAny>,
+        variables: Vec<usize>,
+        swing: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let shifted = self.columns(shifted)?;
+        let parameters = self.columns(parameters)?;
+        let machine = &self.inner;
+        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
+        let placements = Input::new(placements, &[7], "placements")?;
+        let shift = Input::new(shift, &[shifted.len()], "shift")?;
+        let swing = Input::new(swing, &[parameters.len()], "swing")?;
+        let count = placements.count;
+        if variables.len() != parameters.len() {
+            return Err(PyValueError::new_err("as many variables as parameters are needed"));
+        }
+        let commands = joints.rows(0, joints.serves(count, "joints")?);
+        let shifts = shift.rows(0, shift.count != count || count == 1);
+        let swings = swing.rows(0, swing.count != count || count == 1);
+        let places = placements.data();
+        let number = variables.iter().map(|&variable| variable + 1).max().unwrap_or(0);
+        let mut found: Vec<Result<PoseBound, Unproven>> = vec![Err(Unproven::TooWide); count];
+        py.detach(|| {
+            share_out(&mut found, count, 1, |poses, found| {
+                for (i, found) in poses.zip(found) {
+                    let deviating = Deviating {
+                        parameters: parameters.clone(),
+                        variables: variables.clone(),
+                        swing: swings.row(i).to_vec(),
+                        count: number,
+                    };
+                    let extent = Extent::new(
+                        machine,
+                        commands.row(i),
+                        Pose::from_row(&places[7 * i..7 * i + 7]),
+                        shifted.iter().copied().zip(shifts.row(i).iter().copied()),
+                        &deviating,
+                    );
+                    *found = proof::bound_at_pose(&extent);
+                }
+            });
+        });
+        let components = chosen(&machine.dof);
+        let parts = parts(machine);
+        let none =
+            PoseBound { lower: [f64::NAN; 6], upper: [f64::NAN; 6], magnitudes: [f64::NAN; 2] };
+        let all: Vec<PoseBound> = found.iter().map(|found| found.unwrap_or(none)).collect();
+        let rows =
+            |of: &dyn Fn(&PoseBound) -> Vec<f64>| -> Vec<Vec<f64>> { all.iter().map(of).collect() };
+        let lower = rows(&|bound| components.iter().map(|&k| bound.lower[k]).collect());
+        let upper = rows(&|bound| components.iter().map(|&k| bound.upper[k]).collect());
+        let magnitudes = rows(&|bound| parts.iter().map(|&part| bound.magnitudes[part]).collect());
+        let status: Vec<&str> = found
+            .iter()
+            .map(|found| found.as_ref().map_or_else(|&why| word(why), |_| "proven"))
+            .collect();
+        (lower, upper, magnitudes, status).into_bound_py_any(py)
+    }
+
+    /// Bounds of the error over a region of commanded poses, as a dict: `lower`, `upper`, `reached_lower`,
+    /// `reached_upper` (n_component,), `magnitude`, `reached_magnitude` (n_quantity,), where each is reached
+    /// (`lower_at`, `upper_at`, `magnitude_at`, rows of commanded freedoms), `boxes`, `status` and `where`.
+    ///
+    /// `sides` (n_commanded, 2). `shifts` and `yielding`: (parameter, (low, high), per length, strut), a
+    /// known deviation and a compliance under the `wrench` (6,). `columns`: (parameter, variable, swing).
+    /// `progress(boxes, gap)` is called now and then; where it returns False the search stops.
+    #[allow(clippy::too_many_arguments)] // Python's signature
+    fn bounds_over<'py>(
+        &self,
+        py: Python<'py>,
+        sides: Vec<[f64; 2]>,
+        shifts: Vec<(usize, [f64; 2], f64, usize)>,
+        yielding: Vec<(usize, [f64; 2], f64, usize)>,
+        wrench: [f64; 6],
+        columns: Vec<(usize, usize, f64)>,
+        gap: f64,
+        most_boxes: usize,
+        progress: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let machine = &self.inner;
+        let affine = |rows: &[(usize, [f64; 2], f64, usize)]| -> PyResult<Vec<Affine>> {
+            let fits = |&(parameter, _, _, strut): &(usize, [f64; 2], f64, usize)| {
+                parameter < machine.nominal.len() && strut < machine.struts.len()
+            };
+            if !rows.iter().all(fits) {
+                return Err(PyValueError::new_err("there is no such parameter or strut"));
+            }
+            let row =
+                |&(parameter, constant, per_length, strut): &(usize, [f64; 2], f64, usize)| {
+                    Affine { parameter, constant, per_length, strut }
+                };
+            Ok(rows.iter().map(row).collect())
+        };
+        let (shift, yielding) = (affine(&shifts)?, affine(&yielding)?);
+        let parameters: Vec<usize> = columns.iter().map(|column| column.0).collect();
+        let variables: Vec<usize> = columns.iter().map(|column| column.1).collect();
+        let swing: Vec<f64> = columns.iter().map(|column| column.2).collect();
+        if sides.len() != machine.commanded_count()
+            || parameters.iter().any(|&parameter| parameter >= machine.nominal.len())
+        {
+            return Err(PyValueError::new_err("the arguments do not fit the machine"));
+        }
+        let number = variables.iter().map(|&variable| variable + 1).max().unwrap_or(0);
+        let deviating = Deviating { parameters, variables, swing, count: number };
+        let region = Region {
+            machine,
+            sides,
+            shift,
+            yielding,
+            wrench,
+            deviating: &deviating,
+            gap,
+            most_boxes,
+        };
+        let progress = progress.clone().unbind();
+        let mut interrupted: Option<PyErr> = None;
+        let bound = py.detach(|| {
+            proof::bound_over_region(&region, |boxes, gap| {
+                Python::attach(|py| {
+                    let asked = py
+                        .check_signals()
+                        .and_then(|()| progress.call1(py, (boxes, gap))?.extract::<bool>(py));
+                    asked.unwrap_or_else(|error| {
+                        interrupted = Some(error);
+                        false
+                    })
+                })
+            })
+        });
+        if let Some(error) = interrupted {
+            return Err(error);
+        }
+        self.over_region(py, &bound)
+    }
+}
+
+impl Machine {
+    fn over_region<'py>(
+        &self,
+        py: Python<'py>,
+        bound: &RegionBound,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let components = chosen(&self.inner.dof);
+        let parts = parts(&self.inner);
+        let upper = components.clone();
+        let lower: Vec<usize> = components.iter().map(|k| 6 + k).collect();
+        let magnitudes: Vec<usize> = parts.iter().map(|part| 12 + part).collect();
+        let of = |values: &[f64], targets: &[usize], sign: f64| -> Vec<f64> {
+            targets.iter().map(|&target| sign * values[target]).collect()
+        };
+        let at = |targets: &[usize]| -> Vec<Vec<f64>> {
+            targets.iter().map(|&target| bound.at[target].clone()).collect()
+        };
+        let found = PyDict::new(py);
+        for (name, targets, sign) in
+            [("lower", &lower, -1.0), ("upper", &upper, 1.0), ("magnitude", &magnitudes, 1.0)]
+        {
+            found.set_item(name, of(&bound.bound, targets, sign))?;
+            found.set_item(format!("reached_{name}"), of(&bound.reached, targets, sign))?;
+            found.set_item(format!("{name}_at"), at(targets))?;
+        }
+        found.set_item("boxes", bound.boxes)?;
+        found.set_item("gap", bound.gap)?;
+        let (status, place) = match (&bound.out_of_reach, &bound.unproven) {
+            (Some((status, place)), _) => (status.name(), Some(place.clone())),
+            (None, Some((why, place))) => (word(*why), Some(place.clone())),
+            (None, None) => ("proven", None),
+        };
+        found.set_item("status", status)?;
+        found.set_item("where", place)?;
+        Ok(found)
+    }
+}
+
+#[pymethods]
+impl Machine {
+    /// (sensitivity (n, n_component, k), status): as `sensitivity_at`, but of the machine with the
+    /// parameters `moved` (k0,) deviated by `values` (n or 1, k0), at the pose that it then takes.
+    fn sensitivity_moved<'py>(
+        &self,
+        py: Python<'py>,
+        joints: &Bound<'py, PyAny>,
+        placements: &Bound<'py, PyAny>,
+        columns: &Bound<'py, PyAny>,
+        moved: &Bound<'py, PyAny>,
+        values: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (columns, moved) = (self.columns(columns)?, self.columns(moved)?);
+        let joints = Input::new(joints, &[self.inner.drives.len()], "joints")?;
+        let placements = Input::new(placements, &[7], "placements")?;
+        let values = Input::new(values, &[moved.len()], "values")?;
+        let count = placements.count;
+        let shared = moved.is_empty() || values.serves(count, "values")?;
+        let out = output(py, &[count], &[self.components(), columns.len()])?;
+        let status = {
+            let mut writable = out.readwrite();
+            let data = writable.as_slice_mut()?;
+            let samples = Samples {
+                count,
+                joints: joints.rows(0, joints.serves(count, "joints")?),
+                poses: placements.rows(0, count == 1),
+                deviations: Deviations { columns: &moved, values: values.rows(0, shared) },
+            };
+            py.detach(|| batch::moved_sensitivities(&self.inner, &samples, &columns, data))
+        };
+        (out, codes(py, &[count], &status)?).into_bound_py_any(py)
+    }
+}

@@ -20,6 +20,12 @@ Key = tuple[str | int, ...]
 ARRAY_TABLES = ("drive", "strut", "guide")
 """The tables of which a file has several, told apart by their `name`."""
 
+NAMELESS_TABLES = ("correlation",)
+"""The tables of which a file has several that have no name: `correlation.#1` is the first."""
+
+SEVERAL = (*ARRAY_TABLES, *NAMELESS_TABLES)
+"""All of which a file may have several."""
+
 
 @dataclass
 class Document:
@@ -73,7 +79,7 @@ class Document:
             value = _item(value, part)
             if not isinstance(part, int):
                 words.append(part)
-            elif len(words) == 1 and words[0] in ARRAY_TABLES:
+            elif len(words) == 1 and words[0] in SEVERAL:
                 name = value.get("name") if isinstance(value, dict) else None
                 words.append(str(name) if isinstance(name, (str, int)) else f"#{part + 1}")
             else:
@@ -156,7 +162,8 @@ def _step(value: Any, words: list[str]) -> tuple[str | int, int] | None:
             return word, taken
         if isinstance(value, list):
             for index, row in enumerate(value):
-                if isinstance(row, dict) and str(row.get("name")) == word:
+                named = row.get("name", f"#{index + 1}") if isinstance(row, dict) else None
+                if named is not None and str(named) == word:
                     return index, taken
     return None
 

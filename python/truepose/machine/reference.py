@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from truepose.machine.dimensions import DIMENSIONS
-from truepose.machine.document import ARRAY_TABLES
+from truepose.machine.document import ARRAY_TABLES, SEVERAL
 from truepose.machine.each import EACH
 from truepose.machine.elements import kinds_of
 from truepose.machine.file_parts import SourceType
@@ -31,7 +31,7 @@ def json_schema(registry: Sequence[SourceType]) -> Json:
     for table, models in by_table.items():
         properties[table] = (
             {"type": "array", "minItems": 1, "items": _row_schema(table, models)}
-            if table in ARRAY_TABLES
+            if table in SEVERAL
             else _merged(models)
         )
     properties[EACH] = {
@@ -53,8 +53,9 @@ def json_schema(registry: Sequence[SourceType]) -> Json:
 def _row_schema(table: str, models: tuple[type[BaseModel], ...]) -> Json:
     """A row. Only its name is required of it: `[each.*]` may give all the rest."""
     choices = _choices(table, models)
-    for choice in choices:
-        choice["required"] = ["name"]
+    if table in ARRAY_TABLES:
+        for choice in choices:
+            choice["required"] = ["name"]
     return choices[0] if len(choices) == 1 else {"anyOf": choices}
 
 
@@ -149,7 +150,7 @@ def _section(
     registry: Sequence[SourceType],
     reader: Mapping[str, str],
 ) -> str:
-    title = f"[[{table}]]" if table in ARRAY_TABLES else f"[{table}]"
+    title = f"[[{table}]]" if table in SEVERAL else f"[{table}]"
     lines = [f"## `{title}`", "", _first_line(models[0]), ""]
     schema = _merged(models)
     if schema["properties"]:
@@ -226,7 +227,12 @@ def _takes(schema: Json) -> str:
     named = schema.get("additionalProperties")
     if isinstance(named, dict):
         return f"table of any names, each a {_takes(named)}"
-    words = {"string": "text", "integer": "whole number", "boolean": "`true` or `false`"}
+    words = {
+        "string": "text",
+        "number": "plain number",
+        "integer": "whole number",
+        "boolean": "`true` or `false`",
+    }
     return words.get(schema.get("type", ""), "value")
 
 

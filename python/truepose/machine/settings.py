@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from truepose.errors import Problem, RequestError
-from truepose.machine.document import ARRAY_TABLES, Document, Key
+from truepose.machine.document import SEVERAL, Document, Key
 
 _COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
@@ -91,7 +91,7 @@ def _value(text: str) -> Any:
 def _targets(document: Document, words: list[str], free_tables: Collection[str]) -> list[Key]:
     """The keys that a path names; several where it has a pattern for the rows of an array."""
     table, rest = words[0], words[1:]
-    if table in ARRAY_TABLES:
+    if table in SEVERAL:
         return _row_targets(document, table, rest)
     if table in free_tables and rest and isinstance(document.data.get(table, {}), dict):
         return [(table, ".".join(rest))]
@@ -101,7 +101,10 @@ def _targets(document: Document, words: list[str], free_tables: Collection[str])
 def _row_targets(document: Document, table: str, words: list[str]) -> list[Key]:
     rows = document.data.get(table)
     rows = rows if isinstance(rows, list) else []
-    names = [str(row.get("name")) if isinstance(row, dict) else "" for row in rows]
+    names = [
+        str(row.get("name", f"#{index + 1}")) if isinstance(row, dict) else ""
+        for index, row in enumerate(rows)
+    ]
     # A name may hold points itself: take the longest one that there is.
     for taken in range(len(words) - 1, 0, -1):
         pattern = ".".join(words[:taken])

@@ -1,6 +1,7 @@
 """A tolerance as a machine file writes it: two limits, one half band, or a class of a standard.
 
-Or a table of these with what else is known: how it is distributed, and what varies with it.
+Or a table with what else is known: how it is distributed, which values were measured, and what
+varies with it.
 """
 
 from __future__ import annotations
@@ -20,21 +21,46 @@ Value = TypeVar("Value")
 Read = Callable[[object], float]
 """Reads one value of the file, SI. Raises `QuantityError`."""
 
-DISTRIBUTIONS = ("uniform", "triangular", "normal")
+DISTRIBUTIONS = (
+    "uniform",
+    "triangular",
+    "arcsine",
+    "two-point",
+    "normal",
+    "student-t",
+    "discrete",
+    "empirical",
+)
 """Words for how a tolerance is distributed in its band."""
+
+ENDLESS = ("normal", "student-t")
+"""Those without an end, whose band is so many standard deviations."""
+
+LISTED = ("discrete", "empirical")
+"""Those of listed values."""
+
+LEAST_DOF = 2.0
+"""Student's distribution has a standard deviation only above so many degrees of freedom."""
 
 DEFAULT_SIGMAS = 3.0
 """The half band of a normal distribution, in standard deviations, where nothing says it."""
 
 TABLE_KEYS = {
     "band": "the limits, one half band, or a class",
-    "standard_deviation": "in place of band: a normal distribution about the nominal value",
+    "standard_deviation": "in place of band: a normal or student-t distribution about nominal",
+    "values": "in place of band: list of the deviations that there are, or that were measured",
+    "data": "in place of values: CSV file of measured deviations, in a column `deviation`",
     "distribution": one_of(DISTRIBUTIONS).removeprefix("one of "),
-    "sigmas": "of a normal distribution: the half band in standard deviations",
+    "sigmas": "of a normal or student-t distribution: the half band in standard deviations",
+    "dof": "of a student-t distribution: its degrees of freedom, more than 2",
+    "probabilities": "of a discrete distribution: list of the probability of each of `values`",
     "group": "what varies together has one name",
     "sign": "-1 where it varies the other way than its group",
 }
 """Keys of a tolerance that is written as a table."""
+
+_BANDS = ("band", "standard_deviation", "values", "data")
+"""Keys of a table that say how wide a tolerance is, of which it has one."""
 
 _PLUS_MINUS = re.compile(r"\s*(?:±|\+/?-)\s*(?=[\d.])")
 _CLASS = re.compile(r"\s*[A-Za-z]")
@@ -60,10 +86,12 @@ class Band:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Either a band outright or, of a length, a class whose band depends on the nominal size.
+    """A band outright, a class of a length whose band depends on the nominal size, or values.
 
-    `distribution`: one of `DISTRIBUTIONS`; of a normal one the half band is `sigmas` standard
-    deviations. Tolerances of one `group` vary together, each with its `sign` (+1 or -1).
+    `distribution`: one of `DISTRIBUTIONS`; of a normal or student-t one the half band is `sigmas`
+    standard deviations. A discrete or empirical one has `values`, deviations from nominal, and
+    `probabilities`, or the name of the file of them, `data`. Tolerances of one `group` vary
+    together, each with its `sign` (+1 or -1).
     """
 
     dimension: str
@@ -73,9 +101,16 @@ class Tolerance:
     sigmas: float = DEFAULT_SIGMAS
     group: str | None = None
     sign: float = 1.0
+    dof: float | None = None
+    values: tuple[float, ...] = ()
+    probabilities: tuple[float, ...] = ()
+    data: str | None = None
 
     def band(self, nominal: float) -> Band:
-        """The band for a nominal size in m. Raises `tolerance_standards.ToleranceClassError`."""
+        """The band for a nominal size in m; not of listed values, whose band is their own.
+
+        Raises `tolerance_standards.ToleranceClassError`.
+        """
         if self.outright is not None:
             return self.outright
         if self.designation is None:
@@ -157,23 +192,34 @@ def _from_table(table: Mapping[str, Any], dimension: str, units: UnitSystem) -> 
                 expected=one_of(TABLE_KEYS),
                 hint=did_you_mean(key, TABLE_KEYS),
             )
+    given = [key for key in _BANDS if key in table]
+    if len(given) != 1:
+        raise QuantityError(
+            "excluding-keys" if given else "missing-key",
+            "a tolerance is given by a band, by a standard deviation or by its values",
+            found=" and ".join(given) or shown_value(dict(table)),
+            expected=one_of(_BANDS),
+        )
     distribution = _distribution(table)
     sigmas = _sigmas(table, distribution)
-    if ("band" in table) == ("standard_deviation" in table):
-        both = "band" in table
-        raise QuantityError(
-            "excluding-keys" if both else "missing-key",
-            "a tolerance is given by a band or by a standard deviation",
-            found="band and standard_deviation" if both else shown_value(dict(table)),
-            expected="one of band, standard_deviation",
-        )
+    group, sign = _group(table)
+    stated = Tolerance(dimension)
     if "band" in table:
         stated = _read_key("band", lambda: _read_band(table["band"], dimension, units))
-    else:
+    elif "standard_deviation" in table:
         deviation = _read_key("standard_deviation", lambda: _standard(table, dimension, units))
         stated = Tolerance(dimension, outright=Band(-sigmas * deviation, sigmas * deviation))
-    group, sign = _group(table)
-    return replace(stated, distribution=distribution, sigmas=sigmas, group=group, sign=sign)
+    return replace(
+        stated,
+        distribution=distribution,
+        sigmas=sigmas,
+        dof=_dof(table, distribution),
+        values=_read_key("values", lambda: _values(table, dimension, units)),
+        probabilities=_probabilities(table, distribution),
+        data=_data(table),
+        group=group,
+        sign=sign,
+    )
 
 
 def _read_key(key: str, read: Callable[[], Value]) -> Value:
@@ -199,8 +245,13 @@ def _standard(table: Mapping[str, Any], dimension: str, units: UnitSystem) -> fl
 
 
 def _distribution(table: Mapping[str, Any]) -> str:
-    stated = "standard_deviation" in table
-    word = table.get("distribution", "normal" if stated else DISTRIBUTIONS[0])
+    """The word for it: the one written, or the one that the other keys go with."""
+    listed = "values" in table or "data" in table
+    if listed:
+        usual = "discrete" if "probabilities" in table else "empirical"
+    else:
+        usual = "normal" if "standard_deviation" in table else DISTRIBUTIONS[0]
+    word = table.get("distribution", usual)
     if word not in DISTRIBUTIONS:
         raise QuantityError(
             "unknown-choice" if isinstance(word, str) else "wrong-type",
@@ -209,12 +260,27 @@ def _distribution(table: Mapping[str, Any]) -> str:
             expected=one_of(f'"{each}"' for each in DISTRIBUTIONS),
             hint=did_you_mean(word, DISTRIBUTIONS) if isinstance(word, str) else None,
         )
-    if stated and word != "normal":
+    if "standard_deviation" in table and word not in ENDLESS:
         raise QuantityError(
             "excluding-keys",
-            "a standard deviation is that of a normal distribution",
+            "a standard deviation is that of a normal or student-t distribution",
             found=f'standard_deviation and distribution = "{word}"',
-            expected=f'band, or distribution = "{DISTRIBUTIONS[-1]}"',
+            expected='band, or distribution = "normal"',
+        )
+    if listed != (word in LISTED):
+        raise QuantityError(
+            "excluding-keys" if listed else "missing-key",
+            "a discrete or empirical distribution is one of listed values",
+            found=f"{'values' if 'values' in table else 'data' if listed else 'no values'} and "
+            f'distribution = "{word}"',
+            expected='values and distribution = "discrete" or "empirical"',
+        )
+    if "data" in table and word == "discrete":
+        raise QuantityError(
+            "excluding-keys",
+            "a file of measured deviations is an empirical distribution",
+            found="data and a distribution that is discrete",
+            expected='values and probabilities, or distribution = "empirical"',
         )
     return str(word)
 
@@ -222,29 +288,116 @@ def _distribution(table: Mapping[str, Any]) -> str:
 def _sigmas(table: Mapping[str, Any], distribution: str) -> float:
     if "sigmas" not in table:
         return DEFAULT_SIGMAS
-    if distribution != "normal":
+    if distribution not in ENDLESS:
         raise QuantityError(
             "excluding-keys",
-            "only a normal distribution has a band of so many standard deviations",
+            "only a normal or student-t distribution has a band of so many standard deviations",
             found=f"sigmas and a distribution that is {distribution}",
             expected='distribution = "normal", or no sigmas',
         )
-    sigmas = table["sigmas"]
-    if isinstance(sigmas, bool) or not isinstance(sigmas, (int, float)):
+    sigmas = _plain(table["sigmas"], "sigmas", such_as="2")
+    if sigmas <= 0.0:
         raise QuantityError(
-            "wrong-type",
-            f"sigmas: expected a plain number, found {type_phrase(sigmas)}",
-            found=shown_value(sigmas),
-            expected="a plain number, such as 2",
-        )
-    if not (math.isfinite(sigmas) and sigmas > 0.0):
-        raise QuantityError(
-            "not-positive" if math.isfinite(sigmas) else "not-finite",
+            "not-positive",
             "sigmas: a band is a number of standard deviations above zero",
-            found=shown_value(sigmas),
+            found=shown_value(table["sigmas"]),
             expected="a plain number above zero, such as 2",
         )
-    return float(sigmas)
+    return sigmas
+
+
+def _dof(table: Mapping[str, Any], distribution: str) -> float | None:
+    student = distribution == "student-t"
+    if student != ("dof" in table):
+        raise QuantityError(
+            "missing-key" if student else "excluding-keys",
+            "a student-t distribution, and no other, has degrees of freedom",
+            found="no dof" if student else f"dof and a distribution that is {distribution}",
+            expected='distribution = "student-t" and dof, such as dof = 4',
+        )
+    if not student:
+        return None
+    dof = _plain(table["dof"], "dof", such_as="4")
+    if dof <= LEAST_DOF:
+        raise QuantityError(
+            "too-few-degrees-of-freedom",
+            "dof: a student-t distribution has no standard deviation with so few",
+            found=shown_value(table["dof"]),
+            expected=f"a plain number above {LEAST_DOF:g}, such as 4",
+        )
+    return dof
+
+
+def _plain(value: object, key: str, *, such_as: str) -> float:
+    """A finite number without a unit."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise QuantityError(
+            "wrong-type",
+            f"{key}: expected a plain number, found {type_phrase(value)}",
+            found=shown_value(value),
+            expected=f"a plain number, such as {such_as}",
+        )
+    if not math.isfinite(value):
+        raise QuantityError(
+            "not-finite",
+            f"{key}: not a finite number",
+            found=shown_value(value),
+            expected=f"a plain number, such as {such_as}",
+        )
+    return float(value)
+
+
+def _values(table: Mapping[str, Any], dimension: str, units: UnitSystem) -> tuple[float, ...]:
+    if "values" not in table:
+        return ()
+    listed = _filled_list(table["values"], DIMENSIONS[dimension].plural)
+    return tuple(units.read(each, dimension) for each in listed)
+
+
+def _probabilities(table: Mapping[str, Any], distribution: str) -> tuple[float, ...]:
+    discrete = distribution == "discrete"
+    if discrete != ("probabilities" in table):
+        raise QuantityError(
+            "missing-key" if discrete else "excluding-keys",
+            "a discrete distribution, and no other, has probabilities",
+            found="no probabilities"
+            if discrete
+            else f"probabilities and a distribution that is {distribution}",
+            expected='values and probabilities, or distribution = "empirical"',
+            hint="values that are all as likely are an empirical distribution"
+            if discrete
+            else None,
+        )
+    if not discrete:
+        return ()
+    listed = _read_key(
+        "probabilities", lambda: _filled_list(table["probabilities"], "plain numbers")
+    )
+    return tuple(_plain(each, "probabilities", such_as="0.5") for each in listed)
+
+
+def _filled_list(value: object, phrase: str) -> list[Any]:
+    if not isinstance(value, list) or not value:
+        raise QuantityError(
+            "wrong-type",
+            f"expected a list of {phrase}, found "
+            f"{'an empty one' if value == [] else type_phrase(value)}",
+            found=shown_value(value),
+            expected=f"a list of {phrase}",
+        )
+    return value
+
+
+def _data(table: Mapping[str, Any]) -> str | None:
+    name = table.get("data")
+    if name is not None and (not isinstance(name, str) or not name.strip()):
+        raise QuantityError(
+            "wrong-type",
+            "data: expected the name of a CSV file",
+            found=shown_value(name),
+            expected='the name of a file, such as "measured.csv"',
+        )
+    return name
 
 
 def _group(table: Mapping[str, Any]) -> tuple[str | None, float]:

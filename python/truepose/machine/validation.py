@@ -10,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from truepose.errors import CATALOGUE, Problem
 from truepose.machine import each
-from truepose.machine.document import ARRAY_TABLES, Document, Key
+from truepose.machine.document import SEVERAL, Document, Key
 from truepose.machine.elements import DriveKind, kinds_of
 from truepose.machine.file_table import FileTable
 from truepose.machine.suggestion import did_you_mean, nearest, one_of
@@ -69,7 +69,7 @@ def validate(document: Document, owners: Owners) -> tuple[Validated, list[Proble
     validated = Validated(units)
     for table, models in owners.by_table.items():
         if table in data and table != "units":
-            if table in ARRAY_TABLES:
+            if table in SEVERAL:
                 _array(document, table, models, validated, problems)
             else:
                 _single(document, table, models, validated, problems)
@@ -95,7 +95,7 @@ def _one_per_unit(problems: list[Problem]) -> list[Problem]:
 
 
 def _missing_table(document: Document, table: str) -> Problem:
-    written = f"[[{table}]]" if table in ARRAY_TABLES else f"[{table}]"
+    written = f"[[{table}]]" if table in SEVERAL else f"[{table}]"
     plural = nearest(table, [key for key in document.data if key != table])
     return Problem(
         "missing-key",

@@ -23,6 +23,7 @@ from truepose.sources._block import Block
 from truepose.sources.actuator import Actuator
 from truepose.sources.backlash import Backlash
 from truepose.sources.clearance import Clearance
+from truepose.sources.distributions import Listed, discrete, empirical, student_t
 from truepose.sources.elastic import Elastic
 from truepose.sources.guideway import Guideway
 from truepose.sources.loads import Loads
@@ -67,9 +68,13 @@ __all__ = [
     "Deviation",
     "Distribution",
     "Elastic",
+    "Listed",
     "Loads",
     "Source",
     "Thermal",
     "acting",
+    "discrete",
+    "empirical",
     "normal",
+    "student_t",
 ]

@@ -10,7 +10,6 @@ All values are SI (m, rad, dimensionless), as the kernel's parameter vector has 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,6 +17,15 @@ from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from truepose.sources.distributions import (
+    ARCSINE,
+    TRIANGULAR,
+    TWO_POINT,
+    UNIFORM,
+    Distribution,
+    normal,
+)
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -35,44 +43,6 @@ OWN_GROUP = -1
 
 
 @dataclass(frozen=True)
-class Distribution:
-    """How a deviation spreads inside its band.
-
-    `sigmas` is the half band in standard deviations: sqrt(3) for a uniform one, k for a normal
-    one that was given by its standard deviation (the band is then k sigma, and values outside
-    it, though rare, exist). GUM (JCGM 100:2008) 4.3.5, 4.3.7, 4.3.9; JCGM 101:2008, 6.4.
-    """
-
-    name: str
-    sigmas: float
-
-    def __str__(self) -> str:
-        return f"{self.name}, {self.sigmas:g} sigma" if self.name == _NORMAL else self.name
-
-
-_NORMAL = "normal"
-
-UNIFORM = Distribution("uniform", math.sqrt(3.0))
-"""Anywhere in the band, as likely."""
-
-TRIANGULAR = Distribution("triangular", math.sqrt(6.0))
-"""Rather in the middle: the sum of two uniform ones of one width."""
-
-ARCSINE = Distribution("arcsine", math.sqrt(2.0))
-"""A sine of unknown phase: rather near the ends."""
-
-TWO_POINT = Distribution("two-point", 1.0)
-"""At either end of the band, as likely."""
-
-
-def normal(sigmas: float = 3.0) -> Distribution:
-    """Normal distribution whose half band is taken as `sigmas` standard deviations."""
-    if not (math.isfinite(sigmas) and sigmas > 0.0):
-        raise ValueError(f"a band of {sigmas} standard deviations is no band")
-    return Distribution(_NORMAL, sigmas)
-
-
-@dataclass(frozen=True)
 class Deviation:
     """What one source does to the k columns of parameters it touches, for n poses.
 
@@ -87,6 +57,9 @@ class Deviation:
     `distribution`: of each column's variable; one for all, or k of them, equal within a group.
     `edge` (k,): lengths and offsets, which `error_lower` and `error_upper` move to the ends of
     their bands; coordinates and directions are not moved there.
+    `correlation` (n_variable, n_variable), of the numbers in `variables`: Pearson's coefficients
+    of the variables t; None where all are independent.
+    `group_names`: what a group is called, where it has a name.
 
     Raises `ValueError` where shapes or values contradict this.
     """
@@ -98,6 +71,8 @@ class Deviation:
     sign: Floats
     edge: Flags
     distribution: tuple[Distribution, ...] = field(default=())
+    correlation: Floats | None = None
+    group_names: Mapping[int, str] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -110,6 +85,8 @@ class Deviation:
         sign: ArrayLike = 1.0,
         edge: ArrayLike = True,
         distribution: Distribution | Sequence[Distribution] = UNIFORM,
+        correlation: ArrayLike | None = None,
+        group_names: Mapping[int, str] | None = None,
     ) -> Self:
         """A deviation from plain values: a number or a (k,) array stands for every pose."""
         columns = np.atleast_1d(np.asarray(parameters, np.intp))
@@ -123,6 +100,8 @@ class Deviation:
             _table(sign, count),
             np.broadcast_to(np.asarray(edge, np.bool_), (count,)).copy(),
             tuple(each),
+            None if correlation is None else np.array(correlation, np.float64),
+            dict(group_names or {}),
         )
 
     def __post_init__(self) -> None:
@@ -146,6 +125,19 @@ class Deviation:
         for group, each in zip(self.groups.tolist(), self.distribution, strict=True):
             if group != OWN_GROUP and shared.setdefault(group, each) != each:
                 raise ValueError(f"group {group} has one variable but two distributions")
+        self._check_correlation()
+
+    def _check_correlation(self) -> None:
+        given = self.correlation
+        if given is None:
+            return
+        count = self.n_variable
+        if given.shape != (count, count):
+            raise ValueError(f"correlation has shape {given.shape}, expected ({count}, {count})")
+        if not (np.abs(given) <= 1.0).all():
+            raise ValueError("a correlation is not from -1 to 1")
+        if not (np.array_equal(given, given.T) and (np.diagonal(given) == 1.0).all()):
+            raise ValueError("a correlation is not symmetric, or not one with itself")
 
     @cached_property
     def signed_half(self) -> Floats:
@@ -161,10 +153,24 @@ class Deviation:
         named = np.where(own, above + np.arange(self.groups.size), self.groups)
         return np.asarray(np.unique(named, return_inverse=True)[1], np.intp)
 
+    @property
+    def n_variable(self) -> int:
+        """How many variables there are, each of a column or of a group."""
+        return int(self.variables.max(initial=-1)) + 1
+
     @cached_property
     def banded(self) -> Indices:
         """Columns whose band is not empty at some pose."""
         return np.flatnonzero((self.half > 0.0).any(axis=0))
+
+    @cached_property
+    def banded_correlation(self) -> Floats | None:
+        """The correlation of the variables that have a band, ascending; None: all independent."""
+        if self.correlation is None:
+            return None
+        numbers = np.unique(self.variables[self.banded])
+        found: Floats = self.correlation[np.ix_(numbers, numbers)]
+        return None if np.array_equal(found, np.eye(numbers.size)) else found
 
     def at_edge(self, side: float) -> Floats:
         """(n or 1, k) deviations with lengths and offsets at an end of their bands.
@@ -189,6 +195,9 @@ class Source(Protocol):
     `tables` names the keys that it reads of each table of the file, as one pydantic model a
     table. `sets_overall_edges`: the overall error's minimum and maximum are taken with this
     source at its band edges (equations 3-6 of the paper); other sources stay at their shift.
+
+    A source whose shift depends on the pose may also have `over_region`, which says how, so that
+    bounds over a region can enclose it: see `truepose.budget.over_region`.
     """
 
     name: ClassVar[str]
@@ -227,3 +236,20 @@ def refuse(parts: FileParts, problem: Problem) -> None:
         expected=problem.expected,
         hint=problem.hint,
     )
+
+
+__all__ = [
+    "ARCSINE",
+    "OWN_GROUP",
+    "TRIANGULAR",
+    "TWO_POINT",
+    "UNIFORM",
+    "Deviation",
+    "Distribution",
+    "Flags",
+    "Floats",
+    "Indices",
+    "Source",
+    "normal",
+    "refuse",
+]

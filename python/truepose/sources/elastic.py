@@ -38,6 +38,7 @@ class Elastic:
     doc: ClassVar[str] = "elastic deformation under the wrench on the tool"
     tables: ClassVar[Mapping[str, type[BaseModel]]] = {}
     sets_overall_edges: ClassVar[bool] = False
+    over_region: ClassVar[str] = "wrench"
 
     requested: bool
     """The file gives a wrench and a stiffness, were the wrench zero."""

@@ -40,6 +40,7 @@ class Thermal:
     doc: ClassVar[str] = "thermal expansion of struts, drives, frame, platform and tool"
     tables: ClassVar[Mapping[str, type[BaseModel]]] = {}
     sets_overall_edges: ClassVar[bool] = False
+    over_region: ClassVar[str] = "lengths"
 
     requested: bool
     """The file gives temperatures and an expansion, were all at the reference temperature."""

@@ -4,38 +4,52 @@ A band [lower, upper] is the deviation `shift = (lower + upper) / 2` with
 `half = (upper - lower) / 2`; an asymmetric one thus has a part that can be compensated. It comes
 from `length_tolerance` of a strut, or from the `[tolerance]` table, whose keys are patterns over
 the parameter names. What is made in one set-up varies together: members of one group share one
-variable. `docs/sources/tolerance.md` has the rules and references.
+variable; what is made alike may be correlated. `docs/sources/tolerance.md` has the rules and
+references.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from truepose.machine.data_file import Column
 from truepose.machine.dimensions import BY_UNIT, DIMENSIONS
 from truepose.machine.quantity import LengthTolerance
-from truepose.sources._base import (
-    OWN_GROUP,
-    TRIANGULAR,
-    UNIFORM,
-    Deviation,
-    Distribution,
-    normal,
-)
+from truepose.machine.tolerance import LISTED, Band
+from truepose.sources._base import OWN_GROUP, Deviation
 from truepose.sources._block import Block
+from truepose.sources._correlation import CorrelationTable, read_correlation
+from truepose.sources.distributions import (
+    ARCSINE,
+    TRIANGULAR,
+    TWO_POINT,
+    UNIFORM,
+    Distribution,
+    Listed,
+    discrete,
+    empirical,
+    normal,
+    student_t,
+)
 
 if TYPE_CHECKING:
-    from truepose.machine import Band, Condition, FileParts, Machine
+    from truepose.machine import Condition, FileParts, Machine
     from truepose.machine import tolerance as file_tolerance
 
 _EDGE_ENDINGS = (".length", ".offset")
 _WILDCARDS = frozenset("*?[")
 _RANKS = 3
+
+_WITHOUT_NUMBERS = {each.name: each for each in (UNIFORM, TRIANGULAR, ARCSINE, TWO_POINT)}
+
+DEVIATION = "deviation"
+"""The column of a file of measured deviations."""
 
 
 class StrutTolerance(BaseModel):
@@ -59,11 +73,7 @@ class _Stated:
     path: str
     tolerance: file_tolerance.Tolerance
     band: Band
-
-    @property
-    def distribution(self) -> Distribution:
-        named = {"uniform": UNIFORM, "triangular": TRIANGULAR}
-        return named.get(self.tolerance.distribution) or normal(self.tolerance.sigmas)
+    distribution: Distribution
 
 
 @dataclass(frozen=True)
@@ -75,6 +85,7 @@ class Tolerance:
     tables: ClassVar[Mapping[str, type[BaseModel]]] = {
         "strut": StrutTolerance,
         "tolerance": ToleranceTable,
+        "correlation": CorrelationTable,
     }
     sets_overall_edges: ClassVar[bool] = True
 
@@ -87,26 +98,24 @@ class Tolerance:
         stated |= _of_table(parts, stated)
         columns = sorted(stated)
         entries = [stated[column] for column in columns]
-        if not stated or _mixed_groups(parts, entries):
+        if _mixed_groups(parts, entries):
             return None
         names = parts.kernel.parameters
-        groups = list(dict.fromkeys(each.tolerance.group for each in entries))
-        return cls(
-            Deviation.of(
-                columns,
-                [each.band.shift for each in entries],
-                [each.band.half for each in entries],
-                groups=[
-                    OWN_GROUP
-                    if each.tolerance.group is None
-                    else groups.index(each.tolerance.group)
-                    for each in entries
-                ],
-                sign=[each.tolerance.sign for each in entries],
-                edge=[names[column].endswith(_EDGE_ENDINGS) for column in columns],
-                distribution=[each.distribution for each in entries],
-            )
+        given = [each.tolerance.group for each in entries]
+        groups = [group for group in dict.fromkeys(given) if group is not None]
+        bands = Deviation.of(
+            columns,
+            [each.band.shift for each in entries],
+            [each.band.half for each in entries],
+            groups=[OWN_GROUP if group is None else groups.index(group) for group in given],
+            sign=[each.tolerance.sign for each in entries],
+            edge=[names[column].endswith(_EDGE_ENDINGS) for column in columns],
+            distribution=[each.distribution for each in entries],
+            group_names=dict(enumerate(groups)),
         )
+        # A tolerance that is wrong would be missed here, and told twice.
+        correlation = None if parts.problems else read_correlation(parts, bands)
+        return cls(replace(bands, correlation=correlation)) if stated else None
 
     def acts(self, condition: Condition) -> bool:
         """In every condition."""
@@ -148,10 +157,9 @@ def _of_struts(parts: FileParts) -> dict[int, _Stated]:
         # ISO classes go by the nominal size; a telescopic strut has the one of its home pose.
         sizes = _strut_sizes(parts) if sizes is None else sizes
         path = f"strut.{parts.struts[index].name}.length_tolerance"
-        band = parts.band(row.length_tolerance, float(sizes[index]), path)
-        if band is not None:
-            column = int(parts.kernel.length_parameters[index])
-            stated[column] = _Stated(path, row.length_tolerance, band)
+        entry = _entry(parts, row.length_tolerance, float(sizes[index]), path)
+        if entry is not None:
+            stated[int(parts.kernel.length_parameters[index])] = entry
     return stated
 
 
@@ -259,15 +267,72 @@ def _stated(parts: FileParts, key: str, columns: list[int], value: object) -> di
     if not columns:
         return {}
     tolerance = parts.tolerance(value, BY_UNIT[parts.kernel.units[columns[0]]], path)
+    if tolerance is None:
+        return {}
+    listed = _listed(parts, tolerance, path)
     stated: dict[int, _Stated] = {}
     for column in columns:
-        if tolerance is None:
+        size = float(parts.kernel.nominal[column])
+        entry = _with_band(parts, tolerance, listed, size, path)
+        if entry is None:
             break
-        band = parts.band(tolerance, float(parts.kernel.nominal[column]), path)
-        if band is None:
-            break
-        stated[column] = _Stated(path, tolerance, band)
+        stated[column] = entry
     return stated
+
+
+def _entry(
+    parts: FileParts, tolerance: file_tolerance.Tolerance, nominal: float, path: str
+) -> _Stated | None:
+    """A tolerance of a parameter of so much nominal value; None, and a problem, if bad."""
+    return _with_band(parts, tolerance, _listed(parts, tolerance, path), nominal, path)
+
+
+def _with_band(
+    parts: FileParts,
+    tolerance: file_tolerance.Tolerance,
+    listed: Listed | None,
+    nominal: float,
+    path: str,
+) -> _Stated | None:
+    if listed is not None:
+        band = Band(listed.centre - listed.half, listed.centre + listed.half)
+        return _Stated(path, tolerance, band, listed.distribution)
+    if tolerance.distribution in LISTED:
+        return None  # and the problem is recorded
+    found = parts.band(tolerance, nominal, path)
+    if found is None:
+        return None
+    return _Stated(path, tolerance, found, _distribution(tolerance))
+
+
+def _distribution(tolerance: file_tolerance.Tolerance) -> Distribution:
+    """That of a band; listed values bring their own."""
+    if tolerance.dof is not None:
+        return student_t(tolerance.dof, tolerance.sigmas)
+    return _WITHOUT_NUMBERS.get(tolerance.distribution) or normal(tolerance.sigmas)
+
+
+def _listed(parts: FileParts, tolerance: file_tolerance.Tolerance, path: str) -> Listed | None:
+    """Listed values as a band; None where there are none, or, with a problem, no good ones."""
+    if tolerance.data is not None:
+        columns = (Column(DEVIATION, tolerance.dimension),)
+        table = parts.data_file(tolerance.data, columns, f"{path}.data")
+        return None if table is None else empirical(table.numbers[DEVIATION].tolist())
+    if not tolerance.values:
+        return None
+    if not tolerance.probabilities:
+        return empirical(tolerance.values)
+    try:
+        return discrete(tolerance.values, tolerance.probabilities)
+    except ValueError as error:
+        parts.refuse(
+            "bad-distribution",
+            f"these values and probabilities are no distribution: {error}",
+            path,
+            found=", ".join(f"{each:g}" for each in tolerance.probabilities),
+            expected="a probability from 0 to 1 of each value, their sum 1",
+        )
+        return None
 
 
 def _patterns(names: tuple[str, ...]) -> list[str]:

@@ -1,0 +1,163 @@
+"""`[[correlation]]`: variables of tolerances that are correlated, but not one and the same.
+
+Every pair of the variables that a row names has its coefficient, Pearson's. A variable is a
+parameter's own, or that of a group of tolerances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydantic import Field
+
+from truepose.machine.file_table import FileTable
+from truepose.machine.suggestion import counted
+from truepose.sources._base import Deviation, Floats
+from truepose.sources.semidefinite import clash
+
+if TYPE_CHECKING:
+    from truepose.machine import FileParts
+
+
+class CorrelationTable(FileTable):
+    """Tolerances that are correlated: made alike, on one machine, say, or in one batch."""
+
+    between: list[str] = Field(
+        min_length=1,
+        description="What is correlated: parameter names or patterns over them, as in "
+        "`[tolerance]`, or groups of tolerances; at least two variables in all.",
+    )
+    coefficient: float = Field(
+        description="Pearson correlation coefficient of every two of them, from -1 to 1."
+    )
+
+
+def read_correlation(parts: FileParts, bands: Deviation) -> Floats | None:
+    """(n_variable, n_variable) of the variables of `bands`; None where all are independent.
+
+    Or where a problem is recorded: names that match nothing, fewer than two variables, a pair that
+    is given twice, coefficients that are none or cannot all hold.
+    """
+    rows = parts.rows(CorrelationTable)
+    if not rows:
+        return None
+    names = _Names(parts, bands)
+    matrix = np.eye(bands.n_variable)
+    given: dict[tuple[int, int], str] = {}
+    before = len(parts.problems)
+    for index, row in enumerate(rows):
+        path = f"correlation.#{index + 1}"
+        if not -1.0 <= row.coefficient <= 1.0:
+            parts.refuse(
+                "bad-correlation",
+                "a correlation coefficient is from -1 to 1",
+                f"{path}.coefficient",
+                found=f"{row.coefficient:g}",
+                expected="a number from -1 to 1",
+            )
+        pairs = list(combinations(names.numbers(row.between, path), 2))
+        doubled = [pair for pair in pairs if pair in given]
+        if doubled:
+            one, other = (names.of_variable[number] for number in doubled[0])
+            parts.refuse(
+                "correlation-twice",
+                f"{one} and {other} are given a correlation twice",
+                path,
+                found=f"in {path} and in {given[doubled[0]]}",
+                expected="one coefficient for each pair",
+            )
+        given |= dict.fromkeys(pairs, path)
+        for i, j in pairs:
+            matrix[i, j] = matrix[j, i] = row.coefficient
+    if len(parts.problems) > before:
+        return None
+    problem = clash(names.of_variable, matrix)
+    if problem is None:
+        return matrix
+    parts.refuse(
+        problem.code,
+        problem.message,
+        "correlation",
+        found=problem.found,
+        expected=problem.expected,
+        hint=problem.hint,
+    )
+    return None
+
+
+class _Names:
+    """What the words of `between` may stand for.
+
+    `of_variable` (n_variable): what each variable is called: its group, or its parameter.
+    """
+
+    def __init__(self, parts: FileParts, bands: Deviation) -> None:
+        self._parts = parts
+        self._parameters = parts.kernel.parameters
+        self._groups: dict[str, int] = {}
+        self._variable: dict[str, int] = {}
+        self.of_variable = [""] * bands.n_variable
+        columns = zip(bands.parameters, bands.groups, bands.variables.tolist(), strict=True)
+        for parameter, group, number in columns:
+            name = self._parameters[parameter]
+            self._variable[name] = number
+            self.of_variable[number] = bands.group_names.get(int(group), name)
+            if int(group) in bands.group_names:
+                self._groups[bands.group_names[int(group)]] = number
+
+    def numbers(self, between: Sequence[str], path: str) -> list[int]:
+        """Numbers of the variables, ascending, each named by one entry; none where one is wrong."""
+        taken: dict[int, str] = {}
+        fine = True
+        for word in between:
+            found = self._of(word, path)
+            doubled = next((number for number in found if number in taken), None)
+            if doubled is not None:
+                self._parts.refuse(
+                    "correlation-twice",
+                    f"{taken[doubled]!r} and {word!r} are one variable: "
+                    f"{self.of_variable[doubled]}",
+                    f"{path}.between",
+                    found=f"{taken[doubled]}, {word}",
+                    expected="each variable once; a group is one",
+                )
+            fine = fine and bool(found) and doubled is None
+            taken |= dict.fromkeys(found, word)
+        if fine and len(taken) < 2:
+            self._parts.refuse(
+                "correlation-too-few",
+                "a correlation is between two variables or more",
+                f"{path}.between",
+                found=f"{counted(len(taken), 'variable')}: "
+                f"{', '.join(self.of_variable[number] for number in taken)}",
+                expected="two parameters or more that vary by themselves, or groups",
+            )
+        return sorted(taken) if fine and len(taken) > 1 else []
+
+    def _of(self, word: str, path: str) -> list[int]:
+        """The variables that a group's name, a parameter's or a pattern stands for."""
+        if word in self._groups:
+            return [self._groups[word]]
+        if word in self._variable:
+            return [self._variable[word]]
+        matching = [name for name in self._variable if fnmatchcase(name, word)]
+        if matching:
+            return list(dict.fromkeys(self._variable[name] for name in matching))
+        without = [name for name in self._parameters if name == word or fnmatchcase(name, word)]
+        self._parts.refuse(
+            "correlation-matches-nothing",
+            f"{without[0]} has no tolerance"
+            if without
+            else f"no tolerance is of, or is grouped as, {word!r}",
+            f"{path}.between",
+            found=word,
+            expected="a parameter that has a tolerance, a pattern over such, or a group of them",
+            hint=None
+            if without
+            else self._parts.suggest(word, [*self._groups, *self._variable, *self._parameters]),
+        )
+        return []

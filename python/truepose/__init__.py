@@ -23,28 +23,46 @@ if TYPE_CHECKING:
 
     from truepose import errors
     from truepose._kernel import threads
+    from truepose.budget.bounds import bounds
+    from truepose.budget.inputs import Input
+    from truepose.budget.monte_carlo import monte_carlo
     from truepose.budget.poses import Progress
+    from truepose.budget.shares import shares
+    from truepose.budget.uncertainty import uncertainty
+    from truepose.budget.worst_case import worst_case
     from truepose.machine import Condition, Machine
 
     __version__: str
 
 _WHERE = {
     "Condition": "truepose.machine",
+    "Input": "truepose.budget.inputs",
     "Machine": "truepose.machine",
+    "bounds": "truepose.budget.bounds",
+    "monte_carlo": "truepose.budget.monte_carlo",
+    "shares": "truepose.budget.shares",
     "threads": "truepose._kernel",
+    "uncertainty": "truepose.budget.uncertainty",
+    "worst_case": "truepose.budget.worst_case",
 }
 
 __all__ = [
     "Condition",
+    "Input",
     "Machine",
     "__version__",
+    "bounds",
     "budget",
     "compensate",
     "errors",
     "load",
+    "monte_carlo",
     "over_time",
+    "shares",
     "strain",
     "threads",
+    "uncertainty",
+    "worst_case",
 ]
 
 

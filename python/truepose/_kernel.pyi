@@ -5,7 +5,7 @@ Arrays in may be of any real dtype and layout, arrays out are float64 and C-cont
 is seven numbers: the tool point and the platform's unit quaternion w x y z, base frame.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, final, overload
 
 import numpy as np
@@ -15,6 +15,9 @@ __all__ = [
     "STATUS",
     "KernelError",
     "Machine",
+    "Study",
+    "Tallies",
+    "Variables",
     "_rebuild",
     "elements",
     "instruction_set",
@@ -135,6 +138,59 @@ class Machine:
         self, joints: ArrayLike, placements: ArrayLike, columns: ArrayLike
     ) -> _WithStatus:
         """(sensitivity (n, n_component, k), status)."""
+    def sensitivity_moved(
+        self,
+        joints: ArrayLike,
+        placements: ArrayLike,
+        columns: ArrayLike,
+        moved: ArrayLike,
+        values: ArrayLike,
+    ) -> _WithStatus:
+        """(sensitivity (n, n_component, k), status) of the machine with parameters moved.
+
+        The parameters `moved` (k0,) are deviated by `values` (n or 1, k0); derivatives of the
+        displacement from `placements` and of its rotation vector, where the machine then is.
+        """
+
+    @property
+    def can_be_enclosed(self) -> bool:
+        """Whether bounds over a region can be proven: see `bounds_over`."""
+
+    def bounds_at(
+        self,
+        joints: ArrayLike,
+        placements: ArrayLike,
+        shifted: ArrayLike,
+        shift: ArrayLike,
+        parameters: ArrayLike,
+        variables: Sequence[int],
+        swing: ArrayLike,
+    ) -> tuple[list[list[float]], list[list[float]], list[list[float]], list[str]]:
+        """(lower, upper (n, n_component), magnitudes (n, n_quantity), status (n,)), proven bounds.
+
+        Over every variable in [-1, 1]: parameters `shifted` (k0,) are deviated by `shift`
+        (n or 1, k0), and column c moves `parameters[c]` by `swing` (n or 1, k) times variable
+        `variables[c]`. Status: proven, near_singular, box_too_wide.
+        """
+
+    def bounds_over(
+        self,
+        sides: Sequence[tuple[float, float]],
+        shifts: Sequence[tuple[int, tuple[float, float], float, int]],
+        yielding: Sequence[tuple[int, tuple[float, float], float, int]],
+        wrench: Sequence[float],
+        columns: Sequence[tuple[int, int, float]],
+        gap: float,
+        most_boxes: int,
+        progress: Callable[[int, float], bool],
+    ) -> dict[str, Any]:
+        """Proven bounds over a region of commanded poses with these `sides` (n_commanded, 2).
+
+        `shifts` and `yielding`, a known deviation and a compliance under `wrench` (6,): parameter,
+        (low, high) of a constant, per length of a strut, which strut. `columns`: parameter,
+        variable, swing. Where `progress(boxes, gap)` returns False the search ends.
+        """
+
     def base_loads_at(
         self, joints: ArrayLike, placements: ArrayLike, forces: ArrayLike, columns: ArrayLike
     ) -> _Floats:
@@ -207,6 +263,100 @@ class Machine:
         Each is `what` ("strut", "travel", "singular"), `name`, `amount` and `unit`; the amount is
         negative where a strut would have to be shorter, or a joint is below its travel.
         """
+
+@final
+class Variables:
+    """Independent or correlated variables t of mean zero, drawn by counter-based random numbers.
+
+    Each is a dict: `kind` (uniform, triangular, arcsine, two-point, normal, student-t, discrete),
+    `sigmas` (half band in standard deviations), `stream` and `number` (its identity: whatever else
+    varies, its samples are the same), `dof`, `values` and `probabilities` where the kind has them.
+    The variables `members` are correlated: `factor` (k x k, row after row) times independent normal
+    numbers, then taken to their distributions.
+    """
+
+    def __new__(
+        cls,
+        variables: Sequence[Mapping[str, object]],
+        members: Sequence[int] = ...,
+        factor: Sequence[float] = ...,
+    ) -> Variables: ...
+    def draw(self, seed: int, first: int, count: int) -> _Floats:
+        """(count, n_variable) the samples from number `first` on."""
+
+@final
+class Tallies:
+    """What is kept of samples at n poses, in constant memory.
+
+    `origins`, `widths` (n, columns): where the values of a column lie, and how wide a bin of its
+    histogram may be at least. The first `covariant` columns have a covariance.
+    """
+
+    def __new__(
+        cls, origins: ArrayLike, widths: ArrayLike, columns: int, covariant: int
+    ) -> Tallies: ...
+    def blank(self) -> Tallies:
+        """The same without samples."""
+    def add(self, values: ArrayLike) -> None:
+        """Add samples (count, columns) to the first pose."""
+    def fail(self, count: int) -> None:
+        """Count samples of the first pose that have no result."""
+    def merge(self, other: Tallies) -> None:
+        """Add the samples of other tallies."""
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """(n,) samples with a result."""
+    @property
+    def failed(self) -> NDArray[np.int64]:
+        """(n,) samples without a result."""
+    @property
+    def mean(self) -> _Floats:
+        """(n, columns)."""
+    @property
+    def covariance(self) -> _Floats:
+        """(n, covariant, covariant)."""
+    @property
+    def extremes(self) -> _Floats:
+        """(n, columns, 2) smallest and largest value."""
+    def quantiles(self, shares: Sequence[float]) -> _Floats:
+        """(n, columns, n_share) the values below which lie the shares of the samples."""
+    def shortest(self, share: float) -> _Floats:
+        """(n, columns, 2) the narrowest interval that holds the share of the samples."""
+
+@final
+class Study:
+    """A machine at n poses, ready for sampling.
+
+    `joints` (n, n_joint), `placements` (n, 7) of the commands; `shifted` (k0,) parameters and their
+    `shift` (n or 1, k0); `parameters`, `variables` (k,) of the columns and their `swing`
+    (n or 1, k); `whitening` (n, 12): centre (3) and matrix (3 x 3) of the position error, whose
+    length then is the last column of the tallies.
+    """
+
+    def __new__(
+        cls,
+        machine: Machine,
+        joints: ArrayLike,
+        placements: ArrayLike,
+        shifted: ArrayLike,
+        shift: ArrayLike,
+        parameters: ArrayLike,
+        variables: Sequence[int],
+        swing: ArrayLike,
+        whitening: ArrayLike | None = None,
+    ) -> Study: ...
+    @property
+    def status(self) -> _Codes:
+        """(n,) of the machine at its shifts."""
+    @property
+    def shift_error(self) -> _Floats:
+        """(n, n_component) error at the shifts."""
+    def sample(
+        self, variables: Variables, seed: int, first: int, count: int, tallies: Tallies
+    ) -> None:
+        """Evaluate samples into tallies of the components, the magnitudes and the length."""
+    def sample_given(self, variables: Variables, values: ArrayLike, tallies: Tallies) -> None:
+        """Evaluate samples of given variables (count, n_variable)."""
 
 def elements() -> dict[str, list[dict[str, Any]]]:
     """Every element by family (`drive`, `strut`), for models, schema, docs and pictures.

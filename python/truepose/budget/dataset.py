@@ -9,23 +9,28 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
+from truepose.budget.comparison import quantities
 from truepose.budget.percent import POSITIONS
 from truepose.budget.poses import LeftOut
 from truepose.machine import Condition, Machine
 from truepose.sources import Block
 from truepose.sources._base import Flags, Floats, Indices
 
+if TYPE_CHECKING:
+    from truepose.budget.model import FunctionModel
+
 
 @dataclass(frozen=True)
 class Variable:
     """One variable of a result: its dims, its unit, what it is.
 
-    `units` is a unit, or the dim along which it differs: "component", "joint" or "quantity".
+    `units` is a unit, or the dim along which it differs: "component", "joint" or "quantity"; or
+    "covariance", of the products of two components.
     """
 
     dims: tuple[str, ...]
@@ -37,6 +42,9 @@ class Variable:
 Schema = Mapping[str, Variable]
 
 QUANTITY_UNITS = {"position": "m", "orientation": "rad"}
+
+_PRODUCTS = {(False, True): "m^2", (True, False): "rad^2", (True, True): "m^2, m rad, rad^2"}
+"""Units of a covariance, by whether the machine turns and whether it moves."""
 
 
 class Rows:
@@ -129,7 +137,74 @@ def assemble(
         **_left_out_coords(machine, poses, left_out),
         **(coords or {}),
     }
-    return xr.Dataset(data, labels, _provenance(machine, condition, rows, len(poses)))
+    attrs = _provenance(machine, condition)
+    attrs |= {"poses_used": rows.count, "poses_left_out": len(poses) - rows.count}
+    return xr.Dataset(data, labels, attrs)
+
+
+def region_dataset(
+    machine: Machine, condition: Condition, schema: Schema, values: Mapping[str, Any]
+) -> xr.Dataset:
+    """The Dataset of a result over a continuous region, which has no dim pose."""
+    data = {
+        name: xr.Variable(variable.dims, values[name], _attrs(machine, variable))
+        for name, variable in schema.items()
+    }
+    labels = {
+        "component": label("component", list(machine.components), "component of the error"),
+        "component_units": label("component", component_units(machine), "unit of the component"),
+        "commanded": label("commanded", list(machine.commanded), "commanded freedom"),
+        "commanded_units": label("commanded", commanded_units(machine), "unit of the freedom"),
+        **quantity_coords(machine),
+    }
+    return xr.Dataset(data, labels, _provenance(machine, condition))
+
+
+def function_dataset(
+    schema: Schema,
+    values: Mapping[str, Any],
+    model: FunctionModel,
+    *,
+    coords: Mapping[str, xr.Variable] | None = None,
+) -> xr.Dataset:
+    """The Dataset of a plain function: `values` by name, over its outputs as `component`.
+
+    A variable of `schema` that has a dim pose has it not here.
+    """
+    data = {}
+    for name, variable in schema.items():
+        dims = tuple(dim for dim in variable.dims if dim != "pose")
+        units = variable.units
+        if units in ("component", "covariance"):
+            units = ", ".join(dict.fromkeys(model.output_units))
+        attrs = {"units": units, "long_name": variable.long_name}
+        data[name] = xr.Variable(dims, values[name], attrs)
+    used = {dim for variable in data.values() for dim in variable.dims}
+    labels = {
+        dim: label(dim, list(model.outputs), meaning)
+        for dim, meaning in (
+            ("component", "output of the function"),
+            ("other_component", "the other output of a covariance"),
+        )
+        if dim in used
+    }
+    attrs = {
+        "truepose_version": version("truepose"),
+        "function": getattr(model.function, "__name__", type(model.function).__name__),
+        "inputs": json.dumps(
+            {
+                name: {
+                    "centre": one.centre,
+                    "half": one.half,
+                    "distribution": str(one.distribution),
+                    "dof": one.dof if np.isfinite(one.dof) else None,
+                }
+                for name, one in model.inputs.items()
+            }
+        ),
+        "seed": "none",
+    }
+    return xr.Dataset(data, {**labels, **(coords or {})}, attrs)
 
 
 def label(dim: str, values: Any, long_name: str, units: str = "1") -> xr.Variable:
@@ -137,10 +212,25 @@ def label(dim: str, values: Any, long_name: str, units: str = "1") -> xr.Variabl
     return xr.Variable((dim,), values, {"long_name": long_name, "units": units})
 
 
+def quantity_coords(machine: Machine) -> dict[str, xr.Variable]:
+    """What has a size, position and orientation, and its unit."""
+    kinds = list(quantities(machine.components))
+    units = [QUANTITY_UNITS[kind] for kind in kinds]
+    return {
+        "quantity": label("quantity", kinds, "what has a size"),
+        "quantity_units": label("quantity", units, "unit of the quantity"),
+    }
+
+
 def joint_units(machine: Machine) -> list[str]:
     """Unit of each joint coordinate."""
     unit = {"length": "m", "angle": "rad"}
     return [unit[drive.coordinate] for drive in machine.drives]
+
+
+def commanded_units(machine: Machine) -> list[str]:
+    """Unit of each commanded freedom."""
+    return ["m" if name in POSITIONS else "rad" for name in machine.commanded]
 
 
 def component_units(machine: Machine) -> list[str]:
@@ -150,10 +240,13 @@ def component_units(machine: Machine) -> list[str]:
 
 def _attrs(machine: Machine, variable: Variable) -> dict[str, str]:
     units = variable.units
+    if units == "covariance":
+        units = _PRODUCTS["rad" in component_units(machine), "m" in component_units(machine)]
     found = {
         "component": component_units(machine),
         "joint": joint_units(machine),
-        "quantity": component_units(machine),
+        "quantity": [QUANTITY_UNITS[kind] for kind in quantities(machine.components)],
+        "commanded": commanded_units(machine),
     }.get(units)
     if found is None:
         return {"units": units, "long_name": variable.long_name}
@@ -207,9 +300,7 @@ def _left_out_coords(machine: Machine, poses: Floats, left_out: LeftOut) -> dict
     return coords
 
 
-def _provenance(
-    machine: Machine, condition: Condition, rows: Rows, asked: int
-) -> dict[str, str | int | float]:
+def _provenance(machine: Machine, condition: Condition) -> dict[str, str | int | float]:
     attrs: dict[str, str | int | float] = {
         "truepose_version": version("truepose"),
         "machine": machine.name,
@@ -220,8 +311,6 @@ def _provenance(
         "replaced": "; ".join(f"{key}={value!r}" for key, value in machine.replaced.items()),
         "condition": json.dumps(_condition(condition)),
         "seed": "none",
-        "poses_used": rows.count,
-        "poses_left_out": asked - rows.count,
     }
     if machine.accuracy.target is not None:
         attrs["accuracy_target"] = machine.accuracy.target

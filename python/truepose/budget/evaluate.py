@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from truepose.budget import comparison, exact, percent, uncertainty, worst
+from truepose.budget import comparison, exact, percent, propagation, worst
 from truepose.budget.dataset import (
     QUANTITY_UNITS,
     Rows,
@@ -257,9 +257,13 @@ def _band(
             effects, sigmas, status[poses] = worst.variable_effects(
                 machine, block, deviation, poses
             )
-            # Sizes first, then their squares, in the one place.
-            half[poses] = worst.linear_half(effects, scratch=effects)
-            spread[poses] = uncertainty.standard_uncertainty(effects, sigmas, scratch=effects)
+            # Sizes first, then their squares, in the one place; what is correlated keeps its signs.
+            correlation = deviation.banded_correlation
+            scratch = effects if correlation is None else None
+            half[poses] = worst.linear_half(effects, scratch=scratch)
+            spread[poses] = propagation.standard_uncertainty(
+                effects, sigmas, scratch=effects, correlation=correlation
+            )
     return half, spread, status
 
 

@@ -217,10 +217,7 @@ def no_pose_left(
             continue
         excess = max(abs(float(fault["amount"])) for fault in faults)
         if nearest is None or excess < nearest[0]:
-            where = ", ".join(
-                f"{name} = {_in_file_units(machine, value, _dimension_of(name))}"
-                for name, value in zip(machine.commanded, pose, strict=True)
-            )
+            where = pose_in_words(machine, pose)
             nearest = (excess, f"nearest at {where}: {faults_text(machine, faults)}")
     return RequestError(
         Problem(
@@ -238,6 +235,14 @@ def no_pose_left(
             else "the nominal machine reaches them, but not as the error sources move it: look for "
             "a number of the wrong size or unit, or leave more travel for the correction",
         )
+    )
+
+
+def pose_in_words(machine: Machine, pose: Iterable[float]) -> str:
+    """A commanded pose (n_commanded,), m and rad, in the file's units: "x = 200 mm, y = 100 mm"."""
+    return ", ".join(
+        f"{name} = {_in_file_units(machine, value, _dimension_of(name))}"
+        for name, value in zip(machine.commanded, pose, strict=True)
     )
 
 

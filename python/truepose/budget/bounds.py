@@ -1,0 +1,170 @@
+"""Bounds: what the error is proven not to exceed, at poses or over a region.
+
+The variables of all sources are taken anywhere in their bands, in any combination. Interval Newton
+on the closures proves that every such machine has exactly one pose near the commanded one and
+encloses it, rounding included (`crates/kernel/src/proof`). What is reached stands beside it: the
+exact error at the worst vertices that were found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from truepose.budget.band_ends import Ends
+from truepose.budget.comparison import quantities
+from truepose.budget.dataset import Rows, Schema, Variable, assemble, quantity_coords, sizes
+from truepose.budget.evaluate import required_sources
+from truepose.budget.first_order import Mover, first_order
+from truepose.budget.over_region import bounds_over_region, no_proof, required_gap
+from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, requested_poses
+from truepose.budget.spread import Spread, spread
+from truepose.budget.vertices import worst_vertices
+from truepose.budget.worst import linear_half, worst
+from truepose.errors import Problem, RequestError
+from truepose.machine import Condition, Machine
+from truepose.sources import Block
+from truepose.sources._base import Flags, Floats
+
+_EACH = ("pose", "component")
+_SIZE = ("pose", "quantity")
+
+SCHEMA: Schema = {
+    "lower": Variable(_EACH, "component", "proven lower bound of the error"),
+    "upper": Variable(_EACH, "component", "proven upper bound of the error"),
+    "reached_lower": Variable(_EACH, "component", "lowest exact error found at a vertex"),
+    "reached_upper": Variable(_EACH, "component", "highest exact error found at a vertex"),
+    "linear": Variable(_EACH, "component", "worst case of first order"),
+    "magnitude": Variable(_SIZE, "quantity", "proven upper bound of the size of the error"),
+    "reached_magnitude": Variable(_SIZE, "quantity", "largest exact error found at a vertex"),
+    "status": Variable(("pose",), "1", "proven, or why there is no proof", object),
+}
+
+POSES = 16
+"""Poses between two looks at Ctrl-C and progress."""
+
+
+def bounds(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    *,
+    region: Mapping[str, Sequence[float]] | None = None,
+    gap: float = 0.05,
+    truncate: float | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Proven bounds of the error over every combination of deviations in their bands.
+
+    At `poses` (..., n_commanded), SI, default the file's workspace; or over a `region`, freedom ->
+    (from, to) in m and rad, a freedom not named staying at home: then the bounds hold at every pose
+    of it, and lie at most the share `gap` above what is reached somewhere in it, unless the parts
+    that the region may be divided into run out: `gap_reached` says how far they lie. A distribution
+    without ends (normal, Student's) has no bound: `truncate` says at how many standard deviations
+    it is taken to end. `progress` is called with (poses or boxes done, all or 0).
+
+    `status` is "proven", or says why nothing is: "near_singular", "box_too_wide" (the bands are too
+    wide for the method, or a part of the region could not be divided further). Bounds without a
+    proof are missing. The Dataset, SI, is described in docs/results.md.
+
+    Raises `RequestError`: no-finite-band, bad-truncation, bad-gap, bad-region, region-out-of-reach,
+    no-proof (a machine or a source that cannot be enclosed), bad-poses, no-workspace, no-source,
+    no-pose-left.
+    """
+    given = machine.condition if condition is None else condition
+    ends = Ends.of(truncate)
+    if machine.kernel.overconstrained:
+        raise no_proof(
+            machine,
+            "more closures than freedoms",
+            "as many closures as freedoms: there the pose is a root, which can be enclosed",
+        )
+    if region is None:
+        return _at_poses(machine, poses, given, ends, progress)
+    if poses is not None:
+        raise RequestError(
+            Problem(
+                "bad-region",
+                "bounds are asked for at poses and over a region at once",
+                found="both",
+                expected="poses or a region",
+            )
+        )
+    return bounds_over_region(machine, given, region, required_gap(gap), ends, progress)
+
+
+def _at_poses(
+    machine: Machine,
+    poses: ArrayLike | None,
+    condition: Condition,
+    ends: Ends,
+    progress: Progress | None,
+) -> xr.Dataset:
+    table = requested_poses(machine, poses)
+    sources = required_sources(machine, condition)
+    kinds = quantities(machine.components)
+    rows = Rows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
+    walk = Walk(machine, table, condition, path=poses is None and is_path(machine))
+    done = 0
+    for block in walk:
+        ends.narrowed(machine, spread(machine, block, sources))  # refuses before the work
+        for start in range(0, block.indices.size, POSES):
+            chosen = np.zeros(block.indices.size, np.bool_)
+            chosen[start : start + POSES] = True
+            part = block.select(chosen)
+            moves = ends.narrowed(machine, spread(machine, part, sources))
+            value, effects, status = first_order(machine, part, moves)
+            usable = walk.keep(part.indices, status)
+            if usable.any():
+                part = part.select(usable)
+                moves = ends.narrowed(machine, spread(machine, part, sources))
+                order = (value[usable], effects[usable])
+                rows.append(part, *_bounded(machine, part, moves, order, walk))
+            done += int(chosen.sum())
+            if progress is not None:
+                progress(done, len(table))
+    if rows.count == 0:
+        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
+    found = assemble(
+        machine, condition, SCHEMA, rows, table, walk.left_out, coords=quantity_coords(machine)
+    )
+    found["status"] = found["status"].astype(str)
+    return found.assign_attrs(ends.attrs)
+
+
+def _bounded(
+    machine: Machine,
+    block: Block,
+    moves: Spread,
+    order: tuple[Floats, Floats],
+    walk: Walk,
+) -> tuple[dict[str, np.ndarray], Flags]:
+    """Every variable over the poses of a block, and which of them are usable."""
+    value, effects = order
+    kinds = list(quantities(machine.components).values())
+    found = worst_vertices(Mover(machine, block, moves), value, effects, kinds)
+    m = len(machine.components)
+    shifted, shift = moves.shift
+    lower, upper, magnitude, status = machine.kernel.bounds_at(
+        block.joints,
+        block.placements,
+        shifted,
+        np.ascontiguousarray(shift),
+        moves.columns,
+        moves.variables.tolist(),
+        np.ascontiguousarray(moves.swing),
+    )
+    values = {
+        "lower": np.asarray(lower),
+        "upper": np.asarray(upper),
+        "magnitude": np.asarray(magnitude),
+        "status": np.asarray(status, object),
+        "reached_lower": -found.most[:, m : 2 * m],
+        "reached_upper": found.most[:, :m],
+        "reached_magnitude": found.most[:, 2 * m :],
+        "linear": worst(value, linear_half(effects)),
+    }
+    return values, walk.keep(block.indices, found.status)

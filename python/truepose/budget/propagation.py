@@ -1,0 +1,99 @@
+"""The law of propagation of uncertainty (GUM, JCGM 100:2008, 5.1.2, 5.2.2, annex G).
+
+    u[c]^2 = sum over variables of (effect[c] / sigmas)^2
+
+where the effect is the first-order error of the variable at the end of its band, and `sigmas` that
+band in standard deviations: sqrt(3) for a uniform distribution (GUM 4.3.7), k for a normal one.
+Within a correlation group the members add with their signs before the square is taken; variables
+i and j that a coefficient r correlates add 2 r (effect / sigmas)_i (effect / sigmas)_j (5.2.2).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.sources._base import Floats, Indices
+from truepose.sources.quantiles import normal_quantile, student_quantile
+
+
+def standard_uncertainty(
+    effects: Floats,
+    sigmas: Floats,
+    scratch: Floats | None = None,
+    *,
+    correlation: Floats | None = None,
+) -> Floats:
+    """(n, n_component) from effects (n, n_component, n_variable) and sigmas (n_variable,).
+
+    `correlation` (n_variable, n_variable) of the variables, None where they are independent.
+    `scratch`: where what is on the way may go, such as `effects` itself.
+    """
+    if correlation is None:
+        combined: Floats = np.sqrt(np.square(effects, out=scratch) @ sigmas**-2.0)
+        return combined
+    each: Floats = np.divide(effects, sigmas, out=scratch)
+    squares = np.einsum("ncv,ncv->nc", each @ correlation, each)
+    # What cancels leaves rounding, of either sign.
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+
+@dataclass(frozen=True)
+class Combined:
+    """Standard uncertainty (n, m), covariance (n, m, m) and effective degrees of freedom (n, m)."""
+
+    standard_uncertainty: Floats
+    covariance: Floats
+    dof: Floats
+
+
+def combine(
+    effects: Floats,
+    sigmas: Floats,
+    correlation: Floats | None = None,
+    dofs: Floats | None = None,
+) -> Combined:
+    """The law of propagation for effects (n, m, v), of variables with `dofs` (v,), default inf.
+
+    u[c, d] = sum over i, j of a[c, i] r[i, j] a[d, j] with a = effect / sigmas (GUM 5.2.2, H.2.3),
+    and u[c]^4 / dof[c] = sum of u_i[c]^4 / dof_i (G.2b). Variables that are correlated enter the
+    latter as one, with the fewest degrees of freedom among them, which is on the safe side: the
+    formula is for independent ones (G.4.1).
+    """
+    each = effects / sigmas
+    weighed = each if correlation is None else each @ correlation
+    covariance = weighed @ each.transpose(0, 2, 1)
+    covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
+    variance = np.maximum(np.einsum("ncc->nc", covariance), 0.0)
+    dof = np.full(variance.shape, math.inf)
+    if dofs is not None and np.isfinite(dofs).any():
+        sets = _correlated_sets(len(dofs), correlation)
+        member = (sets[:, np.newaxis] == np.unique(sets)).astype(np.float64)
+        fewest = np.array([dofs[column > 0.0].min() for column in member.T])
+        fourth = np.square((weighed * each) @ member) @ (1.0 / fewest)
+        np.divide(np.square(variance), fourth, out=dof, where=fourth > 0.0)
+    return Combined(np.sqrt(variance), covariance, dof)
+
+
+def _correlated_sets(count: int, correlation: Floats | None) -> Indices:
+    """(v,) the first variable of each one's set: those that coefficients link, however far."""
+    if correlation is None:
+        return np.arange(count)
+    linked = (correlation != 0.0) | np.eye(count, dtype=np.bool_)
+    first = np.arange(count)
+    while True:
+        nearest = np.where(linked, first, count).min(axis=1)
+        if np.array_equal(nearest, first):
+            return first
+        first = nearest
+
+
+def coverage_factor(dof: Floats, probability: float) -> Floats:
+    """k of Student's distribution for `dof`, any shape; inf: of the normal one (GUM G.3.2)."""
+    # One number of degrees of freedom at a time: there are few.
+    factor = np.full(dof.shape, float(normal_quantile(0.5 + 0.5 * probability)))
+    for each in np.unique(dof[np.isfinite(dof)]):
+        factor[dof == each] = student_quantile(0.5 + 0.5 * probability, float(each))
+    return factor

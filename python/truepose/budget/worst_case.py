@@ -1,0 +1,234 @@
+"""Worst case: the most that everything together can do, to first order and exactly.
+
+    linear[c] = |error at the shifts| + sum over variables of |effect[c]|
+    exact[c] = the largest |error| at a corner of the box in which the variables lie
+
+Both are of all sources together. The linear one is quick and may fall short of the truth, since the
+error bends; the exact one is a corner that the machine can be at. Neither is a proof: `bounds` is.
+A correlation does not narrow the worst case: every corner of the box is taken to happen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, overload
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from truepose.budget import comparison
+from truepose.budget.dataset import (
+    QUANTITY_UNITS,
+    Rows,
+    Schema,
+    Variable,
+    assemble,
+    function_dataset,
+    label,
+    sizes,
+)
+from truepose.budget.evaluate import required_sources
+from truepose.budget.first_order import Mover, first_order
+from truepose.budget.inputs import Input
+from truepose.budget.model import FunctionModel
+from truepose.budget.poses import OK, Progress, Walk, is_path, no_pose_left, requested_poses
+from truepose.budget.spread import spread
+from truepose.budget.vertices import Found, linear_norms, worst_vertices
+from truepose.budget.worst import linear_half, worst
+from truepose.errors import Problem, RequestError
+from truepose.machine import Condition, Machine
+from truepose.sources import Distribution
+from truepose.sources._base import Floats, Indices
+
+_EACH = ("pose", "component")
+_SIZE = ("pose", "quantity")
+
+SCHEMA: Schema = {
+    "linear": Variable(_EACH, "component", "worst case to first order, of either sign"),
+    "exact": Variable(_EACH, "component", "largest |error| at a corner of the bands"),
+    "exact_lower": Variable(_EACH, "component", "least error at a corner of the bands"),
+    "exact_upper": Variable(_EACH, "component", "largest error at a corner of the bands"),
+    "magnitude_linear": Variable(_SIZE, "quantity", "largest norm to first order"),
+    "magnitude_exact": Variable(_SIZE, "quantity", "largest norm at a corner of the bands"),
+    "search": Variable(("pose",), "1", "every vertex or directed: how corners were found", object),
+    "vertices": Variable(("pose",), "1", "corners evaluated", np.intp),
+}
+
+POSES = 256
+"""Poses whose linear worst cases are computed at once."""
+
+
+@overload
+def worst_case(
+    model: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset: ...
+
+
+@overload
+def worst_case(
+    model: Callable[..., Any],
+    poses: Mapping[str, Input] | None = None,
+    *,
+    inputs: Mapping[str, Input] | None = None,
+) -> xr.Dataset: ...
+
+
+def worst_case(
+    model: Machine | Callable[..., Any],
+    poses: Any = None,
+    condition: Condition | None = None,
+    *,
+    inputs: Mapping[str, Input] | None = None,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The most that all sources together can do: to first order, and exactly at the bands' corners.
+
+    Of a machine: `poses` (..., n_commanded), SI, default the file's workspace; `condition`, default
+    the file's; `progress` is called with (poses done, poses in all). Of a plain function: its
+    `inputs`, as the second argument or by name. The Dataset, SI, is described in docs/results.md.
+
+    Every corner is evaluated where at most 12 variables have a band, else a directed search finds
+    the worst it can (`search` says which). A distribution without ends, such as a normal one, is
+    taken at its band of k standard deviations, which the attribute `unbounded` lists. Values in
+    between the corners are not looked at, but for the shifts themselves.
+
+    Raises `RequestError`: bad-poses, no-workspace, no-source, no-pose-left, where a pose counts as
+    left out if the machine cannot close at one of its corners; not-finite where the function is not
+    finite at one; `TrueposeError` as the sources do.
+    """
+    if isinstance(model, Machine):
+        given = model.condition if condition is None else condition
+        return _of_machine(model, poses, given, progress)
+    return _of_function(model, poses if inputs is None else inputs)
+
+
+def _of_machine(
+    machine: Machine, poses: ArrayLike | None, condition: Condition, progress: Progress | None
+) -> xr.Dataset:
+    table = requested_poses(machine, poses)
+    sources = required_sources(machine, condition)
+    kinds = comparison.quantities(machine.components)
+    rows = Rows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
+    endless: dict[str, dict[str, None]] = {}
+    walk = Walk(machine, table, condition, progress, path=poses is None and is_path(machine))
+    for block in walk:
+        moves = spread(machine, block, sources)
+        value, effects, status = first_order(machine, block, moves)
+        usable = walk.keep(block.indices, status)
+        found = worst_vertices(
+            _only(usable, Mover(machine, block, moves)),
+            value[usable],
+            effects[usable],
+            list(kinds.values()),
+        )
+        block = block.select(usable)
+        values = _values(found, value[usable], effects[usable], list(kinds.values()))
+        rows.append(block, values, walk.keep(block.indices, found.status))
+        _collect(endless, moves.names, moves.distributions)
+    if rows.count == 0:
+        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
+    coords = {
+        "quantity": label("quantity", list(kinds), "what the norm is taken of"),
+        "quantity_units": label(
+            "quantity", [QUANTITY_UNITS[kind] for kind in kinds], "unit of the quantity"
+        ),
+    }
+    result = assemble(
+        machine,
+        condition,
+        SCHEMA,
+        rows,
+        table,
+        walk.left_out,
+        over_all={"search": np.array(rows.arrays["search"], np.str_)},
+        coords=coords,
+    )
+    return result.assign_attrs(unbounded=_listed(endless))
+
+
+def _only(
+    usable: np.ndarray, mover: Callable[[Indices, Floats], tuple[Floats, np.ndarray]]
+) -> Callable[[Indices, Floats], tuple[Floats, np.ndarray]]:
+    """The mover with poses counted among the usable ones."""
+    numbers = np.flatnonzero(usable)
+    return lambda poses, t: mover(numbers[poses], t)
+
+
+def _values(
+    found: Found, value: Floats, effects: Floats, quantities: Sequence[Indices]
+) -> dict[str, np.ndarray]:
+    """Every variable over n poses, from exact values (n, m) and effects (n, m, v) at the shifts."""
+    n_pose, n_output, _ = effects.shape
+    upper, lower = found.most[:, :n_output], -found.most[:, n_output : 2 * n_output]
+    return {
+        "linear": worst(value, linear_half(effects)),
+        "exact": np.maximum(np.abs(lower), np.abs(upper)),
+        "exact_lower": lower,
+        "exact_upper": upper,
+        "magnitude_linear": _linear_magnitudes(value, effects, quantities),
+        "magnitude_exact": found.most[:, 2 * n_output :],
+        "search": np.full(n_pose, found.search, object),
+        "vertices": found.evaluated,
+    }
+
+
+def _linear_magnitudes(value: Floats, effects: Floats, quantities: Sequence[Indices]) -> Floats:
+    """(n, q) largest norm of each quantity at a corner of the linear model."""
+    magnitudes = np.zeros((len(value), len(quantities)))
+    for start in range(0, len(value), POSES):
+        poses = slice(start, start + POSES)
+        for number, columns in enumerate(quantities):
+            norms, _ = linear_norms(value[poses][:, columns], effects[poses][:, columns])
+            magnitudes[poses, number] = norms.max(axis=1)
+    return magnitudes
+
+
+def _collect(
+    endless: dict[str, dict[str, None]],
+    names: Iterable[str],
+    distributions: Iterable[Distribution],
+) -> None:
+    """Add the variables whose distribution has no ends, by the distribution in words."""
+    for name, distribution in zip(names, distributions, strict=True):
+        if not distribution.bounded:
+            endless.setdefault(str(distribution), {})[name] = None
+
+
+def _listed(endless: Mapping[str, Mapping[str, None]]) -> str:
+    return "; ".join(f"{how}: {', '.join(names)}" for how, names in endless.items()) or "none"
+
+
+def _of_function(function: Callable[..., Any], inputs: Any) -> xr.Dataset:
+    model = FunctionModel(function, inputs)
+    law = model.linear()
+
+    def evaluate(poses: Indices, t: Floats) -> tuple[Floats, np.ndarray]:
+        outputs, fine = model.evaluate(t)
+        return outputs, np.where(fine, OK, OK + 1).astype(np.uint8)
+
+    found = worst_vertices(evaluate, law.value[np.newaxis], law.effects[np.newaxis])
+    if found.status[0] != OK:
+        raise RequestError(
+            Problem(
+                "not-finite",
+                "the function has no finite value at a corner of the bands",
+                found=f"not finite at some of {found.evaluated[0]} corners",
+                expected="finite values wherever the inputs can be",
+                hint="narrow the bands, or keep them off where the function is not defined",
+            )
+        )
+    values = _values(found, law.value[np.newaxis], law.effects[np.newaxis], [])
+    schema = {
+        name: Variable(each.dims[1:], each.units, each.long_name, each.dtype)
+        for name, each in SCHEMA.items()
+        if "quantity" not in each.dims
+    }
+    endless: dict[str, dict[str, None]] = {}
+    _collect(endless, model.names, model.distributions)
+    result = function_dataset(schema, {name: values[name][0] for name in schema}, model)
+    return result.assign_attrs(unbounded=_listed(endless))

@@ -80,6 +80,34 @@ accuracy_option = click.option(
 )
 
 
+class WholeNumber(click.ParamType):  # type: ignore[type-arg]
+    """A whole number, also as people write large ones: 1e6, 1_000_000."""
+
+    name = "integer"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """The number; click's usage error for anything else."""
+        try:
+            return int(value)
+        except ValueError:
+            try:
+                number = float(value)
+            except ValueError:
+                number = 0.5
+        if not number.is_integer():
+            self.fail(f"{value!r} is not a whole number.", param, ctx)
+        return int(number)
+
+
+seed_option = click.option(
+    "--seed",
+    type=WholeNumber(),
+    default=0,
+    show_default=True,
+    help="The same seed draws the same samples, whatever the number of threads.",
+)
+
+
 def takes(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
     """Apply several click options to a command, listed in the order of its help."""
 

@@ -10,26 +10,70 @@ from contextlib import contextmanager
 PATIENCE = 2.0
 """Seconds of work before a bar appears."""
 
+LARGE = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
+"""Above ten thousand, numbers are shown in these."""
+
 
 @contextmanager
-def progress(what: str) -> Iterator[Callable[[int, int], None] | None]:
-    """A function (done, total) that draws a bar, or None where stderr is no terminal."""
+def progress(what: str, unit: str = "poses") -> Iterator[Callable[[int, int], None] | None]:
+    """A function (done, total) that draws a bar, or None where stderr is no terminal.
+
+    Beside the bar stand how many of what `unit`, the rate so far and the time left at that rate.
+    A `total` below one is one that is not known yet.
+    """
     if not sys.stderr.isatty():
         yield None
         return
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import BarColumn, Progress, TextColumn
 
-    bar = Progress(console=Console(stderr=True), transient=True)
-    task = bar.add_task(what, total=None)
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[state]}"),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    task = bar.add_task(what, total=None, state="")
     begun = time.monotonic()
 
     def report(done: int, total: int) -> None:
-        if not bar.live.is_started and time.monotonic() - begun > PATIENCE and done < total:
+        seconds = time.monotonic() - begun
+        if not bar.live.is_started and seconds > PATIENCE and (done < total or total < 1):
             bar.start()
-        bar.update(task, completed=done, total=total)
+        known = total if total >= 1 else None
+        bar.update(task, completed=done, total=known, state=state(done, known, unit, seconds))
 
     try:
         yield report
     finally:
         bar.stop()
+
+
+def state(done: int, total: int | None, unit: str, seconds: float) -> str:
+    """How far the work is after `seconds`: "1.2 M of 10 M samples, 300 k/s, 0:29 left"."""
+    much = f"{_short(done)} of {_short(total)} {unit}" if total else f"{_short(done)} {unit}"
+    if done < 1 or seconds <= 0.0:
+        return much
+    rate = done / seconds
+    said = f"{much}, {_short(rate)}/s"
+    if total is None or done >= total:
+        return said
+    return f"{said}, {_clock((total - done) / rate)} left"
+
+
+def _short(number: float) -> str:
+    """Three digits: "9", "8192", "12.3 k", "1.2 M"."""
+    if number >= 10_000:
+        for size, letter in LARGE:
+            if number >= size:
+                return f"{number / size:.3g} {letter}"
+    return f"{number:.0f}" if number >= 100 else f"{number:.3g}"
+
+
+def _clock(seconds: float) -> str:
+    """Minutes and seconds, "0:29", or hours as well, "1:02:09"."""
+    whole = round(seconds)
+    minutes, rest = divmod(whole, 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"

@@ -65,7 +65,7 @@ def evaluate(request: Request, machine: Machine) -> xr.Dataset:
     """The error budget over the file's workspace."""
     with progress("error budget") as report:
         found = truepose.budget(machine, progress=report)
-    _refuse_left_out_of(request, machine, found)
+    refuse_left_out_of(request, machine, found)
     return found
 
 
@@ -73,7 +73,7 @@ def correct(request: Request, machine: Machine) -> xr.Dataset:
     """The compensation over the file's workspace."""
     with progress("compensation") as report:
         found = truepose.compensate(machine, progress=report)
-    _refuse_left_out_of(request, machine, found)
+    refuse_left_out_of(request, machine, found)
     return found
 
 
@@ -81,7 +81,7 @@ def strain(request: Request, machine: Machine) -> xr.Dataset:
     """The internal forces over the file's workspace."""
     with progress("internal forces") as report:
         found = truepose.strain(machine, progress=report)
-    _refuse_left_out_of(request, machine, found)
+    refuse_left_out_of(request, machine, found)
     return found
 
 
@@ -89,7 +89,7 @@ def over_time(request: Request, machine: Machine) -> xr.Dataset:
     """The error over the file's temperature log, at home."""
     with progress("error over time") as report:
         found = truepose.over_time(machine, progress=report)
-    _refuse_left_out_of(request, machine, found)
+    refuse_left_out_of(request, machine, found)
     return found
 
 
@@ -203,7 +203,8 @@ def _why(machine: Machine, pose: np.ndarray, status: str) -> str:
     return status.replace("_", " ") + (f": {because}" if because else "")
 
 
-def _refuse_left_out_of(request: Request, machine: Machine, dataset: xr.Dataset) -> None:
+def refuse_left_out_of(request: Request, machine: Machine, dataset: xr.Dataset) -> None:
+    """The same of the poses that a result left out."""
     poses = [dataset[f"left_out_{name}"].values for name in machine.commanded]
     refuse_left_out(
         request,

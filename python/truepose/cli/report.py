@@ -35,13 +35,14 @@ from truepose.cli._options import (
 def command(**options: Any) -> int:
     """Do all of it, and write one HTML page.
 
-    Evaluates, compares and compensates, prints the tables, and writes the page, which opens from
-    disk without a network. With --require-accuracy the exit code is 1 when the most that remains
+    Evaluates, compares and compensates, samples, bounds and shares out the error at two poses,
+    prints the tables, and writes the page, which opens from disk without a network. With
+    --require-accuracy the exit code is 1 when the most that remains
     after compensation exceeds the accuracy asked.
     """
-    from truepose.cli import _work
+    from truepose.cli import _how_sure, _work
     from truepose.cli._show import show_tables
-    from truepose.report import accuracy, tables
+    from truepose.report import accuracy, how_sure, tables
 
     if options["output"] is None:
         options["output"] = Path(options["machine_file"].stem + ".html")
@@ -50,7 +51,7 @@ def command(**options: Any) -> int:
     page = _work.report_page()
     machine = _work.read_machine(request, [".html"])
     study = _work.with_time(_work.study_of(request, machine))
-    study = _work.with_strain(request, study)
+    study = _how_sure.with_how_sure(_work.with_strain(request, study))
     text = request.machine_file.read_text(encoding="utf-8")
     page.write(study, request.output, text)
     answers = accuracy.answers(study)
@@ -60,6 +61,7 @@ def command(**options: Any) -> int:
         tables.highest_percent(study),
         tables.compensation(study),
         *tables.strain(study),
+        *how_sure.in_short(study),
         tables.answers(answers),
         tables.poses_left_out(study),
     ]

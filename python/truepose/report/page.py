@@ -9,7 +9,7 @@ import jinja2
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
-from truepose.report import inputs, tables
+from truepose.report import how_sure, inputs, tables
 from truepose.report.accuracy import AFTER, BEFORE, answers, met
 from truepose.report.figures import draw
 from truepose.report.study import Study
@@ -19,7 +19,8 @@ LIMITS = (
     "These results hold for the sources found in the machine file and for the poses evaluated, "
     "nothing else. Sources that the file does not name (backlash, joint clearance, wear, control "
     "and measuring errors, bending of frame and platform) are not in them. Highest values add the "
-    "bands linearly and, with the exact simulation at both edges, are not a guaranteed enclosure. "
+    "bands linearly and, with the exact simulation at both edges, are not a guaranteed enclosure; "
+    "where a guaranteed bound is given it says so, and holds at the poses that it names. "
     "Loads and temperatures act on the nominal machine at the commanded pose."
 )
 FIGURE_SETTINGS = {"displaylogo": False, "responsive": True, "displayModeBar": "hover"}
@@ -39,6 +40,7 @@ def render(study: Study, machine_text: str = "") -> str:
     if study.compensation is not None:
         results.append(tables.compensation(study))
     results += tables.strain(study)
+    results += how_sure.tables(study)
     left_out = tables.poses_left_out(study)
     if left_out is not None:
         results.append(left_out)

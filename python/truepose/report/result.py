@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 DIMENSION_OF = {"m": "length", "rad": "angle", "N": "force", "K": "temperature", "s": "time"}
 """SI unit of a result -> dimension of the unit that the machine file declares for it."""
 
+SQUARE_METRE = "m^2"
+OTHER = "other_"
+"""Begins the name of the second dimension of a matrix: `component` and `other_component`."""
+
 _OVER_TIME = ("temperature", "time")
 """Dimensions that only some results have."""
 
@@ -46,18 +50,24 @@ def pose_si(freedom: str) -> str:
 class Values:
     """One variable in file units.
 
-    `units` is one unit, or one for each index along the axis `mixed`.
+    `units` is one unit, or one for each index along the axes `mixed`: one axis, or the two of a
+    covariance, whose units are in the order of its rows.
     """
 
     dims: tuple[str, ...]
     array: NDArray[np.generic]
     units: tuple[str, ...]
-    mixed: int | None
+    mixed: tuple[int, ...]
     long_name: str
 
-    def unit(self, along: int = 0) -> str:
-        """The unit at an index of the mixed axis, or the only one."""
-        return self.units[along] if self.mixed is not None else self.units[0]
+    def unit(self, *along: int) -> str:
+        """The unit at an index of each mixed axis, or the only one."""
+        if not self.mixed:
+            return self.units[0]
+        index = 0
+        for axis, at in zip(self.mixed, along, strict=True):
+            index = index * self.array.shape[axis] + at
+        return self.units[index]
 
 
 @dataclass(frozen=True)
@@ -83,16 +93,37 @@ class Result:
         array = np.asarray(variable.values)
         long_name = str(variable.attrs.get("long_name", ""))
         by = variable.attrs.get("units_by")
+        if "component" in dims and OTHER + "component" in dims:
+            return self._covariance(dims, array, long_name)
         if by is None:
             array, unit = self._converted(array, str(variable.attrs.get("units", "1")))
-            return Values(dims, array, (unit,), None, long_name)
+            return Values(dims, array, (unit,), (), long_name)
         si = [str(unit) for unit in self.dataset[by].values]
         axis = dims.index(str(self.dataset[by].dims[0]))
         parts, units = zip(
             *(self._converted(np.take(array, i, axis=axis), unit) for i, unit in enumerate(si)),
             strict=True,
         )
-        return Values(dims, np.stack(parts, axis=axis), units, axis, long_name)
+        return Values(dims, np.stack(parts, axis=axis), units, (axis,), long_name)
+
+    def _covariance(
+        self, dims: tuple[str, ...], array: NDArray[np.generic], long_name: str
+    ) -> Values:
+        """A variable over pairs of components, in the products of their units."""
+        axes = (dims.index("component"), dims.index(OTHER + "component"))
+        si = [str(unit) for unit in self.dataset["component_units"].values]
+        moved = np.moveaxis(array, axes, (0, 1)).astype(np.float64)
+        units = []
+        for row, one in enumerate(si):
+            for column, other in enumerate(si):
+                once, first = self._converted(moved[row, column], one)
+                moved[row, column], second = self._converted(once, other)
+                units.append(_product(first, second))
+        same = tuple(dict.fromkeys(units))
+        found = np.moveaxis(moved, (0, 1), axes)
+        if len(same) == 1:
+            return Values(dims, found, same, (), long_name)
+        return Values(dims, found, tuple(units), axes, long_name)
 
     def variables(self) -> list[str]:
         """Names of what was computed, also what xarray takes for a coordinate by its name."""
@@ -128,7 +159,12 @@ class Result:
         return [str(index) for index in range(self.dataset.sizes[dim])]
 
     def left_out(self) -> list[dict[str, object]]:
-        """Every pose that cannot be used: its number, coordinates in file units, and why."""
+        """Every pose that cannot be used: its number, coordinates in file units, and why.
+
+        A result over a region of the workspace has none.
+        """
+        if "left_out_index" not in self.dataset.variables:
+            return []
         poses = [self.values(f"left_out_{name}").array.tolist() for name in self.machine.commanded]
         return [
             {
@@ -145,11 +181,19 @@ class Result:
         ]
 
     def _converted(self, array: NDArray[np.generic], unit: str) -> tuple[NDArray[np.generic], str]:
+        if unit == SQUARE_METRE:
+            once, label = self._converted(array, "m")
+            return self._converted(once, "m")[0], _product(label, label)
         dimension = DIMENSION_OF.get(unit)
         if dimension is None:
             return array, unit
         to = self.machine.file_units[dimension]
         return to.to_file(array), to.label
+
+
+def _product(one: str, other: str) -> str:
+    """A product of two units: "mm^2", "mm deg"."""
+    return f"{one}^2" if one == other else f"{one} {other}"
 
 
 def _is_units(name: str) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -25,8 +26,10 @@ class Study:
 
     `budget` and `compensation` are the Datasets of `truepose.budget` and `truepose.compensate`
     over the same poses, `over_time` that of `truepose.over_time`, where there is a temperature
-    log, `strain` that of `truepose.strain`, where the machine is over-constrained. All values here
-    are SI.
+    log, `strain` that of `truepose.strain`, where the machine is over-constrained. `worst_case`,
+    `monte_carlo`, `bounds` and `shares` are those of the functions of these names at a few of the
+    poses, `ellipses` is a `monte_carlo` at more of them with fewer samples; `missing` says, by
+    name, why one of them is not there. All values here are SI.
     """
 
     machine: Machine
@@ -34,6 +37,12 @@ class Study:
     compensation: xr.Dataset | None = None
     over_time: xr.Dataset | None = None
     strain: xr.Dataset | None = None
+    worst_case: xr.Dataset | None = None
+    monte_carlo: xr.Dataset | None = None
+    ellipses: xr.Dataset | None = None
+    bounds: xr.Dataset | None = None
+    shares: xr.Dataset | None = None
+    missing: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def strained(self) -> xr.Dataset:

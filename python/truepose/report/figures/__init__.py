@@ -1,9 +1,8 @@
 """The figures of the report: one figure is one file, `Study` in, plotly figure out.
 
 A figure's module has `TITLE`, `caption(study)` and `figure(study)`. To add one: write the module
-and name it in `FIGURES`, where the order is that of the report. A figure that shows what
-compensation does sets `NEEDS_COMPENSATION = True` and is left out where there is none, one over
-time sets `NEEDS_TIME = True`, one of internal forces `NEEDS_STRAIN = True`.
+and name it in `FIGURES`, where the order is that of the report. A figure of a result that not every
+study has names it, `NEEDS = "compensation"`, and is left out where `study.compensation` is None.
 """
 
 from __future__ import annotations
@@ -16,12 +15,16 @@ import plotly.graph_objects as go
 
 from truepose.report.figures import (
     before_after,
+    coverage_ellipses,
+    distribution,
     error_over_time,
     internal_forces,
     machine_drawing,
     overall_error,
     ranking,
     source_errors,
+    three_answers,
+    tornado,
     workspace_maps,
 )
 from truepose.report.study import Study
@@ -32,6 +35,10 @@ FIGURES: tuple[ModuleType, ...] = (
     source_errors,
     overall_error,
     workspace_maps,
+    three_answers,
+    distribution,
+    coverage_ellipses,
+    tornado,
     error_over_time,
     internal_forces,
     before_after,
@@ -51,11 +58,8 @@ class Drawn:
 def draw(study: Study) -> Iterator[Drawn]:
     """Every registered figure of a study, in the order of the report."""
     for module in FIGURES:
-        if getattr(module, "NEEDS_COMPENSATION", False) and study.compensation is None:
-            continue
-        if getattr(module, "NEEDS_TIME", False) and study.over_time is None:
-            continue
-        if getattr(module, "NEEDS_STRAIN", False) and study.strain is None:
+        needed: str | None = getattr(module, "NEEDS", None)
+        if needed is not None and getattr(study, needed) is None:
             continue
         yield Drawn(
             name=module.__name__.rpartition(".")[2],

@@ -15,7 +15,7 @@ from truepose.report.study import Study
 
 TITLE = "Before and after compensation"
 
-NEEDS_COMPENSATION = True
+NEEDS = "compensation"
 
 
 def caption(study: Study) -> str:

@@ -12,7 +12,7 @@ from truepose.report.figures._style import MOST_DRAWN, finish, small, source_col
 from truepose.report.study import Study
 
 TITLE = "Error over time"
-NEEDS_TIME = True
+NEEDS = "over_time"
 
 KELVIN = 273.15
 PANEL_HEIGHT = 220

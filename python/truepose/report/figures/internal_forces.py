@@ -18,7 +18,7 @@ from truepose.report.figures._style import (
 from truepose.report.study import Array, Study
 
 TITLE = "Internal forces"
-NEEDS_STRAIN = True
+NEEDS = "strain"
 
 BAR, PANEL = 46, 260
 

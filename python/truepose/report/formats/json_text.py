@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -54,9 +55,10 @@ def write(result: Result, path: Path) -> None:
 
 def _variable(result: Result, values: Values) -> Iterator[str]:
     units: str | dict[str, str] = values.units[0]
-    if values.mixed is not None:
-        labels = result.labels(values.dims[values.mixed])
-        units = dict(zip(labels, values.units, strict=True))
+    if values.mixed:
+        # The two axes of a covariance are both named: {"x x": "mm^2", "x rx": "mm deg", ...}.
+        labels = product(*(result.labels(values.dims[axis]) for axis in values.mixed))
+        units = dict(zip(map(" ".join, labels), values.units, strict=True))
     head = {"dims": list(values.dims), "units": units, "long_name": values.long_name}
     yield _dumped(head)[:-1] + ', "values": '
     if values.array.ndim == 0:

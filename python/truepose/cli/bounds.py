@@ -1,0 +1,67 @@
+"""`truepose bounds`: what the error is proven not to exceed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from truepose.cli._options import (
+    Request,
+    accuracy_option,
+    format_option,
+    machine_argument,
+    output_option,
+    set_option,
+    strict_option,
+    takes,
+)
+
+
+@click.command("bounds")
+@takes(
+    machine_argument,
+    click.option(
+        "--region",
+        metavar="ENDS",
+        help="Every pose in this part of the workspace instead of the file's poses: "
+        '"x=200:400,y=100:300", in the units of the machine file.',
+    ),
+    click.option(
+        "--gap",
+        type=float,
+        metavar="SHARE",
+        help="Of a region: how far the bound may be above what is reached.  [default: 0.05]",
+    ),
+    click.option(
+        "--truncate",
+        type=float,
+        metavar="K",
+        help="Take a distribution without ends, such as a normal one, to end at K standard "
+        "deviations.",
+    ),
+    set_option,
+    format_option,
+    output_option,
+    strict_option,
+    accuracy_option,
+)
+def command(region: str | None, gap: float | None, truncate: float | None, **options: Any) -> int:
+    """Prove what the error cannot exceed.
+
+    Encloses the error of every machine inside the bands, by interval arithmetic with rounding
+    included, and proves that each has exactly one pose near the commanded one. Where there is no
+    proof it says so. With --require-accuracy the exit code is 1 when it is not proven that the
+    accuracy asked is kept.
+    """
+    from truepose.cli import _how_sure, _work
+    from truepose.report import how_sure
+    from truepose.report.result import Result
+
+    request = Request(**options)
+    machine = _work.read_machine(request)
+    found = _how_sure.bound(request, machine, region, gap, truncate)
+    _work.deliver(request, Result("bounds", machine, found), how_sure.bounds(machine, found))
+    if region is not None and request.format == "table":
+        click.echo(how_sure.sentence(machine, found))
+    return _work.exit_code(request, _how_sure.keeps_accuracy(machine, found))

@@ -1,0 +1,87 @@
+"""`truepose montecarlo`: the error of random machines, with its coverage interval."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from truepose.cli._guard import INTERRUPTED
+from truepose.cli._options import (
+    Request,
+    WholeNumber,
+    format_option,
+    machine_argument,
+    output_option,
+    seed_option,
+    set_option,
+    strict_option,
+    takes,
+)
+
+
+@click.command("montecarlo")
+@takes(
+    machine_argument,
+    click.option(
+        "--samples",
+        type=WholeNumber(),
+        metavar="N",
+        help="How many samples at each pose; by default as many as make the standard deviation "
+        "stable (JCGM 101, 7.9).",
+    ),
+    click.option(
+        "--digits",
+        type=click.IntRange(1, 2),
+        default=1,
+        show_default=True,
+        help="Digits of the standard deviation that are to be stable, where N is not given.",
+    ),
+    click.option(
+        "--probability",
+        type=float,
+        metavar="P",
+        default=0.95,
+        show_default=True,
+        help="Of the coverage intervals.",
+    ),
+    seed_option,
+    click.option(
+        "--sampling",
+        type=click.Choice(["random", "sobol"]),
+        default="random",
+        show_default=True,
+        help="Random numbers, or scrambled Sobol points, which fill the bands more evenly and want "
+        "N to be a power of two.",
+    ),
+    set_option,
+    format_option,
+    output_option,
+    strict_option,
+)
+def command(
+    samples: int | None, digits: int, probability: float, seed: int, sampling: str, **options: Any
+) -> int:
+    """Sample the error of machines as they may be made.
+
+    Draws what is not known of the machine from its distributions and solves each machine
+    exactly: mean, standard deviation and coverage interval of the error at every pose of the
+    workspace. Ctrl-C stops the drawing and gives the result so far (exit code 130).
+    """
+    from truepose.cli import _how_sure, _work
+    from truepose.report import how_sure
+    from truepose.report.result import Result
+
+    request = Request(**options)
+    machine = _work.read_machine(request)
+    found = _how_sure.sample(
+        request,
+        machine,
+        samples=samples,
+        digits=digits,
+        probability=probability,
+        seed=seed,
+        sampling=sampling,
+    )
+    _work.deliver(request, Result("montecarlo", machine, found), how_sure.sampled(machine, found))
+    return INTERRUPTED if found.attrs["interrupted"] else 0

@@ -1,0 +1,52 @@
+"""`truepose shares`: which parameter and which source the spread comes from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from truepose.cli._options import (
+    Request,
+    WholeNumber,
+    format_option,
+    machine_argument,
+    output_option,
+    seed_option,
+    set_option,
+    strict_option,
+    takes,
+)
+
+
+@click.command("shares")
+@takes(
+    machine_argument,
+    click.option(
+        "--samples",
+        type=WholeNumber(),
+        metavar="N",
+        help="Base samples at each pose; each needs an evaluation for every parameter and source.",
+    ),
+    seed_option,
+    set_option,
+    format_option,
+    output_option,
+    strict_option,
+)
+def command(samples: int | None, seed: int, **options: Any) -> int:
+    """Say whose fault it is: shares of the variance.
+
+    First-order and total Sobol indices of every parameter and source that is not known exactly,
+    with their confidence, the linear shares beside them, and Shapley shares where parameters are
+    correlated. The first row is the dimension to tighten first.
+    """
+    from truepose.cli import _how_sure, _work
+    from truepose.report import blame
+    from truepose.report.result import Result
+
+    request = Request(**options)
+    machine = _work.read_machine(request)
+    found = _how_sure.share(request, machine, samples=samples, seed=seed)
+    _work.deliver(request, Result("shares", machine, found), blame.shares(machine, found))
+    return 0

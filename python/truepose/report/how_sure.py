@@ -1,0 +1,458 @@
+"""Tables of how sure an error is: sampled, guaranteed, worst case, and whose share it is.
+
+Each is made from one Dataset of `truepose.monte_carlo`, `bounds`, `worst_case` or `shares`, as
+the functions return it. Lengths of errors in µm, angles in µrad.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truepose.machine.suggestion import counted
+from truepose.report.blame import shares
+from truepose.report.display import (
+    MICRO,
+    MISSING,
+    Array,
+    column,
+    decimals_for,
+    error_unit,
+    nearest_middle,
+    pose_text,
+    where_highest,
+)
+from truepose.report.reading import (
+    SIZE_UNIT,
+    at_text,
+    components,
+    percent_text,
+    poses_of,
+    quantities,
+    unit_of,
+    worst_pose,
+)
+from truepose.report.study import Study
+from truepose.report.tables import MOST_LISTED, Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+
+PROVEN = "proven"
+UNPROVEN = {
+    "box_too_wide": "the bands are too wide for a proof",
+    "near_singular": "too near a singularity for a proof",
+}
+"""What a status without a proof means."""
+
+ANSWERS = {
+    "sampled": "sampled, {percent} of all",
+    "farthest": "sampled, farthest",
+    "linear": "linear worst case",
+    "exact": "exact worst corner",
+    "bound": "guaranteed bound",
+}
+"""The answers to "how far off can the tool be?", by rising caution."""
+
+
+@dataclass(frozen=True)
+class Answers:
+    """How far the tool may be off at one pose, by every road.
+
+    `names` are the components and quantities; `sizes` has for each answer (`ANSWERS`) what it says
+    of each name (n_name,), m and rad: the farther end of its interval. Missing ones are NaN; of
+    the bound `status` says why.
+    """
+
+    names: tuple[str, ...]
+    sizes: dict[str, Array]
+    at: str
+    percent: str
+    status: str = PROVEN
+
+
+def rounded(values: Array, senses: Sequence[int]) -> tuple[str, ...]:
+    """Numbers of one row as `column` shows them, each rounded up (+1), down (-1) or to nearest (0).
+
+    A proof that is rounded the wrong way is none.
+    """
+    places = decimals_for(values)
+    scaled, ways = values * 10.0**places, np.asarray(senses)
+    whole = np.where(ways > 0, np.ceil(scaled), np.where(ways < 0, np.floor(scaled), scaled))
+    return column(whole / 10.0**places, places)
+
+
+def spread_over(poses: Array, axes: list[int]) -> list[int]:
+    """Indices of at most 25 of `poses` (n, n_coordinate), spread over their middle planes.
+
+    `axes` are the coordinates over which ellipses are drawn, at most three. Over two of them five
+    by five poses nearest to an even grid, over each pair of three three by three, the other
+    coordinates nearest to the middle of their ranges.
+    """
+    if len(poses) == 0 or not axes:
+        return [int(pose) for pose in nearest_middle(poses)[:1]]
+    span = np.ptp(poses, axis=0)
+    middle = poses[nearest_middle(poses)[0]]
+    scaled = (poses - middle) / np.where(span > 0, span, 1.0)
+    low, high = scaled.min(axis=0), scaled.max(axis=0)
+    pairs = [(0, 1), (0, 2), (1, 2)] if len(axes) > 2 else [tuple(range(len(axes)))]
+    count = 3 if len(axes) > 2 else 5
+    chosen: dict[int, None] = {}
+    for pair in pairs:
+        shown = [axes[at] for at in pair]
+        steps = [np.linspace(low[at], high[at], count) for at in shown]
+        for place in np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, len(shown)):
+            target = np.zeros(poses.shape[1])
+            target[shown] = place
+            off = ((scaled - target) ** 2).sum(axis=1).round(9)
+            chosen[int(np.argmin(off))] = None
+    return sorted(chosen)
+
+
+def sampled(machine: Machine, found: xr.Dataset) -> list[Table]:
+    """What the samples say at the pose where the position is farthest off, and over all poses."""
+    pose = worst_pose(found, "magnitude_upper")
+    tables = [_sampled_at(machine, found, pose)]
+    if found.sizes["pose"] > 1:
+        tables.append(_sampled_over(machine, found))
+    return tables
+
+
+def _sampled_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
+    names = components(found)
+    ends = ("lower", "upper", "shortest_lower", "shortest_upper", "minimum", "maximum")
+    kinds = ("mean", "standard_deviation", *ends)
+    values = np.stack([found[kind].values[pose] for kind in kinds], axis=-1)
+    rows = [
+        (f"{name}, {error_unit(name)}", *column(row * MICRO))
+        for name, row in zip(names, values, strict=True)
+    ]
+    for at, name in enumerate(quantities(found)):
+        mean, upper, most = (
+            found[f"magnitude_{kind}"].values[pose, at] for kind in ("mean", "upper", "maximum")
+        )
+        cells = [mean, np.nan, np.nan, upper, np.nan, upper, np.nan, most]
+        rows.append((f"{name}, {SIZE_UNIT[name]}", *column(np.array(cells) * MICRO)))
+    percent = percent_text(float(found.attrs["probability"]))
+    return Table(
+        "sampled",
+        f"Sampled error, {percent} coverage intervals",
+        (
+            "",
+            "mean",
+            "standard deviation",
+            "lower",
+            "upper",
+            "shortest, lower",
+            "upper",
+            "minimum",
+            "maximum",
+        ),
+        tuple(rows),
+        note=f"At {at_text(machine, found, pose)}, where the position is farthest off. "
+        f"{percent} of the samples lie between lower and upper, as many below as above; the "
+        "shortest interval with as many is beside it. Of a magnitude, as many lie below upper. "
+        + _drawn(found, pose),
+    )
+
+
+def _drawn(found: xr.Dataset, pose: int) -> str:
+    """How many samples, how drawn, and how many of them the machine could not follow."""
+    count, failed = int(found["samples"].values[pose]), int(found["failed"].values[pose])
+    how = "scrambled Sobol points" if found.attrs["sampling"] == "sobol" else "samples"
+    text = f"{count:,} {how}, seed {found.attrs['seed']}."
+    if found.attrs.get("digits"):
+        digits = counted(int(found.attrs["digits"]), "digit")
+        text += f" As many as make {digits} of the standard deviation stable (JCGM 101, 7.9)."
+    if failed:
+        text += f" {failed:,} more could not be assembled and are in no number."
+    if found.attrs.get("interrupted"):
+        text += " Interrupted: fewer than were asked for."
+    return text
+
+
+def _sampled_over(machine: Machine, found: xr.Dataset) -> Table:
+    names = components(found)
+    far = np.maximum(np.abs(found["lower"].values), np.abs(found["upper"].values))
+    spread = found["standard_deviation"].values
+    most = np.maximum(np.abs(found["minimum"].values), np.abs(found["maximum"].values))
+    rows = []
+    for at, name in enumerate(names):
+        pose = where_highest(far[:, at])
+        cells = column(np.array([spread[:, at].max(), far[pose, at], most[:, at].max()]) * MICRO)
+        rows.append((f"{name}, {error_unit(name)}", at_text(machine, found, pose), *cells))
+    for at, name in enumerate(quantities(found)):
+        upper = found["magnitude_upper"].values[:, at]
+        pose = where_highest(upper)
+        largest = found["magnitude_maximum"].values[:, at].max()
+        cells = column(np.array([np.nan, upper[pose], largest]) * MICRO)
+        rows.append((f"{name}, {SIZE_UNIT[name]}", at_text(machine, found, pose), *cells))
+    return Table(
+        "sampled_over",
+        f"Sampled error over {found.sizes['pose']:,} poses",
+        (
+            "",
+            "farthest at",
+            "highest standard deviation",
+            f"farthest of {percent_text(float(found.attrs['probability']))}",
+            "farthest sample",
+        ),
+        tuple(rows),
+        words=2,
+        note="Farthest: the end of the coverage interval that is farther from zero.",
+    )
+
+
+def bounds(machine: Machine, found: xr.Dataset) -> list[Table]:
+    """What is proven: at poses or over a region, and where nothing could be."""
+    if "pose" not in found.sizes:
+        return [_region(machine, found)]
+    tables = [_bounds_at(machine, found, worst_pose(found, "magnitude"))]
+    unproven = _unproven(machine, found)
+    return tables if unproven is None else [*tables, unproven]
+
+
+def _bounds_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
+    rows = []
+    for at, name in enumerate(components(found)):
+        ends = [found[f"{kind}lower"].values[pose, at] for kind in ("", "reached_")]
+        tops = [found[f"{kind}upper"].values[pose, at] for kind in ("reached_", "")]
+        linear = found["linear"].values[pose, at]
+        row = np.array([ends[0], ends[1], tops[0], tops[1], linear]) * MICRO
+        cells = rounded(row, (-1, 1, -1, 1, 0))
+        rows.append((f"{name}, {error_unit(name)}", *cells))
+    for at, name in enumerate(quantities(found)):
+        size = [found[f"{kind}magnitude"].values[pose, at] for kind in ("reached_", "")]
+        cells = rounded(np.array([np.nan, np.nan, *size, np.nan]) * MICRO, (0, 0, -1, 1, 0))
+        rows.append((f"{name}, {SIZE_UNIT[name]}", *cells))
+    return Table(
+        "bounds",
+        "Guaranteed bounds",
+        ("", "never below", "reached", "reached", "never above", "linear worst case"),
+        tuple(rows),
+        note=f"At {at_text(machine, found, pose)}, where the position's bound is highest. For "
+        "every deviation inside the bands the tool is there and nowhere else, and its error "
+        "between these ends, rounding included; the error that is reached shows how much of the "
+        "bound is used.",
+    )
+
+
+def _unproven(machine: Machine, found: xr.Dataset) -> Table | None:
+    """Poses without a proof and why; None where all have one."""
+    status = np.array([str(each) for each in found["status"].values])
+    lost = np.flatnonzero(status != PROVEN)
+    if lost.size == 0:
+        return None
+    rows = [
+        (at_text(machine, found, int(pose)), unproven_text(status[pose]))
+        for pose in lost[:MOST_LISTED]
+    ]
+    more = f" The first {MOST_LISTED} are listed." if lost.size > MOST_LISTED else ""
+    return Table(
+        "unproven",
+        f"Poses without a proof: {lost.size:,} of {status.size:,}",
+        ("pose", "status"),
+        tuple(rows),
+        words=2,
+        note="No bound is given where none is proven." + more,
+    )
+
+
+def _region(machine: Machine, found: xr.Dataset) -> Table:
+    rows = []
+    for name, bound, reached, where in region_answers(found):
+        least = abs(reached) * MICRO
+        most = abs(bound) * MICRO
+        gap = 100.0 * (most / least - 1.0) if least > 0 else np.nan
+        cells = rounded(np.array([most, least]), (1, -1))
+        rows.append(
+            (
+                f"{name}, {unit_of(name)}",
+                pose_text(where, machine.commanded) if np.isfinite(where).all() else MISSING,
+                *cells,
+                *column(np.array([gap]), 1),
+            )
+        )
+    name, bound, reached, _ = region_answers(found)[0]
+    asked = float(found.attrs["gap"])
+    open_ = (
+        ""
+        if bound <= reached * (1.0 + asked)
+        else (f" The gap asked, {percent_text(asked)}, was not reached.")
+    )
+    status = str(found["status"].values)
+    proof = (
+        f"Proven over the whole region, cut into {int(found['boxes'].values):,} boxes."
+        if status == PROVEN
+        else f"Not proven: {_unproven_where(machine, found)}."
+    )
+    return Table(
+        "region",
+        "Guaranteed bounds over a region",
+        ("", "reached at", "nowhere more than", "reached", "gap, %"),
+        tuple(rows),
+        words=2,
+        note=proof
+        + open_
+        + " Every pose in the region, not only those of a grid; the error's sign left "
+        "out.",
+    )
+
+
+def region_answers(found: xr.Dataset) -> list[tuple[str, float, float, Array]]:
+    """Name, bound, what is reached and where (n_commanded,), of every component and quantity.
+
+    Of a component's two ends the one that is farther from zero.
+    """
+    answers: list[tuple[str, float, float, Array]] = []
+    for at, name in enumerate(quantities(found)):
+        size, reached = (float(found[f"{k}magnitude"].values[at]) for k in ("", "reached_"))
+        answers.append((name, size, reached, np.asarray(found["where_magnitude"].values[at])))
+    for at, name in enumerate(components(found)):
+        low, high = float(found["lower"].values[at]), float(found["upper"].values[at])
+        side = "upper" if not abs(low) > abs(high) else "lower"
+        reached = float(found[f"reached_{side}"].values[at])
+        bound = high if side == "upper" else low
+        where = found["where" if side == "upper" else "where_lower"].values[at]
+        answers.append((name, bound, reached, np.asarray(where)))
+    return answers
+
+
+def _unproven_where(machine: Machine, found: xr.Dataset) -> str:
+    """Why a region has no proof, and a pose of it where that is so."""
+    reason = unproven_text(str(found["status"].values))
+    pose = np.asarray(found["where_unproven"].values)
+    if not np.isfinite(pose).all():
+        return reason
+    return f"{reason} at {pose_text(pose, machine.commanded)}"
+
+
+def sentence(machine: Machine, found: xr.Dataset) -> str:
+    """A region's answer in words."""
+    name, bound, reached, where = region_answers(found)[0]
+    if str(found["status"].values) != PROVEN or not np.isfinite(bound):
+        return f"No bound is proven over this region: {_unproven_where(machine, found)}."
+    unit = unit_of(name)
+    most, least = rounded(np.array([bound, reached]) * MICRO, (1, -1))
+    what = "deviate" if name == "position" else "turn"
+    return (
+        f"Nowhere in this region does the tool {what} more than {most} {unit}; "
+        f"{least} {unit} is reached at {pose_text(where, machine.commanded)}."
+    )
+
+
+def answers(study: Study) -> Answers:
+    """Every answer at the worst pose of those looked at, side by side.
+
+    What a result does not say, or where it is not there, is NaN.
+    """
+    worst = study.worst_case
+    assert worst is not None
+    pose = worst_pose(worst, "magnitude_linear")
+    place = poses_of(study.machine, worst)[pose]
+    names = (*components(worst), *quantities(worst))
+    sizes = {name: np.full(len(names), np.nan) for name in ANSWERS}
+    for kind in ("linear", "exact"):
+        sizes[kind] = np.concatenate(
+            [np.abs(worst[kind].values[pose]), worst[f"magnitude_{kind}"].values[pose]]
+        )
+    percent = ""
+    if study.monte_carlo is not None:
+        found = study.monte_carlo
+        percent = percent_text(float(found.attrs["probability"]))
+        at = _same_pose(study.machine, found, place)
+        if at is not None:
+            sizes["sampled"] = _farther(found, at, "lower", "upper", "magnitude_upper")
+            sizes["farthest"] = _farther(found, at, "minimum", "maximum", "magnitude_maximum")
+    status = PROVEN
+    if study.bounds is not None:
+        at = _same_pose(study.machine, study.bounds, place)
+        if at is not None:
+            sizes["bound"] = _farther(study.bounds, at, "lower", "upper", "magnitude")
+            status = str(study.bounds["status"].values[at])
+    return Answers(names, sizes, pose_text(place, study.machine.commanded), percent, status)
+
+
+def _farther(found: xr.Dataset, pose: int, lower: str, upper: str, magnitude: str) -> Array:
+    ends = np.maximum(np.abs(found[lower].values[pose]), np.abs(found[upper].values[pose]))
+    return np.concatenate([ends, found[magnitude].values[pose]])
+
+
+def _same_pose(machine: Machine, found: xr.Dataset, pose: Array) -> int | None:
+    """Index in a result of a pose (n_commanded,), if it is there."""
+    same = np.flatnonzero((poses_of(machine, found) == pose).all(axis=1))
+    return int(same[0]) if same.size else None
+
+
+def three_answers(study: Study) -> Table:
+    """Linear, sampled and guaranteed side by side, at the worst pose."""
+    found = answers(study)
+    rows = []
+    for at, name in enumerate(found.names):
+        row = np.array([found.sizes[kind][at] for kind in ANSWERS]) * MICRO
+        cells = rounded(row, [1 if kind == "bound" else 0 for kind in ANSWERS])
+        rows.append((f"{name}, {unit_of(name)}", *cells))
+    because = lacking(study)
+    return Table(
+        "three_answers",
+        "How far off can the tool be?",
+        ("", *(title.format(percent=found.percent) for title in ANSWERS.values())),
+        tuple(rows),
+        note=" ".join([f"At {found.at}, without regard to the sign.", *because]),
+    )
+
+
+LACKING = {
+    "monte_carlo": "sampled answer",
+    "bounds": "guaranteed bound",
+    "worst_case": "worst case",
+    "shares": "shares",
+}
+"""What is said not to be there, by the result that would have it."""
+
+
+def lacking(study: Study) -> list[str]:
+    """Sentences on what is not there, and why."""
+    said = {name: why for name, why in study.missing.items() if name in LACKING}
+    if study.bounds is not None and study.worst_case is not None:
+        status = answers(study).status
+        if status != PROVEN:
+            said["bounds"] = f"{unproven_text(status)}."
+    return [f"No {LACKING[name]}: {why}" for name, why in said.items()]
+
+
+def unproven_text(status: str) -> str:
+    """Why there is no proof, for people."""
+    return UNPROVEN.get(status, status.replace("_", " "))
+
+
+IN_SHORT = ("three_answers", "shares_parameter_position", "shares_parameter_orientation", "lacking")
+"""Names of the tables that the report prints as well; the page has them all."""
+
+
+def in_short(study: Study) -> list[Table]:
+    """What the report prints of these results."""
+    return [table for table in tables(study) if table.name in IN_SHORT]
+
+
+def tables(study: Study) -> list[Table]:
+    """All that the report's page shows of these results."""
+    shown: list[Any] = []
+    if study.worst_case is not None:
+        shown.append(three_answers(study))
+    for result, of in (
+        (study.monte_carlo, sampled),
+        (study.bounds, bounds),
+        (study.shares, shares),
+    ):
+        if result is not None:
+            shown += of(study.machine, result)
+    if lacking(study):
+        rows = tuple((LACKING[name], why) for name, why in study.missing.items() if name in LACKING)
+        shown.append(Table("lacking", "What could not be said, and why", ("", ""), rows, words=2))
+    return shown

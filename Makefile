@@ -87,7 +87,7 @@ docs: package tools ## write the generated pages of docs/ anew; tests refuse sta
 .PHONY: lock
 lock: tools ## resolve requirements.lock anew from pyproject.toml
 	$(BIN)/python -m pip install --quiet uv
-	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --extra report --extra netcdf --extra dev \
+	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --extra report --extra netcdf --extra sobol --extra dev \
 		--custom-compile-command "make lock" --output-file requirements.lock pyproject.toml
 
 .PHONY: tools

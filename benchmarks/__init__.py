@@ -16,4 +16,8 @@ BENCHMARKS = (
     Benchmark("all_sources"),
     Benchmark("million_poses", cores=2),
     Benchmark("over_time"),
+    Benchmark("monte_carlo"),
+    Benchmark("memory"),
+    Benchmark("bounds"),
+    Benchmark("containment", cores=2),
 )

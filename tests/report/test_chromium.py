@@ -18,7 +18,14 @@ import pytest
 from command_line import MACHINES
 from system_package import missing
 from truepose.cli import run
-from truepose.report.figures import FIGURES, _style, machine_drawing
+from truepose.report.figures import (
+    FIGURES,
+    _style,
+    distribution,
+    machine_drawing,
+    three_answers,
+    tornado,
+)
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 # The browser looks for no updates and asks no service; WebGL is drawn by the processor.
@@ -35,6 +42,10 @@ COLOURS = {
     "source_errors": list(_style.SOURCE_COLOURS[:3]),
     "overall_error": [_style.BEFORE, _style.OVERALL],
     "before_after": [_style.BEFORE, _style.AFTER],
+    "three_answers": [three_answers.COLOURS[kind] for kind in ("sampled", "farthest", "exact")],
+    "distribution": [distribution.WITHIN, distribution.OUTSIDE],
+    "coverage_ellipses": [_style.SOURCE_COLOURS[0]],
+    "tornado": [tornado.LOOKS["first"][1], tornado.LINEAR],
     "internal_forces": [_style.BEFORE, _style.AFTER, *_style.SOURCE_COLOURS[:4]],
 }
 OVERCONSTRAINED = "overconstrained"
@@ -42,7 +53,7 @@ MACHINES_SHOWN = ["planar_two_slider", "hexapod", "rotary_delta", OVERCONSTRAINE
 ONLY_OVERCONSTRAINED = {
     module.__name__.rpartition(".")[2]
     for module in FIGURES
-    if getattr(module, "NEEDS_STRAIN", False)
+    if getattr(module, "NEEDS", None) == "strain"
 }
 
 # In the page, so that no image library is needed: a picture -> how many pixels of which colour.

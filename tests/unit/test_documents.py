@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,6 +26,20 @@ def test_the_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     machine, budget, corrected = names["m"], names["budget"], names["corrected"]
     assert machine.forward(names["q"]) == pytest.approx([0.3, 0.2], abs=1e-12)
     assert budget.sizes["pose"] == corrected.sizes["pose"] == len(machine.poses())
+
+
+def test_the_example_of_how_sure_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    text = (ROOT / "docs" / "how_sure.md").read_text("utf-8")
+    (example,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(example, names)  # noqa: S102 the page is ours
+    assert (names["proven"]["status"] == "proven").all()
+    assert names["whole"]["status"] == "proven"
+    # What is reached and what is sampled stays within what is proven.
+    most = names["proven"]["upper"]
+    assert (names["worst"]["exact_upper"] <= most).all()
+    assert (names["sampled"]["maximum"] <= most).all()
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)

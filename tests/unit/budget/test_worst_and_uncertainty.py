@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from truepose.budget import uncertainty, worst
+from truepose.budget import propagation, worst
 from truepose.sources import OWN_GROUP, UNIFORM, Deviation, normal
 
 RANDOM = np.random.default_rng(20051)
@@ -76,13 +76,13 @@ def test_a_group_that_cancels_does_no_harm() -> None:
     deviation = Deviation.of([2, 2], half=0.3, groups=0, sign=[1.0, -1.0])
     effects, sigmas, _ = worst.variable_effects(MACHINE, BLOCK, deviation)
     assert np.abs(worst.linear_half(effects)).max() < 1e-16
-    assert np.abs(uncertainty.standard_uncertainty(effects, sigmas)).max() < 1e-16
+    assert np.abs(propagation.standard_uncertainty(effects, sigmas)).max() < 1e-16
 
 
 def test_uncertainty_is_the_spread_of_drawn_deviations() -> None:
     deviation = grouped()
     effects, sigmas, _ = worst.variable_effects(MACHINE, BLOCK, deviation)
-    found = uncertainty.standard_uncertainty(effects, sigmas)
+    found = propagation.standard_uncertainty(effects, sigmas)
     count = 200_000
     draws = {
         3: RANDOM.uniform(-1, 1, count),

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from made_how_sure import shares, sure_study
 from made_study import hexapod_study, planar_study
-from truepose.report import figures
+from truepose.report import blame, figures, how_sure
 from truepose.report.figures import (
     FIGURES,
     _style,
+    coverage_ellipses,
+    distribution,
     draw,
     error_over_time,
     internal_forces,
@@ -18,11 +23,18 @@ from truepose.report.figures import (
     overall_error,
     ranking,
     source_errors,
+    three_answers,
+    tornado,
     workspace_maps,
 )
 from truepose.report.study import Study
 
-STUDIES = {"planar": planar_study(), "hexapod": hexapod_study(3), "one pose": planar_study(1)}
+STUDIES = {
+    "planar": sure_study(planar_study()),
+    "hexapod": sure_study(hexapod_study(3)),
+    "one pose": sure_study(planar_study(1)),
+}
+NEEDING = {module.__name__.rpartition(".")[2] for module in FIGURES if hasattr(module, "NEEDS")}
 
 
 @pytest.fixture(params=STUDIES)
@@ -55,7 +67,8 @@ def test_every_figure_has_traces_a_title_and_a_caption(study: Study) -> None:
 def test_figures_of_results_that_not_every_study_has_need_one(study: Study) -> None:
     names = {each.name for each in draw(Study(study.machine, study.budget))}
     every = {module.__name__.rpartition(".")[2] for module in FIGURES}
-    assert names == every - {"before_after", "error_over_time", "internal_forces"}
+    assert names == every - NEEDING
+    assert {"before_after", "error_over_time", "internal_forces", "tornado"} <= NEEDING
 
 
 def trace(figure: go.Figure, name: str, nth: int = 0) -> go.Scatter:
@@ -206,3 +219,93 @@ def test_many_times_are_thinned_and_the_last_is_kept(monkeypatch: pytest.MonkeyP
     assert len(x) <= 51
     assert x[-1] == pytest.approx(60.0)
     assert "of 361 times" in error_over_time.caption(study)
+
+
+def test_the_histogram_has_the_shares_that_the_quantiles_say() -> None:
+    levels = np.linspace(0.0, 1.0, 101)
+    edges, share = distribution.histogram(levels, levels**2, bars=10)
+    np.testing.assert_allclose(np.cumsum(share), np.sqrt(edges[1:]), atol=0.01)
+    # Three values of probability 1/4, 1/2 and 1/4: bars at the ends and in the middle only.
+    steps = np.select([levels <= 0.25, levels <= 0.75], [-1.0, 0.0], 1.0)
+    edges, share = distribution.histogram(levels, steps, bars=5)
+    assert share[[0, 2, 4]] == pytest.approx([0.25, 0.5, 0.25], abs=0.02)
+    assert share.sum() == pytest.approx(1.0)
+    edges, share = distribution.histogram(levels, np.full(101, 3.0))
+    assert (edges[0], edges[-1], share.sum()) == (3.0, 3.0, 1.0)
+
+
+def test_the_distribution_is_dark_inside_its_coverage_interval(study: Study) -> None:
+    found = study.monte_carlo
+    assert found is not None
+    pose = int(found["magnitude_upper"].values[:, 0].argmax())
+    drawn = distribution.figure(study)
+    bars = [each for each in drawn.data if isinstance(each, go.Bar) and len(each.x) > 1]
+    assert len(bars) == len(study.components) + (2 if study.rotations else 1)
+    first = bars[0]
+    ends = [float(found[end].values[pose, 0]) * 1e6 for end in ("lower", "upper")]
+    inside = [
+        x for x, c in zip(first.x, first.marker.color, strict=True) if c == distribution.WITHIN
+    ]
+    assert ends[0] <= min(inside)
+    assert max(inside) <= ends[1]
+    dark = [y for y, c in zip(first.y, first.marker.color, strict=True) if c == distribution.WITHIN]
+    assert sum(dark) == pytest.approx(95.0, abs=4.0)
+    assert "4,000 samples" in distribution.caption(study)
+
+
+def test_answers_stand_side_by_side(study: Study) -> None:
+    found = how_sure.answers(study)
+    drawn = three_answers.figure(study)
+    for kind, title in how_sure.ANSWERS.items():
+        bars = trace(drawn, title.format(percent="95 %"))
+        at = [found.names.index(name.strip("|")) for name in bars.x]
+        np.testing.assert_allclose(bars.y, found.sizes[kind][at] * 1e6, rtol=1e-6)
+    assert "in 5 ways" in three_answers.caption(study)
+    without = replace(study, bounds=None, missing={"bounds": "no ends."})
+    assert {each.name for each in three_answers.figure(without).data}.isdisjoint(
+        {"guaranteed bound"}
+    )
+    assert three_answers.caption(without).endswith("No guaranteed bound: no ends.")
+
+
+def test_the_tornado_has_the_largest_on_top(study: Study) -> None:
+    assert study.shares is not None
+    who = blame.blame(study.shares, blame.spread_pose(study.shares))
+    drawn = tornado.figure(study)
+    for kind, name in (("first", "first order"), ("total", "total"), ("linear", "linear")):
+        bars = trace(drawn, name)
+        assert list(bars.y) == list(who.names)[::-1]
+        np.testing.assert_allclose(bars.x, 100 * who.kinds[kind][::-1], rtol=1e-6)
+    correlated = replace(study, shares=shares(study.machine, study.poses[:1], correlated=True))
+    names = {each.name for each in tornado.figure(correlated).data}
+    assert names == {"Shapley", "linear"}
+    assert "Shapley shares do" in tornado.caption(correlated)
+
+
+def test_an_ellipse_holds_what_it_says(study: Study) -> None:
+    found = study.ellipses
+    assert found is not None
+    centre, outline = coverage_ellipses.ellipse(found, 0, (0, 1))
+    matrix = found["ellipse"].values[0][:2, :2]
+    squared = np.einsum("ni,ij,nj->n", outline, np.linalg.inv(matrix), outline)
+    np.testing.assert_allclose(squared, 1.0, rtol=1e-9)
+    np.testing.assert_array_equal(centre, found["ellipse_centre"].values[0, :2])
+    flat = found.copy(deep=True)
+    flat["ellipse"].values[:] = 0.0
+    flat["ellipse"].values[:, 0, 0] = 1e-10
+    _, line = coverage_ellipses.ellipse(flat, 0, (0, 1))
+    assert (line[:, 0].max(), abs(line[:, 1]).max()) == (pytest.approx(1e-5), 0.0)
+
+
+def test_ellipses_do_not_touch_and_are_to_one_scale(study: Study) -> None:
+    drawn = coverage_ellipses.figure(study)
+    outlines = [each for each in drawn.data if each.legendgroup == "ellipse"]
+    assert study.ellipses is not None
+    spatial = study.ellipses.sizes["axis"] == 3
+    assert len(outlines) == (27 if spatial else study.ellipses.sizes["pose"])
+    first, second = outlines[0], outlines[min(1, len(outlines) - 1)]
+    if first is not second and first.xaxis == second.xaxis:
+        apart = np.hypot(*(np.mean(first[a]) - np.mean(second[a]) for a in "xy"))
+        assert apart > max(np.ptp(first.x), np.ptp(first.y))
+    assert drawn.layout.yaxis.scaleanchor == "x"
+    assert "times as large as the workspace" in coverage_ellipses.caption(study)

@@ -8,6 +8,7 @@ import re
 import pytest
 from plotly.offline import get_plotlyjs
 
+from made_how_sure import sure_study
 from made_study import hexapod_study, planar_study
 from truepose.report import page
 from truepose.report.figures import FIGURES
@@ -15,7 +16,7 @@ from truepose.report.figures import FIGURES
 
 @pytest.fixture(scope="module")
 def planar() -> str:
-    return page.render(planar_study(), 'name = "<b>bold</b> & co"\n')
+    return page.render(sure_study(planar_study()), 'name = "<b>bold</b> & co"\n')
 
 
 def without_scripts(text: str) -> str:

@@ -57,6 +57,51 @@ def test_a_group_s_sign_may_differ_from_pose_to_pose() -> None:
     assert deviation.signed_half.tolist() == [[0.5, 0.5], [0.5, -0.5], [-0.5, 0.5]]
 
 
+def test_variables_may_be_correlated() -> None:
+    """Numbers are those of `variables`: groups first, in the order of their ids."""
+    coefficients = np.array([[1.0, 0.5, 0.2], [0.5, 1.0, 0.0], [0.2, 0.0, 1.0]])
+    deviation = Deviation.of(
+        [4, 5, 6, 7],
+        half=[1.0, 0.0, 3.0, 4.0],
+        groups=[8, OWN_GROUP, 8, OWN_GROUP],
+        correlation=coefficients,
+        group_names={8: "batch"},
+    )
+    assert deviation.n_variable == 3
+    assert deviation.variables.tolist() == [0, 1, 0, 2]
+    assert deviation.group_names == {8: "batch"}
+    # Column 5, of variable 1, has no band.
+    assert deviation.banded_correlation is not None
+    assert deviation.banded_correlation.tolist() == [[1.0, 0.2], [0.2, 1.0]]
+    coefficients[0, 2] = 9.0
+    assert deviation.correlation is not None
+    assert deviation.correlation[0, 2] == 0.2
+
+
+def test_what_has_a_band_may_be_independent_though_something_is_not() -> None:
+    coefficients = [[1.0, 0.5], [0.5, 1.0]]
+    assert (
+        Deviation.of([4, 5], half=[1.0, 0.0], correlation=coefficients).banded_correlation is None
+    )
+    assert Deviation.of([4, 5], half=1.0).banded_correlation is None
+    assert Deviation.of([], half=1.0).n_variable == 0
+
+
+@pytest.mark.parametrize(
+    ("coefficients", "words"),
+    [
+        ([[1.0]], "shape"),
+        ([[1.0, 2.0], [2.0, 1.0]], "from -1 to 1"),
+        ([[1.0, np.nan], [np.nan, 1.0]], "from -1 to 1"),
+        ([[1.0, 0.5], [0.4, 1.0]], "not symmetric"),
+        ([[0.5, 0.0], [0.0, 1.0]], "one with itself"),
+    ],
+)
+def test_correlations_that_contradict_themselves(coefficients: list, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        Deviation.of([4, 5], half=1.0, correlation=coefficients)
+
+
 def test_a_distribution_says_how_many_sigmas_its_band_is() -> None:
     assert UNIFORM.sigmas == pytest.approx(3**0.5, abs=1e-15)
     assert str(UNIFORM) == "uniform"

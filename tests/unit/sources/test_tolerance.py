@@ -236,7 +236,7 @@ def test_every_parameter_of_every_machine_can_have_a_tolerance(file: Path) -> No
         (('"tool.x" = { band = 1, standard_deviation = 1 }',), "excluding-keys", 0, "band and st"),
         (('"tool.x" = { band = 1, sigmas = 2 }',), "excluding-keys", 0, "normal"),
         (('"tool.x" = { standard_deviation = 1, distribution = "uniform" }',), "excluding-keys", 0,
-         "of a normal distribution"),
+         "of a normal or student-t distribution"),
         (('"tool.x" = { standard_deviation = -1 }',), "negative", 0, "standard_deviation: "),
         (('"tool.x" = { standard_deviation = "1 N" }',), "wrong-dimension", 0, "found a force"),
         (('"tool.x" = { band = "1 N" }',), "wrong-dimension", 0, "band: expected a length"),

@@ -1,0 +1,89 @@
+"""The law of propagation: correlation, effective degrees of freedom, coverage factors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from truepose.budget.propagation import combine, coverage_factor, standard_uncertainty
+
+RANDOM = np.random.default_rng(1993)
+EFFECTS = RANDOM.normal(size=(4, 3, 5))
+SIGMAS = np.array([3.0, np.sqrt(3.0), 1.0, np.sqrt(6.0), 2.0])
+
+
+def correlation() -> np.ndarray:
+    factors = RANDOM.normal(size=(5, 2))
+    matrix = factors @ factors.T
+    scale = np.sqrt(np.diagonal(matrix))
+    return np.asarray(matrix / np.outer(scale, scale))
+
+
+def test_independent_variables_add_as_squares() -> None:
+    found = combine(EFFECTS, SIGMAS)
+    each = EFFECTS / SIGMAS
+    assert np.allclose(found.standard_uncertainty, np.sqrt((each**2).sum(axis=2)), rtol=1e-14)
+    assert np.allclose(found.standard_uncertainty, standard_uncertainty(EFFECTS, SIGMAS))
+    assert np.isinf(found.dof).all()
+
+
+def test_correlated_ones_with_their_covariance() -> None:
+    matrix = correlation()
+    found = combine(EFFECTS, SIGMAS, matrix)
+    inputs = matrix / np.outer(SIGMAS, SIGMAS)
+    for n in range(4):
+        expected = EFFECTS[n] @ inputs @ EFFECTS[n].T
+        assert np.allclose(found.covariance[n], expected, rtol=1e-12, atol=1e-14)
+        assert np.array_equal(found.covariance[n], found.covariance[n].T)
+    alone = standard_uncertainty(EFFECTS, SIGMAS, correlation=matrix)
+    assert np.allclose(found.standard_uncertainty, alone, rtol=1e-12)
+    assert np.allclose(alone**2, np.einsum("ncc->nc", found.covariance), rtol=1e-12)
+
+
+def test_no_coefficient_is_no_correlation() -> None:
+    plain = standard_uncertainty(EFFECTS, SIGMAS)
+    assert np.allclose(standard_uncertainty(EFFECTS, SIGMAS, correlation=np.eye(5)), plain)
+    assert np.allclose(standard_uncertainty(EFFECTS.copy(), SIGMAS, EFFECTS.copy()), plain)
+
+
+def test_what_cancels_is_nothing_and_not_the_root_of_rounding_below_zero() -> None:
+    effects = np.array([[[1.0, 1.0]]])
+    opposite = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    assert standard_uncertainty(effects, np.ones(2), correlation=opposite).tolist() == [[0.0]]
+    assert combine(effects, np.ones(2), opposite).standard_uncertainty.tolist() == [[0.0]]
+
+
+def test_effective_degrees_of_freedom_by_welch_and_satterthwaite() -> None:
+    # GUM G.4.2: two readings of 9 degrees of freedom each, and one that is known outright.
+    effects = np.array([[[3.0, 4.0, 0.0], [3.0, 4.0, 12.0]]])
+    found = combine(effects, np.ones(3), None, np.array([9.0, 9.0, np.inf]))
+    assert found.dof[0, 0] == pytest.approx(25.0**2 / ((3.0**4 + 4.0**4) / 9.0))
+    assert found.dof[0, 1] == pytest.approx(169.0**2 / ((3.0**4 + 4.0**4) / 9.0))
+    assert np.isinf(
+        combine(effects * [0, 0, 1], np.ones(3), None, np.array([9, 9, np.inf])).dof[0]
+    )[1]
+
+
+def test_correlated_variables_enter_as_one_of_the_fewest() -> None:
+    matrix = np.eye(4)
+    matrix[0, 1] = matrix[1, 0] = 0.5
+    matrix[1, 2] = matrix[2, 1] = 0.5
+    effects, dofs = np.array([[[1.0, 2.0, 1.0, 3.0]]]), np.array([20.0, 8.0, 30.0, 5.0])
+    found = combine(effects, np.ones(4), matrix, dofs)
+    together = 1.0 + 4.0 + 1.0 + 2.0 * 0.5 * (2.0 + 2.0)
+    expected = (together + 9.0) ** 2 / (together**2 / 8.0 + 81.0 / 5.0)
+    assert found.dof[0, 0] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.6827, 0.95, 0.99, 0.9999])
+def test_coverage_factors_are_students(probability: float) -> None:
+    dof = np.array([[1.0, 2.5, 16.75], [1e4, np.inf, 2.5]])
+    found = coverage_factor(dof, probability)
+    expected = stats.t.ppf(0.5 + probability / 2, dof)
+    assert np.allclose(found, expected, rtol=1e-9)
+
+
+def test_table_g_2_of_the_gum() -> None:
+    found = coverage_factor(np.array([1.0, 10.0, 16.0, 50.0, np.inf]), 0.95)
+    assert np.round(found, 2).tolist() == [12.71, 2.23, 2.12, 2.01, 1.96]

@@ -1,0 +1,233 @@
+"""`truepose montecarlo | bounds | shares` on real machines: what is refused, Ctrl-C, and seeds."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truepose
+from command_line import MACHINES, PLANAR, call
+from truepose.errors import RequestError
+
+FEW = ["--set", "workspace.grid={ x = [250, 350, 2], y = [200, 200, 1] }"]
+NORMAL = [
+    "--set",
+    'strut.1.length_tolerance={ band = 0.3, distribution = "normal", sigmas = 3 }',
+]
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (["--samples", "0"], "bad-samples"),
+        (["--samples", "-5"], "bad-samples"),
+        (["--probability", "0"], "bad-probability"),
+        (["--probability", "1"], "bad-probability"),
+        (["--probability", "95"], "bad-probability"),
+        (["--probability", "nan"], "bad-probability"),
+        (["--seed", "-1"], "bad-seed"),
+        (["--sampling", "sobol", "--samples", "1000"], "bad-samples"),
+    ],
+)
+def test_a_sampling_that_cannot_be(
+    options: list[str], code: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outcome = call(capsys, "montecarlo", PLANAR, *options)
+    assert (outcome.code, outcome.codes, outcome.out) == (2, [code], "")
+
+
+@pytest.mark.parametrize(
+    ("region", "code"),
+    [
+        ("z=0:1", "bad-region"),
+        ("x=200:400,c=0:1", "bad-region"),
+        ("x=200:900,y=100:300", "region-out-of-reach"),
+        ("x=-4000:-3000", "region-out-of-reach"),
+    ],
+)
+def test_a_region_that_the_machine_cannot_have(
+    region: str, code: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outcome = call(capsys, "bounds", PLANAR, "--region", region)
+    assert (outcome.code, outcome.codes, outcome.out) == (2, [code], "")
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (["--region", "x=290:310", "--gap", "0"], "bad-gap"),
+        (["--region", "x=290:310", "--gap", "2"], "bad-gap"),
+        (["--truncate", "0"], "bad-truncation"),
+        (["--truncate", "nan"], "bad-truncation"),
+    ],
+)
+def test_a_proof_that_cannot_be(
+    options: list[str], code: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outcome = call(capsys, "bounds", PLANAR, *options)
+    assert (outcome.code, outcome.codes, outcome.out) == (2, [code], "")
+
+
+def test_shares_of_no_samples(capsys: pytest.CaptureFixture[str]) -> None:
+    outcome = call(capsys, "shares", PLANAR, "--samples", "0")
+    assert (outcome.code, outcome.codes) == (2, ["bad-samples"])
+
+
+def test_shares_where_nothing_varies(capsys: pytest.CaptureFixture[str]) -> None:
+    exact = ["--set", "strut.*.length_tolerance=[0, 0]"]
+    outcome = call(capsys, "shares", PLANAR, *exact)
+    assert (outcome.code, outcome.codes) == (2, ["nothing-varies"])
+
+
+def test_the_same_seed_gives_the_same_and_another_another(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    asked = ["montecarlo", PLANAR, *FEW, "--samples", "3000", "--format", "csv", "--seed"]
+    first, again, other = (call(capsys, *asked, seed).out for seed in ("1", "1", "2"))
+    assert first == again
+    assert first != other
+    rows = list(csv.DictReader(io.StringIO(first)))
+    found = truepose.monte_carlo(truepose.load(PLANAR, FEW[1:]), samples=3000, seed=1)
+    for row, upper in zip(rows, found["upper"].values, strict=True):
+        assert float(row["upper_x [mm]"]) == pytest.approx(upper[0] * 1e3, rel=1e-12)
+        assert row["samples"] == "3000"
+
+
+def test_a_distribution_without_ends_has_no_bound_until_it_is_cut(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    refused = call(capsys, "bounds", PLANAR, *FEW, *NORMAL)
+    assert (refused.code, refused.codes) == (2, ["no-finite-band"])
+    assert "strut.1.length" in refused.err
+    assert "--truncate 3" in refused.err
+    highest = []
+    for sigmas in ("2", "3", "4"):
+        done = call(capsys, "bounds", PLANAR, *FEW, *NORMAL, "--truncate", sigmas, "--format=json")
+        document = json.loads(done.out)
+        assert document["attributes"]["truncate"] == float(sigmas)
+        assert document["variables"]["status"]["values"] == ["proven", "proven"]
+        highest.append(document["variables"]["upper"]["values"][0][0])
+    assert highest == sorted(highest)
+    assert highest[0] < highest[2]
+
+
+def test_the_report_says_why_it_has_no_bound(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for machine, options, because in (
+        (PLANAR, [*FEW, *NORMAL], "no bound where a deviation has no ends"),
+        (MACHINES / "overconstrained.toml", [], "more closures than freedoms"),
+    ):
+        page = tmp_path / "page.html"
+        done = call(capsys, "report", machine, *options, "--output", page)
+        assert done.code == 0
+        text = page.read_text("utf-8")
+        assert because in text
+        assert "No guaranteed bound: " in text
+        assert 'id="figure-three_answers"' in text
+        assert 'id="table-bounds"' not in text
+
+
+def test_a_region_is_proven_and_what_is_reached_lies_in_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    asked = ["bounds", PLANAR, "--region", "x=290:310,y=195:205", "--gap", "0.1", "--format"]
+    rows = list(csv.DictReader(io.StringIO(call(capsys, *asked, "csv").out)))
+    assert [row["name"] for row in rows] == ["x", "y", "position"]
+    for row in rows:
+        assert row["status"] == "proven"
+        assert 0 < float(row["reached_upper"]) <= float(row["upper"])
+        assert 290 <= float(row["where_x [mm]"]) <= 310
+        assert 195 <= float(row["where_y [mm]"]) <= 205
+    size = rows[2]
+    assert float(size["upper"]) <= 1.1 * float(size["reached_upper"])
+    said = call(capsys, *asked, "table").out.splitlines()[-1]
+    assert said.startswith("Nowhere in this region does the tool deviate more than ")
+
+
+# A child of a background job starts deaf to Ctrl-C. The first sign of progress is told to the test.
+TOLD = """
+import importlib, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+import truepose
+name = sys.argv.pop(1)
+whole = getattr(importlib.import_module(f"truepose.budget.{name}"), name)
+
+def told(*arguments, progress, **settings):
+    said = []
+    def tell(done, total):
+        if not said:
+            said.append(print("begun", flush=True))
+    return whole(*arguments, progress=tell, **settings)
+
+setattr(truepose, name, told)
+from truepose.cli import main
+main()
+"""
+
+
+def interrupted(function: str, *arguments: str) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a command that gets Ctrl-C in the middle of a function."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", TOLD, function, *arguments],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stdout.readline() == "begun\n"
+    process.send_signal(signal.SIGINT)
+    shown, errors = process.communicate(timeout=60)
+    return process.returncode, shown, errors
+
+
+def test_ctrl_c_in_the_middle_of_sampling_gives_the_result_so_far(tmp_path: Path) -> None:
+    output = tmp_path / "found.json"
+    asked = ["montecarlo", str(PLANAR), *FEW, "--samples", "1e12", "--output", str(output)]
+    code, shown, errors = interrupted("monte_carlo", *asked)
+    assert code == 130, errors
+    assert "Traceback" not in errors
+    assert "Interrupted after " in errors
+    assert "Interrupted: fewer than were asked for." in shown
+    document = json.loads(output.read_text("utf-8"))
+    assert document["attributes"]["interrupted"] == 1
+    samples = np.array(document["variables"]["samples"]["values"])
+    assert samples.size == 2
+    assert (samples > 0).all()
+    assert (samples < 1e12).all()
+
+
+@pytest.mark.parametrize(
+    ("machine", "options", "because"),
+    [
+        ("overconstrained", [], "more closures than freedoms"),
+        ("hexapod_all_sources", ["--region", "x=-5:5"], "loads: it differs from pose to pose"),
+    ],
+)
+def test_where_the_method_has_no_proof(
+    machine: str, options: list[str], because: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outcome = call(capsys, "bounds", MACHINES / f"{machine}.toml", *options)
+    assert (outcome.code, outcome.codes, outcome.out) == (2, ["no-proof"], "")
+    assert because in outcome.err
+
+
+def test_ctrl_c_ends_a_long_proof(tmp_path: Path) -> None:
+    output = tmp_path / "found.json"
+    region = ["--region", "x=200:400,y=100:300", "--gap", "0.001"]
+    asked = ["bounds", str(PLANAR), *region, "--output", str(output)]
+    code, _, errors = interrupted("bounds", *asked)
+    assert (code, errors) == (130, "Interrupted: no file was changed.\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_way_of_sampling_that_is_not_there() -> None:
+    with pytest.raises(RequestError) as refusal:
+        truepose.monte_carlo(truepose.load(PLANAR), sampling="latin")
+    assert [problem.code for problem in refusal.value.problems] == ["bad-sampling"]

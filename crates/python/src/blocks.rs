@@ -16,6 +16,38 @@ use truepose_kernel::spatial::{Pose, rotate, rotation_matrix};
 
 #[pymethods]
 impl Machine {
+    /// (sensitivity (n, n_component, k), status): as `sensitivity_at`, but of the machine with the
+    /// parameters `moved` (k0,) deviated by `values` (n or 1, k0), at the pose that it then takes.
+    fn sensitivity_moved<'py>(
+        &self,
+        py: Python<'py>,
+        joints: &Bound<'py, PyAny>,
+        placements: &Bound<'py, PyAny>,
+        columns: &Bound<'py, PyAny>,
+        moved: &Bound<'py, PyAny>,
+        values: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (columns, moved) = (self.columns(columns)?, self.columns(moved)?);
+        let joints = Input::new(joints, &[self.inner.drives.len()], "joints")?;
+        let placements = Input::new(placements, &[7], "placements")?;
+        let values = Input::new(values, &[moved.len()], "values")?;
+        let count = placements.count;
+        let shared = moved.is_empty() || values.serves(count, "values")?;
+        let out = output(py, &[count], &[self.components(), columns.len()])?;
+        let status = {
+            let mut writable = out.readwrite();
+            let data = writable.as_slice_mut()?;
+            let samples = Samples {
+                count,
+                joints: joints.rows(0, joints.serves(count, "joints")?),
+                poses: placements.rows(0, count == 1),
+                deviations: Deviations { columns: &moved, values: values.rows(0, shared) },
+            };
+            py.detach(|| batch::moved_sensitivities(&self.inner, &samples, &columns, data))
+        };
+        (out, codes(py, &[count], &status)?).into_bound_py_any(py)
+    }
+
     /// Loads (n, k) on parameters from forces (n or 1, 3 n_strut), N, base axes, that act on the base-side
     /// joint centres themselves.
     fn base_loads_at<'py>(

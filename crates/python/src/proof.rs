@@ -1,15 +1,13 @@
 //! Guaranteed bounds, as methods of the machine.
 
-use crate::arrays::{Input, output};
-use crate::evaluate::codes;
+use crate::arrays::Input;
 use crate::machine::Machine;
-use numpy::PyArrayMethods;
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use truepose_kernel::batch::{self, Deviations, Samples, share_out};
-use truepose_kernel::machine::chosen;
+use truepose_kernel::batch::share_out;
+use truepose_kernel::machine::{chosen, parts};
 use truepose_kernel::proof::{
     self, Affine, Deviating, Extent, PoseBound, Region, RegionBound, Unproven,
 };
@@ -20,11 +18,6 @@ fn word(unproven: Unproven) -> &'static str {
         Unproven::NearSingular => "near_singular",
         Unproven::TooWide => "box_too_wide",
     }
-}
-
-/// Numbers of both parts of an error that the platform can move in.
-fn parts(machine: &truepose_kernel::Machine) -> Vec<usize> {
-    (0..2).filter(|part| chosen(&machine.dof).iter().any(|k| k / 3 == *part)).collect()
 }
 
 #[pymethods]
@@ -91,7 +84,7 @@ impl Machine {
             });
         });
         let components = chosen(&machine.dof);
-        let parts = parts(machine);
+        let parts = parts(&machine.dof);
         let none =
             PoseBound { lower: [f64::NAN; 6], upper: [f64::NAN; 6], magnitudes: [f64::NAN; 2] };
         let all: Vec<PoseBound> = found.iter().map(|found| found.unwrap_or(none)).collect();
@@ -191,7 +184,7 @@ impl Machine {
         bound: &RegionBound,
     ) -> PyResult<Bound<'py, PyDict>> {
         let components = chosen(&self.inner.dof);
-        let parts = parts(&self.inner);
+        let parts = parts(&self.inner.dof);
         let upper = components.clone();
         let lower: Vec<usize> = components.iter().map(|k| 6 + k).collect();
         let magnitudes: Vec<usize> = parts.iter().map(|part| 12 + part).collect();
@@ -219,40 +212,5 @@ impl Machine {
         found.set_item("status", status)?;
         found.set_item("where", place)?;
         Ok(found)
-    }
-}
-
-#[pymethods]
-impl Machine {
-    /// (sensitivity (n, n_component, k), status): as `sensitivity_at`, but of the machine with the
-    /// parameters `moved` (k0,) deviated by `values` (n or 1, k0), at the pose that it then takes.
-    fn sensitivity_moved<'py>(
-        &self,
-        py: Python<'py>,
-        joints: &Bound<'py, PyAny>,
-        placements: &Bound<'py, PyAny>,
-        columns: &Bound<'py, PyAny>,
-        moved: &Bound<'py, PyAny>,
-        values: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let (columns, moved) = (self.columns(columns)?, self.columns(moved)?);
-        let joints = Input::new(joints, &[self.inner.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
-        let values = Input::new(values, &[moved.len()], "values")?;
-        let count = placements.count;
-        let shared = moved.is_empty() || values.serves(count, "values")?;
-        let out = output(py, &[count], &[self.components(), columns.len()])?;
-        let status = {
-            let mut writable = out.readwrite();
-            let data = writable.as_slice_mut()?;
-            let samples = Samples {
-                count,
-                joints: joints.rows(0, joints.serves(count, "joints")?),
-                poses: placements.rows(0, count == 1),
-                deviations: Deviations { columns: &moved, values: values.rows(0, shared) },
-            };
-            py.detach(|| batch::moved_sensitivities(&self.inner, &samples, &columns, data))
-        };
-        (out, codes(py, &[count], &status)?).into_bound_py_any(py)
     }
 }

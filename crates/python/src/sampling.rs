@@ -8,7 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truepose_kernel::Status;
-use truepose_kernel::machine::chosen;
+use truepose_kernel::machine::{chosen, parts};
 use truepose_kernel::sampling::{
     self, Columns, Copula, Shape, StudyPose, Tally, Variable, Whitening,
 };
@@ -363,9 +363,8 @@ impl Study {
 
     fn check(&self, tallies: &Tallies, variables: usize) -> PyResult<()> {
         let components = chosen(&self.machine.dof);
-        let parts = (0..2).filter(|part| components.iter().any(|k| k / 3 == *part)).count();
         let whitened = self.poses.iter().all(|pose| pose.is_whitened());
-        let columns = components.len() + parts + usize::from(whitened);
+        let columns = components.len() + parts(&self.machine.dof).len() + usize::from(whitened);
         if tallies.inner.len() != self.poses.len()
             || tallies.columns() != columns
             || self.columns.variables() > variables

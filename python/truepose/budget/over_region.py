@@ -17,6 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import xarray as xr
 
+from truepose import _kernel
 from truepose.budget.band_ends import Ends
 from truepose.budget.comparison import quantities
 from truepose.budget.dataset import Schema, Variable, region_dataset
@@ -135,7 +136,7 @@ def bounds_over_region(
         _going_on(progress),
     )
     status = str(found["status"])
-    if status in ("out_of_travel", "unreachable", "singular", "joint_limit", "not_converged"):
+    if status in _kernel.STATUS:
         raise _out_of_reach(machine, np.array(found["where"]), status)
     proven = status == "proven"
     count, kinds = len(machine.components), len(quantities(machine.components))

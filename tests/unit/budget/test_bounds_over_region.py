@@ -183,6 +183,16 @@ def test_a_region_of_one_pose_is_that_pose() -> None:
     assert np.allclose(found.reached_upper, at.reached_upper, rtol=1e-9, atol=0)
 
 
+def test_a_region_of_one_pose_is_bounded_as_the_pose_is() -> None:
+    """Nothing is lost by a region: the first box is bounded as well as can be, and not divided."""
+    machine = load("linear_delta")
+    region = tp.bounds(machine, region={"x": (0.0, 0.0), "y": (0.0, 0.0), "z": (0.1, 0.1)})
+    pose = tp.bounds(machine, [0.0, 0.0, 0.1])
+    assert int(region["boxes"]) == 1
+    for name in ("lower", "upper", "magnitude"):
+        assert np.allclose(region[name], pose[name][0], rtol=1e-6)
+
+
 def test_the_schema_is_what_there_is() -> None:
     found = planar()
     assert list(found.data_vars) == list(SCHEMA)

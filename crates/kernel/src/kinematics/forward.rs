@@ -110,7 +110,7 @@ pub fn chord_inverse(sample: &Sample<'_>, pose: &Pose<f64>) -> Matrix6<f64> {
     inverse_of(&sample.squared(pose).0)
 }
 
-/// Newton's iteration on all lanes with the inverse of a nearby pose all the way: no elimination, and
+/// Newton's iteration on all lanes of a plain machine with the inverse of a nearby pose all the way: no elimination, and
 /// more steps, each shorter than the one before by the relative change of the rows.
 ///
 /// While steps shrink tenfold each, the rows of every pose on the way differ from those of the start by
@@ -123,11 +123,11 @@ pub fn chord<S: Real>(
     inverse: &Matrix6<f64>,
 ) -> Descent<S> {
     let mut pose = *start;
-    let mut proof = S::splat(if machine.plain { 1.0 } else { -1.0 });
+    let mut proof = S::splat(1.0);
     let mut last = S::splat(LONG_STEP / CONTRACTION);
     let mut residuals = [S::default(); SIX];
     let mut twist = [S::default(); SIX];
-    let count = if machine.plain { machine.struts.len() } else { 0 };
+    let count = machine.struts.len();
     for _ in 0..CHORD_LIMIT {
         squared_residuals(machine, limbs, &pose, &IN_ORDER, &mut residuals);
         for k in 0..SIX {

@@ -136,6 +136,11 @@ pub fn chosen(flags: &[bool; SIX]) -> Vec<usize> {
     (0..SIX).filter(|&k| flags[k]).collect()
 }
 
+/// The parts of an error that exist: 0 the displacement, 1 the rotation.
+pub fn parts(dof: &[bool; SIX]) -> Vec<usize> {
+    (0..2).filter(|part| dof[3 * part..3 * part + 3].contains(&true)).collect()
+}
+
 impl Machine {
     /// The same machine with other parameter values, by index.
     pub fn with_values(&self, values: &[(usize, f64)]) -> Self {

@@ -6,13 +6,13 @@
 //! fixed the bound is the error at a vertex, but for rounding.
 
 use super::closures::{Placed, Six, derivatives};
-use super::directions::longest;
 use super::root::{Inverse, Varying, prove};
+use super::targets::targets;
 use super::{Deviating, Unproven, point};
 use crate::kinematics::{Sample, forward, limbs};
 use crate::linear::SIX;
-use crate::machine::{Machine, chosen};
-use crate::scalar::{Interval, Scalar};
+use crate::machine::Machine;
+use crate::scalar::Interval;
 use crate::spatial::{Pose, Quaternion, Vector, relative_quaternion, rotation_matrix};
 use crate::status::Status;
 
@@ -80,16 +80,6 @@ pub fn placed(pose: &Pose<f64>) -> Placed {
     Placed {
         position: pose.position.map(point),
         rotation: rotation_matrix(pose.rotation.map(point)),
-    }
-}
-
-/// An upper bound of a rotation vector's component from one of the Cayley vector's, `squared` an upper
-/// bound of its squared length: the factor between them lies in [1 - squared / 12, 1].
-pub fn rotation_bound(cayley: f64, squared: f64) -> f64 {
-    if cayley >= 0.0 {
-        cayley
-    } else {
-        (point(cayley) * (point(1.0) - point(squared) / point(12.0))).upper
     }
 }
 
@@ -241,37 +231,13 @@ impl<'a> Extent<'a> {
 
 /// Bounds of the error at one pose over every deviation in the box.
 pub fn bound_at_pose(extent: &Extent<'_>) -> Result<PoseBound, Unproven> {
-    let machine = extent.machine;
     let first = extent.whole()?;
-    let free = chosen(&machine.dof);
-    let length = machine.characteristic_length;
-    let squared = (3..SIX)
-        .map(|k| (first.whole[k] / point(length)).square())
-        .fold(point(0.0), |sum, one| sum + one)
-        .upper;
-    let in_components = |bound: f64, k: usize| {
-        if k < 3 { bound } else { rotation_bound((point(bound) / point(length)).upper, squared) }
-    };
+    let bounds = targets(extent.machine, &first.whole, |u| extent.most(u, &first));
     let mut result = PoseBound { lower: [0.0; SIX], upper: [0.0; SIX], magnitudes: [0.0; 2] };
-    for &k in &free {
-        let mut direction = [0.0; SIX];
-        direction[k] = 1.0;
-        result.upper[k] = in_components(extent.most(&direction, &first), k);
-        direction[k] = -1.0;
-        result.lower[k] = -in_components(extent.most(&direction, &first), k);
+    for k in 0..SIX {
+        result.upper[k] = bounds[k];
+        result.lower[k] = -bounds[SIX + k];
     }
-    for part in 0..2 {
-        let own: Vec<usize> = free.iter().filter(|&&k| k / 3 == part).map(|k| k % 3).collect();
-        if own.is_empty() {
-            continue;
-        }
-        let farthest = longest(&own, |u| {
-            let mut direction = [0.0; SIX];
-            direction[3 * part..3 * part + 3].copy_from_slice(&u);
-            extent.most(&direction, &first)
-        });
-        result.magnitudes[part] =
-            if part == 0 { farthest } else { (point(farthest) / point(length)).upper };
-    }
+    result.magnitudes.copy_from_slice(&bounds[2 * SIX..]);
     Ok(result)
 }

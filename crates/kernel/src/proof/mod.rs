@@ -12,6 +12,7 @@ mod directions;
 mod over_region;
 mod pose_box;
 mod root;
+mod targets;
 
 pub use affine::Affine;
 pub use at_pose::{Extent, PoseBound, bound_at_pose};

@@ -5,21 +5,18 @@
 //! no bound lies above what is reached somewhere by more than the gap.
 
 use super::affine::Affine;
-use super::at_pose::{Extent, along, displacement_numbers, rotation_bound};
-use super::closures::Six;
-use super::directions::longest;
+use super::at_pose::{Extent, along, displacement_numbers};
 use super::pose_box::{Over, reach, reach_more};
+use super::targets::{TARGETS, targets};
 use super::{Deviating, Unproven, point};
 use crate::batch::{displacement, share_out};
 use crate::kinematics::{Sample, commanded_pose, forward, inverse, limbs};
 use crate::linear::SIX;
 use crate::machine::{Machine, chosen};
-use crate::scalar::{Interval, Scalar};
+use crate::scalar::Interval;
 use crate::spatial::Pose;
 use crate::status::Status;
 
-/// Upper ends of the six components, their lower ends with the sign turned, both magnitudes.
-const TARGETS: usize = 2 * SIX + 2;
 /// Boxes that are looked at together.
 const BATCH: usize = 32;
 /// A box of less than this share of the region along every axis is given up.
@@ -108,8 +105,8 @@ impl Region<'_> {
                 .map(|(side, middle)| Interval::new(side[0], side[1]) - point(middle[0]))
                 .collect();
             let rates = self.rates(&command, &over)?;
-            let mut bound = self.targets(&over.whole, |u| reach(u, &own, &rates, &halves));
-            let direct = self.targets(&over.whole, |u| reach(u, &over, &[], &[]));
+            let mut bound = targets(machine, &over.whole, |u| reach(u, &own, &rates, &halves));
+            let direct = targets(machine, &over.whole, |u| reach(u, &over, &[], &[]));
             for (bound, direct) in bound.iter_mut().zip(direct) {
                 *bound = bound.min(direct);
             }
@@ -123,7 +120,7 @@ impl Region<'_> {
                     deviating: self.deviating,
                 };
                 let first = extent.whole()?;
-                let finer = self.targets(&over.whole, |u| {
+                let finer = targets(machine, &over.whole, |u| {
                     let more = reach_more(u, &over, &rates, &halves);
                     (point(extent.most(u, &first)) + point(more)).upper
                 });
@@ -137,44 +134,6 @@ impl Region<'_> {
             Ok((bound, reached)) => Found { bound: Ok(bound), reached, middle, status: Status::Ok },
             Err(why) => Found { bound: Err(why), reached, middle, status: Status::Ok },
         }
-    }
-
-    /// Bounds of all targets from how far displacements reach along directions; `whole` encloses them.
-    fn targets(&self, whole: &Six, most: impl Fn(&[f64; SIX]) -> f64) -> [f64; TARGETS] {
-        let machine = self.machine;
-        let length = point(machine.characteristic_length);
-        let free = chosen(&machine.dof);
-        let squared = (3..SIX)
-            .map(|k| (whole[k] / length).square())
-            .fold(point(0.0), |sum, one| sum + one)
-            .upper;
-        let mut result = [0.0; TARGETS];
-        for &k in &free {
-            for (target, sign) in [(k, 1.0), (SIX + k, -1.0)] {
-                let mut direction = [0.0; SIX];
-                direction[k] = sign;
-                let bound = most(&direction);
-                result[target] = if k < 3 {
-                    bound
-                } else {
-                    rotation_bound((point(bound) / length).upper, squared)
-                };
-            }
-        }
-        for part in 0..2 {
-            let own: Vec<usize> = free.iter().filter(|&&k| k / 3 == part).map(|k| k % 3).collect();
-            if own.is_empty() {
-                continue;
-            }
-            let farthest = longest(&own, |u| {
-                let mut direction = [0.0; SIX];
-                direction[3 * part..3 * part + 3].copy_from_slice(&u);
-                most(&direction)
-            });
-            result[2 * SIX + part] =
-                if part == 0 { farthest } else { (point(farthest) / length).upper };
-        }
-        result
     }
 
     /// The exact error at the vertices that are worst to first order.
@@ -265,7 +224,8 @@ pub fn bound_over_region(
         out_of_reach: None,
     };
     let mut closed = [f64::NEG_INFINITY; TARGETS];
-    let mut allowed = [f64::INFINITY; TARGETS];
+    // Nothing is reached yet, so the first box is bounded as well as can be.
+    let mut allowed = [f64::NEG_INFINITY; TARGETS];
     let mut open = vec![Cell { sides: region.sides.clone(), found: None }];
     loop {
         // The boxes not looked at yet, side by side.

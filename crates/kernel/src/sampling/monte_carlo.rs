@@ -4,7 +4,9 @@ use super::tally::{Sums, Tally};
 use super::{SEGMENT, Variables};
 use crate::batch::{displacement, share_out};
 use crate::dispatch::{Work, dispatch};
-use crate::kinematics::{Limbs, Sample, chord, chord_inverse, forward, limbs, place_limbs};
+use crate::kinematics::{
+    Descent, Limbs, Sample, chord, chord_inverse, forward, limbs, place_limbs,
+};
 use crate::linear::{Matrix6, SIX};
 use crate::machine::{Machine, chosen};
 use crate::scalar::{LANES, Real};
@@ -201,7 +203,11 @@ impl Work for Segment<'_> {
                     *parameter = S::splat(swing).mul_add(value, from);
                 }
                 place_limbs(machine, &p, &q, &mut placed);
-                let mut found = chord(machine, &placed, &start, &pose.inverse);
+                let mut found = if machine.plain {
+                    chord(machine, &placed, &start, &pose.inverse)
+                } else {
+                    Descent { pose: start, proof: S::splat(-1.0) }
+                };
                 let lanes = S::WIDTH.min(size - from);
                 let mut status = [Status::Ok; LANES];
                 for lane in 0..lanes {

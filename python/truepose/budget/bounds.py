@@ -110,17 +110,16 @@ def _at_poses(
     walk = Walk(machine, table, condition, path=poses is None and is_path(machine))
     done = 0
     for block in walk:
-        ends.narrowed(machine, spread(machine, block, sources))  # refuses before the work
+        every = ends.narrowed(machine, spread(machine, block, sources))
         for start in range(0, block.indices.size, POSES):
             chosen = np.zeros(block.indices.size, np.bool_)
             chosen[start : start + POSES] = True
             part = block.select(chosen)
-            moves = ends.narrowed(machine, spread(machine, part, sources))
+            moves = every.select(chosen)
             value, effects, status = first_order(machine, part, moves)
             usable = walk.keep(part.indices, status)
             if usable.any():
-                part = part.select(usable)
-                moves = ends.narrowed(machine, spread(machine, part, sources))
+                part, moves = part.select(usable), moves.select(usable)
                 order = (value[usable], effects[usable])
                 rows.append(part, *_bounded(machine, part, moves, order, walk))
             done += int(chosen.sum())

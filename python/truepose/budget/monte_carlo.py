@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose import _kernel
 from truepose.budget.asked import (
     required_digits,
     required_probability,
@@ -35,10 +36,11 @@ from truepose.budget.dataset import (
 )
 from truepose.budget.drawn import Adaptive, Draws, Enough, Fixed, Random, Sampler, sobol
 from truepose.budget.evaluate import required_sources
+from truepose.budget.exact import displacement
 from truepose.budget.first_order import first_order
 from truepose.budget.model import FunctionModel
 from truepose.budget.percent import POSITIONS
-from truepose.budget.poses import OK, Progress, Walk, is_path, no_pose_left, requested_poses
+from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, requested_poses
 from truepose.budget.spread import Spread, spread
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
@@ -46,11 +48,13 @@ from truepose.sources import Block
 from truepose.sources._base import Floats
 
 if TYPE_CHECKING:
-    from truepose import _kernel
     from truepose.budget.inputs import Correlation, Input
 
 POSES = 256
 """Poses that are sampled together: their histograms take some 50 MB."""
+
+NOT_CONVERGED = _kernel.STATUS.index("not_converged")
+"""The kernel's status of a pose at which no sample has a result."""
 
 LEVELS = np.linspace(0.0, 1.0, 201)
 """Probabilities of the quantiles that a result has."""
@@ -261,27 +265,24 @@ def _of_machine(
     walk = Walk(machine, table, given, path=poses is None and is_path(machine))
     interrupted = False
     for block in walk:
+        every = spread(machine, block, sources)
+        _, shifted = displacement(machine, block.joints, block.placements, every.shift)
+        usable = walk.keep(block.indices, shifted)
+        block, every = block.select(usable), every.select(usable)
+        draws = asked.draws(every)
         for start in range(0, block.indices.size, POSES):
             chosen = np.zeros(block.indices.size, np.bool_)
             chosen[start : start + POSES] = True
             part = block.select(chosen)
-            sampler = _MachineSampler(machine, part, spread(machine, part, sources))
-            usable = walk.keep(part.indices, sampler.status)
-            if not usable.all():
-                if not usable.any():
-                    continue
-                part = part.select(usable)
-                sampler = _MachineSampler(machine, part, spread(machine, part, sources))
-            draws = asked.draws(sampler.spread)
+            sampler = _MachineSampler(machine, part, every.select(chosen))
             drawn = sampler.run(draws, asked.stop, account.add)
             interrupted = drawn.interrupted
             if drawn.tallies is not None and (drawn.tallies.count > 0).any():
                 values = sampler.values(drawn.tallies, asked.probability)
-                rows.append(part, values, drawn.tallies.count > 1)
-                walk.left_out.add(
-                    part.indices[drawn.tallies.count <= 1],
-                    sampler.status[drawn.tallies.count <= 1] + NOT_CONVERGED,
-                )
+                sampled = drawn.tallies.count > 1
+                rows.append(part, values, sampled)
+                lost = part.indices[~sampled]
+                walk.left_out.add(lost, np.full(lost.size, NOT_CONVERGED, np.uint8))
             if interrupted:
                 break
         if interrupted:
@@ -304,17 +305,12 @@ def _of_machine(
     return found
 
 
-NOT_CONVERGED = 4
-"""The kernel's status of a pose at which no sample has a result."""
-
-
 class _MachineSampler(Sampler):
     """A machine at some poses; columns of its tallies: components, magnitudes, ellipse distance."""
 
     def __init__(self, machine: Machine, block: Block, moves: Spread) -> None:
         self.machine, self.block, self.spread = machine, block, moves
         self._study = self._studied(None)
-        self.status = np.asarray(self._study.status)
         kinds = quantities(machine.components)
         self._kinds = list(kinds.values())
         self._axes = [at for at, name in enumerate(machine.components) if name in POSITIONS]
@@ -322,8 +318,6 @@ class _MachineSampler(Sampler):
         self._unwhitened = (self._origins()[0], self._widths())
 
     def _studied(self, whitening: Floats | None) -> _kernel.Study:
-        from truepose import _kernel
-
         shifted, shift = self.spread.shift
         return _kernel.Study(
             self.machine.kernel,
@@ -356,15 +350,11 @@ class _MachineSampler(Sampler):
 
     def tallies(self) -> _kernel.Tallies:
         """New ones, without the ellipse."""
-        from truepose import _kernel
-
         origins, widths = self._unwhitened
         return _kernel.Tallies(origins, widths, origins.shape[1], len(self.machine.components))
 
     def begin(self, pilot: _kernel.Tallies) -> _kernel.Tallies:
         """Tallies with the ellipse, whose shape is the covariance of the pilot."""
-        from truepose import _kernel
-
         origins, widths = self._unwhitened
         if self._axes:
             covariance = np.asarray(pilot.covariance)[:, self._axes][:, :, self._axes]
@@ -462,8 +452,6 @@ class _FunctionSampler(Sampler):
 
     def tallies(self) -> _kernel.Tallies:
         """New ones."""
-        from truepose import _kernel
-
         m = self._origins.shape[1]
         return _kernel.Tallies(self._origins, self._widths, m, m)
 
@@ -521,4 +509,4 @@ def _of_function(model: FunctionModel, asked: _Asked, progress: Progress | None)
     return found
 
 
-__all__ = ["ELLIPSE", "LEVELS", "MACHINE", "OK", "SCHEMA", "monte_carlo", "statistics"]
+__all__ = ["ELLIPSE", "LEVELS", "MACHINE", "SCHEMA", "monte_carlo", "statistics"]

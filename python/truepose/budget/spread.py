@@ -19,7 +19,7 @@ import numpy as np
 from truepose.budget.exact import Moved, together
 from truepose.machine import Machine
 from truepose.sources import REGISTRY, Block, Deviation, Source
-from truepose.sources._base import Distribution, Floats, Indices
+from truepose.sources._base import Distribution, Flags, Floats, Indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +49,15 @@ class Spread:
 
     def at(self, pose: int) -> Spread:
         """The same at one pose of the block."""
+        return self.select(slice(pose, pose + 1))
+
+    def select(self, poses: Flags | slice) -> Spread:
+        """The same at some poses of the block, as `Block.select` has them."""
         parameters, shift = self.shift
         return dataclasses.replace(
             self,
-            shift=(parameters, shift if len(shift) == 1 else shift[pose : pose + 1]),
-            swing=self.swing if len(self.swing) == 1 else self.swing[pose : pose + 1],
+            shift=(parameters, shift if len(shift) == 1 else shift[poses]),
+            swing=self.swing if len(self.swing) == 1 else self.swing[poses],
         )
 
     def parameters_moved(self, t: Floats) -> Moved:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import cache
 from typing import Any
 
@@ -124,6 +125,43 @@ def test_bounds_at_the_poses_of_the_file_are_inside() -> None:
 def test_no_sample_anywhere_leaves_the_bounds() -> None:
     machine = load("planar_two_slider")
     assert_encloses(planar(), machine, anywhere(WHOLE, POSES, 2), SAMPLES)
+
+
+@pytest.mark.parametrize(
+    ("name", "region"),
+    [
+        ("planar_two_slider", {"x": (0.2, 0.22), "y": (0.1, 0.12)}),
+        ("five_bar", None),
+        ("hexapod", None),
+        ("linear_delta", None),
+    ],
+)
+def test_a_box_that_is_not_divided_bounds_what_changes_in_it(
+    name: str, region: Region | None
+) -> None:
+    """In one box the bound at its middle does not serve: it must grow with the box.
+
+    Dividing would hide that, for then every middle is near.
+    """
+    machine = load(name)
+    middle = machine.poses().mean(axis=0)
+    if region is None:
+        half = [1e-3 if each in "xyz" else 1e-2 for each in machine.commanded]
+        ends = zip(middle - half, middle + half, strict=True)
+        region = dict(zip(machine.commanded, ends, strict=True))
+    found = tp.bounds(machine, region=region, gap=0.99)
+    assert int(found.boxes) == 1
+    assert str(found.status.values) == "proven"
+    low, high = np.array(list(region.values())).T
+    corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
+    worst = tp.worst_case(machine, corners)
+    slack = ROUNDING * machine.characteristic_length
+    assert (worst.exact_upper <= found.upper + slack).all()
+    assert (worst.exact_lower >= found.lower - slack).all()
+    assert (worst.magnitude_exact <= found.magnitude + slack).all()
+    # And the middle's own worst case is exceeded somewhere, so that it would not have served.
+    at = tp.worst_case(machine, 0.5 * (low + high))
+    assert (worst.exact.max("pose") > at.exact.isel(pose=0) + slack).any()
 
 
 def test_what_is_reached_is_reached_there() -> None:

@@ -6,6 +6,7 @@
 //! SI units, radians; vectors and wrenches along the base axes, linear part first.
 
 pub mod batch;
+pub mod code;
 pub mod dispatch;
 pub mod element;
 pub mod kinematics;

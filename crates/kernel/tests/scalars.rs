@@ -161,9 +161,10 @@ fn a_traced_closure_prints_c_that_equals_f64() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     for (number, kind) in kinds().into_iter().enumerate() {
         let tape = Tape::new();
-        let inputs: [Trace<'_>; INPUTS] = std::array::from_fn(|i| tape.input(i));
+        let inputs: [Trace<'_>; INPUTS] = std::array::from_fn(|i| tape.input(format!("x[{i}]")));
         let output = residual(kind, &frame(), &inputs);
-        let function = tape.print_c("closure", &[output]);
+        let (body, _) = tape.print_c(&[("y[0]".to_string(), output)]);
+        let function = format!("static void closure(const double *x, double *y)\n{{\n{body}}}\n");
         let many = samples(50);
         let rows: Vec<String> = many
             .iter()
@@ -185,7 +186,7 @@ fn a_traced_closure_prints_c_that_equals_f64() {
         std::fs::write(&source, code).unwrap();
         let compiled = Command::new("cc")
             .args(["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic"])
-            .args(["-Werror", "-Wno-missing-prototypes"])
+            .args(["-Werror"])
             .args([&source, Path::new("-o"), &program, Path::new("-lm")])
             .output()
             .unwrap();

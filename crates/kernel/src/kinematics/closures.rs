@@ -24,20 +24,20 @@ pub struct Limb<S> {
 /// The struts of one sample; those beyond the machine's are unused.
 pub type Limbs<S> = [Limb<S>; CLOSURES];
 /// Rows of all closures of one sample.
-pub type Rows = [[f64; SIX]; CLOSURES];
+pub type Rows<S> = [[S; SIX]; CLOSURES];
 /// Residuals of all closures of one sample.
-pub type Residuals = [f64; CLOSURES];
+pub type Residuals<S> = [S; CLOSURES];
 
 /// Places every strut's joint centres for parameters `p` and joint coordinates `q`.
 #[inline(always)]
-pub fn place_limbs<S: Real>(machine: &Machine, p: &[S], q: &[S], limbs: &mut Limbs<S>) {
+pub fn place_limbs<S: Scalar>(machine: &Machine, p: &[S], q: &[S], limbs: &mut Limbs<S>) {
     let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
     for (limb, strut) in limbs.iter_mut().zip(&machine.struts) {
         let own = &p[strut.first..];
         let base = [own[0], own[1], own[2]];
         let length = match strut.own_length {
             Some(index) => p[index],
-            None => S::splat(0.0),
+            None => base[0].lift(0.0),
         };
         limb.arm = [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]];
         (limb.base, limb.length) = match strut.drive {
@@ -60,11 +60,11 @@ pub fn limbs(machine: &Machine, p: &[f64], q: &[f64]) -> Limbs<f64> {
 /// A row from the derivative to the platform joint: the same force, and its moment about the tool
 /// point; zero in the freedoms that the frame holds.
 #[inline(always)]
-pub fn row<S: Real>(machine: &Machine, to_centre: Vector<S>, arm: Vector<S>) -> [S; SIX] {
+pub fn row<S: Scalar>(machine: &Machine, to_centre: Vector<S>, arm: Vector<S>) -> [S; SIX] {
     let moment = cross(arm, to_centre);
     let mut row = [to_centre[0], to_centre[1], to_centre[2], moment[0], moment[1], moment[2]];
     for &freedom in &machine.held {
-        row[freedom] = S::default();
+        row[freedom] = arm[0].lift(0.0);
     }
     row
 }
@@ -101,7 +101,7 @@ pub fn guide_limb<S: Scalar>(guide: &MachineGuide, p: &[S], tool: Vector<S>) -> 
 
 /// Residual of a strut's closure and its derivatives to the platform-side joint centre.
 #[inline(always)]
-fn strut_closure<S: Real, const SQUARED: bool>(limb: &Limb<S>, centre: Vector<S>) -> Dual<S, 3> {
+fn strut_closure<S: Scalar, const SQUARED: bool>(limb: &Limb<S>, centre: Vector<S>) -> Dual<S, 3> {
     let at = [
         Dual::<S, 3>::variable(centre[0], 0),
         Dual::variable(centre[1], 1),
@@ -175,6 +175,43 @@ pub fn squared_residuals<S: Real>(
     }
 }
 
+/// Rows and residuals of all closures as they come, struts squared or not; guides as they are. Zero beyond
+/// the machine's closures.
+pub fn system<S: Scalar, const SQUARED: bool>(
+    machine: &Machine,
+    p: &[S],
+    limbs: &Limbs<S>,
+    rotation: &RotationMatrix<S>,
+    position: Vector<S>,
+) -> (Rows<S>, Residuals<S>) {
+    let zero = position[0].lift(0.0);
+    let (mut rows, mut residuals) = ([[zero; SIX]; CLOSURES], [zero; CLOSURES]);
+    for (i, strut) in machine.struts.iter().enumerate() {
+        let limb = &limbs[i];
+        let arm = match &strut.ring {
+            None => rotate(rotation, limb.arm),
+            Some(ring) => ring_arm(ring, p[ring.radius], limb, rotation, position).0,
+        };
+        let closure = strut_closure::<S, SQUARED>(limb, add(arm, position));
+        rows[i] = row(machine, closure.parts, arm);
+        residuals[i] = closure.value;
+    }
+    for (number, &(guide, which)) in machine.guide_closures.iter().enumerate() {
+        let guide = &machine.guides[guide];
+        let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
+        let limb = guide_limb(guide, p, tool);
+        let length = machine.characteristic_length;
+        let (residual, mut row) =
+            guide.kind.row(which, &guide.frames, &limb, (rotation, position), length);
+        for &freedom in &machine.held {
+            row[freedom] = zero;
+        }
+        rows[machine.struts.len() + number] = row;
+        residuals[machine.struts.len() + number] = residual;
+    }
+    (rows, residuals)
+}
+
 /// One sample of any machine on the single road: parameters, and the struts placed.
 #[derive(Clone, Copy)]
 pub struct Sample<'a> {
@@ -187,35 +224,10 @@ pub struct Sample<'a> {
 }
 
 impl Sample<'_> {
-    /// Residuals and rows of all closures as they come, struts squared or not; guides as they are.
-    fn system<const SQUARED: bool>(&self, pose: &Pose<f64>) -> (Rows, Residuals) {
-        let Sample { machine, p, limbs } = *self;
-        let (mut rows, mut residuals) = ([[0.0; SIX]; CLOSURES], [0.0; CLOSURES]);
+    /// Residuals and rows of all closures as they come; see [`system`].
+    fn system<const SQUARED: bool>(&self, pose: &Pose<f64>) -> (Rows<f64>, Residuals<f64>) {
         let rotation = rotation_matrix(pose.rotation);
-        for (i, strut) in machine.struts.iter().enumerate() {
-            let limb = &limbs[i];
-            let arm = match &strut.ring {
-                None => rotate(&rotation, limb.arm),
-                Some(ring) => ring_arm(ring, p[ring.radius], limb, &rotation, pose.position).0,
-            };
-            let closure = strut_closure::<f64, SQUARED>(limb, add(arm, pose.position));
-            rows[i] = row(machine, closure.parts, arm);
-            residuals[i] = closure.value;
-        }
-        for (number, &(guide, which)) in machine.guide_closures.iter().enumerate() {
-            let guide = &machine.guides[guide];
-            let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
-            let limb = guide_limb(guide, p, tool);
-            let at = (&rotation, pose.position);
-            let (residual, mut row) =
-                guide.kind.row(which, &guide.frames, &limb, at, machine.characteristic_length);
-            for &freedom in &machine.held {
-                row[freedom] = 0.0;
-            }
-            rows[machine.struts.len() + number] = row;
-            residuals[machine.struts.len() + number] = residual;
-        }
-        (rows, residuals)
+        system::<_, SQUARED>(self.machine, self.p, self.limbs, &rotation, pose.position)
     }
 
     /// Residuals and rows on which Newton's iteration runs, as a square system: struts squared, identity
@@ -247,7 +259,7 @@ impl Sample<'_> {
     }
 
     /// Residuals (m) and rows (unit wrenches) of the closures themselves.
-    pub fn closures(&self, pose: &Pose<f64>) -> (Rows, Residuals) {
+    pub fn closures(&self, pose: &Pose<f64>) -> (Rows<f64>, Residuals<f64>) {
         self.system::<false>(pose)
     }
 }

@@ -11,10 +11,10 @@ use super::linearisation::Linearisation;
 use crate::element::{Dimension, Reach};
 use crate::linear::{Matrix6, Pivoted, SIX, condition_index, factor_pivoting, null_space, solve};
 use crate::machine::{Machine, MachineDrive, chosen};
-use crate::scalar::Real;
+use crate::scalar::{Real, Scalar};
 use crate::spatial::{
-    Pose, RotationMatrix, Vector, add, cross, dot, euler_axes, norm, rotate, rotation_matrix,
-    subtract,
+    Pose, RotationMatrix, Vector, add, angle_rates, cross, dot, euler_axes, norm, rotate,
+    rotation_matrix, subtract,
 };
 use crate::status::Status;
 
@@ -57,7 +57,7 @@ pub fn lane_inverse<S: Real>(machine: &Machine, p: &[S], pose: &Pose<S>, joints:
 
 /// A drive's closed form for the first strut that it carries.
 #[inline(always)]
-fn closed_form<S: Real>(
+pub fn closed_form<S: Scalar>(
     machine: &Machine,
     drive: &MachineDrive,
     p: &[S],
@@ -72,13 +72,13 @@ fn closed_form<S: Real>(
     let arm = match &strut.ring {
         None => rotate(rotation, platform),
         Some(ring) => {
-            let limb = Limb { base, arm: platform, length: S::default() };
+            let limb = Limb { base, arm: platform, length: base[0].lift(0.0) };
             ring_arm(ring, p[ring.radius], &limb, rotation, position).0
         }
     };
     let length = match strut.own_length {
         Some(index) => p[index],
-        None => S::splat(0.0),
+        None => base[0].lift(0.0),
     };
     let parameters = &p[drive.first..];
     let platform = add(arm, position);
@@ -86,7 +86,7 @@ fn closed_form<S: Real>(
         drive.kind.inverse(&drive.nominal, parameters, drive.mode, base, length, platform);
     if strut.own_length.is_some() {
         // The closed forms know the length's square only; no strut of negative length reaches.
-        reach.margin = reach.margin.min(length);
+        reach.margin = length.select(reach.margin, length);
     }
     reach
 }
@@ -208,8 +208,7 @@ fn solve_strained(
         }
         solved.pose = found;
         let reached = found.to_coordinates();
-        let [a, b, c] = [reached[3], reached[4], reached[5]];
-        let axes = euler_axes([a, b, c]);
+        let angles = [reached[3], reached[4], reached[5]];
         let mut linear = Linearisation::default();
         linear.fill_alone(&sample, &solved.joints, &found);
         // Twist per joint, and twist per coordinate, in the commanded freedoms.
@@ -233,7 +232,7 @@ fn solve_strained(
                 let rate = if freedom < 3 {
                     twist[freedom]
                 } else {
-                    angle_rates(&axes, [twist[3], twist[4], twist[5]])[freedom - 3]
+                    angle_rates(angles, [twist[3], twist[4], twist[5]])[freedom - 3]
                 };
                 system[row][joint] = rate * unit(freedom) / joint_length(machine, joint);
             }
@@ -255,12 +254,6 @@ fn solve_strained(
         }
     }
     solved.status = unreachable;
-}
-
-/// Rates of the angles a, b, c for an angular velocity, by the instantaneous axes of the angles.
-fn angle_rates(axes: &[Vector<f64>; 3], rate: Vector<f64>) -> Vector<f64> {
-    let volume = dot(axes[0], cross(axes[1], axes[2]));
-    [0, 1, 2].map(|k| dot(rate, cross(axes[(k + 1) % 3], axes[(k + 2) % 3])) / volume)
 }
 
 /// Newton's iteration on parasitic freedoms and joints together.
@@ -429,7 +422,7 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
 }
 
 /// The closures' rows with rotations in units of the characteristic length.
-fn scaled_rows(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Rows {
+fn scaled_rows(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Rows<f64> {
     let mut linear = Linearisation::default();
     linear.differentiate(machine, p, q, pose);
     let mut rows = linear.rows;

@@ -2,12 +2,16 @@
 
 mod closures;
 mod forward;
+mod gradients;
 mod inverse;
 mod linearisation;
 mod overconstrained;
 
+pub(crate) use closures::system;
 pub use closures::{Limb, Limbs, Sample, guide_limb, limbs, place_limbs, ring_arm};
 pub use forward::{Descent, chord, chord_inverse, descend, forward, start_order};
+pub(crate) use gradients::{Gradients, gradients};
+pub(crate) use inverse::closed_form;
 pub use inverse::{
     Inverse, Obstacle, commanded_pose, condition, free_motions, inverse, lane_inverse, obstacles,
     permitted,

@@ -80,8 +80,7 @@ impl Structure {
         let values: Vec<f64> = machine.parameter_compliance.iter().map(|&(_, c)| c).collect();
         let mut compliance = closure_compliance(linear, &readers, &values);
         let own = &machine.closure_compliance;
-        let carrying: Vec<usize> =
-            (0..machine.closure_count()).filter(|&i| own[i].is_finite()).collect();
+        let carrying: Vec<usize> = machine.carrying().collect();
         for &i in &carrying {
             compliance[i][i] += own[i];
         }

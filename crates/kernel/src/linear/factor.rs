@@ -10,11 +10,12 @@ use crate::scalar::{Real, Scalar};
 /// Eliminates in place, rows in the order in which they stand: multipliers below the diagonal, inverse
 /// pivots on it. Returns the product of the pivots, the determinant.
 #[inline(always)]
-pub fn factor<S: Real>(m: &mut Matrix6<S>) -> S {
-    let mut product = S::splat(1.0);
+pub fn factor<S: Scalar>(m: &mut Matrix6<S>) -> S {
+    let one = m[0][0].lift(1.0);
+    let mut product = one;
     for k in 0..SIX {
         product = product * m[k][k];
-        let inverse = S::splat(1.0) / m[k][k];
+        let inverse = one / m[k][k];
         m[k][k] = inverse;
         for i in k + 1..SIX {
             let multiplier = m[i][k] * inverse;
@@ -113,6 +114,24 @@ fn back_substitute<S: Real>(m: &Matrix6<S>, x: &mut [S; SIX]) {
     }
 }
 
+/// Solves the transposed system for one right-hand side: the unknowns of the rows in their order.
+#[inline(always)]
+pub fn solve_transposed<S: Scalar>(m: &Matrix6<S>, right: &[S; SIX]) -> [S; SIX] {
+    let mut x = *right;
+    for k in 0..SIX {
+        for i in 0..k {
+            x[k] = (-m[i][k]).mul_add(x[i], x[k]);
+        }
+        x[k] = x[k] * m[k][k];
+    }
+    for k in (0..SIX).rev() {
+        for i in k + 1..SIX {
+            x[k] = (-m[i][k]).mul_add(x[i], x[k]);
+        }
+    }
+    x
+}
+
 /// The inverse of the eliminated matrix, in the first six columns; `order[k]` is the column that row k
 /// answers to.
 #[inline(always)]
@@ -171,7 +190,14 @@ mod tests {
             assert!((product.abs() - determinant.abs()).abs() < 1e-14);
             let mut y = order.map(|row| right[row]);
             solve(&again, &mut y);
+            let placed = solve_transposed(&again, &right);
+            let mut z = [0.0; SIX];
+            for (k, row) in order.into_iter().enumerate() {
+                z[row] = placed[k];
+            }
             for i in 0..SIX {
+                let transposed: f64 = (0..SIX).map(|j| rows[j][i] * z[j]).sum();
+                assert!((transposed - right[i]).abs() < 1e-11);
                 let product: f64 = (0..SIX).map(|j| rows[i][j] * x[j]).sum();
                 assert!((product - right[i]).abs() < 1e-11);
                 assert!((x[i] - y[i]).abs() < 1e-11);

@@ -3,7 +3,9 @@
 mod factor;
 mod singular;
 
-pub use factor::{Pivoted, factor, factor_pivoting, growth, inverse_of, invert, solve};
+pub use factor::{
+    Pivoted, factor, factor_pivoting, growth, inverse_of, invert, solve, solve_transposed,
+};
 pub use singular::{condition_index, null_space};
 
 /// Six freedoms of a rigid body.

@@ -161,6 +161,11 @@ impl Machine {
         self.closure_count() > self.dof_count()
     }
 
+    /// The closures that can carry a force: those that are not infinitely compliant.
+    pub fn carrying(&self) -> impl Iterator<Item = usize> {
+        (0..self.closure_count()).filter(|&i| self.closure_compliance[i].is_finite())
+    }
+
     /// Number of the platform's freedoms.
     pub fn dof_count(&self) -> usize {
         self.dof.iter().filter(|&&flag| flag).count()

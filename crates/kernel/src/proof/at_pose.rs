@@ -141,12 +141,12 @@ impl<'a> Extent<'a> {
         let columns = self.columns(&spread);
         let away = variables.iter().zip(&middles).map(|(one, middle)| *one - *middle);
         let varying: Vec<Varying> = columns.into_iter().zip(away).collect();
-        let root = prove(&middle, &exact.residuals, &varying, |tried| {
+        let root = prove(&middle, &exact.closures.residuals, &varying, |tried| {
             derivatives(machine, &p, q, at, tried).to_displacement
         })?;
         let over = derivatives(machine, &p, q, at, &root.enclosure);
         let inverse = Inverse::of(&over.to_displacement).ok_or(Unproven::TooWide)?;
-        let off = inverse.times(&exact.residuals);
+        let off = inverse.times(&exact.closures.residuals);
         let mut at_middle = middle.map(point);
         for k in 0..SIX {
             at_middle[k] = at_middle[k] - off[k];
@@ -164,7 +164,7 @@ impl<'a> Extent<'a> {
         let mut columns = vec![[point(0.0); SIX]; self.deviating.count];
         let Deviating { parameters, variables, swing, .. } = self.deviating;
         for ((&parameter, &variable), &swing) in parameters.iter().zip(variables).zip(swing) {
-            let gradient = at.to_parameter(self.machine, parameter);
+            let gradient = at.closures.to_parameter(self.machine, parameter);
             for k in 0..SIX {
                 columns[variable][k] = columns[variable][k] + gradient[k] * point(swing);
             }

@@ -107,7 +107,8 @@ impl Region<'_> {
             let mut matrix = at.to_displacement;
             for (joint, &slot) in slots.iter().enumerate() {
                 for (i, row) in matrix.iter_mut().enumerate() {
-                    row[slot] = if self.drives(joint, i) { at.to_joint[i] } else { point(0.0) };
+                    row[slot] =
+                        if self.drives(joint, i) { at.closures.to_joint[i] } else { point(0.0) };
                 }
             }
             matrix
@@ -118,7 +119,8 @@ impl Region<'_> {
         };
         let (moved, q) = split(&middle.map(point));
         let spot: Vec<[f64; 2]> = sides.iter().map(|[a, b]| [0.5 * (a + b); 2]).collect();
-        let exact = derivatives(machine, &p, &q, &self.place(&spot, solved), &moved).residuals;
+        let exact =
+            derivatives(machine, &p, &q, &self.place(&spot, solved), &moved).closures.residuals;
         let spread = derivatives(machine, &p, &q, &at, &moved);
         let axes = self.axes(sides, solved);
         let mut varying: Vec<Varying> = Vec::with_capacity(slots.len());
@@ -217,14 +219,14 @@ impl Region<'_> {
         let moves = |over: &Derivatives| {
             let mut known = [point(0.0); SIX];
             for &(index, shift) in &shifts {
-                let gradient = over.to_parameter(machine, index);
+                let gradient = over.closures.to_parameter(machine, index);
                 for k in 0..SIX {
                     known[k] = known[k] + gradient[k] * shift;
                 }
             }
             let mut columns = vec![[point(0.0); SIX]; *count];
             for ((&parameter, &variable), &swing) in parameters.iter().zip(variables).zip(swing) {
-                let gradient = over.to_parameter(machine, parameter);
+                let gradient = over.closures.to_parameter(machine, parameter);
                 for k in 0..SIX {
                     columns[variable][k] = columns[variable][k] + gradient[k] * point(swing);
                 }
@@ -274,7 +276,7 @@ impl Region<'_> {
         let inverse = Inverse::of(&at.to_displacement).ok_or(Unproven::TooWide)?;
         let forces = self.forces(&inverse);
         let deflection = |yielding: &Affine| {
-            let gradient = at.to_parameter(machine, yielding.parameter);
+            let gradient = at.closures.to_parameter(machine, yielding.parameter);
             let mut load = point(0.0);
             for k in 0..machine.closure_count() {
                 load = load + forces[k] * gradient[k];
@@ -330,19 +332,19 @@ impl Region<'_> {
             let mut open = [point(0.0); SIX];
             for (i, open) in open.iter_mut().enumerate().take(machine.closure_count()) {
                 for k in 0..SIX {
-                    *open = *open + partly(along.to_twist[i][k].parts[0]) * twist[k];
+                    *open = *open + partly(along.closures.to_twist[i][k].parts[0]) * twist[k];
                 }
                 for k in 0..3 {
-                    *open = *open + along.to_twist[i][3 + k].value * more[k];
+                    *open = *open + along.closures.to_twist[i][3 + k].value * more[k];
                 }
                 for (joint, &speed) in speeds.iter().enumerate() {
                     if self.drives(joint, i) {
-                        *open = *open + partly(along.to_joint[i].parts[0]) * speed;
+                        *open = *open + partly(along.closures.to_joint[i].parts[0]) * speed;
                     }
                 }
             }
             for (index, rate) in self.shift_rates(command, freedom)? {
-                let gradient = along.to_parameter(machine, index);
+                let gradient = along.closures.to_parameter(machine, index);
                 for k in 0..SIX {
                     open[k] = open[k] + gradient[k].value * partly(rate);
                 }
@@ -389,20 +391,20 @@ impl Region<'_> {
             };
             let mut known = [point(0.0); SIX];
             for &(index, shift) in &over.shifts {
-                let gradient = at.to_parameter(machine, index);
+                let gradient = at.closures.to_parameter(machine, index);
                 for k in 0..SIX {
                     known[k] = known[k] + gradient[k].parts[0] * shift;
                 }
             }
             for &(index, rate) in &shift_rates {
-                let gradient = at.to_parameter(machine, index);
+                let gradient = at.closures.to_parameter(machine, index);
                 for k in 0..SIX {
                     known[k] = known[k] + gradient[k].value * rate;
                 }
             }
             let mut columns = vec![[point(0.0); SIX]; *count];
             for ((&parameter, &variable), &swing) in parameters.iter().zip(variables).zip(swing) {
-                let gradient = at.to_parameter(machine, parameter);
+                let gradient = at.closures.to_parameter(machine, parameter);
                 for k in 0..SIX {
                     let rate = gradient[k].parts[0] * point(swing);
                     columns[variable][k] = columns[variable][k] + rate;
@@ -456,7 +458,7 @@ impl Region<'_> {
         }
         let force_rates = inverse.row_times(&pull).map(|value| -value);
         for yielding in &self.yielding {
-            let gradient = at.to_parameter(machine, yielding.parameter);
+            let gradient = at.closures.to_parameter(machine, yielding.parameter);
             let mut load = still(point(0.0));
             for k in 0..machine.closure_count() {
                 load = load + changing(forces[k], force_rates[k]) * gradient[k];
@@ -559,7 +561,7 @@ fn pull(machine: &Machine, at: &Derivatives, twist: &Six) -> Six {
     let mut result = [point(0.0); SIX];
     for i in 0..machine.closure_count() {
         for k in 0..SIX {
-            result[i] = result[i] + at.to_twist[i][k] * twist[k];
+            result[i] = result[i] + at.closures.to_twist[i][k] * twist[k];
         }
     }
     result

@@ -1,6 +1,6 @@
 //! Where a rigid body is: the tool point and a quaternion. Euler angles appear only at the edges.
 
-use super::vector::{Vector, add};
+use super::vector::{Vector, add, cross, dot};
 use crate::scalar::{Real, Scalar};
 
 /// `w + x i + y j + z k`, not necessarily of unit length.
@@ -167,22 +167,31 @@ pub fn quaternion_from_euler<S: Scalar>(angles: [S; 3]) -> Quaternion<S> {
 
 /// The angles `[a, b, c]` of `R = Rz(c) Ry(b) Rx(a)`, b in [-pi/2, pi/2]. Where b is a right angle
 /// only a sum of a and c is defined; then a = 0.
-pub fn euler_angles(r: &RotationMatrix<f64>) -> [f64; 3] {
-    let horizontal = r[0][0].hypot(r[1][0]);
+pub fn euler_angles<S: Scalar>(r: &RotationMatrix<S>) -> [S; 3] {
+    let zero = r[0][0].lift(0.0);
+    let horizontal = r[0][0].square_plus(r[1][0].square()).sqrt();
+    let defined = horizontal - zero.lift(1e-12);
     // 0 - x, not -x: a level platform has b = 0, not -0.
-    let b = (0.0 - r[2][0]).atan2(horizontal);
-    if horizontal < 1e-12 {
-        return [0.0, b, (-r[0][1]).atan2(r[1][1])];
-    }
-    [r[2][1].atan2(r[2][2]), b, r[1][0].atan2(r[0][0])]
+    let b = (zero - r[2][0]).atan2(horizontal);
+    let a = defined.select(r[2][1].atan2(r[2][2]), zero);
+    let c = defined.select(r[1][0].atan2(r[0][0]), (-r[0][1]).atan2(r[1][1]));
+    [a, b, c]
 }
 
 /// The instantaneous rotation axes of the angles a, b, c of `R = Rz(c) Ry(b) Rx(a)`, base frame:
 /// angular velocity = sum of axis times rate.
-pub fn euler_axes(angles: [f64; 3]) -> [Vector<f64>; 3] {
+pub fn euler_axes<S: Scalar>(angles: [S; 3]) -> [Vector<S>; 3] {
+    let (zero, one) = (angles[0].lift(0.0), angles[0].lift(1.0));
     let (sb, cb) = angles[1].sin_cos();
     let (sc, cc) = angles[2].sin_cos();
-    [[cc * cb, sc * cb, -sb], [-sc, cc, 0.0], [0.0, 0.0, 1.0]]
+    [[cc * cb, sc * cb, -sb], [-sc, cc, zero], [zero, zero, one]]
+}
+
+/// Rates of the angles a, b, c for an angular velocity in the base frame.
+pub fn angle_rates<S: Scalar>(angles: [S; 3], velocity: Vector<S>) -> [S; 3] {
+    let axes = euler_axes(angles);
+    let volume = dot(axes[0], cross(axes[1], axes[2]));
+    [0, 1, 2].map(|k| dot(velocity, cross(axes[(k + 1) % 3], axes[(k + 2) % 3])) / volume)
 }
 
 /// `to` times the conjugate of `from`: what turns `from` into `to`, of the product of their lengths.

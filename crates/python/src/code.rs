@@ -1,0 +1,79 @@
+//! The machine's formulas as C, and the numbers that a program round them needs.
+
+use crate::machine::Machine;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use truepose_kernel::code::{self, Shifts, Term};
+
+/// Parameter, constant, slope, and of which strut's length.
+type GivenTerm = (usize, f64, f64, Option<usize>);
+
+impl Machine {
+    fn term(&self, (parameter, constant, slope, strut): GivenTerm) -> PyResult<Term> {
+        let known = parameter < self.inner.parameters.len()
+            && strut.is_none_or(|strut| strut < self.inner.struts.len());
+        if !known {
+            let message = "a term of a parameter or strut that the machine does not have";
+            return Err(pyo3::exceptions::PyIndexError::new_err(message));
+        }
+        Ok(Term { parameter, constant, slope: strut.map(|strut| (slope, strut)) })
+    }
+}
+
+#[pymethods]
+impl Machine {
+    /// C functions `{name: (arguments, body, values)}` of the machine's formulas; terms are (parameter,
+    /// constant, slope, strut or None).
+    fn c_functions<'py>(
+        &self,
+        py: Python<'py>,
+        always: Vec<GivenTerm>,
+        per_kelvin: Vec<Vec<GivenTerm>>,
+        compliance: Vec<GivenTerm>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let terms = |given: Vec<GivenTerm>| {
+            given.into_iter().map(|term| self.term(term)).collect::<PyResult<Vec<Term>>>()
+        };
+        let shifts = Shifts {
+            always: terms(always)?,
+            per_kelvin: per_kelvin.into_iter().map(terms).collect::<PyResult<_>>()?,
+            compliance: terms(compliance)?,
+        };
+        let found = PyDict::new(py);
+        for function in code::functions(&self.inner, &shifts) {
+            let parts = (function.arguments, function.body, function.values);
+            found.set_item(function.name, parts)?;
+        }
+        Ok(found)
+    }
+
+    /// What the program round the formulas reads beside parameters: see the stub file.
+    #[getter]
+    fn control<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let inner = &self.inner;
+        let found = PyDict::new(py);
+        found.set_item("home", inner.home.to_coordinates())?;
+        found.set_item("dof", inner.dof)?;
+        found.set_item("commanded", inner.commanded)?;
+        found.set_item("travel", inner.drives.iter().map(|d| d.travel).collect::<Vec<_>>())?;
+        let turns = |drive: &truepose_kernel::machine::MachineDrive| {
+            drive.kind.table().coordinate == truepose_kernel::element::Dimension::Angle
+        };
+        found.set_item("turns", inner.drives.iter().map(turns).collect::<Vec<_>>())?;
+        found.set_item("scale", inner.drives.iter().map(|d| d.scale).collect::<Vec<_>>())?;
+        found.set_item(
+            "first_strut",
+            inner.drives.iter().map(|d| d.struts[0]).collect::<Vec<_>>(),
+        )?;
+        found.set_item("strut_drive", inner.struts.iter().map(|s| s.drive).collect::<Vec<_>>())?;
+        found.set_item("closures", inner.closure_count())?;
+        found.set_item("carrying", inner.carrying().collect::<Vec<_>>())?;
+        found.set_item(
+            "strut_drives",
+            inner.drives.iter().map(|d| d.struts.clone()).collect::<Vec<_>>(),
+        )?;
+        found.set_item("regularity_scale", inner.regularity_scale)?;
+        found.set_item("joints_limited", inner.limited)?;
+        Ok(found)
+    }
+}

@@ -2,10 +2,12 @@
 
 mod arrays;
 mod blocks;
+mod code;
 mod description;
 mod elements;
 mod evaluate;
 mod failure;
+mod gcode;
 mod machine;
 mod proof;
 mod sampling;
@@ -81,6 +83,7 @@ fn _kernel(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("STATUS", PyTuple::new(py, Status::ALL.map(Status::name))?)?;
     module.add("KernelError", py.get_type::<failure::KernelError>())?;
     module.add_class::<machine::Machine>()?;
+    gcode::register(module)?;
     module.add_class::<sampling::Variables>()?;
     module.add_class::<sampling::Tallies>()?;
     module.add_class::<sampling::Study>()?;

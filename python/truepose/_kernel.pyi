@@ -6,13 +6,19 @@ is seven numbers: the tool point and the platform's unit quaternion w x y z, bas
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
 from typing import Any, Literal, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
+    "GCODE_AXES",
     "STATUS",
+    "GcodeCorrector",
+    "GcodeError",
+    "GcodeMoves",
+    "GcodeReader",
     "KernelError",
     "Machine",
     "Study",
@@ -20,6 +26,7 @@ __all__ = [
     "Variables",
     "_rebuild",
     "elements",
+    "gcode_codes",
     "instruction_set",
     "threads",
     "toml_lines",
@@ -29,6 +36,8 @@ __all__ = [
 _Floats = NDArray[np.float64]
 _Codes = NDArray[np.uint8]
 _WithStatus = tuple[_Floats, _Codes]
+_Term = tuple[int, float, float, int | None]
+"""Parameter, constant, slope per metre of a strut's length, and which strut."""
 
 STATUS: tuple[str, ...]
 """Status of a pose by its code: ok, out_of_travel, unreachable, singular, not_converged,
@@ -249,6 +258,27 @@ class Machine:
         parameter_compliance: ArrayLike,
     ) -> _WithStatus:
         """(stiffness (n, n_component, n_component), status)."""
+    def c_functions(
+        self,
+        always: Sequence[_Term],
+        per_kelvin: Sequence[Sequence[_Term]],
+        compliance: Sequence[_Term],
+    ) -> dict[str, tuple[str, str, int]]:
+        """C functions of the machine's formulas: name -> (arguments, body, values kept).
+
+        Terms are shifts of parameters: always, per kelvin of each part, and per load on them.
+        `crates/kernel/src/code` says what each function computes.
+        """
+    @property
+    def control(self) -> dict[str, Any]:
+        """What a program round the formulas reads beside parameters.
+
+        `home` (6,), `dof` and `commanded` (6,) flags; of each drive its `travel`, whether it
+        `turns`, the parameter of its `scale` or None, and the struts that it carries
+        (`strut_drives`); `strut_drive` or None of each strut; the number of `closures`, and those
+        that are `carrying`; `regularity_scale`; `joints_limited`, whether joints limit how far a
+        strut may lean.
+        """
     def lengths_at(self, joints: ArrayLike, placements: ArrayLike) -> _Floats:
         """(n, n_closure) present length of each strut, m."""
     def pose_of(self, placements: ArrayLike) -> _Floats:
@@ -379,3 +409,151 @@ def use_instruction_set(name: str) -> None:
 
 def _rebuild(table: Mapping[str, Any], replaced: Mapping[int, float]) -> Machine:
     """A machine from its pickle."""
+
+# Programs (gcode.rs). Here lengths are mm and angles degrees: the programs' world. Coordinates are
+# of the machine (offsets applied), axes in the order of GCODE_AXES; one not known is NaN.
+
+GCODE_AXES: str
+"""The axes' letters in the order of all columns: XYZABCUVW."""
+
+class GcodeError(ValueError):
+    """A program cannot be interpreted, or written anew, exactly. For `code` see `gcode_codes`."""
+
+    code: str
+    message: str
+    line: int
+    column: int
+    found: str | None
+    expected: str | None
+    hint: str | None
+
+def gcode_codes() -> dict[str, str]:
+    """The codes that a `GcodeError` can have, each with its meaning in one line."""
+
+@final
+class GcodeMoves:
+    """Some moves of a program, in its order. Every property makes a new array."""
+
+    def __len__(self) -> int: ...
+    @property
+    def line(self) -> NDArray[np.int64]:
+        """Line of the program, from 1 on, (n,)."""
+    @property
+    def kind(self) -> NDArray[np.uint8]:
+        """0 rapid (also the way to the intermediate point of G28 and G30), 1 line, 2 arc, (n,)."""
+    @property
+    def start(self) -> _Floats:
+        """(n, 9), mm and degrees."""
+    @property
+    def end(self) -> _Floats:
+        """(n, 9), mm and degrees."""
+    @property
+    def length(self) -> _Floats:
+        """Length of the path that F refers to, (n,).
+
+        In mm of X Y Z; where these stand still of U V W; where those do too in degrees of A B C.
+        """
+    @property
+    def plane(self) -> NDArray[np.uint8]:
+        """17, 18 or 19 for an arc, else 0, (n,)."""
+    @property
+    def centre(self) -> _Floats:
+        """Centre of an arc, mm, on the axes XY, ZX or YZ of its plane, else NaN, (n, 2)."""
+    @property
+    def sweep(self) -> _Floats:
+        """Angle of an arc, rad, all turns included, counterclockwise positive, else 0, (n,)."""
+    @property
+    def turns(self) -> NDArray[np.int32]:
+        """Turns of an arc, begun ones included, clockwise negative, else 0, (n,)."""
+    def points(self, index: NDArray[np.int64], share: _Floats) -> _Floats:
+        """The points of the moves `index` (k,) at `share` (k,) of their paths, (k, 9).
+
+        0 is the start and 1 the end; arcs, helices, several turns and what goes along with them
+        included. Raises IndexError.
+        """
+
+@final
+class GcodeReader:
+    """Reads the moves of a program of any size, in constant memory.
+
+    Args:
+        path: the program.
+        units: "mm" or "inch" before the first G20 or G21; without it a length before these is
+            refused.
+        start: where the machine stands, by axis letter; axes not named are not known.
+        offsets: "G54" ... "G59", "G59.1" ... "G59.3" to offsets by axis letter; 0 where not named.
+        reference: "G28" and "G30" to the coordinates that they go to, by axis letter, where known.
+        block_delete: whether lines that begin with / are left out; None refuses them.
+        axes: letters of the axes that must be known at the end of every move, and at the start of
+            every one at feed.
+
+    Raises OSError, and ValueError for a setting that is none.
+    """
+
+    def __new__(
+        cls,
+        path: str | PathLike[str],
+        *,
+        units: str | None = None,
+        start: dict[str, float] | None = None,
+        offsets: dict[str, dict[str, float]] | None = None,
+        reference: dict[str, dict[str, float]] | None = None,
+        block_delete: bool | None = None,
+        axes: str = "XYZ",
+    ) -> GcodeReader: ...
+    def read(self, most_moves: int) -> GcodeMoves:
+        """The next moves, at most so many; none at the end. Raises GcodeError, OSError."""
+    @property
+    def lines(self) -> int:
+        """Lines read."""
+
+@final
+class GcodeCorrector:
+    """Writes a program anew, block by block, with corrected and divided moves.
+
+    Everything that moves nothing stays as it is, where it is. `read` a batch, `write` its pieces,
+    until `read` finds no more moves; then `finish`. Arguments are those of `GcodeReader`, and
+
+    Args:
+        target: the file to write; emptied at once.
+        axes: letters of the axes that are corrected. The others are written where the program
+            writes them, and go along on the programmed path.
+        digits: decimals of mm and degrees, 0 to 8; inches have one more.
+    """
+
+    def __new__(
+        cls,
+        path: str | PathLike[str],
+        target: str | PathLike[str],
+        *,
+        units: str | None = None,
+        start: dict[str, float] | None = None,
+        offsets: dict[str, dict[str, float]] | None = None,
+        reference: dict[str, dict[str, float]] | None = None,
+        block_delete: bool | None = None,
+        axes: str = "XYZ",
+        digits: int = 6,
+    ) -> GcodeCorrector: ...
+    def read(self, most_moves: int) -> GcodeMoves:
+        """The next moves, at most so many; none behind the last.
+
+        Fewer where much text stands between them. Raises GcodeError, OSError, and RuntimeError
+        where those before are not written.
+        """
+    def write(self, counts: NDArray[np.int64], points: _Floats, shares: _Floats) -> None:
+        """Writes the moves read last.
+
+        Args:
+            counts: pieces of each move, (n,), one or more.
+            points: where each piece ends, (sum of counts, 9), machine coordinates in mm and
+                degrees; columns of axes that are not corrected are not looked at.
+            shares: share of the move's programmed path at each piece's end, (sum of counts,),
+                rising to exactly 1.
+
+        Raises GcodeError, OSError, and RuntimeError where the arrays do not fit the moves.
+        """
+    def finish(self) -> None:
+        """Writes what is left, which moves nothing. Raises GcodeError, OSError, RuntimeError."""
+    @property
+    def lines(self) -> int:
+        """Lines read."""

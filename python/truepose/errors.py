@@ -129,6 +129,43 @@ CATALOGUE: dict[str, str] = {
     "output-is-input": "the output would write over the machine file",
     "output-exists": "a new file is wanted where there is one already",
     "unknown-kind": "a kind of machine that is not in the library",
+    # controllers
+    "unknown-controller": "a controller that there is no adapter for",
+    "bad-option": "an option of a controller's adapter that it does not have or cannot read",
+    "controller-cannot": "a machine that the controller has no way to take",
+    # programs
+    "gcode-not-text": "a byte that no program has outside of comments",
+    "gcode-line-too-long": "a line of a program longer than a controller reads",
+    "gcode-bad-character": "a character that no word begins with",
+    "gcode-comment": "a comment that is not closed, or one within another",
+    "gcode-no-number": "a letter of a program without its number",
+    "gcode-bad-number": "a number of a program that cannot be read",
+    "gcode-number-range": "a number of a program too large to be kept exactly",
+    "gcode-parameters": "a program that computes: parameters, expressions, functions",
+    "gcode-flow": "a program with subprograms, loops or conditions",
+    "gcode-block-delete": "a line that begins with /, and nobody says whether it counts",
+    "gcode-word-twice": "a letter twice in one block",
+    "gcode-modal-group": "two codes of one block that exclude each other",
+    "gcode-too-many-codes": "more M codes in a block than a controller takes",
+    "gcode-unknown-code": "a G or M code that is not known",
+    "gcode-unsupported": "a G or M code that cannot be corrected exactly",
+    "gcode-unused-word": "a word that nothing in its block uses",
+    "gcode-shared-word": "a word that two codes of its block use",
+    "gcode-missing-word": "a word that a code needs is not there",
+    "gcode-bad-value": "a word with a number that its code cannot take",
+    "gcode-no-units": "a length before G20 or G21 says what it is",
+    "gcode-no-motion": "an axis word where no motion is active",
+    "gcode-no-feed": "a move at feed before a feed rate is given",
+    "gcode-position-unknown": "a move whose start or end is not known",
+    "gcode-arc": "an arc that does not close, or is none",
+    "gcode-division": "a block that cannot be divided or corrected as asked",
+    "gcode-pose": "a move of a program onto or over a pose that the machine cannot be commanded to",
+    "gcode-singularity": "a move of a program onto or through a singularity",
+    "gcode-tolerance": "a move of a program that no division brings within the tolerance",
+    "gcode-axis": "a move of an axis that the platform moves in but that cannot be commanded",
+    "gcode-start": "the machine cannot be where the program is said to start",
+    "gcode-proof": "a corrected program that, read back, does not keep its tolerance",
+    "bad-correction": "an option of a corrected program that is not what it can be",
 }
 """Every code with its meaning in one line. A `Problem` refuses a code that is not here."""
 
@@ -137,8 +174,8 @@ CATALOGUE: dict[str, str] = {
 class Problem:
     """One thing that is wrong with the input, for people (`str`) and for programs (`to_dict`).
 
-    `line` counts from 1. `path` is the key inside the file, rows of an array by their name:
-    `strut.1.length`.
+    `line` and `column` count from 1. `path` is the key inside the file, rows of an array by their
+    name: `strut.1.length`.
     """
 
     code: str
@@ -149,15 +186,24 @@ class Problem:
     found: str | None = None
     expected: str | None = None
     hint: str | None = None
+    column: int | None = None
 
     def __post_init__(self) -> None:
         if self.code not in CATALOGUE:
             raise ValueError(f"{self.code!r} is not in truepose.errors.CATALOGUE")
 
+    @property
+    def place(self) -> tuple[str, ...]:
+        """File, line and column, as far as they are known."""
+        known = []
+        for part in (self.file, self.line, self.column):
+            if part is None:
+                break
+            known.append(str(part))
+        return tuple(known)
+
     def __str__(self) -> str:
-        place = "" if self.file is None else f"{self.file}:"
-        if place and self.line is not None:
-            place += f"{self.line}:"
+        place = "".join(f"{part}:" for part in self.place)
         lines = [f"{place} error[{self.code}]: {self.message}".lstrip()]
         for label in ("found", "expected", "hint"):
             value = getattr(self, label)

@@ -76,6 +76,30 @@ def require_new(path: Path) -> None:
         )
 
 
+def require_folder(path: Path) -> None:
+    """Refuse a folder that files cannot be written into; one that is not there will be made.
+
+    Raises `RequestError` (code `output-not-writable`).
+    """
+    standing = next(each for each in (path, *path.absolute().parents) if each.exists())
+    if not standing.is_dir():
+        raise _refusal(
+            "output-not-writable",
+            "the output folder is a file",
+            path,
+            found=f"the file {standing}",
+            expected="a folder, or a name that is free",
+        )
+    if not os.access(standing, os.W_OK | os.X_OK):
+        raise _refusal(
+            "output-not-writable",
+            "nothing may be written into the output folder",
+            path,
+            found=f"no write permission for {standing}",
+            expected="a folder that you may write into",
+        )
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A temporary file beside `path` that takes its place when the block ends well.

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from truepose.errors import RequestError
-from truepose.report.writing import replacing, require_new, require_writable
+from truepose.output import replacing, require_new, require_writable
 
 
 def test_the_file_takes_its_place_at_the_end(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from truepose.budget.band_ends import Ends
 from truepose.budget.comparison import quantities
 from truepose.budget.dataset import Schema, Variable, region_dataset
 from truepose.budget.evaluate import required_sources
+from truepose.budget.length_law import law_of_length
 from truepose.budget.poses import Progress, Walk, faults_text, pose_in_words
 from truepose.budget.spread import spread
 from truepose.errors import Problem, RequestError
@@ -32,9 +33,6 @@ from truepose.sources._base import Floats, Indices
 
 MOST_BOXES = 10_000
 """Parts of a region that are looked at before giving up."""
-
-ROUNDING = 1e-9
-"""Of a known deviation: by which its law over lengths is widened, and may be missed."""
 
 _ALL = ("component",)
 _SIZE = ("quantity",)
@@ -270,22 +268,13 @@ def _affine(machine: Machine, columns: Indices, table: Floats, block: Block) -> 
     result: list[Affine] = []
     for at, column in enumerate(columns.tolist()):
         values = table[:, at]
-        if not np.ptp(values).any():
-            result.append((column, (float(values[0]), float(values[0])), 0.0, 0))
-            continue
         strut = of_strut.get(column)
-        if strut is None:
+        lengths = np.zeros(len(values)) if strut is None else block.lengths[:, strut]
+        law = law_of_length(values, lengths)
+        if law is None:
             return None
-        lengths = block.lengths[:, strut]
-        low, high = int(np.argmin(lengths)), int(np.argmax(lengths))
-        if lengths[high] <= lengths[low]:
-            return None
-        slope = float((values[high] - values[low]) / (lengths[high] - lengths[low]))
-        constant = float(values[low] - slope * lengths[low])
-        slack = ROUNDING * float(np.abs(values).max())
-        if (np.abs(constant + slope * lengths - values) > slack).any():
-            return None
-        result.append((column, (constant - slack, constant + slack), slope, strut))
+        constant, slope, slack = law
+        result.append((column, (constant - slack, constant + slack), slope, strut or 0))
     return result
 
 

@@ -31,7 +31,7 @@ def _show_on_terminal(problems: tuple[Problem, ...]) -> None:
 
     console = Console(stderr=True, highlight=False)
     for problem in problems:
-        place = ":".join(str(part) for part in (problem.file, problem.line) if part is not None)
+        place = ":".join(problem.place)
         head = Text.assemble(
             (f"{place}: " if place else "", "bold"),
             ("error", "bold red"),

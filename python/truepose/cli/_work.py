@@ -21,12 +21,12 @@ from truepose.cli._show import show_tables
 from truepose.errors import Problem, RequestError
 from truepose.machine.suggestion import counted
 from truepose.machine.workspace import Accuracy
+from truepose.output import require_writable
 from truepose.report import formats
 from truepose.report.display import nearest_middle, pose_text, where_highest
 from truepose.report.result import Result
 from truepose.report.study import Study
 from truepose.report.tables import Table
-from truepose.report.writing import require_writable
 
 if TYPE_CHECKING:
     import xarray as xr

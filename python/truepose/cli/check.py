@@ -38,9 +38,9 @@ def command(**options: Any) -> int:
     compensation would leave is shown beside it.
     """
     from truepose.cli import _work
+    from truepose.output import replacing
     from truepose.report import accuracy, inputs
     from truepose.report.reach import reach
-    from truepose.report.writing import replacing
 
     request = Request(**options)
     machine = _work.read_machine(request, [".json", ".csv"])

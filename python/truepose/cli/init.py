@@ -39,7 +39,7 @@ def command(kind: str | None, listed: bool, output: Path | None, format: str) ->
         raise click.UsageError("Give a KIND, or --list to see which there are.")
     from truepose.cli._work import note_written
     from truepose.machine import library
-    from truepose.report.writing import replacing, require_new, require_writable
+    from truepose.output import replacing, require_new, require_writable
 
     if kind is None:
         _show(library.machines(), format)

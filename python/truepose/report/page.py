@@ -9,11 +9,11 @@ import jinja2
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
+from truepose.output import replacing
 from truepose.report import how_sure, inputs, tables
 from truepose.report.accuracy import AFTER, BEFORE, answers, met
 from truepose.report.figures import draw
 from truepose.report.study import Study
-from truepose.report.writing import replacing
 
 LIMITS = (
     "These results hold for the sources found in the machine file and for the poses evaluated, "

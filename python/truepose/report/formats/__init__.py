@@ -9,8 +9,8 @@ import importlib
 from collections.abc import Iterator
 from pathlib import Path
 
+from truepose.output import replacing
 from truepose.report.result import Result
-from truepose.report.writing import replacing
 
 FORMATS: dict[str, str] = {
     ".json": "truepose.report.formats.json_text",

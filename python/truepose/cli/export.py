@@ -1,0 +1,101 @@
+"""`truepose export`: what a controller is to be given for a machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from truepose.cli._options import set_option, takes
+
+
+@click.command("export")
+@takes(
+    click.argument("controller", required=False),
+    click.argument(
+        "machine_file",
+        metavar="[MACHINE.toml]",
+        type=click.Path(path_type=Path),
+        required=False,
+    ),
+    set_option,
+    click.option(
+        "--option",
+        "options",
+        metavar="KEY=VALUE",
+        multiple=True,
+        help="What the controller's adapter may be asked besides; --list names them. "
+        "May be repeated.",
+    ),
+    click.option(
+        "--output",
+        "-o",
+        "folder",
+        metavar="FOLDER",
+        type=click.Path(path_type=Path),
+        help="Write the files into FOLDER, which is made where it is not there. Without it they "
+        "are printed.",
+    ),
+    click.option("--list", "listed", is_flag=True, help="Describe every controller, and stop."),
+)
+def command(
+    controller: str | None,
+    machine_file: Path | None,
+    settings: tuple[str, ...],
+    options: tuple[str, ...],
+    folder: Path | None,
+    listed: bool,
+) -> int:
+    """Print what a CONTROLLER is to be given for the machine.
+
+    C or a module with the machine's kinematics and live compensation, the numbers of a
+    controller's own model with what they leave over, or a map of corrections. The condition is
+    the file's; --set changes it.
+    """
+    if listed:
+        _show_controllers()
+        return 0
+    if controller is None or machine_file is None:
+        raise click.UsageError("Give a CONTROLLER and a MACHINE.toml, or --list.")
+    import truepose
+    from truepose.cli._progress import progress
+    from truepose.cli._work import note_written
+    from truepose.controllers import controller as adapter_of
+    from truepose.controllers import export
+    from truepose.output import replacing, require_folder
+
+    adapter_of(controller)
+    if folder is not None:
+        require_folder(folder)
+    machine = truepose.load(machine_file, settings=settings)
+    with progress(f"export {controller}"):
+        result = export(machine, controller, options)
+    if folder is None:
+        for name, text in result.files.items():
+            if len(result.files) > 1:
+                click.echo(f"==> {name} <==")
+            click.echo(text, nl=not text.endswith("\n"))
+    else:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in result.files.items():
+            with replacing(folder / name) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+            note_written(folder / name)
+    for line in result.statement:
+        click.echo(line, err=folder is None)
+    return 0
+
+
+def _show_controllers() -> None:
+    from truepose.cli._show import show_tables
+    from truepose.controllers import REGISTRY
+    from truepose.controllers import controller as adapter_of
+    from truepose.report.tables import Table
+
+    header = ("controller", "what it is given", "options")
+    rows = []
+    for name in REGISTRY:
+        adapter = adapter_of(name)
+        described = (f"{key}: {option.doc}" for key, option in adapter.options.items())
+        rows.append((name, adapter.doc, "; ".join(described)))
+    show_tables([Table("controllers", "Controllers", header, tuple(rows), words=len(header))])

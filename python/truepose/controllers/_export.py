@@ -1,0 +1,136 @@
+"""The one form in which every controller is served: a machine in, text files and a statement out.
+
+A controller's adapter is one folder. It knows its controller's language and, where that has only
+a small model of its own, states the model as a machine; fitting, evaluating and judging are done
+once for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol
+
+from truepose.errors import Problem, ReadingError, RequestError
+from truepose.machine import Machine
+from truepose.machine.suggestion import did_you_mean, one_of
+from truepose.machine.units import UnitSystem
+
+
+@dataclass(frozen=True)
+class Option:
+    """One thing that may be asked of an adapter.
+
+    `dimension` names what a quantity measures ("length", "ratio" for a plain number, ...), SI
+    once read; None: the value is text. `choices` are the words of a text that is one of them.
+    """
+
+    default: float | str
+    doc: str
+    dimension: str | None = "ratio"
+    choices: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Export:
+    """What an adapter gives.
+
+    `files`: name -> whole text, to be written into one folder. `statement`: what the user must
+    know, one line each: what is left over in µm and where, what the export leaves out.
+    """
+
+    files: Mapping[str, str]
+    statement: tuple[str, ...] = field(default=())
+
+
+class Controller(Protocol):
+    """A controller's adapter."""
+
+    name: ClassVar[str]
+    doc: ClassVar[str]
+    options: ClassVar[Mapping[str, Option]]
+
+    @classmethod
+    def export(cls, machine: Machine, options: Mapping[str, float | str]) -> Export:
+        """What the controller is to be given for `machine` in its condition.
+
+        `options` has a value, SI, for every one declared. Raises `RequestError`
+        (controller-cannot) where the controller has no way to take the machine.
+        """
+        ...
+
+
+def options_of(
+    controller: type[Controller], machine: Machine, given: Mapping[str, str] | Sequence[str] = ()
+) -> dict[str, float | str]:
+    """Every option of a controller: what is `given` (`["clamp=1 mm"]`), else its default.
+
+    Bare numbers are in the units of the machine file. Raises `RequestError` (bad-option), all
+    problems at once.
+    """
+    units = UnitSystem(machine.file_units)
+    pairs = given.items() if isinstance(given, Mapping) else (_pair(text) for text in given)
+    values: dict[str, float | str] = {key: o.default for key, o in controller.options.items()}
+    problems = []
+    for key, text in pairs:
+        option = controller.options.get(key)
+        if option is None:
+            problems.append(_unknown(controller, key))
+            continue
+        try:
+            values[key] = _read(option, units, text)
+        except ReadingError as failure:
+            problems.append(
+                Problem(
+                    "bad-option",
+                    f"option {key} of {controller.name}: {failure.message}",
+                    found=failure.found or repr(text),
+                    expected=failure.expected or option.doc,
+                    hint=failure.hint,
+                )
+            )
+    if problems:
+        raise RequestError(*problems)
+    return values
+
+
+def _pair(text: str) -> tuple[str, str]:
+    key, _, value = text.partition("=")
+    return key.strip(), value.strip()
+
+
+def _read(option: Option, units: UnitSystem, text: str) -> float | str:
+    if option.dimension is not None:
+        return units.read(text, option.dimension)
+    if option.choices and text not in option.choices:
+        raise ReadingError(
+            "bad-option", "no such choice", found=repr(text), expected=one_of(option.choices)
+        )
+    return text
+
+
+def _unknown(controller: type[Controller], key: str) -> Problem:
+    return Problem(
+        "bad-option",
+        f"{controller.name} has no option {key!r}",
+        found=repr(key),
+        expected=one_of(sorted(controller.options)) if controller.options else "no option",
+        hint=did_you_mean(key, controller.options),
+    )
+
+
+def cannot(controller: str, machine: Machine, found: str, expected: str, hint: str) -> RequestError:
+    """The refusal of a machine that the controller has no way to take."""
+    return RequestError(
+        Problem(
+            "controller-cannot",
+            f"{controller} cannot take this machine",
+            file=machine.file,
+            found=found,
+            expected=expected,
+            hint=hint,
+        )
+    )
+
+
+__all__ = ["Controller", "Export", "Option", "cannot", "options_of"]

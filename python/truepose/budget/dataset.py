@@ -137,7 +137,7 @@ def assemble(
         **_left_out_coords(machine, poses, left_out),
         **(coords or {}),
     }
-    attrs = _provenance(machine, condition)
+    attrs = provenance(machine, condition)
     attrs |= {"poses_used": rows.count, "poses_left_out": len(poses) - rows.count}
     return xr.Dataset(data, labels, attrs)
 
@@ -157,7 +157,7 @@ def region_dataset(
         "commanded_units": label("commanded", commanded_units(machine), "unit of the freedom"),
         **quantity_coords(machine),
     }
-    return xr.Dataset(data, labels, _provenance(machine, condition))
+    return xr.Dataset(data, labels, provenance(machine, condition))
 
 
 def function_dataset(
@@ -300,7 +300,8 @@ def _left_out_coords(machine: Machine, poses: Floats, left_out: LeftOut) -> dict
     return coords
 
 
-def _provenance(machine: Machine, condition: Condition) -> dict[str, str | int | float]:
+def provenance(machine: Machine, condition: Condition) -> dict[str, str | int | float]:
+    """Version, machine file with its hash, changes to it and condition: what every result says."""
     attrs: dict[str, str | int | float] = {
         "truepose_version": version("truepose"),
         "machine": machine.name,

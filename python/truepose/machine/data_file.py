@@ -439,11 +439,14 @@ class _Reader:
         message: str,
         line: int | None = None,
         column: str | None = None,
-        **parts: str | None,
+        *,
+        found: str | None = None,
+        expected: str | None = None,
+        hint: str | None = None,
     ) -> None:
         if column is not None:
             message = f"{column}: {message}"
-        problem = Problem(code, message, self.file, line, column, **parts)
+        problem = Problem(code, message, self.file, line, column, found, expected, hint)
         self._problems.setdefault((code, column), []).append(problem)
 
 

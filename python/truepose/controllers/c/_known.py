@@ -25,6 +25,7 @@ from truepose.budget.poses import Walk, no_pose_left
 from truepose.controllers._export import cannot
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.machine.parts_of_machine import Body, Drive, Strut
 from truepose.machine.suggestion import did_you_mean, one_of
 from truepose.sources import Block, Source, acting
 from truepose.sources._base import Floats, Indices
@@ -132,7 +133,8 @@ def _probe(machine: Machine, condition: Condition) -> Block:
 
 def _expanding(machine: Machine) -> Iterator[str]:
     """Parts that grow with their temperature."""
-    parts = (*machine.struts, *machine.drives, machine.frame, machine.platform, machine.tool)
+    bodies = (machine.frame, machine.platform, machine.tool)
+    parts: tuple[Strut | Drive | Body, ...] = (*machine.struts, *machine.drives, *bodies)
     return (part.part for part in parts if part.expansion)
 
 

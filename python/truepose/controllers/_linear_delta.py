@@ -1,0 +1,149 @@
+"""The linear delta as printers' firmware and lineardeltakins have it.
+
+Towers stand upright at a radius R about the z axis, each with one rod of length L to the tool point
+below. The carriage of tower i, at the angle a_i, stands at the height
+
+    s_i = z + sqrt(L_i^2 - (R cos a_i - x)^2 - (R sin a_i - y)^2) + u x + v y
+
+where u and v, the tilt, exist in some controllers only. Where the endstop trips, s_i is h_i: that
+is how the controller's heights and the machine's joint coordinates q_i belong together,
+
+    q_i = e_i + up_i (s_i - h_i),
+
+with the joint coordinate e_i at which it trips and the sense up_i of the drive.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.controllers._delta import LEAN, Limb, limbs
+from truepose.controllers._export import cannot
+from truepose.controllers._homing import switches
+from truepose.controllers._small_model import INSTEAD, Parameter
+from truepose.machine import Machine
+from truepose.sources._base import Floats, Indices
+
+RADIUS, ANGLES, ARMS, HEIGHTS, TILT = (
+    slice(0, 1),
+    slice(1, 4),
+    slice(4, 7),
+    slice(7, 10),
+    slice(10, 12),
+)
+"""Places of the twelve numbers: R, a_i, L_i, h_i and u, v, in the order of the towers."""
+
+COUNT = 12
+
+Numbers = Floats
+
+
+@dataclass(frozen=True)
+class LinearDelta:
+    """The nominal machine as a linear delta.
+
+    `order` (3,): number of the drive of each tower; `up` (3,): +1 where its coordinate rises with
+    the carriage, else -1; `switch` (3,): coordinates e_i, m. `nominal` (12,): the numbers above.
+    """
+
+    machine: Machine
+    order: Indices
+    up: Floats
+    switch: Floats
+    nominal: Numbers
+
+    def joints(self, numbers: Numbers, poses: Floats) -> Floats:
+        """(n, 3) joint coordinates, in the machine's order, for `poses` (n, 3) x y z."""
+        x, y, z = poses.T[:, :, np.newaxis]
+        radius, angles, arms = numbers[RADIUS], numbers[ANGLES], numbers[ARMS]
+        across = (radius * np.cos(angles) - x) ** 2 + (radius * np.sin(angles) - y) ** 2
+        with np.errstate(invalid="ignore"):  # out of reach is NaN
+            rise = np.sqrt(arms**2 - across)
+        heights = z + rise + numbers[TILT][0] * x + numbers[TILT][1] * y
+        found = np.empty((len(poses), 3))
+        found[:, self.order] = self.switch + self.up * (heights - numbers[HEIGHTS])
+        return found
+
+    def in_order(self, order: list[int]) -> LinearDelta:
+        """The same with its towers counted in another order."""
+        nominal = self.nominal.copy()
+        for places in (ANGLES, ARMS, HEIGHTS):
+            nominal[places] = self.nominal[places][order]
+        return LinearDelta(
+            self.machine, self.order[order], self.up[order], self.switch[order], nominal
+        )
+
+    def names(self) -> list[str]:
+        """Names of the drives, tower by tower."""
+        return [self.machine.drives[index].name for index in self.order]
+
+
+def linear_delta(
+    machine: Machine, options: Mapping[str, float | str], controller: str
+) -> LinearDelta:
+    """The machine as a linear delta, its towers in the order of the drives.
+
+    Raises `RequestError`: controller-cannot, bad-option.
+    """
+    found = limbs(machine, controller, "slider")
+    for limb in found:
+        if abs(limb.axis[2]) < math.cos(LEAN):
+            raise _refused(machine, controller, f"drive {limb.drive.name}, which is not upright")
+        if limb.base[2] + limb.origin[2] <= limb.platform[2] + _home(machine)[2]:
+            raise _refused(machine, controller, f"carriage {limb.drive.name} below the platform")
+    up = np.array([math.copysign(1.0, limb.axis[2]) for limb in found])
+    ends = [limb.drive.travel[1 if sense > 0 else 0] for limb, sense in zip(found, up, strict=True)]
+    switch = switches(machine, options, ends, controller)
+    heads = np.array([_head(machine, limb) for limb in found])
+    nominal = np.zeros(COUNT)
+    nominal[RADIUS] = np.hypot(heads[:, 0], heads[:, 1]).mean()
+    nominal[ANGLES] = np.arctan2(heads[:, 1], heads[:, 0])
+    nominal[ARMS] = [limb.length for limb in found]
+    nominal[HEIGHTS] = heads[:, 2] + up * (switch - [limb.home for limb in found])
+    return LinearDelta(machine, np.arange(3), up, switch, nominal)
+
+
+def parameters(delta: LinearDelta, *, tilt: bool = False) -> tuple[Parameter, ...]:
+    """All numbers of the delta as what can be fitted, with or without the tilt."""
+    radius = float(delta.nominal[RADIUS][0])
+    names = ["delta radius"]
+    for what in ("angle", "rod", "endstop"):
+        names += [f"{what} {drive}" for drive in delta.names()]
+    names += ["tilt along x", "tilt along y"]
+    sizes = [1.0] + [1.0 / radius] * 3 + [1.0] * 6 + [1.0 / radius] * 2
+    count = COUNT if tilt else TILT.start
+    return tuple(
+        Parameter(*each)
+        for each in zip(names[:count], delta.nominal[:count].tolist(), sizes[:count], strict=True)
+    )
+
+
+def endstop(numbers: Numbers) -> Floats:
+    """(3,) height of the tool at x = y = 0 at which each carriage trips its endstop, m."""
+    found: Floats = numbers[HEIGHTS] - np.sqrt(numbers[ARMS] ** 2 - numbers[RADIUS] ** 2)
+    return found
+
+
+def heights(endstops: Floats, arms: Floats, radius: float) -> Floats:
+    """(3,) heights of the carriages at the endstops: `endstop` undone."""
+    found: Floats = endstops + np.sqrt(arms**2 - radius**2)
+    return found
+
+
+def _head(machine: Machine, limb: Limb) -> Floats:
+    """(3,) the carriage at home as seen with the effector shrunk to the tool point, base frame."""
+    found: Floats = limb.origin + limb.base - limb.platform
+    return found
+
+
+def _home(machine: Machine) -> Floats:
+    return machine.home[:3]
+
+
+def _refused(machine: Machine, controller: str, found: str) -> Exception:
+    wanted = "a delta with upright guideways and the carriages above the platform"
+    return cannot(controller, machine, found, wanted, INSTEAD)

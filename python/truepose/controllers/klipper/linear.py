@@ -1,0 +1,110 @@
+"""Klipper's `kinematics: delta`: one radius, and an angle, a rod and an endstop a tower.
+
+`position_endstop` is the height of the nozzle over z = 0, in the middle, at which the tower's
+endstop trips; `delta_radius` counts for every tower. Facts from Klipper's configuration reference
+(https://www.klipper3d.org/Config_Reference.html, linear delta kinematics) and delta page.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from truepose.controllers._delta import print_radius
+from truepose.controllers._linear_delta import (
+    ANGLES,
+    ARMS,
+    COUNT,
+    HEIGHTS,
+    RADIUS,
+    TILT,
+    endstop,
+    heights,
+    linear_delta,
+    parameters,
+)
+from truepose.controllers._small_model import Parameter, Printed, ascii_only, fixed
+from truepose.machine import Machine
+from truepose.sources._base import Floats
+
+MM = 1e-3
+LENGTH_DIGITS, ANGLE_DIGITS = 6, 7
+STEPPERS = "abc"
+
+
+class Linear:
+    """A `SmallModel` of ten numbers; stepper_a drives the machine's first drive, and so on."""
+
+    def __init__(self, machine: Machine, options: Mapping[str, float | str]) -> None:
+        """Raises `RequestError`: controller-cannot, bad-option."""
+        self._machine = machine
+        self._delta = linear_delta(machine, options, "klipper")
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """R, angles, rods and heights."""
+        return parameters(self._delta)
+
+    def joints(self, values: Floats, poses: Floats) -> Floats:
+        """(n, 3) joint coordinates, m, for poses (n, 3)."""
+        return self._delta.joints(_all(values), poses)
+
+    def printed(self, values: Floats) -> Printed:
+        """Numbers by section and key, mm and degrees."""
+        numbers = _all(values)
+        found = {"printer.delta_radius": fixed(float(numbers[RADIUS][0]) / MM, LENGTH_DIGITS)}
+        each = zip(
+            STEPPERS,
+            np.degrees(numbers[ANGLES]) % 360.0,
+            numbers[ARMS] / MM,
+            endstop(numbers) / MM,
+            strict=True,
+        )
+        for letter, angle, arm, height in each:
+            found[f"stepper_{letter}.angle"] = fixed(angle, ANGLE_DIGITS)
+            found[f"stepper_{letter}.arm_length"] = fixed(arm, LENGTH_DIGITS)
+            found[f"stepper_{letter}.position_endstop"] = fixed(height, LENGTH_DIGITS)
+        return found
+
+    def taken(self, printed: Printed) -> Floats:
+        """(10,) the model's values of printed numbers."""
+
+        def of(key: str) -> Floats:
+            return np.array([float(printed[f"stepper_{letter}.{key}"]) for letter in STEPPERS])
+
+        radius, arms = float(printed["printer.delta_radius"]) * MM, of("arm_length") * MM
+        values = np.empty(TILT.start)
+        values[RADIUS], values[ARMS] = radius, arms
+        values[ANGLES] = np.radians(of("angle"))
+        values[HEIGHTS] = heights(of("position_endstop") * MM, arms, radius)
+        return values
+
+    def block(self, printed: Printed) -> list[str]:
+        """The sections of printer.cfg."""
+        z = self._machine.poses()[:, 2]
+        reach = math.ceil(print_radius(self._machine) / MM * 10.0) / 10.0
+        lines = [
+            "[printer]",
+            "kinematics: delta",
+            f"delta_radius: {printed['printer.delta_radius']}",
+            "# of the workspace, not fitted:",
+            f"print_radius: {reach:.1f}",
+            f"minimum_z_position: {min(0.0, math.floor(z.min() / MM)):.0f}",
+        ]
+        for letter, drive in zip(STEPPERS, self._delta.names(), strict=True):
+            lines += ["", f"# drive {ascii_only(drive)}", f"[stepper_{letter}]"]
+            for key in ("position_endstop", "arm_length", "angle"):
+                lines.append(f"{key}: {printed[f'stepper_{letter}.{key}']}")
+        return lines
+
+
+def _all(values: Floats) -> Floats:
+    """(12,) the numbers of a linear delta, without a tilt."""
+    numbers = np.zeros(COUNT)
+    numbers[: TILT.start] = values
+    return numbers
+
+
+__all__ = ["Linear"]

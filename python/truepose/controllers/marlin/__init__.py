@@ -1,0 +1,143 @@
+"""Marlin: linear deltas, as M665 and M666.
+
+    M665 L rod, R radius, H height, X Y Z tower angle trims (degrees, counter-clockwise seen from
+         above, from 210, 330 and 90 degrees), A B C rod trims (added to L)
+    M666 X Y Z endstop adjustments, zero or less: by how much a carriage is lowered from its endstop
+         before the three stand as for the nozzle at x = y = 0, z = H
+
+Two numbers say one thing twice: the mean of A, B and C is made 0; the highest adjustment is
+made `least` below 0, since Marlin leaves out one that is shorter than MIN_STEPS_PER_SEGMENT steps.
+The radius trims of single towers can be set in Configuration.h only and are taken to be 0. With a
+bed probe Marlin homes to H less the probe's z offset (M851 Z), which is what the option
+`probe_offset` is for. Facts: https://marlinfw.org/docs/gcode/M665.html and M666.html, and the
+behaviour of Marlin 2.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from truepose.controllers._delta import SWITCHES, TOWERS, tower_order, wrapped
+from truepose.controllers._export import Export, Option
+from truepose.controllers._fit import fit, heading
+from truepose.controllers._linear_delta import (
+    ANGLES,
+    ARMS,
+    COUNT,
+    HEIGHTS,
+    RADIUS,
+    TILT,
+    endstop,
+    heights,
+    linear_delta,
+    parameters,
+)
+from truepose.controllers._small_model import Parameter, Printed, ascii_only, fixed, stem
+from truepose.errors import Problem, RequestError
+from truepose.machine import Machine
+from truepose.sources._base import Floats
+
+MM = 1e-3
+LENGTH_DIGITS, ANGLE_DIGITS = 5, 6
+AXES, TRIMS = "XYZ", "ABC"
+
+
+class _Model:
+    """A `SmallModel` of ten numbers; its towers are counted as Marlin does."""
+
+    def __init__(self, machine: Machine, options: Mapping[str, float | str]) -> None:
+        delta = linear_delta(machine, options, "marlin")
+        self.delta = delta.in_order(tower_order(delta.nominal[ANGLES]))
+        self._probe = float(options["probe_offset"])
+        self._least = float(options["least"])
+        if self._least < 0.0:
+            raise RequestError(
+                Problem(
+                    "bad-option",
+                    "option least of marlin would raise a carriage over its endstop",
+                    found=f"{self._least / MM:g} mm",
+                    expected="zero or more",
+                )
+            )
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return parameters(self.delta)
+
+    def joints(self, values: Floats, poses: Floats) -> Floats:
+        return self.delta.joints(_all(values), poses)
+
+    def printed(self, values: Floats) -> Printed:
+        numbers = _all(values)
+        trips, arms = endstop(numbers), numbers[ARMS]
+        height = float(trips.min()) - self._least
+        lengths = {"L": float(arms.mean()), "R": float(numbers[RADIUS][0])}
+        lengths["H"] = height + self._probe
+        lengths |= dict(zip(TRIMS, arms - arms.mean(), strict=True))
+        found = {f"M665 {word}": fixed(v / MM, LENGTH_DIGITS) for word, v in lengths.items()}
+        turned = np.degrees(wrapped(numbers[ANGLES] - TOWERS))
+        found |= {f"M665 {w}": fixed(v, ANGLE_DIGITS) for w, v in zip(AXES, turned, strict=True)}
+        lowered = (height - trips) / MM
+        found |= {f"M666 {w}": fixed(v, LENGTH_DIGITS) for w, v in zip(AXES, lowered, strict=True)}
+        return found
+
+    def taken(self, printed: Printed) -> Floats:
+        def of(code: str, words: str) -> Floats:
+            return np.array([float(printed[f"{code} {word}"]) for word in words])
+
+        radius, rod, height = of("M665", "RLH") * MM
+        values = np.empty(TILT.start)
+        values[RADIUS], values[ARMS] = radius, rod + of("M665", TRIMS) * MM
+        values[ANGLES] = TOWERS + np.radians(of("M665", AXES))
+        trips = height - self._probe - of("M666", AXES) * MM
+        values[HEIGHTS] = heights(trips, values[ARMS], radius)
+        return values
+
+    def block(self, printed: Printed) -> list[str]:
+        def line(code: str, words: str) -> str:
+            return " ".join([code, *(f"{word}{printed[f'{code} {word}']}" for word in words)])
+
+        drives = ", ".join(f"{w} {d}" for w, d in zip(AXES, self.delta.names(), strict=True))
+        return [
+            f"; towers: {ascii_only(drives)}",
+            line("M665", f"LRH{AXES}{TRIMS}"),
+            line("M666", AXES),
+            "; They count from the next homing (G28) on; M500 keeps them.",
+        ]
+
+
+class Marlin:
+    """The numbers of M665 and M666, fitted."""
+
+    name: ClassVar[str] = "marlin"
+    doc: ClassVar[str] = "M665 and M666 of a linear delta for Marlin"
+    options: ClassVar[Mapping[str, Option]] = {
+        "switches": SWITCHES,
+        "probe_offset": Option(0.0, "z offset of a bed probe, M851 Z; 0 without one", "length"),
+        "least": Option(0.0002, "how far every carriage is lowered from its endstop", "length"),
+    }
+
+    @classmethod
+    def export(cls, machine: Machine, options: Mapping[str, float | str]) -> Export:
+        """The commands to send.
+
+        Raises `RequestError`: controller-cannot, bad-option, no-workspace, no-pose-left.
+        """
+        model = _Model(machine, options)
+        found = fit(machine, model)
+        comment = [f"; {line}" for line in heading(machine, found, "Marlin")]
+        text = "\n".join([*comment, *model.block(found.printed), ""])
+        return Export({f"{stem(machine)}_marlin.gcode": text}, found.statement(machine))
+
+
+def _all(values: Floats) -> Floats:
+    """(12,) the numbers of a linear delta, without a tilt."""
+    numbers = np.zeros(COUNT)
+    numbers[: TILT.start] = values
+    return numbers
+
+
+__all__ = ["Marlin"]

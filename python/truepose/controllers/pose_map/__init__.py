@@ -1,0 +1,345 @@
+"""Pose map: what to add to a wanted pose, on a grid, for a controller with a table of its own.
+
+    commanded = wanted + correction(wanted)
+
+freedom by freedom, angles as they are programmed. Between the nodes the correction is taken to be
+multilinear; how wrong that is is found by comparing with exact corrections there.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
+from typing import ClassVar
+
+import numpy as np
+
+from truepose import _kernel
+from truepose.budget.dataset import provenance
+from truepose.budget.poses import OK, pose_in_words
+from truepose.compensation.commands import corrected_poses, with_joints
+from truepose.controllers._export import Export, Option
+from truepose.controllers._fit import Extent, angle_between, extent
+from truepose.controllers._small_model import ascii_only, fixed, stem
+from truepose.controllers.pose_map.grid import COUNT, Grid, grid_of
+from truepose.errors import Problem, RequestError
+from truepose.machine import Machine
+from truepose.machine.units import FileUnit, default_units
+from truepose.sources._base import Floats
+
+FINEST = 1e-10
+"""m and rad to which corrections are written, and finer."""
+
+SCATTERED, CENTRES = 20_000, 20_000
+"""Points at which the interpolation is judged: random ones, and middles of cells."""
+
+WORST, STEPS, ROUNDS = 30, 20, 8
+"""The search for the largest goes on from so many points, so many steps from each, so often."""
+
+SEED = 1
+
+FRAME = "base frame of the machine file; the tool point"
+CONVENTION = "R = Rz(c) Ry(b) Rx(a)"
+USE = "commanded = wanted + correction(wanted), multilinear between the nodes"
+
+
+@dataclass(frozen=True, eq=False)
+class NodeCorrections:
+    """Corrections (n_node, n_commanded) as written, in file units, NaN without one; their status.
+
+    `units`: of each commanded freedom. `digits`: decimals that are written.
+    """
+
+    machine: Machine
+    grid: Grid
+    units: tuple[FileUnit, ...]
+    digits: tuple[int, ...]
+    corrections: Floats
+    status: np.ndarray
+
+    @property
+    def corrections_si(self) -> Floats:
+        """(n_node, n_commanded) m and rad."""
+        scale = np.array([unit.scale for unit in self.units])
+        found: Floats = self.corrections * scale
+        return found
+
+
+def pose_map(machine: Machine, grid: Grid) -> NodeCorrections:
+    """Exact corrections at every node. Raises `RequestError` (no-pose-left) where there is none."""
+    nodes = grid.nodes
+    commanded, status = corrected_poses(machine, nodes)
+    if not with_joints(status).any():
+        raise RequestError(
+            Problem(
+                "no-pose-left",
+                "the machine can reach no node of the pose map",
+                file=machine.file,
+                found=f"{len(nodes)} nodes out of reach",
+                expected="a workspace within the machine's reach",
+            )
+        )
+    known = default_units() | dict(machine.file_units)
+    units = tuple(known["length" if name in "xyz" else "angle"] for name in machine.commanded)
+    digits = tuple(max(0, math.ceil(math.log10(unit.scale / FINEST))) for unit in units)
+    written = np.empty_like(nodes)
+    for column, (unit, places) in enumerate(zip(units, digits, strict=True)):
+        written[:, column] = np.round(
+            (commanded[:, column] - nodes[:, column]) / unit.scale, places
+        )
+    return NodeCorrections(machine, grid, units, digits, written, status)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What interpolation is wrong by, m and rad, over the points.
+
+    `points`: how many were compared; `left_out`: how many lie in cells with a node out of reach.
+    """
+
+    position: Extent
+    orientation: Extent | None
+    points: int
+    left_out: int
+
+
+def judge(found: NodeCorrections) -> Judged:
+    """Compare interpolated with exact corrections between the nodes.
+
+    The rms is that over points scattered all over the box. The largest is looked for from the worst
+    of those and of the middles of the cells, where a smooth correction is worst, by steps at random
+    that shrink.
+    """
+    grid = found.grid
+    middles = grid.centres()
+    chosen = np.unique(np.linspace(0, len(middles) - 1, min(len(middles), CENTRES)).astype(np.intp))
+    scattered = _compare(found, grid.scattered(SCATTERED, SEED))
+    if not len(scattered.points):
+        raise RequestError(
+            Problem(
+                "no-pose-left",
+                "no cell of the pose map lies within the machine's reach",
+                file=found.machine.file,
+                found=f"{SCATTERED} points in cells with a node out of reach",
+                expected="a workspace within the machine's reach, or more nodes",
+            )
+        )
+    first = [scattered, _compare(found, middles[chosen])]
+    searched = [_search(found, first, of) for of in (_POSITION, _ORIENTATION)]
+    every = [*first, *(each for parts in searched for each in parts)]
+
+    def over_all(of: _Of) -> Extent:
+        values = np.concatenate([of(each) for each in every])
+        even = np.arange(len(values)) < len(scattered.points)
+        return extent(values, np.concatenate([each.points for each in every]), even)
+
+    turns = any(name in "abc" for name in found.machine.commanded)
+    return Judged(
+        over_all(_POSITION),
+        over_all(_ORIENTATION) if turns else None,
+        sum(len(each.points) for each in every),
+        sum(each.left_out for each in every),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """Usable points (n, n_axis), and what interpolation is off there, (n,).
+
+    `position` in m, `orientation` in rad; `left_out`: points that are not usable.
+    """
+
+    points: Floats
+    position: Floats
+    orientation: Floats
+    left_out: int
+
+
+_Of = Callable[[_Compared], Floats]
+_POSITION: _Of = attrgetter("position")
+_ORIENTATION: _Of = attrgetter("orientation")
+
+
+def _compare(found: NodeCorrections, points: Floats) -> _Compared:
+    machine = found.machine
+    exact, status = corrected_poses(machine, points)
+    added = found.grid.interpolated(found.corrections_si, points)
+    usable = with_joints(status) & np.isfinite(added).all(axis=1)
+    at, exact, added = points[usable], exact[usable], points[usable] + added[usable]
+    linear = [column for column, name in enumerate(machine.commanded) if name in "xyz"]
+    place = machine.kernel.placement_of
+    return _Compared(
+        at,
+        np.linalg.norm((added - exact)[:, linear], axis=1),
+        angle_between(place(added), place(exact)),
+        int((~usable).sum()),
+    )
+
+
+def _search(found: NodeCorrections, first: Sequence[_Compared], of: _Of) -> list[_Compared]:
+    """More points about the worst ones: rounds of random steps, each half as long as the last."""
+    points = np.concatenate([each.points for each in first])
+    values = np.concatenate([of(each) for each in first])
+    ends = np.array([(axis.start, axis.stop) for axis in found.grid.axes])
+    cell = (ends[:, 1] - ends[:, 0]) / np.maximum(np.array(found.grid.shape) - 1, 1)
+    generator = np.random.default_rng(SEED)
+    tried: list[_Compared] = []
+    for round_ in range(ROUNDS):
+        worst = np.argsort(values)[-WORST:]
+        points, values = points[worst], values[worst]
+        steps = generator.uniform(-1.0, 1.0, (STEPS, *points.shape)) * cell * 0.5 ** (round_ + 1)
+        moved = np.clip((points + steps).reshape(-1, len(ends)), ends[:, 0], ends[:, 1])
+        tried.append(_compare(found, moved))
+        points = np.concatenate([points, tried[-1].points])
+        values = np.concatenate([values, of(tried[-1])])
+    return tried
+
+
+class PoseMap:
+    """Corrections on a grid, as CSV and JSON."""
+
+    name: ClassVar[str] = "pose-map"
+    doc: ClassVar[str] = "what to add to each pose, on a grid, as CSV and JSON for any controller"
+    options: ClassVar[Mapping[str, Option]] = {"count": COUNT}
+
+    @classmethod
+    def export(cls, machine: Machine, options: Mapping[str, float | str]) -> Export:
+        """The same map in both formats.
+
+        Raises `RequestError`: bad-option, no-workspace, grid-too-large, no-pose-left.
+        """
+        found = pose_map(machine, grid_of(machine, str(options["count"])))
+        judged = judge(found)
+        head = _head(found)
+        lines = statement(found, judged)
+        name = f"{stem(machine)}_pose_map"
+        files = {
+            f"{name}.csv": _csv(found, head, lines),
+            f"{name}.json": _json(found, judged, head),
+        }
+        return Export(files, lines)
+
+
+def statement(found: NodeCorrections, judged: Judged) -> tuple[str, ...]:
+    """Lines for the user."""
+    machine = found.machine
+    count = " x ".join(str(number) for number in found.grid.shape)
+    lines = [f"{len(found.status)} nodes ({count}); {USE}"]
+    text = f"interpolation between the nodes is off by {_words(machine, judged.position, 'm')}"
+    if judged.orientation is not None:
+        text += f"; {_words(machine, judged.orientation, 'rad')}"
+    lines.append(text)
+    lines.append(f"the corrections at the nodes: {_words(machine, _sizes(found), 'm')}")
+    lines.append(f"compared with exact corrections at {judged.points} points between the nodes")
+    names, counts = np.unique(found.status[found.status != OK], return_counts=True)
+    for code, number in zip(names, counts, strict=True):
+        what = str(_kernel.STATUS[code]).replace("_", " ")
+        lines.append(f"{number} nodes are {what}: {_instead(int(code))}")
+    if judged.left_out:
+        lines.append(f"{judged.left_out} points in cells with such a node were not compared")
+    return tuple(lines)
+
+
+def _sizes(found: NodeCorrections) -> Extent:
+    """How far corrections move the tool point."""
+    linear = [at for at, name in enumerate(found.machine.commanded) if name in "xyz"]
+    sizes = np.linalg.norm(found.corrections_si[:, linear], axis=1)
+    have = np.isfinite(sizes)
+    return extent(sizes[have], found.grid.nodes[have])
+
+
+def _instead(code: int) -> str:
+    if with_joints(np.array([code], np.uint8))[0]:
+        return "they have corrections, but must not be commanded"
+    return "they have no correction"
+
+
+def _words(machine: Machine, found: Extent, unit: str) -> str:
+    return (
+        f"at most {found.highest * 1e6:.2f} µ{unit} (at {pose_in_words(machine, found.at)}), "
+        f"rms {found.rms * 1e6:.2f} µ{unit}"
+    )
+
+
+def _head(found: NodeCorrections) -> dict[str, object]:
+    """What the map is of and how it is to be read, for both formats."""
+    known = provenance(found.machine, found.machine.condition)
+    given = {key: known[key] for key in ("truepose_version", "machine", "machine_file")}
+    return {
+        "format": "truepose pose map 1",
+        **given,
+        "machine_file_sha256": known["machine_hash"],
+        "settings": known["settings"],
+        "replaced": known["replaced"],
+        "condition": json.loads(str(known["condition"])),
+        "frame": FRAME,
+        "orientation": CONVENTION,
+        "use": USE,
+        "order": "the first axis runs fastest",
+    }
+
+
+def _csv(found: NodeCorrections, head: Mapping[str, object], lines: tuple[str, ...]) -> str:
+    out = io.StringIO()
+    for key, value in head.items():
+        text = value if isinstance(value, str) else json.dumps(value)
+        if text:
+            out.write(f"# {key}: {ascii_only(text)}\n")
+    for line in lines:
+        out.write(f"# {ascii_only(line)}\n")
+    rows = csv.writer(out, lineterminator="\n")
+    columns = [
+        f"{what}{name} ({unit.label})"
+        for what in ("", "add_")
+        for name, unit in zip(found.machine.commanded, found.units, strict=True)
+    ]
+    rows.writerow([*columns, "status"])
+    nodes = found.grid.nodes
+    for node, added, code in zip(nodes, found.corrections, found.status, strict=True):
+        place = [
+            f"{value / unit.scale:.12g}" for value, unit in zip(node, found.units, strict=True)
+        ]
+        numbers = [
+            "" if math.isnan(value) else fixed(value, places)
+            for value, places in zip(added, found.digits, strict=True)
+        ]
+        rows.writerow([*place, *numbers, _kernel.STATUS[code]])
+    return out.getvalue()
+
+
+def _json(found: NodeCorrections, judged: Judged, head: Mapping[str, object]) -> str:
+    machine = found.machine
+    axes = [
+        {"name": name, "unit": unit.label, "nodes": [float(f"{v / unit.scale:.12g}") for v in axis]}
+        for name, unit, axis in zip(machine.commanded, found.units, found.grid.values, strict=True)
+    ]
+    columns = {
+        name: [None if math.isnan(value) else float(value) for value in column]
+        for name, column in zip(machine.commanded, found.corrections.T, strict=True)
+    }
+    document = {
+        **head,
+        "interpolation_error": {
+            "position_m": _plain(judged.position),
+            "orientation_rad": None if judged.orientation is None else _plain(judged.orientation),
+            "points": judged.points,
+        },
+        "axes": axes,
+        "corrections": columns,
+        "status": [_kernel.STATUS[code] for code in found.status],
+    }
+    # One key a line: a column of numbers reads better, and shorter, along it.
+    lines = [f"{json.dumps(k)}: {json.dumps(v, allow_nan=False)}" for k, v in document.items()]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _plain(found: Extent) -> dict[str, object]:
+    return {"highest": found.highest, "rms": found.rms, "highest_at": found.at.tolist()}
+
+
+__all__ = ["NodeCorrections", "PoseMap", "judge", "pose_map"]

@@ -1,0 +1,122 @@
+"""RepRapFirmware: linear deltas, as M665 and M666.
+
+    M665 L rods (X:Y:Z tower), R radius, H height, B safe radius, X Y Z tower angle corrections
+         (degrees, counter-clockwise seen from above, from 210, 330 and 90 degrees)
+    M666 X Y Z endstop adjustments: how much higher than by R, L and H alone each carriage stands
+         at its endstop; A B tilt in percent: the heights of all carriages grow by (A x + B y) / 100
+
+H and the adjustments say one thing twice: the mean of the adjustments is made 0, as the
+firmware's own calibration does. Facts: https://docs.duet3d.com, M665 and M666, and the behaviour
+of RepRapFirmware 3; rods of different lengths need 2.03 or newer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from truepose.controllers._delta import SWITCHES, TOWERS, print_radius, tower_order, wrapped
+from truepose.controllers._export import Export, Option
+from truepose.controllers._fit import fit, heading
+from truepose.controllers._linear_delta import (
+    ANGLES,
+    ARMS,
+    COUNT,
+    HEIGHTS,
+    RADIUS,
+    TILT,
+    endstop,
+    heights,
+    linear_delta,
+    parameters,
+)
+from truepose.controllers._small_model import Parameter, Printed, ascii_only, fixed, stem
+from truepose.machine import Machine
+from truepose.sources._base import Floats
+
+MM, PERCENT = 1e-3, 1e-2
+LENGTH_DIGITS, ANGLE_DIGITS, TILT_DIGITS = 5, 6, 6
+AXES, TILTS = "XYZ", "AB"
+
+
+class _Model:
+    """A `SmallModel` of twelve numbers; its towers are counted as the firmware does."""
+
+    def __init__(self, machine: Machine, options: Mapping[str, float | str]) -> None:
+        delta = linear_delta(machine, options, "reprap")
+        self.delta = delta.in_order(tower_order(delta.nominal[ANGLES]))
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return parameters(self.delta, tilt=True)
+
+    def joints(self, values: Floats, poses: Floats) -> Floats:
+        return self.delta.joints(values, poses)
+
+    def printed(self, values: Floats) -> Printed:
+        trips = endstop(values)
+        height = float(trips.mean())
+        found = {
+            "M665 R": fixed(values[RADIUS][0] / MM, LENGTH_DIGITS),
+            "M665 H": fixed(height / MM, LENGTH_DIGITS),
+        }
+        turned = np.degrees(wrapped(values[ANGLES] - TOWERS))
+        for at, axis in enumerate(AXES):
+            found[f"M665 L{axis}"] = fixed(values[ARMS][at] / MM, LENGTH_DIGITS)
+            found[f"M665 {axis}"] = fixed(turned[at], ANGLE_DIGITS)
+            found[f"M666 {axis}"] = fixed((trips[at] - height) / MM, LENGTH_DIGITS)
+        for axis, tilt in zip(TILTS, values[TILT], strict=True):
+            found[f"M666 {axis}"] = fixed(tilt / PERCENT, TILT_DIGITS)
+        return found
+
+    def taken(self, printed: Printed) -> Floats:
+        def of(words: list[str]) -> Floats:
+            return np.array([float(printed[word]) for word in words])
+
+        radius, height = of(["M665 R", "M665 H"]) * MM
+        values = np.empty(COUNT)
+        values[RADIUS] = radius
+        values[ARMS] = of([f"M665 L{axis}" for axis in AXES]) * MM
+        values[ANGLES] = TOWERS + np.radians(of([f"M665 {axis}" for axis in AXES]))
+        trips = height + of([f"M666 {axis}" for axis in AXES]) * MM
+        values[HEIGHTS] = heights(trips, values[ARMS], radius)
+        values[TILT] = of([f"M666 {axis}" for axis in TILTS]) * PERCENT
+        return values
+
+    def block(self, printed: Printed, reach: float) -> list[str]:
+        drives = ", ".join(f"{w} {d}" for w, d in zip(AXES, self.delta.names(), strict=True))
+        rods = ":".join(printed[f"M665 L{axis}"] for axis in AXES)
+        corrections = " ".join(f"{axis}{printed[f'M665 {axis}']}" for axis in AXES)
+        adjustments = " ".join(f"{word}{printed[f'M666 {word}']}" for word in AXES + TILTS)
+        return [
+            f"; towers: {ascii_only(drives)}; B is the workspace's radius, not fitted",
+            f"M665 L{rods} R{printed['M665 R']} H{printed['M665 H']} B{reach:.1f} {corrections}",
+            f"M666 {adjustments}",
+        ]
+
+
+class RepRap:
+    """The numbers of M665 and M666, fitted."""
+
+    name: ClassVar[str] = "reprap"
+    doc: ClassVar[str] = "M665 and M666 of a linear delta for RepRapFirmware (Duet)"
+    options: ClassVar[Mapping[str, Option]] = {"switches": SWITCHES}
+
+    @classmethod
+    def export(cls, machine: Machine, options: Mapping[str, float | str]) -> Export:
+        """The commands for config.g.
+
+        Raises `RequestError`: controller-cannot, bad-option, no-workspace, no-pose-left.
+        """
+        model = _Model(machine, options)
+        found = fit(machine, model)
+        comment = [f"; {line}" for line in heading(machine, found, "RepRapFirmware")]
+        reach = math.ceil(print_radius(machine) / MM * 10.0) / 10.0
+        text = "\n".join([*comment, *model.block(found.printed, reach), ""])
+        return Export({f"{stem(machine)}_reprap.g": text}, found.statement(machine))
+
+
+__all__ = ["RepRap"]

@@ -276,8 +276,8 @@ class Machine:
         `home` (6,), `dof` and `commanded` (6,) flags; of each drive its `travel`, whether it
         `turns`, the parameter of its `scale` or None, and the struts that it carries
         (`strut_drives`); `strut_drive` or None of each strut; the number of `closures`, and those
-        that are `carrying`; `regularity_scale`; `joints_limited`, whether joints limit how far a
-        strut may lean.
+        that are `carrying`; `regularity_scale`; how many `joint_limits` there are on how far struts
+        may lean.
         """
     def lengths_at(self, joints: ArrayLike, placements: ArrayLike) -> _Floats:
         """(n, n_closure) present length of each strut, m."""

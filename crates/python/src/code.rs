@@ -73,7 +73,8 @@ impl Machine {
             inner.drives.iter().map(|d| d.struts.clone()).collect::<Vec<_>>(),
         )?;
         found.set_item("regularity_scale", inner.regularity_scale)?;
-        found.set_item("joints_limited", inner.limited)?;
+        let limits = inner.struts.iter().flat_map(|strut| strut.limits).flatten();
+        found.set_item("joint_limits", limits.count())?;
         Ok(found)
     }
 }

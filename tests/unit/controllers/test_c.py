@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from c_program import EXACT, FUSED, STRICT, Answers, compiled, compiler, run
-from truepose import controllers
+from truepose import _kernel, controllers
 from truepose.budget.exact import together
 from truepose.budget.poses import Walk
 from truepose.controllers.c import Program, program_of
@@ -24,6 +24,8 @@ from truepose.sources import acting
 MACHINES = sorted(path.stem for path in Path("machines").glob("*.toml"))
 FREEDOMS = "xyzabc"
 WITHOUT = {"hexapod_all_sources": ("loads", "backlash", "clearance", "screw_coupling")}
+ALWAYS = {"hexapod_all_sources": ("tolerance", "sensor", "actuator", "guideway")}
+"""Sources whose shift does not go away with heat and load."""
 POSES = 100_000
 Floats = NDArray[np.float64]
 
@@ -142,6 +144,35 @@ def test_forward_from_home_is_the_kernels(name: str, tmp_path: Path) -> None:
     there = in_full(machine, expected, machine.dof)
     assert np.abs(found.back - there)[good].max() < 1e-11 * max(1.0, machine_size(name))
     assert found.steps.max() < c.most_steps
+
+
+IN_C = [
+    "ok",
+    "out_of_travel",
+    "joint_limit",
+    "unreachable",
+    "singular",
+    "not_converged",
+    "branch_lost",
+]
+
+
+@exported
+def test_a_pose_that_cannot_be_used_has_the_kernels_status(name: str, tmp_path: Path) -> None:
+    """Poses of a box three times the workspace: many are out of travel, reach or joint limits."""
+    machine, c = machine_of(name), program(name)
+    table = random_poses(machine, 1000)
+    centre = table.mean(axis=0)
+    table = centre + 3.0 * (table - centre)
+    expected = machine.inverse(table, status=True)[1]
+    kelvin = np.full(max(len(c.temperature_parts), 1), 293.15)
+    wanted = in_full(machine, table, machine.commanded)
+    # Without heat and load compensated joints are the nominal ones.
+    nominal = program_of(machine, without=(*WITHOUT.get(name, ()), *ALWAYS.get(name, ())))
+    found = run(nominal, tmp_path, EXACT, wanted, wanted, kelvin, np.zeros(6)).status
+    names = [_kernel.STATUS[code] for code in expected]
+    assert [IN_C[code] for code in found] == names
+    assert len(set(names)) > 1
 
 
 @exported

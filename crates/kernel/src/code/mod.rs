@@ -8,7 +8,7 @@
 //! row by row, `u` a quaternion; outputs come last. All SI, rad.
 
 use crate::kinematics::{
-    Gradients, Limb, Limbs, closed_form, gradients, inverse, place_limbs, system,
+    Gradients, Limb, Limbs, closed_form, gradients, inverse, leanings, place_limbs, system,
 };
 use crate::linear::{CLOSURES, Matrix6, SIX, factor, factor_pivoting, solve_transposed};
 use crate::machine::Machine;
@@ -213,6 +213,7 @@ impl Shifts {
 /// | `first_order` | rows, residuals and derivatives to the joints of the closures themselves |
 /// | `load` | loads on what gives way, of the multipliers of the closures |
 /// | `shifted` | the parameters with all that is known, from temperature rises and loads |
+/// | `lean` | where joints have limits: how far struts lean beyond them |
 /// | `compliance` | more closures than freedoms: how far closures open per force in closures |
 /// | `compensated` | where the inverse is a closed form: nominal and compensated joints in one go, and by how much rounding errors may have grown |
 pub fn functions(machine: &Machine, shifts: &Shifts) -> Vec<Function> {
@@ -288,6 +289,17 @@ pub fn functions(machine: &Machine, shifts: &Shifts) -> Vec<Function> {
             f.give("to", shifts.apply(&placed(machine, &p, &q), &p, &rise, &load));
         },
     ));
+    if machine.limited {
+        all.push(function(
+            "lean",
+            "const double *p, const double *q, const double at[3], const double r[9], double *beyond",
+            |f| {
+                let (p, q) = (f.many("p", parameters), f.many("q", joints));
+                let found = leanings(machine, &p, &q, &f.matrix("r"), f.inputs("at"));
+                f.give("beyond", found.into_iter().map(|(_, _, beyond)| beyond));
+            },
+        ));
+    }
     if machine.is_overconstrained() {
         all.push(compliance(machine));
     } else if machine.has_direct_inverse() && !loaded.is_empty() {

@@ -5,11 +5,13 @@
 //! solved for together by Newton's iteration, started from the closed forms at the home attitude.
 
 use super::SINGULAR;
-use super::closures::{Limb, Rows, Sample, limbs, ring_arm};
+use super::closures::{Limb, Rows, Sample, limbs, place_limbs, ring_arm};
 use super::forward::forward;
 use super::linearisation::Linearisation;
 use crate::element::{Dimension, Reach};
-use crate::linear::{Matrix6, Pivoted, SIX, condition_index, factor_pivoting, null_space, solve};
+use crate::linear::{
+    CLOSURES, Matrix6, Pivoted, SIX, condition_index, factor_pivoting, null_space, solve,
+};
 use crate::machine::{Machine, MachineDrive, chosen};
 use crate::scalar::{Real, Scalar};
 use crate::spatial::{
@@ -130,7 +132,7 @@ pub fn permitted(machine: &Machine, p: &[f64], joints: &[f64], pose: &Pose<f64>)
     if !in_travel(machine, joints) {
         Status::OutOfTravel
     } else if machine.limited
-        && leanings(machine, p, joints, pose).any(|(_, _, beyond)| beyond > 0.0)
+        && leaning_at(machine, p, joints, pose).any(|(_, _, beyond)| beyond > 0.0)
     {
         Status::JointLimit
     } else {
@@ -140,48 +142,62 @@ pub fn permitted(machine: &Machine, p: &[f64], joints: &[f64], pose: &Pose<f64>)
 
 /// For every limited joint: the strut, the end (0 base, 1 platform) and by how much the strut leans
 /// beyond the limit, rad.
-fn leanings(
+pub fn leanings<S: Scalar>(
+    machine: &Machine,
+    p: &[S],
+    joints: &[S],
+    rotation: &RotationMatrix<S>,
+    position: Vector<S>,
+) -> Vec<(usize, usize, S)> {
+    let zero = position[0].lift(0.0);
+    let mut at = [Limb { base: [zero; 3], arm: [zero; 3], length: zero }; CLOSURES];
+    place_limbs(machine, p, joints, &mut at);
+    let mut found = Vec::new();
+    for (i, strut) in machine.struts.iter().enumerate() {
+        let limb = &at[i];
+        let arm = match &strut.ring {
+            None => rotate(rotation, limb.arm),
+            Some(ring) => ring_arm(ring, p[ring.radius], limb, rotation, position).0,
+        };
+        let along = subtract(add(arm, position), limb.base);
+        for (end, limit) in strut.limits.iter().enumerate() {
+            let Some(limit) = limit else { continue };
+            let given = limit.axis.map(|value| zero.lift(value));
+            let axis = match (end, strut.drive) {
+                (1, _) => rotate(rotation, given),
+                (_, None) => given,
+                (_, Some(drive)) => carried(machine, p, joints, drive, given),
+            };
+            let angle = norm(cross(axis, along)).atan2(dot(axis, along));
+            found.push((i, end, angle - zero.lift(limit.angle)));
+        }
+    }
+    found
+}
+
+/// The same of a pose, by how much beyond.
+fn leaning_at(
     machine: &Machine,
     p: &[f64],
     joints: &[f64],
     pose: &Pose<f64>,
 ) -> impl Iterator<Item = (usize, usize, f64)> {
-    let rotation = rotation_matrix(pose.rotation);
-    let at = limbs(machine, p, joints);
-    let mut found = Vec::new();
-    for (i, strut) in machine.struts.iter().enumerate() {
-        let limb = &at[i];
-        let arm = match &strut.ring {
-            None => rotate(&rotation, limb.arm),
-            Some(ring) => ring_arm(ring, p[ring.radius], limb, &rotation, pose.position).0,
-        };
-        let along = subtract(add(arm, pose.position), limb.base);
-        for (end, limit) in strut.limits.iter().enumerate() {
-            let Some(limit) = limit else { continue };
-            let axis = match (end, strut.drive) {
-                (1, _) => rotate(&rotation, limit.axis),
-                (_, None) => limit.axis,
-                (_, Some(drive)) => carried(machine, p, joints, drive, limit.axis),
-            };
-            let angle = norm(cross(axis, along)).atan2(dot(axis, along));
-            found.push((i, end, angle - limit.angle));
-        }
-    }
-    found.into_iter()
+    leanings(machine, p, joints, &rotation_matrix(pose.rotation), pose.position).into_iter()
 }
 
 /// A direction of a drive's carriage or crank, in base axes.
-fn carried(
+fn carried<S: Scalar>(
     machine: &Machine,
-    p: &[f64],
-    joints: &[f64],
+    p: &[S],
+    joints: &[S],
     drive: usize,
-    axis: Vector<f64>,
-) -> Vector<f64> {
+    axis: Vector<S>,
+) -> Vector<S> {
     let joint = joints[drive];
     let drive = &machine.drives[drive];
-    let place = |point| drive.kind.place(&drive.nominal, &p[drive.first..], joint, point, 1.0).0;
-    subtract(place(axis), place([0.0; 3]))
+    let parameters = &p[drive.first..];
+    let place = |point| drive.kind.place(&drive.nominal, parameters, joint, point, joint.lift(1.0));
+    subtract(place(axis).0, place([joint.lift(0.0); 3]).0)
 }
 
 /// Joints for which the pose of least elastic energy is the commanded one in its commanded freedoms, by
@@ -409,7 +425,7 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
             }
         }
         if machine.limited {
-            let beyond = leanings(machine, p, &solved.joints, &solved.pose)
+            let beyond = leaning_at(machine, p, &solved.joints, &solved.pose)
                 .filter(|&(_, _, beyond)| beyond > 0.0);
             found.extend(beyond.map(|(strut, end, angle)| Obstacle::Leaning(strut, end, angle)));
         }

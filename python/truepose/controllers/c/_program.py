@@ -204,6 +204,7 @@ class _Writer:
             "LOADED": str(max(self.compliant, 1)),
             "proven": self._proven(),
             "turns": self._turns(),
+            "leaning": self._leaning(),
             "before_system": self._before_system(),
             "columns": self._columns(),
             "apply": self._apply(),
@@ -236,8 +237,6 @@ class _Writer:
             yield "Nothing gives way: the wrench has no effect."
         if self.known.left_out:
             yield f"Left out, and not compensated: {', '.join(self.known.left_out)}."
-        if self.control["joints_limited"]:
-            yield "How far struts lean at their joints is not looked at."
         yield "Loads are those of the nominal machine at the pose asked for."
 
     # ---- tables and pieces of code ----
@@ -311,6 +310,19 @@ class _Writer:
         }}
         if (fabs(determinant) > asked * pow(square, {0.5 * count!r}))
             return 1;
+    }}"""
+
+    def _leaning(self) -> str:
+        """How far struts lean at joints that have a limit."""
+        count, p, P = self.control["joint_limits"], self.prefix, self.prefix.upper()
+        if not count:
+            return "    (void)p;\n    (void)placed;"
+        return f"""    {{
+        double beyond[{count}];
+        {p}_lean(p, joints, placed->at, placed->r, beyond);
+        for (k = 0; k < {count}; k++)
+            if (!(beyond[k] <= 0.0))
+                return {P}_JOINT_LIMIT;
     }}"""
 
     def _turns(self) -> str:
@@ -388,10 +400,10 @@ class _Writer:
         {p}_compensated(machine->parameter, placed.at, placed.r, rise, wrench, q, margin, found,
             left, &growth);
         if (growth < 100.0) {{
-            status = {p}_judged({p}_least(margin), q, nominal);
-            if (status != {P}_OK && status != {P}_OUT_OF_TRAVEL)
+            status = {p}_judged(machine->parameter, &placed, {p}_least(margin), q, nominal);
+            if (status > {P}_JOINT_LIMIT)
                 return status;
-            return {p}_judged({p}_least(left), found, joints);
+            return {p}_judged(machine->parameter, &placed, {p}_least(left), found, joints);
         }}
     }}"""
 

@@ -193,13 +193,8 @@ impl Interpreter {
         self.ended |= block.ends;
         match block.once {
             Some(GCode::Dwell) => dwell(block, words)?,
-            Some(GCode::StoreReference(which)) => {
-                if let Some(word) = block.first_axis(words) {
-                    return Err(block::unused(word));
-                }
-                // The controller stores where it stands: corrected, and not by this program's word.
-                self.reference[usize::from(which)] = UNKNOWN;
-            }
+            // The controller stores where it stands: corrected, and not by this program's word.
+            Some(GCode::StoreReference(which)) => self.reference[usize::from(which)] = UNKNOWN,
             Some(GCode::Reference(which)) => return self.go_to_reference(block, words, which),
             _ => {}
         }
@@ -218,6 +213,12 @@ impl Interpreter {
                 "an arc needs an end or a centre",
             )
             .expected("axis words, and I J K or R"));
+        }
+        if moves && matches!(block.once, Some(GCode::StoreReference(_))) {
+            let (at, end) = block.once_word(words).unwrap_or(&words[0]).span();
+            let message = "G28.1 and G30.1 cannot be corrected beside a move";
+            return Err(Fault::new("gcode-unsupported", at, end, message)
+                .hint("write them in a line of their own"));
         }
         if !moves {
             if machine && block.motion.is_none() {

@@ -320,15 +320,17 @@ impl Writer {
         let unit = frame.unit(axis);
         let from = if frame.incremental { self.position[axis] } else { frame.offset[axis] };
         let value = (target - from) / unit;
-        if !(value.abs() < LARGEST) {
+        let decimal =
+            Decimal::nearest(value.clamp(-LARGEST, LARGEST), self.digits_of(source, axis));
+        let position = decimal.value() * unit + from;
+        if !(value.abs() < LARGEST && position.abs() < LARGEST) {
             let letter = char::from(AXIS_LETTERS[axis]);
             let message =
                 format!("the corrected {letter} of this block is no number, or too large");
             return Err(fault_of(source, "gcode-division", message));
         }
-        let decimal = Decimal::nearest(value, self.digits_of(source, axis));
         decimal.write(out);
-        self.position[axis] = decimal.value() * unit + from;
+        self.position[axis] = position;
         Ok(())
     }
 

@@ -1,4 +1,5 @@
-//! Any bytes as a program: `cargo +nightly fuzz run program -- -max_len=400`, seeded with `seeds/`.
+//! Any bytes as a program, and a last one that chooses the settings. In the crate's folder:
+//! `cargo +nightly fuzz run -a -s none program fuzz/corpus fuzz/seeds -- -max_len=400`
 #![no_main]
 
 #[path = "../../tests/round_trip/mod.rs"]

@@ -42,10 +42,11 @@ fn read(program: &[u8], settings: &Settings) -> (Vec<Move>, Option<String>) {
     }
 }
 
-fn close(one: &Position, other: &Position) -> bool {
-    one.iter().zip(other).all(|(a, b)| {
-        (a.is_nan() && b.is_nan()) || (a - b).abs() <= 3e-6 + 1e-14 * a.abs().max(b.abs())
-    })
+/// Whether a written move ends where it should; what is not known on the way may be anywhere.
+fn close(end: &Position, expected: &Position) -> bool {
+    end.iter()
+        .zip(expected)
+        .all(|(a, b)| b.is_nan() || (a - b).abs() <= 3e-6 + 1e-14 * a.abs().max(b.abs()))
 }
 
 /// The program written anew with its own points, and these points; `None` where it cannot be.
@@ -81,9 +82,9 @@ pub fn write(
     }
 }
 
-/// Checks all of it for some bytes; the first one chooses the settings.
+/// Checks all of it for some bytes; the last one chooses the settings.
 pub fn check(data: &[u8]) {
-    let Some((byte, program)) = data.split_first() else { return };
+    let Some((byte, program)) = data.split_last() else { return };
     let (settings, pieces) = settings_of(*byte);
     let (moves, refusal) = read(program, &settings);
     for motion in &moves {

@@ -1,0 +1,279 @@
+"""`truepose gcode`: a program corrected for the machine, with its proof."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from truepose.cli._options import _note_format, machine_argument, set_option, takes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from truepose.controllers.gcode import Errors, Proof
+    from truepose.machine import Machine
+    from truepose.report.tables import Table
+
+_MICRO = 1e6
+
+
+@click.command("gcode")
+@takes(
+    machine_argument,
+    click.argument("program", metavar="PROGRAM", type=click.Path(path_type=Path)),
+    click.option(
+        "--output",
+        "-o",
+        metavar="FILE",
+        required=True,
+        type=click.Path(path_type=Path),
+        help="The corrected program; not the program itself.",
+    ),
+    click.option(
+        "--tolerance",
+        metavar="LENGTH",
+        default="5 um",
+        show_default=True,
+        help="How far the tool may be off the programmed path. An angle counts times the "
+        "characteristic length.",
+    ),
+    click.option(
+        "--interpolation",
+        type=click.Choice(["either", "pose"]),
+        default="either",
+        show_default=True,
+        help="What the controller does between two blocks: pose, it solves its kinematics all "
+        "along, as LinuxCNC does; either, it may also drive its joints straight to the end.",
+    ),
+    click.option(
+        "--units",
+        type=click.Choice(["mm", "inch"]),
+        help="What holds before the first G20 or G21. Without it lengths before that are refused.",
+    ),
+    click.option(
+        "--start",
+        metavar="x=..,y=..",
+        help="Where the machine stands before the program, in machine coordinates. Axes that are "
+        "not named: the machine's home.",
+    ),
+    click.option(
+        "--offset",
+        "offsets",
+        metavar="G54 x=..,y=..",
+        type=(str, str),
+        multiple=True,
+        help="Offset of a coordinate system, G54 to G59.3, that the controller has stored. May "
+        "be repeated.",
+    ),
+    click.option(
+        "--block-delete",
+        type=click.Choice(["on", "off"]),
+        help="Whether lines that begin with / are left out. Without it they are refused.",
+    ),
+    click.option(
+        "--digits",
+        type=click.IntRange(0, 8),
+        default=6,
+        show_default=True,
+        help="Decimals of mm and degrees; inches get one more.",
+    ),
+    set_option,
+    click.option(
+        "--format",
+        "form",
+        type=click.Choice(["table", "json"]),
+        default="table",
+        show_default=True,
+        callback=_note_format,
+        is_eager=True,
+        help="What is printed: a table for people (µm, µrad), or json for programs (full "
+        "precision, m and rad).",
+    ),
+)
+def command(
+    machine_file: Path,
+    program: Path,
+    output: Path,
+    settings: tuple[str, ...],
+    form: str,
+    tolerance: str,
+    start: str | None,
+    offsets: tuple[tuple[str, str], ...],
+    block_delete: str | None,
+    **options: Any,
+) -> int:
+    """Correct a PROGRAM of G-code for the machine.
+
+    Every block is given the pose that takes the actual machine where the program asks for, and
+    long moves and arcs are divided so that it also stays on the path between. The condition is
+    the file's; --set changes it. What was written is read back, driven through the actual
+    machine, and compared with the program before and after.
+
+    Bare numbers are in the units of the machine file.
+    """
+    import truepose
+    from truepose.cli._progress import progress
+    from truepose.cli._show import show_tables
+    from truepose.cli._work import note_written
+    from truepose.controllers.gcode import correct_program
+    from truepose.output import require_writable
+
+    require_writable(output, [output.suffix.lower()], [machine_file])
+    machine = truepose.load(machine_file, settings=settings)
+    read = _Reading(machine)
+    with progress("corrected program", "lines") as report:
+        proof = correct_program(
+            machine,
+            program,
+            output,
+            tolerance=read.length("--tolerance", tolerance),
+            start=read.position("--start", start or ""),
+            offsets={name: read.position("--offset", text) for name, text in offsets},
+            block_delete=None if block_delete is None else block_delete == "on",
+            progress=report,
+            **options,
+        )
+    if form == "json":
+        json.dump(_as_json(proof), sys.stdout, indent=1, ensure_ascii=False)
+        sys.stdout.write("\n")
+    else:
+        show_tables(_tables(machine, proof))
+    note_written(output)
+    return 0
+
+
+class _Reading:
+    """Reads quantities of options, bare numbers in the units of the machine file."""
+
+    def __init__(self, machine: Machine) -> None:
+        from truepose.machine.units import UnitSystem
+
+        self._units = UnitSystem(machine.file_units)
+
+    def length(self, option: str, text: str) -> float:
+        """M. Raises `RequestError` (bad-correction)."""
+        return self._quantity(option, text, "length")
+
+    def position(self, option: str, text: str) -> dict[str, float]:
+        """Coordinates by axis, m and rad, of "x=10,y=2 in". Raises `RequestError`."""
+        found = {}
+        for part in filter(None, (each.strip() for each in text.split(","))):
+            name, equals, value = part.partition("=")
+            axis = name.strip().lower()
+            if not equals:
+                raise self._refusal(option, part, "an axis and a coordinate, such as x=10")
+            if axis in found:
+                raise self._refusal(option, part, "every axis once")
+            found[axis] = self._quantity(option, value, "angle" if axis in "abc" else "length")
+        return found
+
+    def _quantity(self, option: str, text: str, dimension: str) -> float:
+        from truepose.errors import ReadingError
+
+        try:
+            try:
+                return self._units.read(float(text), dimension)
+            except ValueError:
+                return self._units.read(text, dimension)
+        except ReadingError as failure:
+            expected = failure.expected or f"a {dimension}"
+            raise self._refusal(option, failure.found or text, expected) from None
+
+    @staticmethod
+    def _refusal(option: str, found: str, expected: str) -> Exception:
+        from truepose.errors import Problem, RequestError
+
+        return RequestError(
+            Problem("bad-correction", f"{option} cannot be read", found=found, expected=expected)
+        )
+
+
+def _tables(machine: Machine, proof: Proof) -> Iterable[Table]:
+    """The proof for people; poses as the program has them."""
+    import numpy as np
+
+    from truepose.controllers.gcode._axes import Axes
+    from truepose.report.tables import Table
+
+    axes = Axes(machine)
+    rows = []
+    for kind, unit in (
+        ("position", "µm"),
+        ("orientation", "µrad"),
+    ):
+        for when, errors in (("before", proof.before), ("after", proof.after)):
+            worst, rms = getattr(errors, kind), getattr(errors, f"{kind}_rms")
+            if worst is not None:
+                rows.append(
+                    (
+                        kind,
+                        when,
+                        _micro(worst.value),
+                        "" if rms is None else _micro(rms),
+                        unit,
+                        str(worst.line),
+                        axes.in_words(np.array(worst.pose)),
+                    )
+                )
+    header = ("error of", "program", "maximum", "rms", "in", "at line", "at the pose")
+    start = " ".join(f"{axis}{value:.6g}" for axis, value in proof.start.items())
+    between = {
+        "pose": "a controller that solves its kinematics all along a block",
+        "either": "controllers that drive the pose or the joints between two blocks",
+    }[proof.interpolation]
+    note = (
+        f"{proof.moves:,} moves, written as {proof.blocks:,} blocks; compared at {proof.points:,} "
+        f"points with what was read back.\n"
+        f"Tolerance {_micro(proof.tolerance)} µm, for {between}. rms over the path of the feeds; "
+        "poses in mm and deg, machine coordinates.\n"
+        f"Taken to start at {start}"
+        + (
+            f"; the machine stands there uncorrected, so the path of the first block, in line "
+            f"{proof.approach}, counts from its end on."
+            if proof.approach is not None
+            else "."
+        )
+    )
+    yield Table("proof", "Error of the tool, before and after", header, tuple(rows), 2, note)
+
+
+def _micro(value: float) -> str:
+    scaled = value * _MICRO
+    return f"{scaled:.4f}" if scaled < 1.0 else f"{scaled:.2f}"
+
+
+def _as_json(proof: Proof) -> Mapping[str, object]:
+    """The proof for programs, m and rad; the start in the program's own mm and degrees."""
+
+    def of(errors: Errors) -> dict[str, object]:
+        found: dict[str, object] = {}
+        for kind in ("position", "orientation"):
+            worst = getattr(errors, kind)
+            found[kind] = worst and {
+                "maximum": worst.value,
+                "rms": getattr(errors, f"{kind}_rms"),
+                "line": worst.line,
+                "pose": dict(zip(proof.commanded, worst.pose, strict=True)),
+            }
+        return found
+
+    return {
+        "command": "gcode",
+        "machine": proof.machine,
+        "program": proof.source,
+        "corrected_program": proof.target,
+        "units": {"position": "m", "orientation": "rad", "start": "mm, deg"},
+        "tolerance": proof.tolerance,
+        "interpolation": proof.interpolation,
+        "start": proof.start,
+        "approach_line": proof.approach,
+        "moves": proof.moves,
+        "blocks": proof.blocks,
+        "points": proof.points,
+        "before": of(proof.before),
+        "after": of(proof.after),
+    }

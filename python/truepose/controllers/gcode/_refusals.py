@@ -1,0 +1,125 @@
+"""What a program asks that the machine, or its correction, cannot do: as problems of its lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from truepose.budget.poses import faults_text
+from truepose.controllers.gcode._axes import AXES, Axes
+from truepose.controllers.gcode.division import TOO_SHORT, CannotCorrect, Limits, Moves
+from truepose.controllers.gcode.proof import Proof
+from truepose.errors import Problem, RequestError
+from truepose.machine import Machine
+
+_EXPECTED = "a pose that the machine can be commanded to, all along the move"
+
+
+def of_move(
+    failure: CannotCorrect, machine: Machine, axes: Axes, limits: Limits, moves: Moves, file: Path
+) -> RequestError:
+    """The refusal of a move of a batch."""
+    line = int(moves.line[failure.move])
+    at = axes.in_words(failure.pose)
+    if failure.status == TOO_SHORT:
+        if np.isfinite(failure.off):
+            found = f"{failure.off * 1e6:.3g} µm off"
+        else:
+            found = "a way between two blocks that leaves what the machine can be commanded to,"
+        return _refusal(
+            "gcode-tolerance",
+            "this move cannot be divided so that the tool stays on its path",
+            file,
+            line,
+            found=f"{found} in a piece of less than {2e3 * limits.least:g} mm, near {at}",
+            expected=f"within {limits.chord * 1e6:g} µm",
+            hint="allow more with --tolerance; a jump like that is what play makes where the load "
+            "of a drive or strut changes its sign",
+        )
+    why = faults_text(machine, machine.kernel.explain(failure.pose))
+    status = failure.status.replace("_", " ")
+    if failure.status in ("singular", "branch_lost"):
+        return _refusal(
+            "gcode-singularity",
+            "this move leads onto or through a singularity",
+            file,
+            line,
+            found=f"{at}: {why or 'the platform would not arrive there'}",
+            expected="a way on which the struts hold the platform everywhere",
+            hint="go round it, or turn the workpiece; `truepose check` looks at the workspace",
+        )
+    what = "onto or over a pose" if failure.of_program else "to a corrected pose"
+    return _refusal(
+        "gcode-pose",
+        f"this move leads {what} that the machine cannot be commanded to",
+        file,
+        line,
+        found=f"{at}: {status}" + (f", {why}" if why else ""),
+        expected=_EXPECTED,
+        hint="look at the offset of the workpiece (--offset) and at the units"
+        if failure.of_program
+        else "what lies on the way counts too; leave some travel for the correction",
+    )
+
+
+def of_uncommanded_axis(axes: Axes, moves: Moves, file: Path) -> RequestError | None:
+    """The refusal of the first move on an axis that nobody can command; None: there is none."""
+    if not axes.uncommanded.size:
+        return None
+    columns = axes.uncommanded
+    moved = moves.start[:, columns] != moves.end[:, columns]
+    both = np.isnan(moves.start[:, columns]) & np.isnan(moves.end[:, columns])
+    found = np.argwhere(moved & ~both)
+    if not found.size:
+        return None
+    move, column = found[0]
+    letter = AXES[columns[column]]
+    return _refusal(
+        "gcode-axis",
+        f"the platform moves in {letter}, but not as one asks it to",
+        file,
+        int(moves.line[move]),
+        found=f"a move of {letter}",
+        expected=f"moves of {', '.join(axes.names)} and of axes that are not the platform's",
+        hint="what the platform does besides follows from its pose; take the word out",
+    )
+
+
+def of_proof(proof: Proof, worst: float, line: int) -> RequestError:
+    """The refusal of a corrected program that does not keep what it should."""
+    return _refusal(
+        "gcode-proof",
+        "the corrected program, read back, does not keep the tolerance; it is not written",
+        Path(proof.source),
+        line,
+        found=f"{worst * 1e6:.3g} µm",
+        expected=f"at most {proof.tolerance * 1e6:g} µm",
+        hint="give more --digits, or allow more with --tolerance",
+    )
+
+
+def _refusal(
+    code: str, message: str, file: Path, line: int, *, found: str, expected: str, hint: str
+) -> RequestError:
+    return RequestError(
+        Problem(code, message, file=str(file), line=line, found=found, expected=expected, hint=hint)
+    )
+
+
+def of_start(machine: Machine, axes: Axes, failure: CannotCorrect) -> RequestError:
+    """The refusal of a start at which the machine cannot be."""
+    because = faults_text(machine, machine.kernel.explain(failure.pose))
+    why = failure.status.replace("_", " ") + (f", {because}" if because else "")
+    return RequestError(
+        Problem(
+            "gcode-start",
+            "the machine cannot be where the program is said to start",
+            found=f"{axes.in_words(failure.pose)}: {why}",
+            expected=_EXPECTED,
+            hint="say where it stands: --start x=..,y=.., in machine coordinates",
+        )
+    )
+
+
+__all__ = ["of_move", "of_proof", "of_start", "of_uncommanded_axis"]

@@ -1,0 +1,429 @@
+"""Corrected programs: G-code whose poses take the actual machine where the program asks it to be.
+
+The program is read, divided and written batch by batch, and what was written is read back by a
+second interpreter and driven through the actual machine at once, so that a program of any size
+takes little memory and none is handed over without its proof.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import cast, get_args
+
+import numpy as np
+
+from truepose import _kernel
+from truepose.budget.evaluate import required_sources
+from truepose.compensation.commands import ActualMachine
+from truepose.controllers.gcode import _refusals
+from truepose.controllers.gcode._axes import AXES, Axes, scale_of
+from truepose.controllers.gcode.division import (
+    CannotCorrect,
+    Divided,
+    Division,
+    Interpolation,
+    Limits,
+    Moves,
+    Stand,
+)
+from truepose.controllers.gcode.proof import Proof, Proving
+from truepose.errors import Problem, RequestError
+from truepose.machine import Condition, Machine
+from truepose.machine.suggestion import one_of
+from truepose.output import replacing, require_writable
+
+BATCH = 8192
+"""Moves worked on at a time."""
+
+TOLERANCE = 5e-6
+"""m: how far the tool may leave the programmed path between two written blocks."""
+
+LEAST_PIECE = 1e-5
+"""m: the shortest piece into which a move is divided."""
+
+TURN = 5e-4
+"""s: the longest that a thread waits for its turn while both divide and prove."""
+
+DIGITS = 6
+"""Decimals of mm and degrees; inches have one more."""
+
+SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
+"""Coordinate systems that may be given an offset."""
+
+HINTS = {
+    "gcode-no-units": "or say what holds at first: --units mm",
+    "gcode-block-delete": "say what the operator's switch is: --block-delete on",
+}
+"""What helps against problems of a program that an option solves."""
+
+Positions = Mapping[str, float]
+"""Coordinates by axis, x y z a b c u v w: m and rad."""
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class _Options:
+    """What was asked, checked; coordinates by the axes' letters, mm and degrees."""
+
+    limits: Limits
+    digits: int
+    axes: str
+    units: str | None
+    start: dict[str, float]
+    offsets: dict[str, dict[str, float]]
+    block_delete: bool | None
+
+    def corrector(self, program: Path, target: Path) -> _kernel.GcodeCorrector:
+        """What reads a program and writes it anew."""
+        return _kernel.GcodeCorrector(
+            program,
+            target,
+            units=self.units,
+            start=self.start,
+            offsets=self.offsets,
+            block_delete=self.block_delete,
+            axes=self.axes,
+            digits=self.digits,
+        )
+
+    def reader(self, program: Path) -> _kernel.GcodeReader:
+        """What reads a program as the same controller does."""
+        return _kernel.GcodeReader(
+            program,
+            units=self.units,
+            start=self.start,
+            offsets=self.offsets,
+            block_delete=self.block_delete,
+            axes=self.axes,
+        )
+
+
+def correct_program(
+    machine: Machine,
+    source: str | PathLike[str],
+    target: str | PathLike[str],
+    condition: Condition | None = None,
+    *,
+    tolerance: float = TOLERANCE,
+    interpolation: str = "either",
+    units: str | None = None,
+    start: Positions | None = None,
+    offsets: Mapping[str, Positions] | None = None,
+    block_delete: bool | None = None,
+    digits: int = DIGITS,
+    progress: Progress | None = None,
+) -> Proof:
+    """Write the program `source` anew, corrected for the machine in `condition`, as `target`.
+
+    `tolerance`, m: how far the tool may be off the programmed path; an angle counts times the
+    characteristic length. `interpolation`: "pose" where the controller solves its nominal inverse
+    all along a block, "either" where it may also drive its joints straight to the block's end.
+    `units`: "mm" or "inch" before G20 or G21. `start`: where the machine stands at first, by axis,
+    m and rad, machine coordinates; default home. `offsets` of "G54" to "G59.3" likewise.
+    `block_delete`: whether lines that begin with / are left out. `digits`: decimals of mm and
+    degrees. `progress` is called with lines done, and 0 for their unknown number in all.
+
+    What was written is read back and proven before it gets its name: see `Proof`. Raises
+    `RequestError`: the program's problems with file, line and column (gcode-...), bad-correction
+    for an option, no-source, output-not-writable, output-is-input; `TrueposeError` as
+    `truepose.budget`.
+    """
+    program, written = Path(source), Path(target)
+    axes = Axes(machine)
+    options = _options(axes, tolerance, interpolation, units, start, offsets, block_delete, digits)
+    _require_files(program, written)
+    given = machine.condition if condition is None else condition
+    required_sources(machine, given)
+    division = Division(ActualMachine(machine, given), axes, options.limits)
+    with replacing(written) as temporary, _problems_of(program):
+        session = _Session(division, program, temporary, options)
+        return session.run(written, progress)
+
+
+class _Session:
+    """One program on its way through division, writing and proof."""
+
+    def __init__(
+        self, division: Division, program: Path, temporary: Path, options: _Options
+    ) -> None:
+        self._division = division
+        self._program = program
+        self._options = options
+        self._reader = options.reader(program)
+        self._writing = _Writing(division, program, temporary, options)
+
+    def run(self, target: Path, progress: Progress | None) -> Proof:
+        """Correct the whole program; `target` is what it will be called."""
+        stand = self._start()
+        count, approach = 0, None
+        # While one batch is written and proven, the next is divided, where there are threads.
+        with _quick_turns(), ThreadPoolExecutor(max_workers=1) as aside:
+            task: Future[None] | None = None
+            while moves := _moves_of(self._reader.read(BATCH)):
+                if approach is None:
+                    approach = int(moves.line[0])
+                count += len(moves.line)
+                divided = self._divide(moves, stand)
+                stand = divided.stand
+                if task is not None:
+                    task.result()
+                if _kernel.threads() > 1:
+                    task = aside.submit(self._writing.add, moves, divided)
+                else:
+                    self._writing.add(moves, divided)
+                if progress is not None:
+                    progress(self._reader.lines, 0)
+            if task is not None:
+                task.result()
+            self._writing.finish()
+        return self._proof(target, count, approach)
+
+    def _start(self) -> Stand:
+        point = np.full(len(AXES), np.nan)
+        for letter, value in self._options.start.items():
+            point[AXES.index(letter)] = value
+        try:
+            return self._division.at_start(point)
+        except CannotCorrect as failure:
+            raise _refusals.of_start(
+                self._division.actual.machine, self._division.axes, failure
+            ) from None
+
+    def _divide(self, moves: Moves, stand: Stand) -> Divided:
+        division, program = self._division, self._program
+        refusal = _refusals.of_uncommanded_axis(division.axes, moves, program)
+        if refusal is not None:
+            raise refusal
+        try:
+            return division.divide(moves, stand)
+        except CannotCorrect as failure:
+            machine = division.actual.machine
+            raise _refusals.of_move(
+                failure, machine, division.axes, division.limits, moves, program
+            ) from None
+
+    def _proof(self, target: Path, moves: int, approach: int | None) -> Proof:
+        """The proof of what is written; `RequestError` (gcode-proof) if it breaks its promise."""
+        machine, limits = self._division.actual.machine, self._options.limits
+        proving = self._writing.proving
+        before, after = proving.errors()
+        proof = Proof(
+            machine=machine.name,
+            source=str(self._program),
+            target=str(target),
+            commanded=machine.commanded,
+            tolerance=limits.chord,
+            interpolation=limits.interpolation,
+            start=self._options.start,
+            approach=approach,
+            moves=moves,
+            blocks=proving.blocks,
+            points=proving.points,
+            before=before,
+            after=after,
+        )
+        length = machine.characteristic_length
+        for worst, unit in ((after.position, 1.0), (after.orientation, length)):
+            if worst is not None and not worst.value * unit <= limits.chord:
+                raise _refusals.of_proof(proof, worst.value * unit, worst.line)
+        return proof
+
+
+class _Writing:
+    """Writes divided batches, reads the file back behind that, and proves what it finds."""
+
+    def __init__(
+        self, division: Division, program: Path, temporary: Path, options: _Options
+    ) -> None:
+        self.proving = Proving(division)
+        self._temporary = temporary
+        self._corrector = options.corrector(program, temporary)
+        self._back = options.reader(temporary)
+        self._waiting: list[tuple[Moves, Divided]] = []
+
+    def add(self, moves: Moves, divided: Divided) -> None:
+        """The next moves of the program, as it was divided."""
+        size = self._temporary.stat().st_size
+        self._write(divided)
+        # Written text may wait before it reaches the file, in its order: when the file has grown,
+        # all that was written earlier is in it.
+        if self._temporary.stat().st_size > size:
+            self._prove_waiting()
+        self._waiting.append((moves, divided))
+
+    def finish(self) -> None:
+        """Write what is left of the program, and prove what is left to prove."""
+        self._corrector.finish()
+        self._prove_waiting()
+        if len(self._back.read(1)):
+            raise AssertionError("more was written than the moves of the program")
+
+    def _write(self, divided: Divided) -> None:
+        """Write a batch, of which the corrector may read some at a time."""
+        until = np.cumsum(divided.counts)
+        done = 0
+        while done < len(until):
+            count = len(self._corrector.read(len(until) - done))
+            if not count:
+                raise AssertionError("the program has become shorter")
+            pieces = slice(until[done - 1] if done else 0, until[done + count - 1])
+            self._corrector.write(
+                divided.counts[done : done + count], divided.points[pieces], divided.shares[pieces]
+            )
+            done += count
+
+    def _prove_waiting(self) -> None:
+        """Read back, block by block, what was written, and compare."""
+        for moves, divided in self._waiting:
+            found = self._back.read(len(divided.points))
+            if len(found) != len(divided.points):
+                raise AssertionError("fewer blocks can be read back than were written")
+            self.proving.add(moves, divided, found.start, found.end)
+        self._waiting.clear()
+
+
+@contextmanager
+def _quick_turns() -> Iterator[None]:
+    """Let two threads of the interpreter take turns ten times as often.
+
+    What one of them asks of the kernel takes less time than it would wait for its turn after it.
+    """
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(min(interval, TURN))
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(interval)
+
+
+def _moves_of(found: _kernel.GcodeMoves) -> Moves | None:
+    """The moves as arrays, each made once; None behind the last."""
+    if not len(found):
+        return None
+    return Moves(found.line, found.kind, found.start, found.end, found.length, found.points)
+
+
+@contextmanager
+def _problems_of(program: Path) -> Iterator[None]:
+    """The interpreter's refusals as problems of the program's file."""
+    try:
+        yield
+    except _kernel.GcodeError as refusal:
+        raise RequestError(
+            Problem(
+                refusal.code,
+                refusal.message,
+                file=str(program),
+                line=refusal.line,
+                column=refusal.column,
+                found=refusal.found,
+                expected=refusal.expected,
+                hint=HINTS.get(refusal.code, refusal.hint),
+            )
+        ) from None
+
+
+def _require_files(program: Path, written: Path) -> None:
+    """Refuse what cannot be read or written before any work is done."""
+    if not program.exists():
+        raise _file_problem("file-missing", "there is no such program", program, "no such file")
+    if program.is_dir():
+        raise _file_problem("file-is-directory", "the program is a folder", program, "a folder")
+    if not os.access(program, os.R_OK):
+        raise _file_problem(
+            "file-unreadable", "the program cannot be read", program, "no permission to read"
+        )
+    if written.exists() and written.samefile(program):
+        raise _file_problem(
+            "output-is-input",
+            "the corrected program would write over the program",
+            written,
+            "the program itself",
+            "another file",
+        )
+    require_writable(written, [written.suffix.lower()])
+
+
+def _file_problem(
+    code: str, message: str, file: Path, found: str, expected: str = "a file of G-code"
+) -> RequestError:
+    return RequestError(Problem(code, message, file=str(file), found=found, expected=expected))
+
+
+def _options(
+    axes: Axes,
+    tolerance: float,
+    interpolation: str,
+    units: str | None,
+    start: Positions | None,
+    offsets: Mapping[str, Positions] | None,
+    block_delete: bool | None,
+    digits: int,
+) -> _Options:
+    """The options in the interpreter's form. Raises `RequestError`, all problems at once."""
+    problems: list[Problem] = []
+
+    def refuse(name: str, found: object, expected: str) -> None:
+        problems.append(
+            Problem(
+                "bad-correction",
+                f"the correction of a program cannot have this {name}",
+                found=str(found),
+                expected=expected,
+            )
+        )
+
+    if not (np.isfinite(tolerance) and tolerance > 0.0):
+        refuse("tolerance", tolerance, "a length above zero, m")
+    if interpolation not in get_args(Interpolation):
+        refuse("interpolation", interpolation, one_of(get_args(Interpolation)))
+    if units not in (None, "mm", "inch"):
+        refuse("unit", units, "mm or inch")
+    if not (isinstance(digits, int) and 0 <= digits <= 8):
+        refuse("number of digits", digits, "a whole number from 0 to 8")
+    begin = {**axes.home(), **_named(start or {}, "start", refuse)}
+    shifted = {
+        name.upper(): _named(offset, f"offset {name}", refuse)
+        for name, offset in (offsets or {}).items()
+    }
+    for name in shifted:
+        if name not in SYSTEMS:
+            refuse("offset", name, one_of(SYSTEMS))
+    if problems:
+        raise RequestError(*problems)
+    return _Options(
+        Limits(tolerance, min(LEAST_PIECE, tolerance), cast("Interpolation", interpolation)),
+        digits,
+        axes.names,
+        units,
+        begin,
+        shifted,
+        block_delete,
+    )
+
+
+def _named(
+    position: Positions, what: str, refuse: Callable[[str, object, str], None]
+) -> dict[str, float]:
+    """Coordinates by the axes' letters, mm and degrees."""
+    found = {}
+    for name, value in position.items():
+        letter = name.upper()
+        if len(letter) != 1 or letter not in AXES:
+            refuse(what, name, f"axes, {one_of(tuple(AXES.lower()))}")
+        elif not np.isfinite(value):
+            refuse(what, value, "finite coordinates, m and rad")
+        else:
+            found[letter] = float(value) / scale_of(letter)
+    return found
+
+
+__all__ = ["SYSTEMS", "TOLERANCE", "Positions", "correct_program"]

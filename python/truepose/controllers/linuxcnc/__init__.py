@@ -1,0 +1,115 @@
+"""LinuxCNC: a kinematics module with live compensation, and what to write into INI and HAL.
+
+The generated module includes LinuxCNC's headers and is under GPL-2.0-or-later, as it says itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from truepose.controllers._export import Export, Option
+from truepose.controllers.c import C, names_of, program_of
+from truepose.controllers.linuxcnc._compensation import SPARE, default_clamp
+from truepose.controllers.linuxcnc._configuration import hal_text, ini_text
+from truepose.controllers.linuxcnc._description import MILLIMETRE, Description
+from truepose.controllers.linuxcnc._module import PREFIX, module_text
+from truepose.controllers.linuxcnc._safe_box import Box, safe_box
+from truepose.errors import Problem, RequestError
+from truepose.machine import Machine
+
+
+class LinuxCNC:
+    """Kinematics module for LinuxCNC 2.9."""
+
+    name: ClassVar[str] = "linuxcnc"
+    doc: ClassVar[str] = (
+        "kinematics module for LinuxCNC 2.9 that compensates live, with INI and HAL"
+    )
+    options: ClassVar[Mapping[str, Option]] = {
+        **C.options,
+        "clamp": Option(
+            0.0,
+            "most that a joint is corrected by; 0: three times the most over the workspace",
+            "length",
+        ),
+        "rate_limit": Option(1.0, "how fast a joint is corrected at most, mm/s"),
+    }
+
+    @classmethod
+    def export(cls, machine: Machine, options: Mapping[str, float | str]) -> Export:
+        """`truepose_NAME.c`, `.ini` and `.hal`, NAME that of the machine file.
+
+        Raises `RequestError`: controller-cannot, bad-option, no-workspace, and what the machine's
+        C is refused for.
+        """
+        rate_limit = _positive("rate_limit", float(options["rate_limit"])) * MILLIMETRE
+        asked = _not_negative("clamp", float(options["clamp"]))
+        program = program_of(machine, PREFIX, names_of(options["without"]))
+        description = Description.of(machine, program)
+        clamp = asked if asked > 0.0 else default_clamp(description)
+        box = safe_box(description, clamp)
+        module = description.module
+        return Export(
+            {
+                f"{module}.c": module_text(description, program.in_one, clamp, rate_limit),
+                f"{module}.ini": ini_text(description, box, clamp),
+                f"{module}.hal": hal_text(description, clamp, rate_limit),
+            },
+            (*program.statement, *_statement(description, box, clamp, rate_limit, asked > 0.0)),
+        )
+
+
+def _statement(
+    description: Description, box: Box, clamp: float, rate_limit: float, asked: bool
+) -> list[str]:
+    reason = "as asked" if asked else f"{SPARE:g} times the largest over the workspace"
+    extent = ", ".join(
+        f"{name} {low / unit:.6g} to {high / unit:.6g}"
+        for name, low, high, unit in zip(
+            description.machine.commanded, box.low, box.high, description.pose_units, strict=True
+        )
+    )
+    size = "the whole workspace" if box.asked else "cut from the workspace"
+    lines = [
+        f"compensation of a joint: at most {clamp / MILLIMETRE:.6g} mm ({reason}), "
+        f"at most {rate_limit / MILLIMETRE:.6g} mm/s",
+        f"axis limits, mm and degrees: {extent} ({size}; {box.checked} poses checked)",
+        f"{description.module}.c includes LinuxCNC's headers: it is under GPL-2.0-or-later",
+    ]
+    limited = [
+        strut.name
+        for strut in description.machine.struts
+        if any(joint.angle_limit is not None for joint in strut.joints)
+    ]
+    if limited:
+        lines.append(
+            "the module does not look at how far struts lean; the axis limits keep within it"
+        )
+    return lines
+
+
+def _positive(option: str, value: float) -> float:
+    if value > 0.0:
+        return value
+    raise _bad(option, value, "above zero")
+
+
+def _not_negative(option: str, value: float) -> float:
+    if value >= 0.0:
+        return value
+    raise _bad(option, value, "zero or more")
+
+
+def _bad(option: str, value: float, expected: str) -> RequestError:
+    return RequestError(
+        Problem(
+            "bad-option",
+            f"option {option} of linuxcnc cannot be {value:g}",
+            found=f"{value:g}",
+            expected=expected,
+        )
+    )
+
+
+__all__ = ["LinuxCNC"]

@@ -1,0 +1,108 @@
+"""The snippets of INI and HAL that go with the module."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib.metadata import version
+
+import numpy as np
+
+from truepose.controllers.linuxcnc._description import DEGREE, MILLIMETRE, WRENCHES, Description
+from truepose.controllers.linuxcnc._safe_box import Box
+from truepose.controllers.linuxcnc._template import exact, filled, plain
+
+
+def ini_text(description: Description, box: Box, clamp: float) -> str:
+    """Sections KINS, TRAJ, AXIS and JOINT, mm and degrees. `clamp` in m."""
+    machine = description.machine
+    home = description.home / np.array([MILLIMETRE] * 3 + [DEGREE] * 3)
+    home[[k for k in range(6) if k not in description.freedoms]] = 0.0
+    return filled(
+        "ini.in",
+        {
+            "title": description.title,
+            "version": version("truepose"),
+            "file": plain(machine.file.replace("\\", "/").rpartition("/")[2]),
+            "module": description.module,
+            "n_joint": str(len(machine.joints)),
+            "coordinates": " ".join(name.upper() for name in machine.commanded),
+            "home": " ".join(_clean(value) for value in home),
+            "checked": str(box.checked),
+            "clamp": _short(clamp / MILLIMETRE),
+            "least": f"{box.least:.3g}",
+            "conditioning": f"{box.conditioning:.3g}",
+            "cut": ""
+            if box.asked
+            else " The workspace of the machine file was larger; not all of it\n# is like that.",
+            "axes": "\n".join(_axes(description, box)),
+            "joints": "\n".join(_joints(description)),
+        },
+    )
+
+
+def _axes(description: Description, box: Box) -> Iterable[str]:
+    units = description.pose_units
+    for name, low, high in zip(
+        description.machine.commanded, box.low / units, box.high / units, strict=True
+    ):
+        unit = "mm" if name in "xyz" else "degrees"
+        yield f"\n[AXIS_{name.upper()}]"
+        yield f"MIN_LIMIT = {_short(low)}"
+        yield f"MAX_LIMIT = {_short(high)}"
+        yield f"# MAX_VELOCITY =\n# MAX_ACCELERATION =\n# {unit} per s, per s^2"
+
+
+def _joints(description: Description) -> Iterable[str]:
+    machine = description.machine
+    home = machine.inverse(description.commanded_home) / description.units
+    for index, drive in enumerate(machine.drives):
+        linear = drive.coordinate == "length"
+        low, high = description.travels[index] / description.units[index]
+        yield f"\n[JOINT_{index}]"
+        yield f"# drive {plain(drive.name)}"
+        yield f"TYPE = {'LINEAR' if linear else 'ANGULAR'}"
+        yield f"HOME = {exact(home[index])}"
+        yield f"HOME_OFFSET = {exact(home[index])}"
+        yield "HOME_SEQUENCE = 0"
+        yield f"MIN_LIMIT = {_short(low)}"
+        yield f"MAX_LIMIT = {_short(high)}"
+        yield "# MAX_VELOCITY =\n# MAX_ACCELERATION =\n# FERROR ="
+        yield f"# {'mm' if linear else 'degrees'} per s, per s^2; {'mm' if linear else 'degrees'}"
+
+
+def hal_text(description: Description, clamp: float, rate_limit: float) -> str:
+    """The lines that load, order and connect the module. `clamp` in m, `rate_limit` in m/s."""
+    temperatures = [
+        f"#net {name}  YOUR.SENSOR  => truepose.{name}-temperature   # {plain(part)}"
+        for name, part in zip(
+            description.temperature_names, description.temperature_parts, strict=True
+        )
+    ]
+    wrench = [
+        f"#net {WRENCHES[index]}  YOUR.SENSOR  => truepose.{WRENCHES[index]}"
+        for index in description.wrenches
+    ]
+    return filled(
+        "hal.in",
+        {
+            "module": description.module,
+            "title": description.title,
+            "version": version("truepose"),
+            "file": plain(description.machine.file.replace("\\", "/").rpartition("/")[2]),
+            "temperatures": "\n".join(temperatures) or "# None: no part expands.",
+            "wrench": "\n".join(wrench),
+            "rate_limit": _short(rate_limit / MILLIMETRE),
+            "clamp": _short(clamp / MILLIMETRE),
+        },
+    )
+
+
+def _clean(value: float) -> str:
+    """A number with all its digits, but for a last one that only the change of units has made."""
+    text = f"{value:.15g}"
+    return text if abs(float(text) - value) <= 4e-16 * abs(value) else exact(value)
+
+
+def _short(value: float) -> str:
+    """A number without the digits of rounding: 200.00000000000003 is 200."""
+    return f"{float(f'{value:.12g}'):.12g}"

@@ -1,0 +1,173 @@
+"""What LinuxCNC has to know of a machine: its names, units, limits and pins."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truepose import _kernel
+from truepose.controllers._export import cannot
+from truepose.controllers.c import Program
+from truepose.controllers.linuxcnc._template import plain
+from truepose.machine import Drive, Guide, Machine, Strut
+
+Floats = NDArray[np.float64]
+
+FREEDOMS = ("x", "y", "z", "a", "b", "c")
+COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
+MILLIMETRE = 1e-3
+DEGREE = math.pi / 180.0
+
+MOST_JOINTS = 9
+"""LinuxCNC's axes are X Y Z A B C U V W; a machine has as many joints as commanded freedoms."""
+
+LONGEST_NAME = 40
+"""HAL names have at most 47 characters."""
+
+WRENCHES = ("force-x", "force-y", "force-z", "moment-x", "moment-y", "moment-z")
+"""Pins, in the order of a wrench."""
+
+_FAMILIES = ("strut", "drive", "guide")
+
+
+@dataclass(frozen=True)
+class Description:
+    """A machine in LinuxCNC's terms.
+
+    `units` (n_joint,): m or rad of one machine unit, mm or degree, of each joint. `arms`
+    (n_joint,): by how many m a joint moves what it carries, per m or rad of its coordinate.
+    `temperature_parts`: parts whose temperature counts, in the order of the C.
+    """
+
+    machine: Machine
+    module: str
+    units: Floats
+    arms: Floats
+    temperature_parts: tuple[str, ...]
+    wrench_matters: bool
+
+    @classmethod
+    def of(cls, machine: Machine, program: Program) -> Description:
+        """Raises `RequestError` (controller-cannot) where LinuxCNC has no place for it."""
+        if len(machine.joints) > MOST_JOINTS:  # pragma: no cover - the kernel has six freedoms
+            raise cannot(
+                "linuxcnc",
+                machine,
+                f"{len(machine.joints)} joints",
+                f"at most {MOST_JOINTS}",
+                "correct the programs instead: truepose gcode",
+            )
+        turning = [drive.coordinate == "angle" for drive in machine.drives]
+        return cls(
+            machine,
+            f"truepose_{_stem(machine)}",
+            np.where(turning, DEGREE, MILLIMETRE),
+            _arms(machine),
+            program.temperature_parts,
+            program.wrench_matters,
+        )
+
+    @property
+    def title(self) -> str:
+        """The machine's name, safe anywhere."""
+        return plain(self.machine.name)
+
+    @property
+    def home(self) -> Floats:
+        """(6,) the home pose x y z a b c, m and rad; 0 where the platform has no freedom."""
+        pose = np.zeros(6)
+        pose[[FREEDOMS.index(name) for name in self.machine.dof]] = self.machine.home
+        return pose
+
+    @property
+    def commanded_home(self) -> Floats:
+        """(n_commanded,) home, m and rad."""
+        return self.home[self.freedoms]
+
+    @property
+    def freedoms(self) -> list[int]:
+        """Positions of the commanded freedoms among x y z a b c."""
+        return [FREEDOMS.index(name) for name in self.machine.commanded]
+
+    @property
+    def pose_units(self) -> Floats:
+        """(n_commanded,) m or rad of one mm or degree."""
+        return np.where(np.array(self.freedoms) < 3, MILLIMETRE, DEGREE)
+
+    @property
+    def wrenches(self) -> list[int]:
+        """Components of a wrench that the platform can give way to; none where nothing gives."""
+        if not self.wrench_matters:
+            return []
+        return [COMPONENTS.index(name) for name in self.machine.components]
+
+    @property
+    def travels(self) -> Floats:
+        """(n_joint, 2) travel, m or rad."""
+        return np.array([drive.travel for drive in self.machine.drives])
+
+    @property
+    def size(self) -> float:
+        """m: the largest length that the kinematics reckon with, by which they round."""
+        travels = np.abs(self.travels).max(axis=1) * self.arms
+        lengths = (self.machine.characteristic_length, travels.max(), np.abs(self.home[:3]).max())
+        return float(max(lengths))
+
+    @property
+    def temperature_names(self) -> tuple[str, ...]:
+        """Of each temperature pin, before `-temperature`: `strut-0`, ..., `frame`."""
+        return tuple(_pin(self.machine, part) for part in self.temperature_parts)
+
+
+def _stem(machine: Machine) -> str:
+    stem = re.sub(r"[^a-z0-9_]+", "_", Path(machine.file).stem.lower()).strip("_") or "machine"
+    if len(stem) + len("truepose_") > LONGEST_NAME:
+        stem = stem[: LONGEST_NAME - len("truepose_")].rstrip("_")
+    return stem
+
+
+def _pin(machine: Machine, part: str) -> str:
+    """A part by its number, since names may hold what HAL does not take."""
+    family, _, _ = part.partition(".")
+    if family not in _FAMILIES:
+        return part
+    families: dict[str, tuple[Strut | Drive | Guide, ...]]
+    families = {"strut": machine.struts, "drive": machine.drives, "guide": machine.guides}
+    return f"{family}-{[row.part for row in families[family]].index(part)}"
+
+
+def _arms(machine: Machine) -> Floats:
+    """(n_joint,) how far a joint moves the base joints that it carries, per unit of coordinate.
+
+    A telescopic drive carries none: its coordinate is a length itself. By central difference at
+    home, exact for a straight motion, and for a circle to the square of the step.
+    """
+    step = 1e-4
+    joints = machine.inverse(machine.home[_columns(machine)])
+    placement = machine.kernel.placement_of(machine.home[np.newaxis])
+    arms = np.ones(len(machine.drives))
+    for index, drive in enumerate(machine.drives):
+        if drive.coordinate == "length":
+            continue
+        moved = np.stack([joints, joints])
+        moved[0, index] -= step
+        moved[1, index] += step
+        centres = machine.kernel.joint_centres(moved, np.repeat(placement, 2, axis=0))
+        base = centres[:, :, 0, :]
+        arms[index] = np.linalg.norm(base[1] - base[0], axis=-1).max() / (2.0 * step)
+    return arms
+
+
+def _columns(machine: Machine) -> list[int]:
+    return [machine.dof.index(name) for name in machine.commanded]
+
+
+def status_ok(status: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Where a status is ok."""
+    ok: NDArray[np.bool_] = status == _kernel.STATUS.index("ok")
+    return ok

@@ -20,4 +20,6 @@ BENCHMARKS = (
     Benchmark("memory"),
     Benchmark("bounds"),
     Benchmark("containment", cores=2),
+    Benchmark("linuxcnc_module"),
+    Benchmark("gcode", cores=2),
 )

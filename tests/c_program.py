@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,13 +39,14 @@ void drive(long n, const double *poses, const double *starts, const double *temp
         status[i] = (int)@p@_compensate_from(&machine, poses + 6 * i, temperatures, wrench, q,
             joints + i * @P@_JOINTS);
         same = (int)@p@_inverse(&machine, poses + 6 * i, alone);
-        for (k = 0; k < @P@_JOINTS && same < 2; k++)
+        for (k = 0; k < @P@_JOINTS && same <= (int)@P@_JOINT_LIMIT
+            && status[i] <= (int)@P@_JOINT_LIMIT; k++)
             if (!(alone[k] - q[k] < 1e-12 && q[k] - alone[k] < 1e-12))
                 status[i] = -1;
         for (k = 0; k < 6; k++)
             pose[k] = starts[6 * i + k];
         found[i] = -2;
-        if (status[i] < 2)
+        if (status[i] <= (int)@P@_JOINT_LIMIT)
             found[i] = (int)@p@_forward(&machine, q, pose, steps + i);
     }
 }
@@ -91,28 +92,36 @@ class Answers:
     found: NDArray[np.int32]
 
 
-def run(
-    program: Program,
-    folder: Path,
-    flags: Sequence[str],
-    poses: NDArray[np.float64],
-    starts: NDArray[np.float64],
-    temperatures: NDArray[np.float64],
-    wrench: NDArray[np.float64],
-) -> Answers:
-    """Inverse, compensated joints and the forward solution from `starts`, all (n, 6) SI."""
+Run = Callable[..., Answers]
+
+
+def driver(program: Program, folder: Path, flags: Sequence[str]) -> Run:
+    """A function (poses, starts, temperatures, wrench) of the compiled program.
+
+    Inverse, compensated joints and the forward solution from `starts`; both (n, 6), SI.
+    """
     more = _DRIVER.replace("@p@", program.prefix).replace("@P@", program.prefix.upper())
     library = ctypes.CDLL(str(compiled(program, folder, flags, more=more)))
-    n, count = len(poses), len(program.joints)
-    given = [np.ascontiguousarray(a, np.float64) for a in (poses, starts, temperatures, wrench)]
-    answers = Answers(
-        np.full((n, count), np.nan),
-        np.full((n, count), np.nan),
-        np.zeros(n, np.int32),
-        np.full((n, 6), np.nan),
-        np.zeros(n, np.int32),
-        np.zeros(n, np.int32),
-    )
-    arrays = [*given, *vars(answers).values()]
-    library.drive(ctypes.c_long(n), *(a.ctypes.data_as(ctypes.c_void_p) for a in arrays))
-    return answers
+    count = len(program.joints)
+
+    def run_at(
+        poses: NDArray[np.float64],
+        starts: NDArray[np.float64],
+        temperatures: NDArray[np.float64],
+        wrench: NDArray[np.float64],
+    ) -> Answers:
+        n = len(poses)
+        given = [np.ascontiguousarray(a, np.float64) for a in (poses, starts, temperatures, wrench)]
+        answers = Answers(
+            np.full((n, count), np.nan),
+            np.full((n, count), np.nan),
+            np.zeros(n, np.int32),
+            np.full((n, 6), np.nan),
+            np.zeros(n, np.int32),
+            np.zeros(n, np.int32),
+        )
+        arrays = [*given, *vars(answers).values()]
+        library.drive(ctypes.c_long(n), *(a.ctypes.data_as(ctypes.c_void_p) for a in arrays))
+        return answers
+
+    return run_at

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from truepose.budget.shares import shares
     from truepose.budget.uncertainty import uncertainty
     from truepose.budget.worst_case import worst_case
+    from truepose.controllers import export
+    from truepose.controllers.gcode import correct_program
     from truepose.machine import Condition, Machine
 
     __version__: str
@@ -39,6 +41,8 @@ _WHERE = {
     "Input": "truepose.budget.inputs",
     "Machine": "truepose.machine",
     "bounds": "truepose.budget.bounds",
+    "correct_program": "truepose.controllers.gcode",
+    "export": "truepose.controllers",
     "monte_carlo": "truepose.budget.monte_carlo",
     "shares": "truepose.budget.shares",
     "threads": "truepose._kernel",
@@ -54,7 +58,9 @@ __all__ = [
     "bounds",
     "budget",
     "compensate",
+    "correct_program",
     "errors",
+    "export",
     "load",
     "monte_carlo",
     "over_time",

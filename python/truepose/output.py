@@ -76,28 +76,40 @@ def require_new(path: Path) -> None:
         )
 
 
-def require_folder(path: Path) -> None:
-    """Refuse a folder that files cannot be written into; one that is not there will be made.
+def require_folder(path: Path, names: Collection[str] = ()) -> None:
+    """Make a folder that files `names` can be written into, or refuse it before the work is done.
 
     Raises `RequestError` (code `output-not-writable`).
     """
-    standing = next(each for each in (path, *path.absolute().parents) if each.exists())
-    if not standing.is_dir():
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as failure:
         raise _refusal(
             "output-not-writable",
-            "the output folder is a file",
+            "the output folder cannot be made",
             path,
-            found=f"the file {standing}",
-            expected="a folder, or a name that is free",
-        )
-    if not os.access(standing, os.W_OK | os.X_OK):
+            found="a file, or a link to nothing"
+            if isinstance(failure, FileExistsError)
+            else failure.strerror or str(failure),
+            expected="a folder that you may write into, or a name that is free",
+        ) from failure
+    if not os.access(path, os.W_OK | os.X_OK):
         raise _refusal(
             "output-not-writable",
             "nothing may be written into the output folder",
             path,
-            found=f"no write permission for {standing}",
+            found="no write permission",
             expected="a folder that you may write into",
         )
+    for name in names:
+        if (path / name).is_dir():
+            raise _refusal(
+                "output-not-writable",
+                "a folder stands where a file is to be written",
+                path / name,
+                found="a folder",
+                expected="a file, or a name that is free",
+            )
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from truepose import _kernel
 from truepose.errors import (
     CATALOGUE,
     MachineFileError,
@@ -35,9 +36,15 @@ def strings_in(folder: Path, without: Path) -> set[str]:
 
 def test_every_code_is_used_and_tested() -> None:
     used = strings_in(ROOT / "python" / "truepose", ROOT / "python" / "truepose" / "errors.py")
+    used |= _kernel.gcode_codes().keys()
     tested = strings_in(ROOT / "tests", Path(__file__))
     assert sorted(CATALOGUE.keys() - used) == [], "codes that nothing raises"
     assert sorted(CATALOGUE.keys() - tested) == [], "codes that no test names"
+
+
+def test_the_interpreter_of_programs_has_the_same_codes() -> None:
+    codes = _kernel.gcode_codes()
+    assert {code: CATALOGUE[code] for code in codes} == codes
 
 
 def test_codes_and_meanings_are_well_formed() -> None:
@@ -67,6 +74,11 @@ def test_a_problem_for_people() -> None:
     assert str(Problem("no-source", "none")) == "error[no-source]: none"
 
 
+def test_a_problem_with_a_column() -> None:
+    problem = Problem("gcode-arc", "no arc", "part.ngc", 3, column=7)
+    assert str(problem) == "part.ngc:3:7: error[gcode-arc]: no arc"
+
+
 def test_a_problem_for_programs() -> None:
     problem = Problem("no-source", "none", "m.toml", 3)
     assert json.loads(json.dumps(problem.to_dict())) == {
@@ -78,6 +90,7 @@ def test_a_problem_for_programs() -> None:
         "found": None,
         "expected": None,
         "hint": None,
+        "column": None,
     }
 
 

@@ -15,14 +15,14 @@ def law_of_length(values: Floats, lengths: Floats) -> tuple[float, float, float]
 
     None where they follow no such law. The slack is `ROUNDING` of the largest value.
     """
-    if not np.ptp(values).any():
-        return float(values[0]), 0.0, 0.0
+    slack = ROUNDING * float(np.abs(values).max())
+    if np.ptp(values) <= slack:
+        return float(values[0]), 0.0, float(np.ptp(values))
     low, high = int(np.argmin(lengths)), int(np.argmax(lengths))
     if lengths[high] <= lengths[low]:
         return None
     slope = float((values[high] - values[low]) / (lengths[high] - lengths[low]))
     constant = float(values[low] - slope * lengths[low])
-    slack = ROUNDING * float(np.abs(values).max())
     if (np.abs(constant + slope * lengths - values) > slack).any():
         return None
     return constant, slope, slack

@@ -24,6 +24,7 @@ COMMANDS: dict[str, str] = {
     "over-time": "truepose.cli.over_time",
     "strain": "truepose.cli.strain",
     "report": "truepose.cli.report",
+    "gcode": "truepose.cli.gcode",
     "export": "truepose.cli.export",
 }
 """Command name -> module that holds it, in the order of `truepose --help`."""

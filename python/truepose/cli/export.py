@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import click
@@ -76,10 +77,12 @@ def command(
                 click.echo(f"==> {name} <==")
             click.echo(text, nl=not text.endswith("\n"))
     else:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in result.files.items():
-            with replacing(folder / name) as temporary:
+        require_folder(folder, result.files)
+        with ExitStack() as files:  # all of them are written before any takes its place
+            for name, text in result.files.items():
+                temporary = files.enter_context(replacing(folder / name))
                 temporary.write_text(text, encoding="utf-8")
+        for name in result.files:
             note_written(folder / name)
     for line in result.statement:
         click.echo(line, err=folder is None)

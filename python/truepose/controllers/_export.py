@@ -69,14 +69,27 @@ def options_of(
     problems at once.
     """
     units = UnitSystem(machine.file_units)
-    pairs = given.items() if isinstance(given, Mapping) else (_pair(text) for text in given)
+    listed = [given] if isinstance(given, str) else given
+    pairs = listed.items() if isinstance(listed, Mapping) else map(_pair, listed)
     values: dict[str, float | str] = {key: o.default for key, o in controller.options.items()}
     problems = []
+    read: set[str] = set()
     for key, text in pairs:
         option = controller.options.get(key)
         if option is None:
             problems.append(_unknown(controller, key))
             continue
+        if key in read:
+            problems.append(
+                Problem(
+                    "bad-option",
+                    f"option {key} of {controller.name} is given twice",
+                    found=repr(text),
+                    expected=f"{key} once: {option.doc}",
+                )
+            )
+            continue
+        read.add(key)
         try:
             values[key] = _read(option, units, text)
         except ReadingError as failure:

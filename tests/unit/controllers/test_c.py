@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import truepose as tp
-from c_program import EXACT, FUSED, STRICT, Answers, compiled, compiler, run
+from c_program import EXACT, FUSED, STRICT, Answers, compiled, compiler, driver
 from truepose import _kernel, controllers
 from truepose.budget.exact import together
 from truepose.budget.poses import Walk
@@ -21,7 +21,8 @@ from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import acting
 
-MACHINES = sorted(path.stem for path in Path("machines").glob("*.toml"))
+MACHINE_FOLDER = Path("machines")
+MACHINES = sorted(path.stem for path in MACHINE_FOLDER.glob("*.toml"))
 FREEDOMS = "xyzabc"
 WITHOUT = {"hexapod_all_sources": ("loads", "backlash", "clearance", "screw_coupling")}
 ALWAYS = {"hexapod_all_sources": ("tolerance", "sensor", "actuator", "guideway")}
@@ -96,7 +97,7 @@ class Both:
         moved = [0.005 if f in "xyz" else 0.02 for f in machine.dof]
         starts = in_full(machine, np.concatenate(poses) + moved, machine.dof)
         wanted = in_full(machine, np.concatenate(commanded), machine.commanded)
-        self.c: Answers = run(c, folder, flags, wanted, starts, kelvin, wrench)
+        self.c: Answers = driver(c, folder, flags)(wanted, starts, kelvin, wrench)
         self.angles = [FREEDOMS.index(f) for f in machine.dof if f in "abc"]
         self.lengths = [FREEDOMS.index(f) for f in machine.dof if f in "xyz"]
 
@@ -137,7 +138,7 @@ def test_forward_from_home_is_the_kernels(name: str, tmp_path: Path) -> None:
     home = np.tile(np.array(machine.kernel.control["home"]), (len(table), 1))
     kelvin = np.full(max(len(c.temperature_parts), 1), 293.15)
     wanted = in_full(machine, table, machine.commanded)
-    found = run(c, tmp_path, EXACT, wanted, home, kelvin, np.zeros(6))
+    found = driver(c, tmp_path, EXACT)(wanted, home, kelvin, np.zeros(6))
     assert (found.found == kernel_status).all()
     good = kernel_status == 0
     assert good.mean() > 0.9
@@ -146,6 +147,7 @@ def test_forward_from_home_is_the_kernels(name: str, tmp_path: Path) -> None:
     assert found.steps.max() < c.most_steps
 
 
+NOT_FINITE = 7
 IN_C = [
     "ok",
     "out_of_travel",
@@ -169,7 +171,7 @@ def test_a_pose_that_cannot_be_used_has_the_kernels_status(name: str, tmp_path: 
     wanted = in_full(machine, table, machine.commanded)
     # Without heat and load compensated joints are the nominal ones.
     nominal = program_of(machine, without=(*WITHOUT.get(name, ()), *ALWAYS.get(name, ())))
-    found = run(nominal, tmp_path, EXACT, wanted, wanted, kelvin, np.zeros(6)).status
+    found = driver(nominal, tmp_path, EXACT)(wanted, wanted, kelvin, np.zeros(6)).status
     names = [_kernel.STATUS[code] for code in expected]
     assert [IN_C[code] for code in found] == names
     assert len(set(names)) > 1
@@ -268,17 +270,109 @@ def test_a_tolerance_that_is_known_is_in_it() -> None:
     assert re.search(r"p\[6\]|v6 \+ 0\.0002", program_of(machine).source)
 
 
+@exported
+def test_one_number_that_is_none_is_refused(name: str, tmp_path: Path) -> None:
+    """At each place of temperatures, wrench and pose by itself, and of the joints."""
+    c, machine = program(name), machine_of(name)
+    pose = in_full(machine, random_poses(machine, 1), machine.commanded)
+    good = np.full(max(len(c.temperature_parts), 1), 300.0), np.full(6, 10.0)
+    home = np.array(machine.kernel.control["home"])[np.newaxis]
+    run = driver(c, tmp_path, EXACT)
+    for bad in (np.nan, np.inf):
+        for place in range(len(c.temperature_parts)):
+            kelvin = good[0].copy()
+            kelvin[place] = bad
+            found = run(pose, home, kelvin, good[1])
+            assert found.status[0] == NOT_FINITE
+            assert np.isnan(found.joints).all()
+            assert np.isnan(found.nominal).all()
+        for place in range(6):
+            wrench = good[1].copy()
+            wrench[place] = bad
+            assert run(pose, home, good[0], wrench).status[0] == NOT_FINITE
+            nowhere = pose.copy()
+            nowhere[0, place] = bad
+            found = run(nowhere, home, good[0], good[1])
+            assert found.status[0] == NOT_FINITE
+
+
 def test_sources_that_no_controller_can_follow_are_refused_all_at_once() -> None:
     machine = machine_of("hexapod_all_sources")
+    without = WITHOUT["hexapod_all_sources"]
     with pytest.raises(RequestError) as refusal:
         controllers.export(machine, "c")
-    found = {p.found for p in refusal.value.problems}
-    assert found == {
-        f"the source {name} follows from the pose" for name in WITHOUT["hexapod_all_sources"]
-    }
-    given = controllers.export(machine, "c", {"without": ", ".join(WITHOUT["hexapod_all_sources"])})
+    problems = refusal.value.problems
+    assert {str(p.found).split()[2] for p in problems} == set(without)
+    # One answer for all of them, not one a try.
+    assert {p.hint for p in problems} == {problems[0].hint}
+    assert set(without) == set(str(problems[0].hint).split("without=")[1].split(";")[0].split(","))
+    given = controllers.export(machine, "c", {"without": ", ".join(without)})
     assert any("left out" in line for line in given.statement)
     assert "Left out, and not compensated: loads" in given.files["hexapod_all_sources.h"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (
+            "travel = [0, 900]",
+            'travel = [0, 900]\nbacklash = { play = "40 um", threshold = "10 N" }',
+        ),
+        ('name = "1"', 'name = "1"\nplatform_joint = { clearance = "20 um" }'),
+    ],
+)
+def test_play_that_a_force_presses_is_refused(old: str, new: str, tmp_path: Path) -> None:
+    """Nothing presses it where no force acts: the shift is zero there, and no constant."""
+    text = (MACHINE_FOLDER / "planar_two_slider.toml").read_text()
+    assert old in text
+    file = tmp_path / "play.toml"
+    file.write_text(text.replace(old, new, 1))
+    with pytest.raises(RequestError) as refusal:
+        controllers.export(tp.load(file), "c")
+    assert "follows from the wrench" in str(refusal.value)
+
+
+def test_a_law_is_not_believed_of_one_pose(tmp_path: Path) -> None:
+    """A workspace of one pose makes everything constant: poses about it are asked as well."""
+    text = (MACHINE_FOLDER / "hexapod_all_sources.toml").read_text()
+    file = tmp_path / "one.toml"
+    head, _, rest = text.partition("[workspace]")
+    after = rest[rest.index("\n[") :] if "\n[" in rest else ""
+    file.write_text(f"{head}[workspace]\nposes = [[0, 0, 660, 0, 0, 0]]\n{after}")
+    with pytest.raises(RequestError) as refusal:
+        controllers.export(tp.load(file), "c", {"without": "backlash,clearance,screw_coupling"})
+    assert "the source loads follows from the pose" in str(refusal.value)
+
+
+def test_what_is_left_out_is_said_whatever_the_condition() -> None:
+    machine = machine_of("hexapod").with_condition(
+        machine_of("hexapod").condition.replace(temperature=293.15, force=(0, 0, 0))
+    )
+    given = controllers.export(machine, "c", ["without=thermal,elastic"])
+    assert given.statement[0] == "left out, and not compensated: thermal, elastic"
+    assert "Left out, and not compensated: thermal, elastic." in given.files["hexapod.h"]
+
+
+def test_an_option_given_twice_is_refused() -> None:
+    with pytest.raises(RequestError) as refusal:
+        controllers.export(machine_of("hexapod"), "c", ["without=thermal", "without=elastic"])
+    assert "twice" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("stem", "names"),
+    [("math", ("1", "2")), ("a b-ü", ("a", "A")), ("x", ("ä", "ö")), ("trigraph", ("q??/", "2"))],
+)
+def test_odd_names_compile(stem: str, names: tuple[str, str], tmp_path: Path) -> None:
+    text = (MACHINE_FOLDER / "planar_two_slider.toml").read_text()
+    for old, new in zip(("1", "2"), names, strict=True):
+        text = text.replace(f'[[strut]]\nname = "{old}"', f'[[strut]]\nname = "{new}"')
+    file = tmp_path / f"{stem}.toml"
+    file.write_text(text.replace('name = "Planar two-slider PKM"', 'name = "what?? */ /* ??/"'))
+    c = program_of(tp.load(file))
+    compiled(c, tmp_path, ["-O0", "-I."], to="object")
+    words = re.findall(r"define (\S+_TEMPERATURE_\S+) ", c.header)
+    assert len(set(words)) == 2
 
 
 def test_a_source_that_is_not_there_is_refused() -> None:

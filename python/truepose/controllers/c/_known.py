@@ -21,18 +21,27 @@ import numpy as np
 
 from truepose.budget.exact import Moved, together
 from truepose.budget.length_law import law_of_length
-from truepose.budget.poses import Walk, no_pose_left
+from truepose.budget.poses import Walk
 from truepose.controllers._export import cannot
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.machine.parts_of_machine import Body, Drive, Strut
 from truepose.machine.suggestion import did_you_mean, one_of
-from truepose.sources import Block, Source, acting
+from truepose.sources import Block, Source
 from truepose.sources._base import Floats, Indices
 from truepose.sources._stiffness import lacking
 
-POSES = 200
-"""Poses of the workspace at which the sources are asked."""
+POSES, SCATTERED = 150, 150
+"""Poses of the workspace, and about it, at which the sources are asked."""
+
+FEWEST = 20
+"""Usable poses from which a law is believed."""
+
+MARGIN = 0.05
+"""By how much the poses about the workspace go beyond it, in characteristic lengths or rad."""
+
+PROBING = (50.0, 2000.0)
+"""N at which a source is asked whether it follows from the wrench; moments by the size."""
 
 SMALL, LARGE = 1.0, 20.0
 """K: rises at which a shift is looked at; it has to be in proportion."""
@@ -55,7 +64,7 @@ class Term:
 class Known:
     """Shifts at the reference, per kelvin of each part, and compliances, term by term.
 
-    `left_out`: sources that act and are not in it.
+    `left_out`: sources that the machine has, and that were asked to be left out.
     """
 
     at_reference: tuple[Term, ...]
@@ -81,22 +90,27 @@ def known_of(machine: Machine, without: Sequence[str] = ()) -> Known:
     parts = tuple(_expanding(machine))
     at_reference: list[Term] = []
     per_kelvin: dict[str, list[Term]] = {part: [] for part in parts}
-    problems: list[Problem] = []
+    refused: dict[str, str] = {}
     for source in shifting:
         try:
+            _require_no_wrench(source, block)
             at_reference += _at_reference(source, block)
             for part in parts:
                 per_kelvin[part] += _per_kelvin(source, block, part)
-        except RequestError as refusal:
-            problems += refusal.problems
-    if problems:
-        raise RequestError(*problems)
+        except _NoLawError as failure:
+            refused[source.name] = str(failure)
+    if refused:
+        raise RequestError(*_refusals(machine, refused, without))
     return Known(
         tuple(at_reference),
         {part: tuple(terms) for part, terms in per_kelvin.items()},
         _compliance(block) if len(asked) > len(shifting) else (),
-        tuple(s.name for s in acting(machine) if s.name in without),
+        tuple(source.name for source in sources if source.name in without),
     )
+
+
+class _NoLawError(Exception):
+    """A source follows no law that a controller computes; the text says what it does instead."""
 
 
 def _yields(source: Source) -> bool:
@@ -122,13 +136,27 @@ def _check_names(sources: Sequence[Source], without: Sequence[str]) -> None:
 
 
 def _probe(machine: Machine, condition: Condition) -> Block:
-    """Some usable poses, over the whole workspace."""
+    """Usable poses of the workspace and scattered about it, so that no law is one of a grid only.
+
+    Raises `RequestError`: controller-cannot for too few of them, no-workspace.
+    """
     poses = machine.poses()
-    table = poses[np.unique(np.linspace(0, len(poses) - 1, POSES).astype(int))]
-    walk = Walk(machine, table, condition)
-    for block in walk:
-        return block
-    raise no_pose_left(machine, table, walk.left_out, of_file=True)
+    chosen = poses[np.unique(np.linspace(0, len(poses) - 1, POSES).astype(int))]
+    length = machine.characteristic_length
+    margin = MARGIN * np.array([length if name in "xyz" else 1.0 for name in machine.commanded])
+    low, high = poses.min(axis=0) - margin, poses.max(axis=0) + margin
+    random = np.random.default_rng(0)
+    scattered = low + (high - low) * random.random((SCATTERED, len(low)))
+    found: list[Block] = list(Walk(machine, np.concatenate([chosen, scattered]), condition))
+    if not found or found[0].indices.size < FEWEST:
+        raise cannot(
+            "a controller",
+            machine,
+            f"{found[0].indices.size if found else 0} usable poses about the workspace",
+            f"at least {FEWEST}, from which to find how the sources follow from the pose",
+            "truepose check says why poses cannot be used",
+        )
+    return found[0]
 
 
 def _expanding(machine: Machine) -> Iterator[str]:
@@ -148,7 +176,7 @@ def _shift(source: Source, block: Block, condition: Condition) -> Moved:
 
 def _at_reference(source: Source, block: Block) -> Iterator[Term]:
     columns, values = _shift(source, block, block.condition)
-    return _terms(source.name, block, columns, values)
+    return _terms(block, columns, values)
 
 
 def _per_kelvin(source: Source, block: Block, part: str) -> Iterator[Term]:
@@ -165,8 +193,8 @@ def _per_kelvin(source: Source, block: Block, part: str) -> Iterator[Term]:
     for column, values in zip(*_by_column((columns, large)), strict=True):
         off = np.abs(values * (SMALL / LARGE) - small.get(column, 0.0)).max()
         if off > PROPORTION * np.abs(values).max():
-            raise _cannot(block.machine, source.name, "is not in proportion to the temperature")
-    return _terms(source.name, block, columns, large / LARGE)
+            raise _NoLawError("is not in proportion to the temperature")
+    return _terms(block, columns, large / LARGE)
 
 
 def _by_column(moved: Moved) -> tuple[list[int], list[Floats]]:
@@ -179,31 +207,56 @@ def _compliance(block: Block) -> tuple[Term, ...]:
     if lacking(machine.drives, machine.struts, ""):
         return ()
     columns, values = machine.compliances(block.lengths)
-    return tuple(_terms("elastic", block, columns, values))
+    return tuple(_terms(block, columns, values))
 
 
-def _terms(name: str, block: Block, columns: Indices, values: Floats) -> Iterator[Term]:
+def _terms(block: Block, columns: Indices, values: Floats) -> Iterator[Term]:
     of_strut = {int(c): k for k, c in enumerate(block.machine.kernel.length_parameters)}
     for at, column in enumerate(columns.tolist()):
         strut = of_strut.get(column)
         lengths = np.zeros(len(values)) if strut is None else block.lengths[:, strut]
         law = law_of_length(values[:, at], lengths)
         if law is None:
-            raise _cannot(block.machine, name, "follows from the pose")
+            raise _NoLawError("follows from the pose")
         constant, slope, _ = law
         if constant or slope:
             yield Term(column, constant, slope, strut if slope else None)
 
 
-def _cannot(machine: Machine, name: str, why: str) -> RequestError:
-    return cannot(
-        "C",
-        machine,
-        f"the source {name} {why}",
-        "shifts that are constant, or affine in the length of the strut that they lengthen",
-        f"leave it out, which the file then says: --option without={name}; or correct programs, "
-        "which takes every source: truepose gcode",
-    )
+def _require_no_wrench(source: Source, block: Block) -> None:
+    """Raise `_NoLawError` for a source that shifts otherwise under a load, as play does."""
+    machine, cold = block.machine, block.condition
+    unloaded = _shift(source, block, cold)
+    for component in machine.components:
+        place = "xyz".index(component[-1])
+        for size in PROBING:
+            for sign in (1.0, -1.0):
+                load = [0.0, 0.0, 0.0]
+                lever = 1.0 if len(component) == 1 else machine.characteristic_length
+                load[place] = sign * size * lever
+                loaded = (
+                    cold.replace(force=load) if len(component) == 1 else cold.replace(moment=load)
+                )
+                columns, values = _shift(source, block, loaded)
+                _, change = together([(columns, values), (unloaded[0], -unloaded[1])])
+                if np.abs(change).max(initial=0.0) > 0.0:
+                    raise _NoLawError("follows from the wrench")
+
+
+def _refusals(machine: Machine, refused: dict[str, str], without: Sequence[str]) -> list[Problem]:
+    """One problem a source, each with the one way to leave all of them out."""
+    every = ",".join((*without, *refused))
+    problems: list[Problem] = []
+    for name, why in refused.items():
+        problems += cannot(
+            "a controller",
+            machine,
+            f"the source {name} {why}",
+            "shifts that are constant, or affine in the length of the strut that they lengthen",
+            f"leave it out, which the file then says: --option without={every}; or correct "
+            "programs, which takes every source: truepose gcode",
+        ).problems
+    return problems
 
 
 __all__ = ["Known", "Term", "known_of"]

@@ -21,9 +21,12 @@ SINGULAR = 1e-6
 """Smallest singular value of a pose that holds, relative to the largest, as in the kernel."""
 
 OWN_STACK = 8192
-"""Bytes of stack for the templates' own variables, of which no function has a thousand."""
+"""Bytes of stack that the templates' own variables take, in all their functions together."""
 
 _FREEDOMS = "xyzabc"
+
+_HEADERS = ("assert", "complex", "errno", "fenv", "float", "limits", "math", "stdint", "tgmath")
+"""C's own headers that a file of the same name would hide from a program or from math.h."""
 
 _ACTING = " || ".join(f"wrench[{k}] != 0.0" for k in range(6))
 
@@ -57,9 +60,9 @@ class Program:
         if self.left_out:
             lines.append(f"left out, and not compensated: {', '.join(self.left_out)}")
         if not self.wrench_matters:
-            lines.append("nothing gives way: the wrench has no effect")
+            lines.append("the wrench has no effect")
         if not self.temperature_parts:
-            lines.append("nothing expands: temperatures have no effect")
+            lines.append("temperatures have no effect")
         return tuple(lines)
 
 
@@ -75,7 +78,8 @@ def program_of(machine: Machine, prefix: str | None = None, without: Sequence[st
 def _name_of(machine: Machine) -> str:
     """The machine file's name as a C identifier."""
     name = re.sub(r"\W", "_", Path(machine.file).stem, flags=re.ASCII).lower()
-    return name if re.match(r"[a-z]", name) else f"machine_{name}"
+    usual = re.match(r"[a-z]", name) and name not in _HEADERS
+    return name if usual else f"machine_{name}"
 
 
 class _Writer:
@@ -186,8 +190,8 @@ class _Writer:
             "n_temperature": str(len(self.parts)),
             "n_temperature_room": str(max(len(self.parts), 1)),
             "temperature_macros": "\n".join(
-                f"#define {self.prefix.upper()}_TEMPERATURE_{_word(part)} {number}"
-                for number, part in enumerate(self.parts)
+                f"#define {self.prefix.upper()}_TEMPERATURE_{word} {number}"
+                for number, word in enumerate(_words(self.parts))
             ),
             "most_steps": str(MOST_STEPS),
             "SINGULAR": repr(SINGULAR),
@@ -212,7 +216,7 @@ class _Writer:
             "find_loads": self._find_loads(),
             "straight": self._straight() if self.straight else "",
             "parameters": "\n".join(
-                f"        {value!r}, /* {name} */"
+                f"        {value!r}, /* {_plain(name)} */"
                 for name, value in zip(machine.parameters, machine.nominal.tolist(), strict=True)
             ),
             "reference_temperature": repr(machine.condition.reference_temperature),
@@ -234,7 +238,7 @@ class _Writer:
 
     def _known_lines(self) -> Iterable[str]:
         if not self.compliant:
-            yield "Nothing gives way: the wrench has no effect."
+            yield "The wrench has no effect."
         if self.known.left_out:
             yield f"Left out, and not compensated: {', '.join(self.known.left_out)}."
         yield "Loads are those of the nominal machine at the pose asked for."
@@ -400,10 +404,14 @@ class _Writer:
         {p}_compensated(machine->parameter, placed.at, placed.r, rise, wrench, q, margin, found,
             left, &growth);
         if (growth < 100.0) {{
-            status = {p}_judged(machine->parameter, &placed, {p}_least(margin), q, nominal);
+            double checked[{P}_JOINTS];
+            status = {p}_judged(machine->parameter, &placed, {p}_least(margin), q, checked);
             if (status > {P}_JOINT_LIMIT)
                 return status;
-            return {p}_judged(machine->parameter, &placed, {p}_least(left), found, joints);
+            status = {p}_judged(machine->parameter, &placed, {p}_least(left), found, joints);
+            for (k = 0; k < {P}_JOINTS && status <= {P}_JOINT_LIMIT; k++)
+                nominal[k] = q[k];
+            return status;
         }}
     }}"""
 
@@ -424,11 +432,22 @@ def _flag(value: bool) -> str:
 
 def _plain(text: str) -> str:
     """Text that may stand in a C comment."""
-    return text.replace("*/", "* /").replace("/*", "/ *").replace("\n", " ")
+    for broken in ("*/", "/*", "??"):
+        text = text.replace(broken, " ".join(broken))
+    return " ".join(text.split())
 
 
-def _word(part: str) -> str:
-    return re.sub(r"\W", "_", part, flags=re.ASCII).upper()
+def _words(parts: Sequence[str]) -> list[str]:
+    """Parts as words of macros, each once: `STRUT_1`, and `STRUT_1_2` for one that is alike."""
+    words: list[str] = []
+    for part in parts:
+        word = plain = re.sub(r"\W", "_", part, flags=re.ASCII).upper()
+        number = 1
+        while word in words:
+            number += 1
+            word = f"{plain}_{number}"
+        words.append(word)
+    return words
 
 
 def _lines(lines: Iterable[str]) -> str:

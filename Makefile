@@ -47,7 +47,8 @@ test-rust: cargo $(MADE) ## run the kernel's tests
 
 .PHONY: test-python
 test-python: package tools ## run the package's tests
-	$(BIN)/python -m pytest
+# Matrices here are small: threads of their own only wait for each other on a loaded machine.
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest
 
 .PHONY: lint
 lint: lint-python lint-types lint-imports lint-rust ## check form, types and the direction of imports

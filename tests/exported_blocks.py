@@ -66,12 +66,25 @@ def homed(
     """(n, n_joint) machine coordinates: the controller counts from its endstops, at travel's end.
 
     `joints` (n, n_joint) and `home` in the controller's order and unit; drive `order[k]` is its k.
+    A coordinate is less than what the controller counts by the drive's scale.
     """
     found = np.empty_like(joints)
     for at, drive in enumerate(order):
-        end = machine.drives[drive].travel[1]
-        found[:, drive] = end + (joints[:, at] - home[at]) * unit
+        end, scale = machine.drives[drive].travel[1], scales_of(machine)[drive]
+        found[:, drive] = end + (joints[:, at] - home[at]) * unit / scale
     return found
+
+
+def scales_of(machine: tp.Machine) -> Array:
+    names = machine.parameters
+    return np.array([machine.nominal[names.index(f"drive.{d.name}.scale")] for d in machine.drives])
+
+
+def with_scales(text: str, kind: str, scales: Sequence[float]) -> str:
+    """A machine file whose drives of a kind, in the order of the file, have scales of their own."""
+    left = iter(scales)
+    line = f'kind = "{kind}"'
+    return re.sub(re.escape(line), lambda found: f"{found[0]}\nscale = {next(left)!r}", text)
 
 
 def errors(machine: tp.Machine, joints: Array) -> tuple[Array, Array]:
@@ -119,8 +132,8 @@ def two(export: Export) -> tuple[str, str]:
     return export.files[hal], export.files[ini]
 
 
-def random_shifts(name: str, seed: int, size: float) -> dict[str, float]:
-    """Every joint centre and every drive's zero off by up to `size` mm."""
+def random_shifts(name: str, seed: int, size: float, *, scale: float = 2e-4) -> dict[str, float]:
+    """Every joint centre and every drive's zero off by up to `size` mm, its scale by `scale`."""
     generator = np.random.default_rng(seed)
     machine = tp.load(MACHINES / f"{name}.toml")
     names = [
@@ -129,10 +142,12 @@ def random_shifts(name: str, seed: int, size: float) -> dict[str, float]:
         if each.startswith(("strut.", "drive.")) and not each.endswith((".u", ".v", ".scale"))
     ]
     angular = {f"drive.{drive.name}.offset" for drive in machine.drives if drive.kind == "crank"}
-    return {
+    shifts = {
         each: float(generator.uniform(-size, size)) * (0.1 if each in angular else 1.0)
         for each in names
     }
+    scales = [f"drive.{drive.name}.scale" for drive in machine.drives]
+    return shifts | {each: float(generator.uniform(-scale, scale)) for each in scales}
 
 
 def turned(machine: tp.Machine, degrees: float) -> tp.Machine:

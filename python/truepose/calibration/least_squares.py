@@ -38,6 +38,13 @@ NOISE = 1e-11
 """Decreases of the cost below this share are taken to be lost in its rounding, which that of the
 data adds to where residuals are small differences: there the linear model is believed."""
 
+STEEP = 1e-3
+"""Cosine between residual and Jacobian above which a point is no optimum, however short the steps,
+if the linear model wants to go `FAR`: there the Jacobian is wrong, or the residual too rough."""
+
+FAR = 1e-6
+"""In the norm |D x|: a longer way than rounding leaves to a root."""
+
 HELD = 0.1
 """The step's length may miss the radius of the trust region by this share."""
 
@@ -66,7 +73,8 @@ class Solution:
 
     `values` (n,). `residual` (m,) and `jacobian` (m, n), weighted, at `values`. `cost`: sum of
     squares of `residual`. `status`: which test ended it; `cost`, `step` and `gradient` are
-    convergence, `stalled` means that no step lowers the cost although none of them holds,
+    convergence, `stalled` means that no step lowers the cost although none of them holds (a wrong
+    Jacobian does that, or one that is nowhere finite about the point),
     `exhausted` that the evaluations allowed were used up.
     """
 
@@ -100,14 +108,19 @@ def least_squares(
     `residual(values (n,)) -> (m,)`, `jacobian(values) -> (m, n)` its derivatives; a residual with a
     value that is not finite says that the model does not reach so far, and the step is shortened.
     `weights` (m,): one over each standard uncertainty; default 1. `scale` (n,): typical size of a
-    change of each value; default: found from the Jacobian's columns. `first_radius`: of the first
-    trust region, in units of |D start|. Fewer equations than unknowns, and directions that no
-    equation sees, are allowed: the values do not move along them.
+    change of each value, above zero; default: found from the Jacobian's columns. `first_radius`: of
+    the first trust region, in units of |D start|, above zero. Fewer equations than unknowns, and
+    directions that no equation sees, are allowed: the values do not move along them.
 
-    Raises `ValueError` for shapes that contradict each other and for a start where the residual or
-    the Jacobian is not finite.
+    A Jacobian that is not that of the residual ends as `stalled` where the first step along it,
+    however short, lowers nothing. A point where it is not finite is not gone to.
+
+    Raises `ValueError` for shapes that contradict each other, a scale, weights or a first radius
+    out of range, and for a start where the residual or the Jacobian is not finite.
     """
     limits = tolerances or Tolerances()
+    if not (math.isfinite(first_radius) and first_radius > 0.0):
+        raise ValueError(f"the first radius is {first_radius}, expected a number above zero")
     problem = _Problem(residual, jacobian, weights)
     values = np.array(start, np.float64).reshape(-1)
     error = problem.residual(values)
@@ -138,7 +151,7 @@ def least_squares(
             tried_norm = float(np.linalg.norm(tried))
             promised, half_slope = promise.decrease(multiplier, length, step)
             # Far worse, or not finite: nothing is won by knowing how much.
-            actual = 1.0 - (tried_norm / norm) ** 2 if tried_norm < 10.0 * norm else -1.0
+            actual = 1.0 - _square(tried_norm / norm) if tried_norm < 10.0 * norm else -1.0
             share = actual / promised if promised > 0.0 else 0.0
             rounding = promised <= NOISE and abs(actual) <= NOISE
             radius = _radius(
@@ -146,20 +159,25 @@ def least_squares(
             )
             taken = rounding or share >= ACCEPTED
             if taken:
-                values, error, norm = values + step, tried, tried_norm
+                next_slope = problem.jacobian(values + step, error.size)
+                if not np.isfinite(next_slope).all():
+                    taken, radius = False, 0.5 * min(radius, length)
+            if taken:
+                values, error, norm, slope = values + step, tried, tried_norm, next_slope
                 size = float(np.linalg.norm(axes.of * values))
                 iterations += 1
-            if norm == 0.0 or (rounding and (promised <= limits.cost or promised > 0.5 * last)):
+            if norm * norm == 0.0 or (
+                rounding and (promised <= limits.cost or promised > 0.5 * last)
+            ):
                 status = "cost"
             elif min(radius, length) <= limits.step * size:
-                status = "step"
+                steep = promise.cosine > STEEP and promise.way > FAR * size
+                status = "stalled" if steep and not taken else "step"
             elif not taken and promised <= EPSILON * EPSILON:
                 status = "stalled"
             elif problem.evaluations >= most_evaluations:
                 status = "exhausted"
             last = promised if rounding else math.inf
-        if taken:
-            slope = problem.jacobian(values, error.size)
         if status:
             return ended(status)
         axes.widen(slope)
@@ -174,10 +192,16 @@ def covariance(
     `jacobian` (m, n) of weighted residuals. The second result (n_free, n) are unit directions, in
     values scaled to equal columns, along which the residual does not change: singular values below
     `rank_tolerance` of the largest. The covariance is over the rest; whoever asks must look.
+
+    Raises `ValueError` for a Jacobian of another shape or not finite, and a variance below zero.
     """
     slope = np.asarray(jacobian, np.float64)
     if slope.ndim != 2:
         raise ValueError(f"the Jacobian has shape {slope.shape}, expected (m, n)")
+    if not np.isfinite(slope).all():
+        raise ValueError("the Jacobian is not finite")
+    if not (math.isfinite(variance) and variance >= 0.0):
+        raise ValueError(f"the variance is {variance}, expected zero or more")
     columns = _column_norms(slope)
     columns[columns == 0.0] = 1.0
     factor = np.linalg.qr(slope / columns, mode="r")
@@ -195,6 +219,10 @@ class _Problem:
     def __init__(self, residual: Residual, jacobian: Residual, weights: ArrayLike | None) -> None:
         self._residual, self._jacobian = residual, jacobian
         self._weights = None if weights is None else np.asarray(weights, np.float64)
+        if self._weights is not None:
+            fit = np.isfinite(self._weights) & (self._weights >= 0.0)
+            if not fit.all():
+                raise ValueError("the weights are not all finite and zero or more")
         self.evaluations = 0
 
     def residual(self, values: Floats) -> Floats:
@@ -227,9 +255,10 @@ class _Axes:
     def __init__(self, scale: ArrayLike | None, slope: Floats) -> None:
         self._given = scale is not None
         if scale is not None:
-            self.of = 1.0 / np.asarray(scale, np.float64)
-            if self.of.shape != (slope.shape[1],) or not (self.of > 0.0).all():
-                raise ValueError("a scale above zero is wanted for every value")
+            given = np.asarray(scale, np.float64)
+            if given.shape != (slope.shape[1],) or not (np.isfinite(given) & (given > 0.0)).all():
+                raise ValueError("a finite scale above zero is wanted for every value")
+            self.of = 1.0 / given
         else:
             self.of = _column_norms(slope)
             self.of[self.of == 0.0] = 1.0
@@ -256,17 +285,20 @@ class _Promise:
         columns = _column_norms(slope)
         lengths = np.where(columns > 0.0, columns, 1.0) * (self._norm or 1.0)
         self.cosine = float(np.abs(slope.T @ error / lengths).max(initial=0.0))
+        seen = self._singular > 0.0
+        self._whole = np.zeros_like(self._singular)
+        with np.errstate(over="ignore"):
+            self._whole[seen] = -self._turned[seen] / self._singular[seen]
+        self.way = float(np.linalg.norm(self._whole))
 
     def step(self, radius: float) -> tuple[Floats, float]:
         """The step (n,) inside the trust region, and its multiplier, 0 where the region is wide."""
         s, c = self._singular, self._turned
-        seen = s > 0.0
-        coordinates = np.zeros_like(s)
-        coordinates[seen] = -c[seen] / s[seen]
-        multiplier = 0.0
-        if float(np.linalg.norm(coordinates)) > (1.0 + HELD) * radius:
-            multiplier = self._multiplier(radius, seen)
-            coordinates = -s * c / (s * s + multiplier)
+        coordinates, multiplier = self._whole, 0.0
+        if self.way > (1.0 + HELD) * radius:
+            with np.errstate(all="ignore"):  # a length of infinity is one too long
+                multiplier = self._multiplier(radius, s > 0.0)
+                coordinates = -s * c / (s * s + multiplier)
         return (self._right.T @ coordinates) / self._axes, multiplier
 
     def _multiplier(self, radius: float, seen: NDArray[np.bool_]) -> float:
@@ -292,8 +324,8 @@ class _Promise:
 
     def decrease(self, multiplier: float, length: float, step: Floats) -> tuple[float, float]:
         """Share of the cost that the model promises to take away, and half its slope at 0."""
-        along = (float(np.linalg.norm(self._slope @ step)) / self._norm) ** 2
-        held = multiplier * (length / self._norm) ** 2
+        along = _square(float(np.linalg.norm(self._slope @ step)) / self._norm)
+        held = multiplier * _square(length / self._norm)
         return along + 2.0 * held, -(along + held)
 
 
@@ -320,6 +352,11 @@ def _radius(
     if multiplier == 0.0 or share >= WIDENED:
         return 2.0 * length
     return radius
+
+
+def _square(value: float) -> float:
+    """Infinite where it is too large; a power would raise."""
+    return value * value
 
 
 def _column_norms(matrix: Floats) -> Floats:

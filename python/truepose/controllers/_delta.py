@@ -16,7 +16,7 @@ from truepose.budget.poses import LeftOut, no_pose_left
 from truepose.compensation.commands import with_joints
 from truepose.controllers._export import cannot
 from truepose.controllers._homing import switch_option
-from truepose.controllers._small_model import INSTEAD, value, vector
+from truepose.controllers._small_model import INSTEAD, MM, value, vector
 from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.machine.parts_of_machine import Drive
@@ -30,6 +30,8 @@ UNLIKE = 0.05
 
 TOWERS = np.radians([210.0, 330.0, 90.0])
 """Where controllers that count towers have A, B and C (or X, Y and Z) about the z axis."""
+
+AROUND = "controllers have the z axis of the base frame in the middle of the drives"
 
 SWITCHES = switch_option("the end of each drive's travel that raises the tool")
 
@@ -125,18 +127,33 @@ def wrapped(angles: Floats) -> Floats:
     return turned
 
 
-def print_radius(machine: Machine) -> float:
-    """The radius, m, of the poses of the workspace about the z axis."""
-    return float(np.hypot(*machine.poses()[:, :2].T).max())
+def surrounded(angles: Floats) -> bool:
+    """Whether limbs at `angles` (3,), rad, stand all around the z axis."""
+    turns = np.sort(angles % (2.0 * math.pi))
+    return bool(np.diff(turns, append=turns[0] + 2.0 * math.pi).max() < math.pi)
+
+
+def print_radius(machine: Machine) -> str:
+    """The radius of the workspace about the z axis, mm, rounded up and above zero."""
+    radius = float(np.hypot(*machine.poses()[:, :2].T).max()) / MM
+    return f"{max(math.ceil(radius * 10.0), 1) / 10.0:.1f}"
+
+
+def lowest_z(machine: Machine) -> str:
+    """Klipper's minimum_z_position of the workspace, mm: rounded down, not above zero."""
+    return f"{min(0.0, math.floor(float(machine.poses()[:, 2].min()) / MM)):.0f}"
 
 
 __all__ = [
+    "AROUND",
     "LEAN",
     "SWITCHES",
     "TOWERS",
     "Limb",
     "limbs",
+    "lowest_z",
     "print_radius",
+    "surrounded",
     "tower_order",
     "wrapped",
 ]

@@ -8,9 +8,10 @@ below. The carriage of tower i, at the angle a_i, stands at the height
 where u and v, the tilt, exist in some controllers only. Where the endstop trips, s_i is h_i: that
 is how the controller's heights and the machine's joint coordinates q_i belong together,
 
-    q_i = e_i + up_i (s_i - h_i),
+    q_i = e_i + (s_i - h_i) / g_i,
 
-with the joint coordinate e_i at which it trips and the sense up_i of the drive.
+with the joint coordinate e_i at which it trips and the gain g_i, by which the carriage rises for
+each metre of its coordinate: the drive's nominal scale, negative where that counts downwards.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.controllers._delta import LEAN, Limb, limbs
+from truepose.controllers._delta import AROUND, LEAN, limbs, surrounded
 from truepose.controllers._export import cannot
 from truepose.controllers._homing import switches
-from truepose.controllers._small_model import INSTEAD, Parameter
+from truepose.controllers._small_model import INSTEAD, MM, Parameter, ascii_only, scales
 from truepose.machine import Machine
 from truepose.sources._base import Floats, Indices
 
@@ -39,24 +40,22 @@ RADIUS, ANGLES, ARMS, HEIGHTS, TILT = (
 
 COUNT = 12
 
-Numbers = Floats
-
 
 @dataclass(frozen=True)
 class LinearDelta:
     """The nominal machine as a linear delta.
 
-    `order` (3,): number of the drive of each tower; `up` (3,): +1 where its coordinate rises with
-    the carriage, else -1; `switch` (3,): coordinates e_i, m. `nominal` (12,): the numbers above.
+    `order` (3,): number of the drive of each tower; `gain` (3,): what its carriage rises by, per
+    metre of its coordinate; `switch` (3,): coordinates e_i, m. `nominal` (12,): the numbers above.
     """
 
     machine: Machine
     order: Indices
-    up: Floats
+    gain: Floats
     switch: Floats
-    nominal: Numbers
+    nominal: Floats
 
-    def joints(self, numbers: Numbers, poses: Floats) -> Floats:
+    def joints(self, numbers: Floats, poses: Floats) -> Floats:
         """(n, 3) joint coordinates, in the machine's order, for `poses` (n, 3) x y z."""
         x, y, z = poses.T[:, :, np.newaxis]
         radius, angles, arms = numbers[RADIUS], numbers[ANGLES], numbers[ARMS]
@@ -65,7 +64,7 @@ class LinearDelta:
             rise = np.sqrt(arms**2 - across)
         heights = z + rise + numbers[TILT][0] * x + numbers[TILT][1] * y
         found = np.empty((len(poses), 3))
-        found[:, self.order] = self.switch + self.up * (heights - numbers[HEIGHTS])
+        found[:, self.order] = self.switch + (heights - numbers[HEIGHTS]) / self.gain
         return found
 
     def in_order(self, order: list[int]) -> LinearDelta:
@@ -74,12 +73,24 @@ class LinearDelta:
         for places in (ANGLES, ARMS, HEIGHTS):
             nominal[places] = self.nominal[places][order]
         return LinearDelta(
-            self.machine, self.order[order], self.up[order], self.switch[order], nominal
+            self.machine, self.order[order], self.gain[order], self.switch[order], nominal
         )
+
+    @property
+    def switches(self) -> Floats:
+        """(3,) coordinates e_i, m, in the machine's order."""
+        found = np.empty(3)
+        found[self.order] = self.switch
+        return found
 
     def names(self) -> list[str]:
         """Names of the drives, tower by tower."""
         return [self.machine.drives[index].name for index in self.order]
+
+    def towers(self, letters: str) -> str:
+        """Which drive stands at which tower, for a comment: `X a, Y b, Z c`."""
+        pairs = zip(letters, self.names(), strict=True)
+        return ascii_only(", ".join(f"{letter} {name}" for letter, name in pairs))
 
 
 def linear_delta(
@@ -93,18 +104,25 @@ def linear_delta(
     for limb in found:
         if abs(limb.axis[2]) < math.cos(LEAN):
             raise _refused(machine, controller, f"drive {limb.drive.name}, which is not upright")
-        if limb.base[2] + limb.origin[2] <= limb.platform[2] + _home(machine)[2]:
+        if limb.base[2] + limb.origin[2] <= limb.platform[2] + machine.home[2]:
             raise _refused(machine, controller, f"carriage {limb.drive.name} below the platform")
+    # The carriages at home as seen with the effector shrunk to the tool point, base frame.
+    heads = np.array([limb.origin + limb.base - limb.platform for limb in found])
+    radii, angles = np.hypot(heads[:, 0], heads[:, 1]), np.arctan2(heads[:, 1], heads[:, 0])
+    arms = np.array([limb.length for limb in found])
+    if not surrounded(angles):
+        raise _refused(machine, controller, f"towers at {_degrees(angles)} degrees", AROUND)
+    if not (arms > radii.mean()).all():
+        shown = f"rods of {arms.min() / MM:.6g} mm, towers {radii.mean() / MM:.6g} mm"
+        raise _refused(machine, controller, f"{shown} off the z axis", AROUND)
     up = np.array([math.copysign(1.0, limb.axis[2]) for limb in found])
     ends = [limb.drive.travel[1 if sense > 0 else 0] for limb, sense in zip(found, up, strict=True)]
     switch = switches(machine, options, ends, controller)
-    heads = np.array([_head(machine, limb) for limb in found])
+    gain = up * scales(machine)
     nominal = np.zeros(COUNT)
-    nominal[RADIUS] = np.hypot(heads[:, 0], heads[:, 1]).mean()
-    nominal[ANGLES] = np.arctan2(heads[:, 1], heads[:, 0])
-    nominal[ARMS] = [limb.length for limb in found]
-    nominal[HEIGHTS] = heads[:, 2] + up * (switch - [limb.home for limb in found])
-    return LinearDelta(machine, np.arange(3), up, switch, nominal)
+    nominal[RADIUS], nominal[ANGLES], nominal[ARMS] = radii.mean(), angles, arms
+    nominal[HEIGHTS] = heads[:, 2] + gain * (switch - [limb.home for limb in found])
+    return LinearDelta(machine, np.arange(3), gain, switch, nominal)
 
 
 def parameters(delta: LinearDelta, *, tilt: bool = False) -> tuple[Parameter, ...]:
@@ -122,7 +140,7 @@ def parameters(delta: LinearDelta, *, tilt: bool = False) -> tuple[Parameter, ..
     )
 
 
-def endstop(numbers: Numbers) -> Floats:
+def endstop(numbers: Floats) -> Floats:
     """(3,) height of the tool at x = y = 0 at which each carriage trips its endstop, m."""
     found: Floats = numbers[HEIGHTS] - np.sqrt(numbers[ARMS] ** 2 - numbers[RADIUS] ** 2)
     return found
@@ -134,16 +152,33 @@ def heights(endstops: Floats, arms: Floats, radius: float) -> Floats:
     return found
 
 
-def _head(machine: Machine, limb: Limb) -> Floats:
-    """(3,) the carriage at home as seen with the effector shrunk to the tool point, base frame."""
-    found: Floats = limb.origin + limb.base - limb.platform
-    return found
+def untilted(values: Floats) -> Floats:
+    """(12,) the numbers of a linear delta from the first ten, without a tilt."""
+    numbers = np.zeros(COUNT)
+    numbers[: TILT.start] = values
+    return numbers
 
 
-def _home(machine: Machine) -> Floats:
-    return machine.home[:3]
+def _degrees(angles: Floats) -> str:
+    return ", ".join(f"{angle:.1f}" for angle in np.degrees(angles))
 
 
-def _refused(machine: Machine, controller: str, found: str) -> Exception:
-    wanted = "a delta with upright guideways and the carriages above the platform"
-    return cannot(controller, machine, found, wanted, INSTEAD)
+def _refused(machine: Machine, controller: str, found: str, hint: str = INSTEAD) -> Exception:
+    wanted = "a delta with upright guideways around the z axis and the carriages above the platform"
+    return cannot(controller, machine, found, wanted, hint)
+
+
+__all__ = [
+    "ANGLES",
+    "ARMS",
+    "COUNT",
+    "HEIGHTS",
+    "RADIUS",
+    "TILT",
+    "LinearDelta",
+    "endstop",
+    "heights",
+    "linear_delta",
+    "parameters",
+    "untilted",
+]

@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
-from truepose.controllers._export import Option
-from truepose.controllers._small_model import ascii_only, fixed
+from truepose.controllers._export import Export, Option
+from truepose.controllers._fit import fit, heading
+from truepose.controllers._small_model import (
+    MM,
+    Printed,
+    SmallModel,
+    ascii_only,
+    fixed,
+    more_decimals,
+    stem,
+)
 from truepose.machine import Machine
+from truepose.sources._base import Floats
 
-INCH, MM = 0.0254, 1e-3
+INCH = 0.0254
 
 UNITS = Option(
     "file",
@@ -19,7 +30,10 @@ UNITS = Option(
 )
 
 DIGITS = {"mm": 6, "inch": 8}
-"""Decimals that are written: a nanometre, or less."""
+"""Decimals that are written: a nanometre, or less; more for machines smaller than `SMALL`."""
+
+SMALL = 0.01
+"""m, of the characteristic length."""
 
 SCALE = {"mm": MM, "inch": INCH}
 
@@ -32,24 +46,59 @@ def unit_of(machine: Machine, option: float | str) -> str:
     return "inch" if unit is not None and math.isclose(unit.scale, INCH) else "mm"
 
 
+def digits_of(machine: Machine, unit: str) -> int:
+    """Decimals of a length of this machine in a `unit`."""
+    return DIGITS[unit] + more_decimals(machine.characteristic_length, SMALL)
+
+
+class JointModel(SmallModel, Protocol):
+    """A `SmallModel` that is written as lines for a HAL file and for an INI, in a `unit`."""
+
+    unit: str
+
+    def hal(self, printed: Printed) -> list[str]:
+        """`setp` of every number that is a pin."""
+        ...
+
+    def ini(self, values: Floats, printed: Printed) -> list[str]:
+        """The sections of the joints, from the numbers and from what is printed of them."""
+        ...
+
+
+def exported(machine: Machine, model: JointModel, kinematics: str, joints: int) -> Export:
+    """The fitted model as a HAL file and an INI.
+
+    Raises `RequestError`: controller-cannot, no-workspace, no-pose-left.
+    """
+    found = fit(machine, model)
+    lines = heading(machine, found, f"LinuxCNC {kinematics}")
+    hal = [*(f"# {line}" for line in lines), f"# in {model.unit}", *model.hal(found.printed)]
+    ini = ini_head(lines, kinematics, joints, model.unit) + model.ini(found.values, found.printed)
+    files = {
+        f"{stem(machine)}_{kinematics}.hal": "\n".join([*hal, ""]),
+        f"{stem(machine)}_{kinematics}.ini": "\n".join([*ini, ""]),
+    }
+    return Export(files, found.statement(machine))
+
+
 def ini_joint(
     machine: Machine,
     joint: int,
     drive: int,
     unit: str,
     *,
-    up: float,
+    gain: float,
     offset: float,
     home_offset: str,
     home: float,
 ) -> list[str]:
-    """A [JOINT_n] section: LinuxCNC's joint value is `up` * coordinate + `offset`, m.
+    """A [JOINT_n] section: LinuxCNC's joint value is `gain` * coordinate + `offset`, m.
 
     `home_offset`: its value at the home switch, as printed. `home`: its value at the machine's
     home, m.
     """
-    scale, digits = SCALE[unit], DIGITS[unit]
-    ends = sorted((up * end + offset) / scale for end in machine.drives[drive].travel)
+    scale, digits = SCALE[unit], digits_of(machine, unit)
+    ends = sorted((gain * end + offset) / scale for end in machine.drives[drive].travel)
     last = 10.0**-digits  # inwards, so that rounding does not widen the travel
     return [
         "",
@@ -76,4 +125,4 @@ def ini_head(lines: Sequence[str], kinematics: str, joints: int, unit: str) -> l
     ]
 
 
-__all__ = ["DIGITS", "SCALE", "UNITS", "ini_head", "ini_joint", "unit_of"]
+__all__ = ["SCALE", "UNITS", "digits_of", "exported", "ini_joint", "unit_of"]

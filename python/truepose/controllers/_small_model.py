@@ -8,6 +8,7 @@ it is printed. `printed` are the numbers as they stand in the controller's file,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,8 +17,10 @@ from typing import Protocol
 import numpy as np
 
 from truepose.machine import Machine
-from truepose.machine.units import UnitSystem
+from truepose.machine.units import UnitSystem, default_units
 from truepose.sources._base import Floats
+
+MM = 1e-3
 
 Printed = Mapping[str, str]
 """Numbers as the controller reads them: its own words -> rounded text, in its own units."""
@@ -48,6 +51,11 @@ class SmallModel(Protocol):
         """What can be fitted."""
         ...
 
+    @property
+    def switches(self) -> Floats:
+        """(n_joint,) joint coordinates, m or rad, in the machine's order, where they trip."""
+        ...
+
     def joints(self, values: Floats, poses: Floats) -> Floats:
         """(n, n_joint) where the controller drives the machine's joints for `poses`.
 
@@ -76,6 +84,25 @@ def vector(machine: Machine, name: str) -> Floats:
     return np.array([value(machine, f"{name}.{axis}") for axis in "xyz"])
 
 
+def scales(machine: Machine) -> Floats:
+    """(n_joint,) true travel, as a controller counts it, for each of a joint coordinate: nominal.
+
+    A deviation of it is none of the controller's numbers: it is left over.
+    """
+    return np.array([value(machine, f"{drive.part}.scale") for drive in machine.drives])
+
+
+def in_file_units(machine: Machine, value: float, dimension: str) -> str:
+    """A quantity given in SI, in the unit that the machine file has for it, with that unit."""
+    unit = (default_units() | dict(machine.file_units))[dimension]
+    return f"{float(unit.to_file(np.float64(value))):.6g} {unit.label}"
+
+
+def more_decimals(size: float, usual: float) -> int:
+    """Decimals to add where `size` is shorter than what the usual ones are meant for."""
+    return max(0, math.ceil(math.log10(usual / size)))
+
+
 def fixed(value: float, digits: int) -> str:
     """A number with `digits` decimals, without an exponent and without a negative zero."""
     text = f"{value:.{digits}f}"
@@ -100,3 +127,21 @@ def quantities(machine: Machine, text: str, dimension: str) -> list[float]:
 def stem(machine: Machine) -> str:
     """The machine file's name without its ending, with which the names of files begin."""
     return Path(machine.file).stem
+
+
+__all__ = [
+    "INSTEAD",
+    "MM",
+    "Parameter",
+    "Printed",
+    "SmallModel",
+    "ascii_only",
+    "fixed",
+    "in_file_units",
+    "more_decimals",
+    "quantities",
+    "scales",
+    "stem",
+    "value",
+    "vector",
+]

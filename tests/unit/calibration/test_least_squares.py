@@ -128,11 +128,38 @@ def test_it_starts_at_the_solution() -> None:
     assert found.evaluations == 1
 
 
-def test_a_wrong_jacobian_stalls_and_says_so() -> None:
-    found = least_squares(rosenbrock, lambda x: -rosenbrock_slope(x), [-1.2, 1.0])
-    assert not found.converged or found.status == "step"
-    assert found.cost == pytest.approx(float(np.sum(rosenbrock(np.array([-1.2, 1.0])) ** 2)))
-    assert found.iterations == 0
+@pytest.mark.parametrize(
+    ("residual", "wrong", "start"),
+    [
+        (rosenbrock, lambda x: -rosenbrock_slope(x), [-1.2, 1.0]),
+        (lambda x: x - 1.0, lambda x: -np.eye(2), [3.0, 2.0]),
+    ],
+)
+def test_a_wrong_jacobian_stalls_and_says_so(residual, wrong, start: list[float]) -> None:
+    found = least_squares(residual, wrong, start)
+    assert found.status == "stalled"
+    assert not found.converged
+    assert found.cost == pytest.approx(float(np.sum(residual(np.array(start)) ** 2)))
+
+
+def test_a_jacobian_that_ends_is_not_gone_to() -> None:
+    # Its derivatives are known at the start only.
+    found = least_squares(
+        lambda x: np.array([x[0] ** 2 - 1.0, 0.0]),
+        lambda x: np.array([[2.0 * x[0] if x[0] == 3.0 else np.nan], [0.0]]),
+        [3.0],
+    )
+    assert found.status == "stalled"
+    assert found.values == pytest.approx([3.0])
+    assert np.isfinite(found.jacobian).all()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("start", [[1.0], [1.0, -2.0], [-30.0]])
+def test_a_minimum_at_infinity_ends(start: list[float]) -> None:
+    found = least_squares(lambda x: np.exp(-x), lambda x: -np.diag(np.exp(-x)), start)
+    assert found.values.min() > 300.0
+    assert found.cost < 1e-200
 
 
 def test_evaluations_are_counted_and_limited() -> None:
@@ -182,7 +209,10 @@ def test_looser_tolerances_stop_earlier() -> None:
         (lambda x: np.eye(2), lambda x: np.eye(1), None, None, "residual has shape"),
         (lambda x: x, lambda x: np.eye(2), None, None, "Jacobian has shape"),
         (lambda x: x, lambda x: np.eye(1), [1.0, 2.0], None, "weights"),
+        (lambda x: x, lambda x: np.eye(1), [-1.0], None, "weights"),
         (lambda x: x, lambda x: np.eye(1), None, [-1.0], "scale"),
+        (lambda x: x, lambda x: np.eye(1), None, [0.0], "scale"),
+        (lambda x: x, lambda x: np.eye(1), None, [np.inf], "scale"),
         (lambda x: x, lambda x: np.eye(1), None, [1.0, 1.0], "scale"),
     ],
 )
@@ -191,6 +221,16 @@ def test_what_contradicts_itself_is_refused(residual, slope, weights, scale, wor
         least_squares(residual, slope, [1.0], weights=weights, scale=scale)
 
 
+@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf])
+def test_a_trust_region_has_a_size(radius: float) -> None:
+    with pytest.raises(ValueError, match="radius"):
+        least_squares(rosenbrock, rosenbrock_slope, [-1.2, 1.0], first_radius=radius)
+
+
 def test_a_covariance_wants_a_matrix() -> None:
     with pytest.raises(ValueError, match="Jacobian"):
         covariance([1.0, 2.0])
+    with pytest.raises(ValueError, match="not finite"):
+        covariance([[1.0, np.nan], [0.0, 1.0]])
+    with pytest.raises(ValueError, match="variance"):
+        covariance(np.eye(2), -1.0)

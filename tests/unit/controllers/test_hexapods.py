@@ -23,8 +23,10 @@ from exported_blocks import (
     exported,
     loaded,
     random_shifts,
+    scales_of,
     text_of,
     two,
+    with_scales,
 )
 from truepose.controllers._export import Export
 from truepose.controllers.linuxcnc_genhexkins import LinuxCncGenhexkins
@@ -36,7 +38,7 @@ Array = NDArray[np.float64]
 def hexapod_joints(machine: tp.Machine, export: Export) -> Array:
     model = firmware.genhexkins(*two(export))
     starts = np.array([drive.travel[0] for drive in machine.drives])
-    return model.lengths(machine.poses()) - model.home + starts
+    return (model.lengths(machine.poses()) - model.home) / scales_of(machine) + starts
 
 
 @pytest.mark.parametrize("name", ["hexapod", "hexapod_telescope"])
@@ -56,7 +58,7 @@ def test_a_shipped_hexapod_is_left_as_stated(name: str) -> None:
 def test_a_hexapod_off_everywhere_is_recovered(name: str, units: str, tmp_path: Path) -> None:
     # All 36 coordinates and 6 offsets are in the model: nothing but rounding is left.
     size = 0.02 if name == "hexapod" else 0.5  # in, mm
-    text = cold(text_of(name, random_shifts(name, 3, size)))
+    text = cold(text_of(name, random_shifts(name, 3, size, scale=0.0)))
     machine = loaded(tmp_path, text)
     export = exported(LinuxCncGenhexkins, machine, f"units={units}")
     position, orientation = errors(machine, hexapod_joints(machine, export))
@@ -67,9 +69,45 @@ def test_a_hexapod_off_everywhere_is_recovered(name: str, units: str, tmp_path: 
     agree(hal, AFTER, position, "um")
 
 
+SCALES = (1.01, 0.98, 1.0, 1.03, 0.99, 1.005)
+
+
+def test_leads_that_are_not_what_they_are_called(tmp_path: Path) -> None:
+    # By design: nothing is left over; and off by a little: as stated.
+    text = cold(with_scales(text_of("hexapod", {}), "telescopic", SCALES))
+    machine = loaded(tmp_path, text)
+    export = exported(LinuxCncGenhexkins, machine)
+    position, _ = errors(machine, hexapod_joints(machine, export))
+    assert position.max() < 0.1 * UM
+    line = next(line for line in export.statement if "true travel" in line)
+    named = [f"{drive.name} {s:g}" for drive, s in zip(machine.drives, SCALES, strict=True)]
+    assert line.endswith(", ".join(each for each in named if not each.endswith(" 1")))
+    # The limits of the joints are their lengths at the ends of travel.
+    sections = firmware.read_ini(two(export)[1])
+    for joint, (drive, scale) in enumerate(zip(machine.drives, SCALES, strict=True)):
+        section = {key: float(value) for key, value in sections[f"JOINT_{joint}"].items()}
+        span = (drive.travel[1] - drive.travel[0]) * scale / 0.0254
+        assert section["MAX_LIMIT"] - section["MIN_LIMIT"] == pytest.approx(span, abs=3e-8)
+        assert 0.0 <= section["MIN_LIMIT"] - section["HOME_OFFSET"] < 2e-8
+    off = with_scales(text_of("hexapod", random_shifts("hexapod", 5, 0.02)), "telescopic", SCALES)
+    machine = loaded(tmp_path, off)
+    export = exported(LinuxCncGenhexkins, machine)
+    position, _ = errors(machine, hexapod_joints(machine, export))
+    agree(two(export)[0], AFTER, position, "um")
+    assert position.max() > 1.0 * UM
+
+
+def test_pins_that_must_be_zero_are_set() -> None:
+    pins = firmware.read_hal(
+        two(exported(LinuxCncGenhexkins, tp.load(MACHINES / "hexapod.toml")))[0]
+    )
+    for pin in ("screw-lead", "spindle-offset", "tool-offset"):
+        assert pins[f"genhexkins.{pin}"] == 0.0
+
+
 def test_a_small_workspace_leaves_numbers_where_they_were(tmp_path: Path) -> None:
     # One height, no angles: most of the 42 numbers do not show, and must not wander off.
-    text = cold(text_of("hexapod", random_shifts("hexapod", 3, 0.02)))
+    text = cold(text_of("hexapod", random_shifts("hexapod", 3, 0.02, scale=0.0)))
     text = re.sub(
         r"^grid = .*$",
         "grid = { x = [-4, 4, 5], y = [-4, 4, 5], z = [20, 20, 1] }",
@@ -86,7 +124,8 @@ def test_a_small_workspace_leaves_numbers_where_they_were(tmp_path: Path) -> Non
     for strut in range(6):
         off = np.r_[model.base[strut], model.platform[strut]] - nominal[6 * strut : 6 * strut + 6]
         assert np.abs(off).max() < 3 * 0.02 * 0.0254
-    assert any("of the numbers" in line and "hardly tells" in line for line in export.statement)
+    assert "of the numbers" in export.statement[0]
+    assert "hardly tells" in export.statement[0]
 
 
 def test_home_and_limits_of_linuxcnc_joints() -> None:

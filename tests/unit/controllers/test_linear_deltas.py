@@ -32,6 +32,7 @@ from exported_blocks import (
     text_of,
     turned,
     two,
+    with_scales,
 )
 from truepose.compensation.commands import actual_of_joints
 from truepose.controllers._export import Export
@@ -218,6 +219,37 @@ def test_towers_are_found_by_where_they_stand(tmp_path: Path) -> None:
     plain = firmware.marlin(only(exported(Marlin, machine)))
     moved = firmware.marlin(only(exported(Marlin, machine, "switches=570, 571, 572")))
     assert plain.home - moved.home == pytest.approx([9.0, 8.0, 10.0], abs=5e-5)
+
+
+SCALES = (1.01, 0.98, 1.03)
+
+
+@pytest.mark.parametrize("name", PRINTERS)
+def test_scales_are_what_the_controllers_steps_are_of(name: str, tmp_path: Path) -> None:
+    text = text_of("linear_delta", random_shifts("linear_delta", 4, 0.1))
+    machine, printer = loaded(tmp_path, with_scales(text, "slider", SCALES)), PRINTERS[name]
+    export = exported(printer.adapter, machine)
+    found, _ = errors(machine, printer.joints(machine, export))
+    block = next(iter(export.files.values()))
+    agree(block, AFTER, found, "um")
+    assert 1.0 * UM < found.max() < 500.0 * UM
+    line = next(line for line in export.statement if "true travel" in line)
+    assert line.endswith("a 1.01, b 0.98, c 1.03")
+    # By design it is in the model: nothing is left but for lineardeltakins' one rod length.
+    machine = loaded(tmp_path, cold(with_scales(text_of("linear_delta", {}), "slider", SCALES)))
+    export = exported(printer.adapter, machine)
+    found, _ = errors(machine, printer.joints(machine, export))
+    assert found.max() < (1.0 if name == "linuxcnc-lineardelta" else 0.1) * UM
+
+
+def test_limits_of_joints_with_a_scale(tmp_path: Path) -> None:
+    text = with_scales((MACHINES / "linear_delta.toml").read_text("utf-8"), "slider", SCALES)
+    sections = firmware.read_ini(two(exported(LinuxCncLinearDelta, loaded(tmp_path, text)))[1])
+    for joint, drive in enumerate(LINUXCNC_ORDER):
+        section = {key: float(value) for key, value in sections[f"JOINT_{joint}"].items()}
+        span = section["MAX_LIMIT"] - section["MIN_LIMIT"]
+        assert span == pytest.approx(580.0 * SCALES[drive], abs=3e-6)
+        assert 0.0 <= section["HOME_OFFSET"] - section["MAX_LIMIT"] < 2e-6
 
 
 def test_drives_that_count_downwards(tmp_path: Path) -> None:

@@ -218,6 +218,45 @@ def test_nodes_out_of_reach_stay_empty(tmp_path: Path) -> None:
     assert position.max() <= 1.001 * document["interpolation_error"]["position_m"]["highest"]
 
 
+def test_where_the_machine_may_go_is_stated_by_itself(tmp_path: Path) -> None:
+    # Half of the map is out of travel, and worst there.
+    text = (MACHINES / "linear_delta.toml").read_text(encoding="utf-8")
+    path = tmp_path / "machine.toml"
+    path.write_text(text.replace("travel = [0, 580]", "travel = [0, 400]"), encoding="utf-8")
+    machine = tp.load(path)
+    export = exported(machine)
+    document, axes, values = of_json(export)
+    said = document["interpolation_error"]
+    points = inside(axes, 20_000, 77)
+    exact, status = corrected_poses(machine, points)
+    allowed = status == 0
+    assert 0.1 < allowed.mean() < 0.9
+    off = np.linalg.norm(points + interpolated(axes, values, points) - exact, axis=1)
+    within = said["commandable"]
+    for found, of in ((said, off), (within, off[allowed])):
+        assert 0.85 * found["position_m"]["highest"] <= of.max()
+        assert of.max() <= 1.001 * found["position_m"]["highest"]
+        rms = np.sqrt(np.mean(of**2))
+        assert found["position_m"]["rms"] == pytest.approx(rms, rel=0.03)
+    assert within["position_m"]["highest"] < said["position_m"]["highest"]
+    assert within["points"] < said["points"]
+    line = next(line for line in export.statement if line.startswith("where the machine may be"))
+    assert f"at most {within['position_m']['highest'] / UM:.2f} µm" in line
+    assert not any(
+        line.startswith("where the machine may be")
+        for line in exported(tp.load(MACHINES / "linear_delta.toml")).statement
+    )
+
+
+def test_a_map_of_one_node() -> None:
+    one = [f"workspace.grid.{axis}=[{at}, {at}, 1]" for axis, at in zip("xyz", "123", strict=True)]
+    export = exported(tp.load(MACHINES / "linear_delta.toml", one))
+    assert export.statement[0].startswith("1 node (1 x 1 x 1)")
+    assert "one node: there is nothing to interpolate" in export.statement
+    assert not any("between the nodes" in line for line in export.statement[1:])
+    assert of_json(export)[0]["interpolation_error"]["points"] == 1
+
+
 def refused(machine: Machine, *options: str) -> tuple[str, str]:
     with pytest.raises(RequestError) as failure:
         exported(machine, *options)
@@ -235,6 +274,7 @@ def refused(machine: Machine, *options: str) -> tuple[str, str]:
         ("count=many", "two or more"),
         ("count=x 3 y", "pose-map"),
         ("count=x 3 q 3", "q"),
+        ("count=x 9 x 5", "one count for x"),
         ("count=x y", "two or more"),
         ("count=", "pose-map"),
     ],

@@ -30,6 +30,7 @@ from exported_blocks import (
     only,
     random_shifts,
     text_of,
+    with_scales,
 )
 from truepose.controllers.klipper import Klipper
 
@@ -105,6 +106,56 @@ def test_a_rotary_delta_that_stands_turned(tmp_path: Path) -> None:
     agree(block, AFTER, found, "um")
     angles = np.degrees(firmware.klipper_rotary(block).angles)
     assert np.abs(angles - [55.0, 175.0, 295.0]).max() < 0.05
+
+
+def test_gears_that_are_not_what_they_are_called(tmp_path: Path) -> None:
+    # Half a turn of the coordinate's for every turn of the arm: exact by design.
+    text = with_scales(cold(text_of("rotary_delta", {})), "crank", (0.5, 0.51, 1.02))
+    text = text.replace("travel = [-75, 50]", "travel = [-150, 45]")
+    machine = loaded(tmp_path, text)
+    block = only(exported(Klipper, machine))
+    found, _ = errors(machine, rotary_joints(machine, block))
+    agree(block, AFTER, found, "um")
+    assert found.max() < 0.1 * UM
+    assert "# the controller counts true travel: its steps per mm or degree" in block
+
+
+def test_arms_that_the_controller_would_turn_too_far_are_refused(tmp_path: Path) -> None:
+    # The switches half a turn beyond: Klipper, which counts arms from -180 to 180 degrees, would
+    # come down to the workspace a whole turn off.
+    text = (MACHINES / "rotary_delta.toml").read_text(encoding="utf-8")
+    wide = loaded(tmp_path, text.replace("travel = [-75, 50]", "travel = [-75, 290]"))
+    with pytest.raises(tp.errors.RequestError, match="leaves its travel") as failure:
+        exported(Klipper, wide)
+    (problem,) = failure.value.problems
+    assert problem.code == "controller-cannot"
+    assert "-75 deg to 290 deg" in str(problem.expected)
+    assert "switches" in str(problem.hint)
+    # At its switch of old it is the machine of old.
+    near = only(exported(Klipper, wide, "switches=50"))
+    old = only(exported(Klipper, loaded(tmp_path, text)))
+    assert firmware.read_cfg(near) == firmware.read_cfg(old)
+
+
+def test_a_switch_that_no_height_tells_is_refused(tmp_path: Path) -> None:
+    # With the arms up at 150 degrees no rod reaches the axis.
+    text = (MACHINES / "rotary_delta.toml").read_text(encoding="utf-8")
+    wide = loaded(tmp_path, text.replace("travel = [-75, 50]", "travel = [-75, 150]"))
+    with pytest.raises(tp.errors.RequestError, match="switch") as failure:
+        exported(Klipper, wide)
+    assert failure.value.problems[0].code == "controller-cannot"
+
+
+def test_shoulders_beside_the_axis_are_refused(tmp_path: Path) -> None:
+    # Drives and workspace half a metre along x.
+    text = cold((MACHINES / "rotary_delta.toml").read_text(encoding="utf-8"))
+    text = re.sub(
+        r"^origin = \[([-.\d]+),", lambda m: f"origin = [{float(m[1]) + 500!r},", text, flags=re.M
+    )
+    text = text.replace("x = [-60, 60, 5]", "x = [440, 560, 5]")
+    with pytest.raises(tp.errors.RequestError, match="z axis") as failure:
+        exported(Klipper, loaded(tmp_path, text))
+    assert failure.value.problems[0].code == "controller-cannot"
 
 
 def test_cranks_that_count_the_other_way(tmp_path: Path) -> None:

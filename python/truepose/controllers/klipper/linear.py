@@ -7,16 +7,14 @@ endstop trips; `delta_radius` counts for every tower. Facts from Klipper's confi
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
 
-from truepose.controllers._delta import print_radius
+from truepose.controllers._delta import lowest_z, print_radius
 from truepose.controllers._linear_delta import (
     ANGLES,
     ARMS,
-    COUNT,
     HEIGHTS,
     RADIUS,
     TILT,
@@ -24,13 +22,23 @@ from truepose.controllers._linear_delta import (
     heights,
     linear_delta,
     parameters,
+    untilted,
 )
-from truepose.controllers._small_model import Parameter, Printed, ascii_only, fixed
+from truepose.controllers._small_model import (
+    MM,
+    Parameter,
+    Printed,
+    ascii_only,
+    fixed,
+    more_decimals,
+)
 from truepose.machine import Machine
 from truepose.sources._base import Floats
 
-MM = 1e-3
 LENGTH_DIGITS, ANGLE_DIGITS = 6, 7
+"""Decimals that are written; of lengths more where the characteristic one is below `SMALL`, m."""
+
+SMALL = 0.01
 STEPPERS = "abc"
 
 
@@ -41,20 +49,26 @@ class Linear:
         """Raises `RequestError`: controller-cannot, bad-option."""
         self._machine = machine
         self._delta = linear_delta(machine, options, "klipper")
+        self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """R, angles, rods and heights."""
         return parameters(self._delta)
 
+    @property
+    def switches(self) -> Floats:
+        """(3,) joint coordinates, m, where the endstops trip."""
+        return self._delta.switches
+
     def joints(self, values: Floats, poses: Floats) -> Floats:
         """(n, 3) joint coordinates, m, for poses (n, 3)."""
-        return self._delta.joints(_all(values), poses)
+        return self._delta.joints(untilted(values), poses)
 
     def printed(self, values: Floats) -> Printed:
         """Numbers by section and key, mm and degrees."""
-        numbers = _all(values)
-        found = {"printer.delta_radius": fixed(float(numbers[RADIUS][0]) / MM, LENGTH_DIGITS)}
+        numbers = untilted(values)
+        found = {"printer.delta_radius": fixed(float(numbers[RADIUS][0]) / MM, self._digits)}
         each = zip(
             STEPPERS,
             np.degrees(numbers[ANGLES]) % 360.0,
@@ -64,8 +78,8 @@ class Linear:
         )
         for letter, angle, arm, height in each:
             found[f"stepper_{letter}.angle"] = fixed(angle, ANGLE_DIGITS)
-            found[f"stepper_{letter}.arm_length"] = fixed(arm, LENGTH_DIGITS)
-            found[f"stepper_{letter}.position_endstop"] = fixed(height, LENGTH_DIGITS)
+            found[f"stepper_{letter}.arm_length"] = fixed(arm, self._digits)
+            found[f"stepper_{letter}.position_endstop"] = fixed(height, self._digits)
         return found
 
     def taken(self, printed: Printed) -> Floats:
@@ -83,28 +97,19 @@ class Linear:
 
     def block(self, printed: Printed) -> list[str]:
         """The sections of printer.cfg."""
-        z = self._machine.poses()[:, 2]
-        reach = math.ceil(print_radius(self._machine) / MM * 10.0) / 10.0
         lines = [
             "[printer]",
             "kinematics: delta",
             f"delta_radius: {printed['printer.delta_radius']}",
             "# of the workspace, not fitted:",
-            f"print_radius: {reach:.1f}",
-            f"minimum_z_position: {min(0.0, math.floor(z.min() / MM)):.0f}",
+            f"print_radius: {print_radius(self._machine)}",
+            f"minimum_z_position: {lowest_z(self._machine)}",
         ]
         for letter, drive in zip(STEPPERS, self._delta.names(), strict=True):
             lines += ["", f"# drive {ascii_only(drive)}", f"[stepper_{letter}]"]
             for key in ("position_endstop", "arm_length", "angle"):
                 lines.append(f"{key}: {printed[f'stepper_{letter}.{key}']}")
         return lines
-
-
-def _all(values: Floats) -> Floats:
-    """(12,) the numbers of a linear delta, without a tilt."""
-    numbers = np.zeros(COUNT)
-    numbers[: TILT.start] = values
-    return numbers
 
 
 __all__ = ["Linear"]

@@ -20,15 +20,28 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from truepose.controllers._delta import LEAN, Limb, limbs, wrapped
+from truepose.controllers._delta import AROUND, LEAN, Limb, limbs, lowest_z, surrounded, wrapped
 from truepose.controllers._export import cannot
 from truepose.controllers._homing import switches
-from truepose.controllers._small_model import INSTEAD, Parameter, Printed, ascii_only, fixed
+from truepose.controllers._small_model import (
+    INSTEAD,
+    MM,
+    Parameter,
+    Printed,
+    ascii_only,
+    fixed,
+    more_decimals,
+    scales,
+)
 from truepose.machine import Machine
 from truepose.sources._base import Floats
 
-MM = 1e-3
 LENGTH_DIGITS, ANGLE_DIGITS = 6, 7
+"""Decimals that are written; of lengths more where the characteristic one is below `SMALL`, m."""
+
+SMALL = 0.01
+RETURNED = 1e-5
+"""rad, by how much an arm's angle at its endstop may change by being printed as a height."""
 STEPPERS = "abc"
 RADIUS, HEIGHT = 0, 1
 ANGLES, UPPER, LOWER, ENDS = slice(2, 5), slice(5, 8), slice(8, 11), slice(11, 14)
@@ -51,13 +64,15 @@ class Rotary:
                     "a delta with level axes of its cranks",
                     INSTEAD,
                 )
-        self._up = np.array([_sense(limb) for limb in found])
-        ends = [
-            limb.drive.travel[1 if up > 0.0 else 0]
-            for limb, up in zip(found, self._up, strict=True)
-        ]
-        self._switch = switches(machine, options, ends, "klipper")
+        up = np.array([_sense(limb) for limb in found])
+        ends = [limb.drive.travel[1 if u > 0.0 else 0] for limb, u in zip(found, up, strict=True)]
+        self.switches = switches(machine, options, ends, "klipper")
+        """(3,) joint coordinates, rad, where the endstops trip."""
+        # By how much each arm rises for a radian of its coordinate.
+        self._gain = up * scales(machine)
+        self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
         self._start = self._nominal(found)
+        self._check_endstops()
 
     def _nominal(self, found: list[Limb]) -> Floats:
         start = np.empty(ENDS.stop)
@@ -72,7 +87,7 @@ class Rotary:
         start[UPPER] = [np.linalg.norm(arm) for arm in arms]
         start[LOWER] = [limb.length for limb in found]
         at_home = [math.atan2(arm[2], arm @ o) for arm, o in zip(arms, outwards, strict=True)]
-        start[ENDS] = at_home + self._up * (self._switch - [limb.home for limb in found])
+        start[ENDS] = at_home + self._gain * (self.switches - [limb.home for limb in found])
         if start[RADIUS] <= 0.0:
             raise cannot(
                 "klipper",
@@ -81,7 +96,35 @@ class Rotary:
                 "shoulders farther out than the effector's joints",
                 INSTEAD,
             )
+        if not surrounded(start[ANGLES]):
+            shown = ", ".join(f"{angle:.1f}" for angle in np.degrees(start[ANGLES]))
+            raise cannot(
+                "klipper",
+                self._machine,
+                f"shoulders at {shown} degrees",
+                "shoulders around the z axis",
+                AROUND,
+            )
         return start
+
+    def _check_endstops(self) -> None:
+        """Klipper tells an endstop by the tool's height in the middle, if it comes there."""
+        with np.errstate(invalid="ignore"):
+            trips = _endstop(self._start)
+        back = np.full(3, np.nan)
+        if np.isfinite(trips).all():
+            back = self.taken(self.printed(self._start))[ENDS]
+        for drive, off in zip(
+            self._machine.drives, np.abs(wrapped(back - self._start[ENDS])), strict=True
+        ):
+            if not off < RETURNED:
+                raise cannot(
+                    "klipper",
+                    self._machine,
+                    f"drive {drive.name}, whose arm at its switch cannot hold the tool on the axis",
+                    "switches that are told by a height of the tool at x = y = 0",
+                    "give a switch nearer to the workspace's joint coordinates: switches=...",
+                )
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -99,14 +142,15 @@ class Rotary:
     def joints(self, values: Floats, poses: Floats) -> Floats:
         """(n, 3) joint coordinates, rad, for poses (n, 3)."""
         arms = _arm_angles(values, poses)
-        found: Floats = self._switch + self._up * wrapped(arms - values[ENDS])
+        # As Klipper counts: both angles between -pi and pi, their difference not brought there.
+        found: Floats = self.switches + (arms - wrapped(values[ENDS])) / self._gain
         return found
 
     def printed(self, values: Floats) -> Printed:
         """Numbers by section and key, mm and degrees."""
         found = {
-            "printer.shoulder_radius": fixed(values[RADIUS] / MM, LENGTH_DIGITS),
-            "printer.shoulder_height": fixed(values[HEIGHT] / MM, LENGTH_DIGITS),
+            "printer.shoulder_radius": fixed(values[RADIUS] / MM, self._digits),
+            "printer.shoulder_height": fixed(values[HEIGHT] / MM, self._digits),
         }
         each = zip(
             STEPPERS,
@@ -118,9 +162,9 @@ class Rotary:
         )
         for letter, angle, upper, lower, height in each:
             found[f"stepper_{letter}.angle"] = fixed(angle, ANGLE_DIGITS)
-            found[f"stepper_{letter}.upper_arm_length"] = fixed(upper, LENGTH_DIGITS)
-            found[f"stepper_{letter}.lower_arm_length"] = fixed(lower, LENGTH_DIGITS)
-            found[f"stepper_{letter}.position_endstop"] = fixed(height, LENGTH_DIGITS)
+            found[f"stepper_{letter}.upper_arm_length"] = fixed(upper, self._digits)
+            found[f"stepper_{letter}.lower_arm_length"] = fixed(lower, self._digits)
+            found[f"stepper_{letter}.position_endstop"] = fixed(height, self._digits)
         return found
 
     def taken(self, printed: Printed) -> Floats:
@@ -142,14 +186,13 @@ class Rotary:
 
     def block(self, printed: Printed) -> list[str]:
         """The sections of printer.cfg."""
-        lowest = self._machine.poses()[:, 2].min()
         lines = [
             "[printer]",
             "kinematics: rotary_delta",
             f"shoulder_radius: {printed['printer.shoulder_radius']}",
             f"shoulder_height: {printed['printer.shoulder_height']}",
             "# of the workspace, not fitted:",
-            f"minimum_z_position: {min(0.0, math.floor(lowest / MM)):.0f}",
+            f"minimum_z_position: {lowest_z(self._machine)}",
         ]
         for letter, drive in zip(STEPPERS, self._machine.drives, strict=True):
             lines += ["", f"# drive {ascii_only(drive.name)}", f"[stepper_{letter}]"]

@@ -2,8 +2,8 @@
 
 A joint's value is the length of its strut, |x + R a - b|, from the base joint b to the platform
 joint a, with the tool point x and R = Rz(c) Ry(b) Rx(a). Where the joint trips its home switch its
-value is HOME_OFFSET. screw-lead, spindle-offset and tool-offset are 0: the platform's joints are
-given from the tool point. Facts: the manual page kins(9) and the INI's homing documentation
+value is HOME_OFFSET. screw-lead, spindle-offset and tool-offset are set to 0: the platform's joints
+are given from the tool point. Facts: the manual page kins(9) and the INI's homing documentation
 (https://linuxcnc.org/docs/stable/html/config/ini-homing.html).
 """
 
@@ -15,13 +15,12 @@ from typing import ClassVar
 import numpy as np
 
 from truepose.controllers._export import Export, Option, cannot
-from truepose.controllers._fit import fit, heading
 from truepose.controllers._homing import switch_option, switches
 from truepose.controllers._linuxcnc_joints import (
-    DIGITS,
     SCALE,
     UNITS,
-    ini_head,
+    digits_of,
+    exported,
     ini_joint,
     unit_of,
 )
@@ -30,7 +29,7 @@ from truepose.controllers._small_model import (
     Parameter,
     Printed,
     fixed,
-    stem,
+    scales,
     value,
     vector,
 )
@@ -40,6 +39,9 @@ from truepose.sources._base import Floats
 PINS = "genhexkins"
 STRUTS = 6
 COORDINATES = 3 * STRUTS
+
+ZEROS = ("screw-lead", "spindle-offset", "tool-offset")
+"""Pins that must be 0."""
 
 SWITCHES = switch_option("the start of each drive's travel")
 
@@ -52,21 +54,21 @@ class _Model:
         self.machine = machine
         self.unit = unit_of(machine, options["units"])
         starts = [drive.travel[0] for drive in machine.drives]
-        self.switch = switches(machine, options, starts, "linuxcnc-genhexkins")
+        self.switches = switches(machine, options, starts, "linuxcnc-genhexkins")
+        """(6,) joint coordinates, m, where the home switches trip."""
+        self._gain = scales(machine)
         carried = {strut.drive: strut for strut in machine.struts}
         struts = [carried[drive.name] for drive in machine.drives]
         tool = vector(machine, "tool")
         base = [vector(machine, f"{strut.part}.base") for strut in struts]
         platform = [vector(machine, f"{strut.part}.platform") - tool for strut in struts]
-        parts = [drive.part for drive in machine.drives]
-        lengths = [
-            value(machine, f"{part}.scale") * switch + value(machine, f"{part}.offset")
-            for part, switch in zip(parts, self.switch, strict=True)
-        ]
+        offsets = [value(machine, f"{drive.part}.offset") for drive in machine.drives]
+        lengths = self._gain * self.switches + offsets
         self._start = np.concatenate([*base, *platform, lengths])
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
+        """Coordinates of the joints, and the struts' lengths at the switches."""
         names = [
             f"{end} {strut} {axis}"
             for end in ("base", "platform")
@@ -77,8 +79,9 @@ class _Model:
         return tuple(Parameter(*each) for each in zip(names, self._start.tolist(), strict=True))
 
     def joints(self, values: Floats, poses: Floats) -> Floats:
-        """(n, 6) joint coordinates, m, in the order of the drives."""
-        found: Floats = self.lengths(values, poses) - values[2 * COORDINATES :] + self.switch
+        """(n, 6) joint coordinates, m, in the order of the drives, for poses (n, 6), m, rad."""
+        longer = self.lengths(values, poses) - values[2 * COORDINATES :]
+        found: Floats = self.switches + longer / self._gain
         return found
 
     def lengths(self, values: Floats, poses: Floats) -> Floats:
@@ -90,6 +93,7 @@ class _Model:
         return found
 
     def printed(self, values: Floats) -> Printed:
+        """Pins, and HOME_OFFSET of the joints, in the block's unit."""
         words = [
             f"{PINS}.{end}.{strut}.{axis}"
             for end in ("base", "platform")
@@ -97,17 +101,20 @@ class _Model:
             for axis in "xyz"
         ]
         words += [f"JOINT_{joint} HOME_OFFSET" for joint in range(STRUTS)]
-        scale, digits = SCALE[self.unit], DIGITS[self.unit]
+        scale, digits = SCALE[self.unit], digits_of(self.machine, self.unit)
         return {word: fixed(v / scale, digits) for word, v in zip(words, values, strict=True)}
 
     def taken(self, printed: Printed) -> Floats:
+        """(42,) the model's values, m, of printed numbers."""
         return np.array([float(text) for text in printed.values()]) * SCALE[self.unit]
 
     def hal(self, printed: Printed) -> list[str]:
+        """`setp` of every pin that the kinematics reads."""
         lines = [f"setp {word} {text}" for word, text in printed.items() if word.startswith(PINS)]
-        return [*lines, *(f"setp {PINS}.{pin} 0" for pin in ("screw-lead", "spindle-offset"))]
+        return [*lines, *(f"setp {PINS}.{pin} 0" for pin in ZEROS)]
 
     def ini(self, values: Floats, printed: Printed) -> list[str]:
+        """The sections of the joints."""
         home = self.lengths(values, self.machine.home[np.newaxis, :])[0]
         lines: list[str] = []
         for joint in range(STRUTS):
@@ -116,8 +123,10 @@ class _Model:
                 joint,
                 joint,
                 self.unit,
-                up=1.0,
-                offset=float(values[2 * COORDINATES + joint] - self.switch[joint]),
+                gain=float(self._gain[joint]),
+                offset=float(
+                    values[2 * COORDINATES + joint] - self._gain[joint] * self.switches[joint]
+                ),
                 home_offset=printed[f"JOINT_{joint} HOME_OFFSET"],
                 home=float(home[joint]),
             )
@@ -137,16 +146,7 @@ class LinuxCncGenhexkins:
 
         Raises `RequestError`: controller-cannot, bad-option, no-workspace, no-pose-left.
         """
-        model = _Model(machine, options)
-        found = fit(machine, model)
-        lines = heading(machine, found, "LinuxCNC genhexkins")
-        hal = [*(f"# {line}" for line in lines), f"# in {model.unit}", *model.hal(found.printed)]
-        ini = ini_head(lines, PINS, STRUTS, model.unit) + model.ini(found.values, found.printed)
-        files = {
-            f"{stem(machine)}_{PINS}.hal": "\n".join([*hal, ""]),
-            f"{stem(machine)}_{PINS}.ini": "\n".join([*ini, ""]),
-        }
-        return Export(files, found.statement(machine))
+        return exported(machine, _Model(machine, options), PINS, STRUTS)
 
 
 def _check(machine: Machine) -> None:

@@ -16,7 +16,6 @@ import numpy as np
 
 from truepose.controllers._delta import SWITCHES, TOWERS, tower_order, wrapped
 from truepose.controllers._export import Export, Option, cannot
-from truepose.controllers._fit import fit, heading
 from truepose.controllers._linear_delta import (
     ANGLES,
     ARMS,
@@ -27,14 +26,14 @@ from truepose.controllers._linear_delta import (
     parameters,
 )
 from truepose.controllers._linuxcnc_joints import (
-    DIGITS,
     SCALE,
     UNITS,
-    ini_head,
+    digits_of,
+    exported,
     ini_joint,
     unit_of,
 )
-from truepose.controllers._small_model import INSTEAD, Parameter, Printed, fixed, stem
+from truepose.controllers._small_model import INSTEAD, Parameter, Printed, fixed
 from truepose.machine import Machine
 from truepose.sources._base import Floats
 
@@ -68,6 +67,7 @@ class _Model:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
+        """R, L and the heights."""
         every = parameters(self.delta)
         rod = Parameter("rod", float(self.delta.nominal[ARMS].mean()))
         return (every[0], rod, *every[HEIGHTS])
@@ -78,36 +78,46 @@ class _Model:
         numbers[ARMS], numbers[HEIGHTS] = values[1], values[2:]
         return numbers
 
+    @property
+    def switches(self) -> Floats:
+        """(3,) joint coordinates, m, where the home switches trip."""
+        return self.delta.switches
+
     def joints(self, values: Floats, poses: Floats) -> Floats:
+        """(n, 3) joint coordinates, m, in the machine's order, for poses (n, 3), m."""
         return self.delta.joints(self._all(values), poses)
 
     def printed(self, values: Floats) -> Printed:
+        """Pins, and HOME_OFFSET of the joints, in the block's unit."""
         words = ["R", "L", *(f"JOINT_{joint} HOME_OFFSET" for joint in range(3))]
-        scale, digits = SCALE[self.unit], DIGITS[self.unit]
+        scale, digits = SCALE[self.unit], digits_of(self.delta.machine, self.unit)
         return {word: fixed(v / scale, digits) for word, v in zip(words, values, strict=True)}
 
     def taken(self, printed: Printed) -> Floats:
+        """(5,) the model's values, m, of printed numbers."""
         return np.array([float(text) for text in printed.values()]) * SCALE[self.unit]
 
     def hal(self, printed: Printed) -> list[str]:
+        """`setp` of R and L."""
         return [f"setp {PINS}.{pin} {printed[pin]}" for pin in ("R", "L")]
 
     def ini(self, values: Floats, printed: Printed) -> list[str]:
+        """The sections of the joints."""
         delta, machine = self.delta, self.delta.machine
         home = delta.joints(self._all(values), machine.home[np.newaxis, :3])[0]
         lines: list[str] = []
         for joint, drive in enumerate(delta.order):
-            up = float(delta.up[joint])
-            offset = float(values[2 + joint] - up * delta.switch[joint])
+            gain = float(delta.gain[joint])
+            offset = float(values[2 + joint] - gain * delta.switch[joint])
             lines += ini_joint(
                 machine,
                 joint,
                 int(drive),
                 self.unit,
-                up=up,
+                gain=gain,
                 offset=offset,
                 home_offset=printed[f"JOINT_{joint} HOME_OFFSET"],
-                home=up * float(home[drive]) + offset,
+                home=gain * float(home[drive]) + offset,
             )
         return lines
 
@@ -125,16 +135,7 @@ class LinuxCncLinearDelta:
 
         Raises `RequestError`: controller-cannot, bad-option, no-workspace, no-pose-left.
         """
-        model = _Model(machine, options)
-        found = fit(machine, model)
-        lines = heading(machine, found, "LinuxCNC lineardeltakins")
-        hal = [*(f"# {line}" for line in lines), f"# in {model.unit}", *model.hal(found.printed)]
-        ini = ini_head(lines, PINS, 3, model.unit) + model.ini(found.values, found.printed)
-        files = {
-            f"{stem(machine)}_{PINS}.hal": "\n".join([*hal, ""]),
-            f"{stem(machine)}_{PINS}.ini": "\n".join([*ini, ""]),
-        }
-        return Export(files, found.statement(machine))
+        return exported(machine, _Model(machine, options), PINS, 3)
 
 
 __all__ = ["LinuxCncLinearDelta"]

@@ -26,7 +26,6 @@ from truepose.controllers._fit import fit, heading
 from truepose.controllers._linear_delta import (
     ANGLES,
     ARMS,
-    COUNT,
     HEIGHTS,
     RADIUS,
     TILT,
@@ -34,14 +33,25 @@ from truepose.controllers._linear_delta import (
     heights,
     linear_delta,
     parameters,
+    untilted,
 )
-from truepose.controllers._small_model import Parameter, Printed, ascii_only, fixed, stem
+from truepose.controllers._small_model import (
+    MM,
+    Parameter,
+    Printed,
+    fixed,
+    in_file_units,
+    more_decimals,
+    stem,
+)
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.sources._base import Floats
 
-MM = 1e-3
 LENGTH_DIGITS, ANGLE_DIGITS = 5, 6
+"""Decimals that are written; of lengths more where the characteristic one is below `SMALL`, m."""
+
+SMALL = 0.01
 AXES, TRIMS = "XYZ", "ABC"
 
 
@@ -53,38 +63,65 @@ class _Model:
         self.delta = delta.in_order(tower_order(delta.nominal[ANGLES]))
         self._probe = float(options["probe_offset"])
         self._least = float(options["least"])
+        self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
+        self._check_least()
+
+    def _check_least(self) -> None:
+        """Carriages are lowered, and not so far that the tool cannot rise to its workspace."""
+        machine = self.delta.machine
+        top, highest = float(endstop(self.delta.nominal).min()), float(machine.poses()[:, 2].max())
         if self._least < 0.0:
-            raise RequestError(
-                Problem(
-                    "bad-option",
-                    "option least of marlin would raise a carriage over its endstop",
-                    found=f"{self._least / MM:g} mm",
-                    expected="zero or more",
-                )
+            found, expected = "below zero, over the endstops", "zero or more"
+        elif top - self._least < highest <= top:
+            found = (
+                f"less than the highest pose, {in_file_units(machine, highest, 'length')}, for H"
             )
+            expected = f"zero to {in_file_units(machine, top - highest, 'length')}"
+        else:
+            return
+        raise RequestError(
+            Problem(
+                "bad-option",
+                "option least of marlin lowers the carriages by a wrong length",
+                file=machine.file,
+                found=f"{in_file_units(machine, self._least, 'length')}: {found}",
+                expected=expected,
+                hint="least=0 lowers the highest carriage by nothing",
+            )
+        )
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
+        """R, angles, rods and heights."""
         return parameters(self.delta)
 
+    @property
+    def switches(self) -> Floats:
+        """(3,) joint coordinates, m, where the endstops trip."""
+        return self.delta.switches
+
     def joints(self, values: Floats, poses: Floats) -> Floats:
-        return self.delta.joints(_all(values), poses)
+        """(n, 3) joint coordinates, m, for poses (n, 3), m."""
+        return self.delta.joints(untilted(values), poses)
 
     def printed(self, values: Floats) -> Printed:
-        numbers = _all(values)
+        """Numbers by command and word, mm and degrees."""
+        numbers = untilted(values)
         trips, arms = endstop(numbers), numbers[ARMS]
         height = float(trips.min()) - self._least
         lengths = {"L": float(arms.mean()), "R": float(numbers[RADIUS][0])}
         lengths["H"] = height + self._probe
         lengths |= dict(zip(TRIMS, arms - arms.mean(), strict=True))
-        found = {f"M665 {word}": fixed(v / MM, LENGTH_DIGITS) for word, v in lengths.items()}
+        found = {f"M665 {word}": fixed(v / MM, self._digits) for word, v in lengths.items()}
         turned = np.degrees(wrapped(numbers[ANGLES] - TOWERS))
         found |= {f"M665 {w}": fixed(v, ANGLE_DIGITS) for w, v in zip(AXES, turned, strict=True)}
         lowered = (height - trips) / MM
-        found |= {f"M666 {w}": fixed(v, LENGTH_DIGITS) for w, v in zip(AXES, lowered, strict=True)}
+        found |= {f"M666 {w}": fixed(v, self._digits) for w, v in zip(AXES, lowered, strict=True)}
         return found
 
     def taken(self, printed: Printed) -> Floats:
+        """(10,) the model's values, SI, of printed numbers."""
+
         def of(code: str, words: str) -> Floats:
             return np.array([float(printed[f"{code} {word}"]) for word in words])
 
@@ -97,12 +134,18 @@ class _Model:
         return values
 
     def block(self, printed: Printed) -> list[str]:
+        """The two commands."""
+
         def line(code: str, words: str) -> str:
             return " ".join([code, *(f"{word}{printed[f'{code} {word}']}" for word in words)])
 
-        drives = ", ".join(f"{w} {d}" for w, d in zip(AXES, self.delta.names(), strict=True))
+        probe, least = (
+            in_file_units(self.delta.machine, value, "length")
+            for value in (self._probe, self._least)
+        )
         return [
-            f"; towers: {ascii_only(drives)}",
+            f"; towers: {self.delta.towers(AXES)}",
+            f"; probe_offset {probe}, least {least}",
             line("M665", f"LRH{AXES}{TRIMS}"),
             line("M666", AXES),
             "; They count from the next homing (G28) on; M500 keeps them.",
@@ -131,13 +174,6 @@ class Marlin:
         comment = [f"; {line}" for line in heading(machine, found, "Marlin")]
         text = "\n".join([*comment, *model.block(found.printed), ""])
         return Export({f"{stem(machine)}_marlin.gcode": text}, found.statement(machine))
-
-
-def _all(values: Floats) -> Floats:
-    """(12,) the numbers of a linear delta, without a tilt."""
-    numbers = np.zeros(COUNT)
-    numbers[: TILT.start] = values
-    return numbers
 
 
 __all__ = ["Marlin"]

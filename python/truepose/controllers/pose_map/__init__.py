@@ -29,8 +29,9 @@ from truepose.controllers._small_model import ascii_only, fixed, stem
 from truepose.controllers.pose_map.grid import COUNT, Grid, grid_of
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
+from truepose.machine.suggestion import counted
 from truepose.machine.units import FileUnit, default_units
-from truepose.sources._base import Floats
+from truepose.sources._base import Flags, Floats
 
 FINEST = 1e-10
 """m and rad to which corrections are written, and finer."""
@@ -99,13 +100,25 @@ def pose_map(machine: Machine, grid: Grid) -> NodeCorrections:
 class Judged:
     """What interpolation is wrong by, m and rad, over the points.
 
-    `points`: how many were compared; `left_out`: how many lie in cells with a node out of reach.
+    `commandable`: the same over those points alone whose exact command is within travel; None
+    where all are, or none is. `points`: how many different ones were compared; `left_out`: how
+    many lie in cells with a node out of reach.
     """
 
     position: Extent
     orientation: Extent | None
+    commandable: Commandable | None
     points: int
     left_out: int
+
+
+@dataclass(frozen=True)
+class Commandable:
+    """What interpolation is wrong by where the machine may go, m and rad, over `points`."""
+
+    position: Extent
+    orientation: Extent | None
+    points: int
 
 
 def judge(found: NodeCorrections) -> Judged:
@@ -130,19 +143,36 @@ def judge(found: NodeCorrections) -> Judged:
             )
         )
     first = [scattered, _compare(found, middles[chosen])]
-    searched = [_search(found, first, of) for of in (_POSITION, _ORIENTATION)]
-    every = [*first, *(each for parts in searched for each in parts)]
-
-    def over_all(of: _Of) -> Extent:
-        values = np.concatenate([of(each) for each in every])
-        even = np.arange(len(values)) < len(scattered.points)
-        return extent(values, np.concatenate([each.points for each in every]), even)
-
     turns = any(name in "abc" for name in found.machine.commanded)
+    kinds = [_POSITION, _ORIENTATION] if turns else [_POSITION]
+    allowed = sum(int(each.allowed.sum()) for each in first)
+    some_out = allowed < sum(len(each.points) for each in first)
+    if some_out and allowed:
+        kinds += [_only_allowed(of) for of in kinds]
+    every = [*first, *(each for of in kinds for each in _search(found, first, of))]
+    points = np.concatenate([each.points for each in every])
+    even = np.arange(len(points)) < len(scattered.points)
+    within = np.concatenate([each.allowed for each in every])
+
+    def over(of: _Of, chosen: Flags) -> Extent:
+        values = np.concatenate([of(each) for each in every])[chosen]
+        # The scattered ones alone are even; where none of them is left, all have to do.
+        spread = even[chosen] if even[chosen].any() else np.ones(len(values), np.bool_)
+        return extent(values, points[chosen], spread)
+
+    def orientation(chosen: Flags) -> Extent | None:
+        return over(_ORIENTATION, chosen) if turns else None
+
+    all_of = np.ones(len(points), np.bool_)
+    commandable = None
+    if not within.all() and within.any():
+        count = len(np.unique(points[within], axis=0))
+        commandable = Commandable(over(_POSITION, within), orientation(within), count)
     return Judged(
-        over_all(_POSITION),
-        over_all(_ORIENTATION) if turns else None,
-        sum(len(each.points) for each in every),
+        over(_POSITION, all_of),
+        orientation(all_of),
+        commandable,
+        len(np.unique(points, axis=0)),
         sum(each.left_out for each in every),
     )
 
@@ -151,18 +181,24 @@ def judge(found: NodeCorrections) -> Judged:
 class _Compared:
     """Usable points (n, n_axis), and what interpolation is off there, (n,).
 
-    `position` in m, `orientation` in rad; `left_out`: points that are not usable.
+    `position` in m, `orientation` in rad; `allowed`: whether the exact command is within travel;
+    `left_out`: points that are not usable.
     """
 
     points: Floats
     position: Floats
     orientation: Floats
+    allowed: Flags
     left_out: int
 
 
 _Of = Callable[[_Compared], Floats]
 _POSITION: _Of = attrgetter("position")
 _ORIENTATION: _Of = attrgetter("orientation")
+
+
+def _only_allowed(of: _Of) -> _Of:
+    return lambda each: np.where(each.allowed, of(each), 0.0)
 
 
 def _compare(found: NodeCorrections, points: Floats) -> _Compared:
@@ -177,6 +213,7 @@ def _compare(found: NodeCorrections, points: Floats) -> _Compared:
         at,
         np.linalg.norm((added - exact)[:, linear], axis=1),
         angle_between(place(added), place(exact)),
+        status[usable] == OK,
         int((~usable).sum()),
     )
 
@@ -229,19 +266,31 @@ def statement(found: NodeCorrections, judged: Judged) -> tuple[str, ...]:
     """Lines for the user."""
     machine = found.machine
     count = " x ".join(str(number) for number in found.grid.shape)
-    lines = [f"{len(found.status)} nodes ({count}); {USE}"]
-    text = f"interpolation between the nodes is off by {_words(machine, judged.position, 'm')}"
-    if judged.orientation is not None:
-        text += f"; {_words(machine, judged.orientation, 'rad')}"
-    lines.append(text)
+    lines = [f"{counted(len(found.status), 'node')} ({count}); {USE}"]
+    if judged.points == 1:
+        lines.append("one node: there is nothing to interpolate")
+    else:
+        text = _both(machine, judged)
+        lines.append(f"interpolation between the nodes is off by {text}")
+    where = judged.commandable
+    if where is not None:
+        lines.append(
+            f"where the machine may be commanded to, at {counted(where.points, 'point')} of them: "
+            f"{_both(machine, where)}"
+        )
     lines.append(f"the corrections at the nodes: {_words(machine, _sizes(found), 'm')}")
-    lines.append(f"compared with exact corrections at {judged.points} points between the nodes")
+    if judged.points > 1:
+        points = counted(judged.points, "point")
+        lines.append(f"compared with exact corrections at {points} between the nodes")
     names, counts = np.unique(found.status[found.status != OK], return_counts=True)
     for code, number in zip(names, counts, strict=True):
         what = str(_kernel.STATUS[code]).replace("_", " ")
-        lines.append(f"{number} nodes are {what}: {_instead(int(code))}")
+        be, instead = ("is", "it has") if number == 1 else ("are", "they have")
+        lines.append(f"{counted(number, 'node')} {be} {what}: {instead} {_instead(int(code))}")
     if judged.left_out:
-        lines.append(f"{judged.left_out} points in cells with such a node were not compared")
+        were = "was" if judged.left_out == 1 else "were"
+        points = counted(judged.left_out, "point")
+        lines.append(f"{points} in cells with such a node {were} not compared")
     return tuple(lines)
 
 
@@ -255,8 +304,15 @@ def _sizes(found: NodeCorrections) -> Extent:
 
 def _instead(code: int) -> str:
     if with_joints(np.array([code], np.uint8))[0]:
-        return "they have corrections, but must not be commanded"
-    return "they have no correction"
+        return "corrections, but must not be commanded"
+    return "no correction"
+
+
+def _both(machine: Machine, judged: Judged | Commandable) -> str:
+    text = _words(machine, judged.position, "m")
+    if judged.orientation is not None:
+        text += f"; {_words(machine, judged.orientation, 'rad')}"
+    return text
 
 
 def _words(machine: Machine, found: Extent, unit: str) -> str:
@@ -325,9 +381,8 @@ def _json(found: NodeCorrections, judged: Judged, head: Mapping[str, object]) ->
     document = {
         **head,
         "interpolation_error": {
-            "position_m": _plain(judged.position),
-            "orientation_rad": None if judged.orientation is None else _plain(judged.orientation),
-            "points": judged.points,
+            **_errors(judged),
+            "commandable": None if judged.commandable is None else _errors(judged.commandable),
         },
         "axes": axes,
         "corrections": columns,
@@ -336,6 +391,14 @@ def _json(found: NodeCorrections, judged: Judged, head: Mapping[str, object]) ->
     # One key a line: a column of numbers reads better, and shorter, along it.
     lines = [f"{json.dumps(k)}: {json.dumps(v, allow_nan=False)}" for k, v in document.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _errors(judged: Judged | Commandable) -> dict[str, object]:
+    return {
+        "position_m": _plain(judged.position),
+        "orientation_rad": None if judged.orientation is None else _plain(judged.orientation),
+        "points": judged.points,
+    }
 
 
 def _plain(found: Extent) -> dict[str, object]:

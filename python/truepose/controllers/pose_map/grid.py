@@ -130,9 +130,11 @@ def _counts(machine: Machine, text: str) -> dict[str, int]:
         return dict.fromkeys(machine.commanded, _count(text, words[0]))
     if not words or len(words) % 2:
         raise _bad(text, COUNT.doc)
-    for name, count in zip(words[::2], words[1::2], strict=True):
+    for at, (name, count) in enumerate(zip(words[::2], words[1::2], strict=True)):
         if name not in machine.commanded:
             raise _bad(name, one_of(machine.commanded), did_you_mean(name, machine.commanded))
+        if name in words[: 2 * at : 2]:
+            raise _bad(text, f"one count for {name}")
         counts[name] = _count(text, count)
     return counts
 

@@ -12,7 +12,6 @@ of RepRapFirmware 3; rods of different lengths need 2.03 or newer.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -33,12 +32,15 @@ from truepose.controllers._linear_delta import (
     linear_delta,
     parameters,
 )
-from truepose.controllers._small_model import Parameter, Printed, ascii_only, fixed, stem
+from truepose.controllers._small_model import MM, Parameter, Printed, fixed, more_decimals, stem
 from truepose.machine import Machine
 from truepose.sources._base import Floats
 
-MM, PERCENT = 1e-3, 1e-2
+PERCENT = 1e-2
 LENGTH_DIGITS, ANGLE_DIGITS, TILT_DIGITS = 5, 6, 6
+"""Decimals that are written; of lengths more where the characteristic one is below `SMALL`, m."""
+
+SMALL = 0.01
 AXES, TILTS = "XYZ", "AB"
 
 
@@ -48,31 +50,42 @@ class _Model:
     def __init__(self, machine: Machine, options: Mapping[str, float | str]) -> None:
         delta = linear_delta(machine, options, "reprap")
         self.delta = delta.in_order(tower_order(delta.nominal[ANGLES]))
+        self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
+        """R, angles, rods, heights and the tilt."""
         return parameters(self.delta, tilt=True)
 
+    @property
+    def switches(self) -> Floats:
+        """(3,) joint coordinates, m, where the endstops trip."""
+        return self.delta.switches
+
     def joints(self, values: Floats, poses: Floats) -> Floats:
+        """(n, 3) joint coordinates, m, for poses (n, 3), m."""
         return self.delta.joints(values, poses)
 
     def printed(self, values: Floats) -> Printed:
+        """Numbers by command and word, mm, degrees and percent."""
         trips = endstop(values)
         height = float(trips.mean())
         found = {
-            "M665 R": fixed(values[RADIUS][0] / MM, LENGTH_DIGITS),
-            "M665 H": fixed(height / MM, LENGTH_DIGITS),
+            "M665 R": fixed(values[RADIUS][0] / MM, self._digits),
+            "M665 H": fixed(height / MM, self._digits),
         }
         turned = np.degrees(wrapped(values[ANGLES] - TOWERS))
         for at, axis in enumerate(AXES):
-            found[f"M665 L{axis}"] = fixed(values[ARMS][at] / MM, LENGTH_DIGITS)
+            found[f"M665 L{axis}"] = fixed(values[ARMS][at] / MM, self._digits)
             found[f"M665 {axis}"] = fixed(turned[at], ANGLE_DIGITS)
-            found[f"M666 {axis}"] = fixed((trips[at] - height) / MM, LENGTH_DIGITS)
+            found[f"M666 {axis}"] = fixed((trips[at] - height) / MM, self._digits)
         for axis, tilt in zip(TILTS, values[TILT], strict=True):
             found[f"M666 {axis}"] = fixed(tilt / PERCENT, TILT_DIGITS)
         return found
 
     def taken(self, printed: Printed) -> Floats:
+        """(12,) the model's values, SI, of printed numbers."""
+
         def of(words: list[str]) -> Floats:
             return np.array([float(printed[word]) for word in words])
 
@@ -86,14 +99,15 @@ class _Model:
         values[TILT] = of([f"M666 {axis}" for axis in TILTS]) * PERCENT
         return values
 
-    def block(self, printed: Printed, reach: float) -> list[str]:
-        drives = ", ".join(f"{w} {d}" for w, d in zip(AXES, self.delta.names(), strict=True))
+    def block(self, printed: Printed) -> list[str]:
+        """The two commands."""
+        reach = print_radius(self.delta.machine)
         rods = ":".join(printed[f"M665 L{axis}"] for axis in AXES)
         corrections = " ".join(f"{axis}{printed[f'M665 {axis}']}" for axis in AXES)
         adjustments = " ".join(f"{word}{printed[f'M666 {word}']}" for word in AXES + TILTS)
         return [
-            f"; towers: {ascii_only(drives)}; B is the workspace's radius, not fitted",
-            f"M665 L{rods} R{printed['M665 R']} H{printed['M665 H']} B{reach:.1f} {corrections}",
+            f"; towers: {self.delta.towers(AXES)}; B is the workspace's radius, not fitted",
+            f"M665 L{rods} R{printed['M665 R']} H{printed['M665 H']} B{reach} {corrections}",
             f"M666 {adjustments}",
         ]
 
@@ -114,8 +128,7 @@ class RepRap:
         model = _Model(machine, options)
         found = fit(machine, model)
         comment = [f"; {line}" for line in heading(machine, found, "RepRapFirmware")]
-        reach = math.ceil(print_radius(machine) / MM * 10.0) / 10.0
-        text = "\n".join([*comment, *model.block(found.printed, reach), ""])
+        text = "\n".join([*comment, *model.block(found.printed), ""])
         return Export({f"{stem(machine)}_reprap.g": text}, found.statement(machine))
 
 

@@ -9,7 +9,9 @@ from __future__ import annotations
 import ctypes
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 SOURCE = Path(__file__).with_suffix(".c")
@@ -113,6 +115,13 @@ class Host:
     def _require(self, name: str) -> None:
         if not self._library.host_type(name.encode()):
             raise KeyError(name)
+
+
+@cache
+def the_host() -> Host:
+    """The host of this process: modules find the first that was loaded, so there is one only."""
+    with tempfile.TemporaryDirectory() as folder:
+        return Host(Path(folder))
 
 
 class Module:

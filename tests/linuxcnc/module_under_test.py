@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import truepose as tp
-from benchmarks.kinematics_host import NEEDED, Host, available, compiled
+from benchmarks.kinematics_host import NEEDED, available, compiled, the_host
 from system_package import missing
 from truepose.controllers._export import options_of
 from truepose.controllers.linuxcnc import LinuxCNC
@@ -28,11 +28,6 @@ DEGREE = np.pi / 180.0
 @cache
 def _folder() -> Path:
     return Path(tempfile.mkdtemp(prefix="truepose-modules-"))
-
-
-@cache
-def _host() -> Host:
-    return Host(_folder())
 
 
 @cache
@@ -74,7 +69,7 @@ class Rig:
         # A copy is another library to the loader: with a state of its own.
         copy = Path(tempfile.mkdtemp(dir=_folder())) / "kins.so"
         shutil.copy(library, copy)
-        self.host = _host()
+        self.host = the_host()
         self.module = self.host.load(copy, len(self.machine.joints))
         self.columns = ["xyzabc".index(name) for name in self.machine.commanded]
         self.units = np.where(np.array(self.columns) < 3, 1e-3, DEGREE)

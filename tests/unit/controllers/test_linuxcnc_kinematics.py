@@ -1,13 +1,12 @@
 """The HAL blocks in LinuxCNC's own genhexkins and lineardeltakins, as they are installed.
 
-The modules are loaded by `kinematics_host.c`, which feeds them the block as it stands and asks for
-the joints of the workspace; these, counted from HOME_OFFSET, drive the actual machine.
+The modules are loaded into this process, given the block as it stands and asked for the joints of
+the workspace; these, counted from HOME_OFFSET, drive the actual machine.
 """
 
 from __future__ import annotations
 
 import shutil
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 import firmware
 import truepose as tp
+from benchmarks.kinematics_host import NEEDED, PACKAGED, Host, available, the_host
 from build_machine import MACHINES
 from system_package import missing
 from truepose.compensation.commands import actual_of_joints
@@ -24,36 +24,29 @@ from truepose.controllers.linuxcnc_genhexkins import LinuxCncGenhexkins
 from truepose.controllers.linuxcnc_lineardelta import LinuxCncLinearDelta
 
 Array = NDArray[np.float64]
-MODULES = Path("/usr/lib/linuxcnc/modules")
-HEADERS = Path("/usr/include/linuxcnc")
-SOURCE = Path(__file__).parents[2] / "kinematics_host.c"
 UM = 1e-6
 
 
 @pytest.fixture(scope="module")
-def host(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    compiler = shutil.which("gcc")
-    if compiler is None or not HEADERS.is_dir() or not MODULES.is_dir():
-        missing("needs gcc and Debian's linuxcnc-uspace and linuxcnc-uspace-dev")
-    program = tmp_path_factory.mktemp("host") / "kinematics_host"
-    flags = ["-O1", "-Wall", "-rdynamic", "-DRTAPI", "-DUSPACE", f"-I{HEADERS}"]
-    command = [compiler, *flags, str(SOURCE), "-o", str(program), "-ldl", "-lm"]
-    subprocess.run(command, check=True, capture_output=True)
-    return program
+def host() -> Host:
+    if not (available() and PACKAGED.is_dir()):
+        missing(f"no LinuxCNC: apt-get install --no-install-recommends {NEEDED}")
+    return the_host()
 
 
-def joints_of(host: Path, module: str, count: int, hal: str, poses: Array) -> Array:
+def joints_of(host: Host, folder: Path, module: str, count: int, hal: str, poses: Array) -> Array:
     """(n, count) the module's inverse for poses (n, 6), in the block's units and degrees."""
-    lines = [f"pose {' '.join(repr(float(value)) for value in pose)}" for pose in poses]
-    done = subprocess.run(
-        [str(host), str(MODULES / f"{module}.so"), str(count)],
-        input="\n".join([hal, *lines, ""]),
-        text=True,
-        capture_output=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return np.array([line.split() for line in done.stdout.splitlines()], float)
+    # A copy is another library to the loader: with pins of its own.
+    copy = folder / f"{module}.so"
+    shutil.copy(PACKAGED / copy.name, copy)
+    kinematics = host.load(copy, count)
+    for line in hal.splitlines():
+        if line.startswith("setp "):
+            _, name, value = line.split()
+            host.set(name, float(value))
+    joints = [kinematics.inverse(pose.tolist()) for pose in poses]
+    assert all(row is not None for row in joints)
+    return np.array(joints)
 
 
 def check(machine: tp.Machine, hal: str, joints: Array) -> None:
@@ -68,27 +61,27 @@ def check(machine: tp.Machine, hal: str, joints: Array) -> None:
 
 
 @pytest.mark.parametrize(("name", "unit"), [("hexapod", 0.0254), ("hexapod_telescope", 1e-3)])
-def test_genhexkins(host: Path, name: str, unit: float) -> None:
+def test_genhexkins(host: Host, name: str, unit: float, tmp_path: Path) -> None:
     machine = tp.load(MACHINES / f"{name}.toml")
     files = LinuxCncGenhexkins.export(machine, options_of(LinuxCncGenhexkins, machine)).files
     hal, ini = (next(t for n, t in files.items() if n.endswith(end)) for end in (".hal", ".ini"))
     poses = machine.poses().copy()
     poses[:, :3] /= unit
     poses[:, 3:] = np.degrees(poses[:, 3:])
-    joints = joints_of(host, "genhexkins", 6, hal, poses)
+    joints = joints_of(host, tmp_path, "genhexkins", 6, hal, poses)
     sections = firmware.read_ini(ini)
     home = [float(sections[f"JOINT_{joint}"]["HOME_OFFSET"]) for joint in range(6)]
     starts = np.array([drive.travel[0] for drive in machine.drives])
     check(machine, hal, (joints - home) * unit + starts)
 
 
-def test_lineardeltakins(host: Path) -> None:
+def test_lineardeltakins(host: Host, tmp_path: Path) -> None:
     machine = tp.load(MACHINES / "linear_delta.toml")
     files = LinuxCncLinearDelta.export(machine, options_of(LinuxCncLinearDelta, machine)).files
     hal, ini = (next(t for n, t in files.items() if n.endswith(end)) for end in (".hal", ".ini"))
     poses = np.zeros((len(machine.poses()), 6))
     poses[:, :3] = machine.poses() / 1e-3
-    joints = joints_of(host, "lineardeltakins", 3, hal, poses)
+    joints = joints_of(host, tmp_path, "lineardeltakins", 3, hal, poses)
     sections = firmware.read_ini(ini)
     home = [float(sections[f"JOINT_{joint}"]["HOME_OFFSET"]) for joint in range(3)]
     drives = [2, 0, 1]  # joints 0 1 2 are drives c a b

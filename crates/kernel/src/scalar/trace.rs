@@ -214,7 +214,7 @@ impl<'t> Add for Trace<'t> {
         } else if other.is(0.0) {
             self
         } else if let Some(taken) = other.negated() {
-            self - taken
+            Sub::sub(self, taken)
         } else {
             self.binary(other, |a, b| a + b, Operation::Add)
         }
@@ -229,7 +229,7 @@ impl<'t> Sub for Trace<'t> {
         } else if self.is(0.0) {
             -other
         } else if let Some(added) = other.negated() {
-            self + added
+            Add::add(self, added)
         } else {
             self.binary(other, |a, b| a - b, Operation::Subtract)
         }

@@ -12,6 +12,7 @@ import pytest
 from module_under_test import DEGREE, Rig, clean
 
 from command_line import MACHINES
+from truepose import _kernel
 
 EVERY = [
     "overconstrained",
@@ -61,6 +62,20 @@ def back_and_forth(made: Rig, poses: np.ndarray, joints: np.ndarray) -> None:
         assert back is not None
         assert np.abs(back[made.columns] - pose).max() < WORLD
         assert not np.delete(back, made.columns).any()
+
+
+@pytest.mark.parametrize("stem", ["3prs", "tricept"])
+def test_a_strut_that_leans_too_far_has_no_inverse(stem: str) -> None:
+    """LinuxCNC knows no such limit, so that joints beyond it must not be given."""
+    made = rig(stem)
+    poses = made.poses(400)
+    centre = poses.mean(axis=0)
+    poses = centre + 2.5 * (poses - centre)
+    _, status = made.machine.inverse(poses * made.units, status=True)
+    names = np.array(_kernel.STATUS)[status]
+    assert {"ok", "joint_limit"} <= set(names)
+    for pose, name in zip(poses, names, strict=True):
+        assert (made.inverse(pose) is not None) == (name in ("ok", "out_of_travel"))
 
 
 @pytest.mark.parametrize("stem", EVERY)

@@ -411,6 +411,7 @@ impl Writer {
         Ok(())
     }
 
+    /// A word of an axis, apart from what has been written since `begin`.
     fn add_axis(
         &mut self,
         source: &Source<'_>,
@@ -436,22 +437,22 @@ impl Writer {
         feed: Option<f64>,
         out: &mut Vec<u8>,
     ) -> LineResult<()> {
-        let begin = out.len();
         if source.deletable {
             out.push(b'/');
         }
+        let begin = out.len();
         if source.motions.frame.machine {
             out.extend_from_slice(b"G53");
         }
         let mut any = false;
         for axis in (0..AXES).filter(|axis| plan.replaced.contains(*axis)) {
             if self.differs(source, axis, self.position[axis], target[axis]) {
-                self.append_axis(source, plan, axis, target[axis], begin, out)?;
+                self.add_axis(source, plan, axis, target[axis], begin, out)?;
                 any = true;
             }
         }
         if !any && let Some(axis) = (0..AXES).find(|axis| plan.replaced.contains(*axis)) {
-            self.append_axis(source, plan, axis, target[axis], begin, out)?;
+            self.add_axis(source, plan, axis, target[axis], begin, out)?;
         }
         if let Some(feed) = feed {
             separate(plan.spaced, out);
@@ -459,22 +460,6 @@ impl Writer {
             feed_rate(source, feed)?.write(out);
         }
         Ok(())
-    }
-
-    fn append_axis(
-        &mut self,
-        source: &Source<'_>,
-        plan: &Plan,
-        axis: usize,
-        target: f64,
-        begin: usize,
-        out: &mut Vec<u8>,
-    ) -> LineResult<()> {
-        if out.len() > begin + usize::from(source.deletable) {
-            separate(plan.spaced, out);
-        }
-        out.push(AXIS_LETTERS[axis]);
-        self.number(source, axis, target, out)
     }
 
     /// G28 or G30 from where the pieces have led.

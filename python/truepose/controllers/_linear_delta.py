@@ -159,6 +159,29 @@ def untilted(values: Floats) -> Floats:
     return numbers
 
 
+class TowerModel:
+    """What every `SmallModel` of a linear delta shares: all but how its numbers are written."""
+
+    def __init__(self, delta: LinearDelta, *, tilt: bool = False) -> None:
+        """`tilt`: whether the controller knows u and v."""
+        self.delta = delta
+        self._tilt = tilt
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """R, angles, rods and heights, and the tilt where there is one."""
+        return parameters(self.delta, tilt=self._tilt)
+
+    @property
+    def switches(self) -> Floats:
+        """(3,) joint coordinates, m, where the endstops trip."""
+        return self.delta.switches
+
+    def joints(self, values: Floats, poses: Floats) -> Floats:
+        """(n, 3) joint coordinates, m, for poses (n, 3), m."""
+        return self.delta.joints(values if self._tilt else untilted(values), poses)
+
+
 def _degrees(angles: Floats) -> str:
     return ", ".join(f"{angle:.1f}" for angle in np.degrees(angles))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import truepose as tp
 from command_line import MACHINES, call
 from truepose import controllers
 
@@ -115,10 +116,24 @@ def test_all_files_are_written_or_none(capsys: pytest.CaptureFixture[str], tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["planar_two_slider.c"]
 
 
-def test_the_pose_map_is_what_the_api_gives(
+def test_a_file_that_fails_takes_the_others_with_it(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Header and source of two exports must never stand together."""
+    given = controllers.Export({"one.h": "whole", "two.c": "\udc80 is no text"})
+    monkeypatch.setattr(controllers, "export", lambda *_: given)
+    (tmp_path / "one.h").write_text("of before")
+    with pytest.raises(UnicodeEncodeError):
+        call(capsys, "export", "c", PLANAR, "-o", str(tmp_path))
+    assert [path.name for path in tmp_path.iterdir()] == ["one.h"]
+    assert (tmp_path / "one.h").read_text() == "of before"
+
+
+def test_what_is_written_is_what_the_api_gives(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    done = call(capsys, "export", "pose-map", PLANAR, "-o", str(tmp_path))
-    assert done.code == 0
-    written = next(tmp_path.glob("*.json"))
-    assert json.loads(written.read_text())
+    arguments = ["pose-map", PLANAR, "--option", "count=3", "-o", str(tmp_path)]
+    assert call(capsys, "export", *arguments).code == 0
+    files = controllers.export(tp.load(PLANAR), "pose-map", {"count": "3"}).files
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == files
+    assert any(json.loads(text) for name, text in files.items() if name.endswith(".json"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import subprocess
 from functools import cache
@@ -13,13 +14,14 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from c_program import EXACT, FUSED, STRICT, Answers, compiled, compiler, driver
+from made_source import MadeSource, with_sources
 from truepose import _kernel, controllers
 from truepose.budget.exact import together
 from truepose.budget.poses import Walk
 from truepose.controllers.c import Program, program_of
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
-from truepose.sources import acting
+from truepose.sources import Block, Deviation, acting
 
 MACHINE_FOLDER = Path("machines")
 MACHINES = sorted(path.stem for path in MACHINE_FOLDER.glob("*.toml"))
@@ -342,6 +344,38 @@ def test_a_law_is_not_believed_of_one_pose(tmp_path: Path) -> None:
     with pytest.raises(RequestError) as refusal:
         controllers.export(tp.load(file), "c", {"without": "backlash,clearance,screw_coupling"})
     assert "the source loads follows from the pose" in str(refusal.value)
+
+
+def test_a_shift_out_of_proportion_to_the_heat_is_refused() -> None:
+    def bending(block: Block) -> Deviation:
+        return Deviation.of([6], 1e-7 * block.condition.temperature_rise("strut.1") ** 2)
+
+    machine = with_sources(machine_of("planar_two_slider"), MadeSource("bending", of_block=bending))
+    with pytest.raises(RequestError) as refusal:
+        program_of(machine)
+    (problem,) = refusal.value.problems
+    assert problem.found == "the source bending is not in proportion to the temperature"
+
+
+@pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "hexaglide", "hexapod_telescope"])
+def test_both_ways_to_compensated_joints_agree(name: str, tmp_path: Path) -> None:
+    """In one go, and with pivoting, which is for poses where the order of home does not serve."""
+    c, machine = program(name), machine_of(name)
+    assert c.source.count("growth < 100.0") == 1
+    pivoting = dataclasses.replace(c, source=c.source.replace("growth < 100.0", "growth < 0.0"))
+    _, kelvin, wrench = hot_and_loaded(name)
+    poses = in_full(machine, random_poses(machine, 500), machine.commanded)
+    found = []
+    for way, each in enumerate((c, pivoting)):
+        (folder := tmp_path / str(way)).mkdir()
+        found.append(driver(each, folder, EXACT)(poses, poses, kelvin, wrench))
+    straight, other = found
+    assert (straight.status == other.status).all()
+    assert (straight.status == 0).mean() > 0.5
+    usable = straight.status == 0
+    size = np.abs(straight.joints[usable]).max()
+    assert np.abs(straight.joints - other.joints)[usable].max() <= 1e-12 * size
+    assert np.abs(straight.joints - straight.nominal)[usable].max() > 1e-5
 
 
 def test_what_is_left_out_is_said_whatever_the_condition() -> None:

@@ -29,7 +29,7 @@ class C:
     def export(cls, machine: Machine, options: Mapping[str, float | str]) -> Export:
         """Header and source, named as the machine file.
 
-        Raises `RequestError` (controller-cannot, bad-option, no-workspace, no-pose-left).
+        Raises `RequestError` (controller-cannot, bad-option, no-workspace).
         """
         program = program_of(machine, without=names_of(options["without"]))
         return Export(

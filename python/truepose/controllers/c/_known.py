@@ -77,8 +77,8 @@ def known_of(machine: Machine, without: Sequence[str] = ()) -> Known:
     """What is known of `machine` in its condition, but for its temperatures and the wrench.
 
     `without`: sources, by name, to leave out. Raises `RequestError`: controller-cannot where a
-    source follows from the pose in a way that a controller cannot compute, bad-option for a source
-    in `without` that the machine does not have, no-workspace, no-pose-left.
+    source follows no law that a controller can compute, or too few poses are usable to find one,
+    bad-option for a source in `without` that the machine does not have, no-workspace.
     """
     sources = cast("tuple[Source, ...]", machine.sources)
     _check_names(sources, without)
@@ -93,10 +93,11 @@ def known_of(machine: Machine, without: Sequence[str] = ()) -> Known:
     refused: dict[str, str] = {}
     for source in shifting:
         try:
-            _require_no_wrench(source, block)
-            at_reference += _at_reference(source, block)
+            cold_shift = _shift(source, block, cold)
+            _require_no_wrench(source, block, cold_shift)
+            at_reference += _terms(block, *cold_shift)
             for part in parts:
-                per_kelvin[part] += _per_kelvin(source, block, part)
+                per_kelvin[part] += _per_kelvin(source, block, cold_shift, part)
         except _NoLawError as failure:
             refused[source.name] = str(failure)
     if refused:
@@ -174,31 +175,26 @@ def _shift(source: Source, block: Block, condition: Condition) -> Moved:
     return together([(deviation.parameters, deviation.shift)])
 
 
-def _at_reference(source: Source, block: Block) -> Iterator[Term]:
-    columns, values = _shift(source, block, block.condition)
-    return _terms(block, columns, values)
+def _less(moved: Moved, other: Moved) -> Moved:
+    """What is moved more than by `other`."""
+    return together([moved, (other[0], -other[1])])
 
 
-def _per_kelvin(source: Source, block: Block, part: str) -> Iterator[Term]:
+def _per_kelvin(source: Source, block: Block, cold_shift: Moved, part: str) -> Iterator[Term]:
     """What one kelvin of a part adds, which has to be in proportion to the rise."""
     cold = block.condition
 
-    def at(rise: float) -> Moved:
+    def added(rise: float) -> Moved:
         warm = cold.replace(temperature={part: cold.reference_temperature + rise})
-        columns, values = _shift(source, block, cold)
-        return together([_shift(source, block, warm), (columns, -values)])
+        return _less(_shift(source, block, warm), cold_shift)
 
-    columns, large = at(LARGE)
-    small = dict(zip(*[list(each) for each in _by_column(at(SMALL))], strict=True))
-    for column, values in zip(*_by_column((columns, large)), strict=True):
-        off = np.abs(values * (SMALL / LARGE) - small.get(column, 0.0)).max()
-        if off > PROPORTION * np.abs(values).max():
-            raise _NoLawError("is not in proportion to the temperature")
+    columns, large = added(LARGE)
+    every, off = _less((columns, large * (SMALL / LARGE)), added(SMALL))
+    allowed = np.zeros(every.size)
+    allowed[np.searchsorted(every, columns)] = PROPORTION * np.abs(large).max(axis=0)
+    if (np.abs(off).max(axis=0) > allowed).any():
+        raise _NoLawError("is not in proportion to the temperature")
     return _terms(block, columns, large / LARGE)
-
-
-def _by_column(moved: Moved) -> tuple[list[int], list[Floats]]:
-    return moved[0].tolist(), list(moved[1].T)
 
 
 def _compliance(block: Block) -> tuple[Term, ...]:
@@ -223,24 +219,19 @@ def _terms(block: Block, columns: Indices, values: Floats) -> Iterator[Term]:
             yield Term(column, constant, slope, strut if slope else None)
 
 
-def _require_no_wrench(source: Source, block: Block) -> None:
+def _require_no_wrench(source: Source, block: Block, unloaded: Moved) -> None:
     """Raise `_NoLawError` for a source that shifts otherwise under a load, as play does."""
-    machine, cold = block.machine, block.condition
-    unloaded = _shift(source, block, cold)
-    for component in machine.components:
-        place = "xyz".index(component[-1])
-        for size in PROBING:
-            for sign in (1.0, -1.0):
-                load = [0.0, 0.0, 0.0]
-                lever = 1.0 if len(component) == 1 else machine.characteristic_length
-                load[place] = sign * size * lever
-                loaded = (
-                    cold.replace(force=load) if len(component) == 1 else cold.replace(moment=load)
-                )
-                columns, values = _shift(source, block, loaded)
-                _, change = together([(columns, values), (unloaded[0], -unloaded[1])])
-                if np.abs(change).max(initial=0.0) > 0.0:
-                    raise _NoLawError("follows from the wrench")
+    size = block.machine.characteristic_length
+    for component in block.machine.components:
+        direction = np.eye(3)["xyz".index(component[-1])]
+        for load in (sign * newtons for newtons in PROBING for sign in (1.0, -1.0)):
+            loaded = (
+                block.condition.replace(force=(load * direction).tolist())
+                if len(component) == 1
+                else block.condition.replace(moment=(load * size * direction).tolist())
+            )
+            if _less(_shift(source, block, loaded), unloaded)[1].any():
+                raise _NoLawError("follows from the wrench")
 
 
 def _refusals(machine: Machine, refused: dict[str, str], without: Sequence[str]) -> list[Problem]:

@@ -69,8 +69,7 @@ class Program:
 def program_of(machine: Machine, prefix: str | None = None, without: Sequence[str] = ()) -> Program:
     """The C program of a machine; `prefix` is by default the machine file's name.
 
-    Raises `RequestError`: controller-cannot for a source that C cannot take, bad-option for one in
-    `without` that there is not, no-workspace, no-pose-left.
+    Raises `RequestError` as `known_of`.
     """
     return _Writer(machine, prefix or _name_of(machine), known_of(machine, without)).program()
 

@@ -7,8 +7,7 @@ from typing import ClassVar
 
 from truepose.controllers._delta import SWITCHES
 from truepose.controllers._export import Export, Option
-from truepose.controllers._fit import fit, heading
-from truepose.controllers._small_model import stem
+from truepose.controllers._one_file import in_one_file
 from truepose.controllers.klipper.linear import Linear
 from truepose.controllers.klipper.rotary import Rotary
 from truepose.machine import Machine
@@ -29,11 +28,10 @@ class Klipper:
         """
         cranks = all(drive.kind == "crank" for drive in machine.drives)
         model = Rotary(machine, options) if cranks else Linear(machine, options)
-        found = fit(machine, model)
-        comment = [f"# {line}" for line in heading(machine, found, "Klipper")]
-        comment.append("# Merge into printer.cfg; mm and degrees.")
-        text = "\n".join([*comment, *model.block(found.printed), ""])
-        return Export({f"{stem(machine)}_klipper.cfg": text}, found.statement(machine))
+        notes = ["Merge into printer.cfg; mm and degrees."]
+        return in_one_file(
+            machine, model, "Klipper", ending="klipper.cfg", comment="#", notes=notes
+        )
 
 
 __all__ = ["Klipper"]

@@ -18,15 +18,14 @@ from truepose.controllers._linear_delta import (
     HEIGHTS,
     RADIUS,
     TILT,
+    TowerModel,
     endstop,
     heights,
     linear_delta,
-    parameters,
     untilted,
 )
 from truepose.controllers._small_model import (
     MM,
-    Parameter,
     Printed,
     ascii_only,
     fixed,
@@ -42,28 +41,13 @@ SMALL = 0.01
 STEPPERS = "abc"
 
 
-class Linear:
+class Linear(TowerModel):
     """A `SmallModel` of ten numbers; stepper_a drives the machine's first drive, and so on."""
 
     def __init__(self, machine: Machine, options: Mapping[str, float | str]) -> None:
         """Raises `RequestError`: controller-cannot, bad-option."""
-        self._machine = machine
-        self._delta = linear_delta(machine, options, "klipper")
+        super().__init__(linear_delta(machine, options, "klipper"))
         self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """R, angles, rods and heights."""
-        return parameters(self._delta)
-
-    @property
-    def switches(self) -> Floats:
-        """(3,) joint coordinates, m, where the endstops trip."""
-        return self._delta.switches
-
-    def joints(self, values: Floats, poses: Floats) -> Floats:
-        """(n, 3) joint coordinates, m, for poses (n, 3)."""
-        return self._delta.joints(untilted(values), poses)
 
     def printed(self, values: Floats) -> Printed:
         """Numbers by section and key, mm and degrees."""
@@ -102,10 +86,10 @@ class Linear:
             "kinematics: delta",
             f"delta_radius: {printed['printer.delta_radius']}",
             "# of the workspace, not fitted:",
-            f"print_radius: {print_radius(self._machine)}",
-            f"minimum_z_position: {lowest_z(self._machine)}",
+            f"print_radius: {print_radius(self.delta.machine)}",
+            f"minimum_z_position: {lowest_z(self.delta.machine)}",
         ]
-        for letter, drive in zip(STEPPERS, self._delta.names(), strict=True):
+        for letter, drive in zip(STEPPERS, self.delta.names(), strict=True):
             lines += ["", f"# drive {ascii_only(drive)}", f"[stepper_{letter}]"]
             for key in ("position_endstop", "arm_length", "angle"):
                 lines.append(f"{key}: {printed[f'stepper_{letter}.{key}']}")

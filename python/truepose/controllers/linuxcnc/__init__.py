@@ -71,22 +71,12 @@ def _statement(
         )
     )
     size = "the whole workspace" if box.asked else "cut from the workspace"
-    lines = [
+    return [
         f"compensation of a joint: at most {clamp / MILLIMETRE:.6g} mm ({reason}), "
         f"at most {rate_limit / MILLIMETRE:.6g} mm/s",
         f"axis limits, mm and degrees: {extent} ({size}; {box.checked} poses checked)",
         f"{description.module}.c includes LinuxCNC's headers: it is under GPL-2.0-or-later",
     ]
-    limited = [
-        strut.name
-        for strut in description.machine.struts
-        if any(joint.angle_limit is not None for joint in strut.joints)
-    ]
-    if limited:
-        lines.append(
-            "the module does not look at how far struts lean; the axis limits keep within it"
-        )
-    return lines
 
 
 def _positive(option: str, value: float) -> float:

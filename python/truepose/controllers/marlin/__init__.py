@@ -22,27 +22,25 @@ import numpy as np
 
 from truepose.controllers._delta import SWITCHES, TOWERS, tower_order, wrapped
 from truepose.controllers._export import Export, Option
-from truepose.controllers._fit import fit, heading
 from truepose.controllers._linear_delta import (
     ANGLES,
     ARMS,
     HEIGHTS,
     RADIUS,
     TILT,
+    TowerModel,
     endstop,
     heights,
     linear_delta,
-    parameters,
     untilted,
 )
+from truepose.controllers._one_file import in_one_file
 from truepose.controllers._small_model import (
     MM,
-    Parameter,
     Printed,
     fixed,
     in_file_units,
     more_decimals,
-    stem,
 )
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
@@ -55,12 +53,12 @@ SMALL = 0.01
 AXES, TRIMS = "XYZ", "ABC"
 
 
-class _Model:
+class _Model(TowerModel):
     """A `SmallModel` of ten numbers; its towers are counted as Marlin does."""
 
     def __init__(self, machine: Machine, options: Mapping[str, float | str]) -> None:
         delta = linear_delta(machine, options, "marlin")
-        self.delta = delta.in_order(tower_order(delta.nominal[ANGLES]))
+        super().__init__(delta.in_order(tower_order(delta.nominal[ANGLES])))
         self._probe = float(options["probe_offset"])
         self._least = float(options["least"])
         self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
@@ -89,20 +87,6 @@ class _Model:
                 hint="least=0 lowers the highest carriage by nothing",
             )
         )
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """R, angles, rods and heights."""
-        return parameters(self.delta)
-
-    @property
-    def switches(self) -> Floats:
-        """(3,) joint coordinates, m, where the endstops trip."""
-        return self.delta.switches
-
-    def joints(self, values: Floats, poses: Floats) -> Floats:
-        """(n, 3) joint coordinates, m, for poses (n, 3), m."""
-        return self.delta.joints(untilted(values), poses)
 
     def printed(self, values: Floats) -> Printed:
         """Numbers by command and word, mm and degrees."""
@@ -170,10 +154,7 @@ class Marlin:
         Raises `RequestError`: controller-cannot, bad-option, no-workspace, no-pose-left.
         """
         model = _Model(machine, options)
-        found = fit(machine, model)
-        comment = [f"; {line}" for line in heading(machine, found, "Marlin")]
-        text = "\n".join([*comment, *model.block(found.printed), ""])
-        return Export({f"{stem(machine)}_marlin.gcode": text}, found.statement(machine))
+        return in_one_file(machine, model, "Marlin", ending="marlin.gcode", comment=";")
 
 
 __all__ = ["Marlin"]

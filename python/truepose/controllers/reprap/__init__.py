@@ -19,7 +19,6 @@ import numpy as np
 
 from truepose.controllers._delta import SWITCHES, TOWERS, print_radius, tower_order, wrapped
 from truepose.controllers._export import Export, Option
-from truepose.controllers._fit import fit, heading
 from truepose.controllers._linear_delta import (
     ANGLES,
     ARMS,
@@ -27,12 +26,13 @@ from truepose.controllers._linear_delta import (
     HEIGHTS,
     RADIUS,
     TILT,
+    TowerModel,
     endstop,
     heights,
     linear_delta,
-    parameters,
 )
-from truepose.controllers._small_model import MM, Parameter, Printed, fixed, more_decimals, stem
+from truepose.controllers._one_file import in_one_file
+from truepose.controllers._small_model import MM, Printed, fixed, more_decimals
 from truepose.machine import Machine
 from truepose.sources._base import Floats
 
@@ -44,27 +44,13 @@ SMALL = 0.01
 AXES, TILTS = "XYZ", "AB"
 
 
-class _Model:
+class _Model(TowerModel):
     """A `SmallModel` of twelve numbers; its towers are counted as the firmware does."""
 
     def __init__(self, machine: Machine, options: Mapping[str, float | str]) -> None:
         delta = linear_delta(machine, options, "reprap")
-        self.delta = delta.in_order(tower_order(delta.nominal[ANGLES]))
+        super().__init__(delta.in_order(tower_order(delta.nominal[ANGLES])), tilt=True)
         self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """R, angles, rods, heights and the tilt."""
-        return parameters(self.delta, tilt=True)
-
-    @property
-    def switches(self) -> Floats:
-        """(3,) joint coordinates, m, where the endstops trip."""
-        return self.delta.switches
-
-    def joints(self, values: Floats, poses: Floats) -> Floats:
-        """(n, 3) joint coordinates, m, for poses (n, 3), m."""
-        return self.delta.joints(values, poses)
 
     def printed(self, values: Floats) -> Printed:
         """Numbers by command and word, mm, degrees and percent."""
@@ -126,10 +112,7 @@ class RepRap:
         Raises `RequestError`: controller-cannot, bad-option, no-workspace, no-pose-left.
         """
         model = _Model(machine, options)
-        found = fit(machine, model)
-        comment = [f"; {line}" for line in heading(machine, found, "RepRapFirmware")]
-        text = "\n".join([*comment, *model.block(found.printed), ""])
-        return Export({f"{stem(machine)}_reprap.g": text}, found.statement(machine))
+        return in_one_file(machine, model, "RepRapFirmware", ending="reprap.g", comment=";")
 
 
 __all__ = ["RepRap"]

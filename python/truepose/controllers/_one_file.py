@@ -1,0 +1,41 @@
+"""A fitted small model as one file: what is left over in comments, then the block to paste."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from truepose.controllers._export import Export
+from truepose.controllers._fit import fit, heading
+from truepose.controllers._small_model import Printed, SmallModel, stem
+from truepose.machine import Machine
+
+
+class BlockModel(SmallModel, Protocol):
+    """A `SmallModel` that is written as one block."""
+
+    def block(self, printed: Printed) -> list[str]:
+        """Its lines."""
+        ...
+
+
+def in_one_file(
+    machine: Machine,
+    model: BlockModel,
+    controller: str,
+    *,
+    ending: str,
+    comment: str,
+    notes: Sequence[str] = (),
+) -> Export:
+    """The file `STEM_ENDING`; `comment` begins the lines of the heading and of the notes below it.
+
+    Raises `RequestError`: controller-cannot, no-workspace, no-pose-left.
+    """
+    found = fit(machine, model)
+    lines = [f"{comment} {line}" for line in (*heading(machine, found, controller), *notes)]
+    text = "\n".join([*lines, *model.block(found.printed), ""])
+    return Export({f"{stem(machine)}_{ending}": text}, found.statement(machine))
+
+
+__all__ = ["BlockModel", "in_one_file"]

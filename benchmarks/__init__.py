@@ -22,4 +22,5 @@ BENCHMARKS = (
     Benchmark("containment", cores=2),
     Benchmark("linuxcnc_module"),
     Benchmark("gcode", cores=2),
+    Benchmark("calibration"),
 )

@@ -84,6 +84,20 @@ def turned(quaternions: Array, step: Array) -> Array:
     )  # fmt: skip
 
 
+def turned_by(quaternions: Array, vectors: Array) -> Array:
+    """Unit quaternions (n, 4) turned further by rotation vectors (n, 3), base frame."""
+    angle = np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
+    factor = 0.5 * np.sinc(angle / (2.0 * np.pi))
+    w, x, y, z = quaternions.T
+    c = np.cos(0.5 * angle)
+    a, b, d = (factor[:, None] * vectors).T
+    return np.stack(
+        [c * w - a * x - b * y - d * z, c * x + a * w + b * z - d * y,
+         c * y + b * w + d * x - a * z, c * z + d * w + a * y - b * x],
+        axis=1,
+    )  # fmt: skip
+
+
 def rotation_vectors(quaternions: Array) -> Array:
     """(n, 3) rotation vectors of quaternions (n, 4) with a positive real part."""
     imaginary = quaternions[:, 1:]

@@ -22,7 +22,7 @@ computes everything from it.
 | exit code | meaning |
 |---|---|
 | 0 | done |
-| 1 | the command is a question and the answer is no: `check`, or any with `--require-accuracy` |
+| 1 | a question answered with no: `check`, `calibrate`, `compare`, any with `--require-accuracy` |
 | 2 | bad input; every problem is on stderr, with `--format json` on stdout too |
 | 130 | interrupted (Ctrl-C): no file was changed, but `montecarlo` gives the result so far |
 | 141 | the reader of the output went away |
@@ -32,9 +32,9 @@ back) in the units that the machine file declares, and name the unit of every va
 number is `null` or an empty cell. The variables are those of [results.md](results.md). `json` has
 every variable; `csv` has one row for each pose and source and one for all sources together
 (`overall`); of shares one for each pose and parameter or source, of bounds over a region one for
-each component and magnitude. A pose that cannot be used is left out, counted, and listed with its
-status: in `json` under `left_out`, in `csv` as a row of its own. `.nc` files are the Dataset as it
-is, in SI.
+each component and magnitude, of a calibration one for each unknown. A pose that cannot be used is
+left out, counted, and listed with its status: in `json` under `left_out`, in `csv` as a row of its
+own. `.nc` files are the Dataset as it is, in SI.
 
 A file is written under a temporary name beside its place and then renamed, so it is whole or it
 is not there. Progress, with the rate and the time left at that rate, shows on stderr, on a

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from made_calibration import calibration
 from truepose.report.how_sure import spread_over
 from truepose.report.study import Study
 
@@ -25,7 +26,7 @@ SQUARED = "m^2, m rad, rad^2"
 
 
 def sure_study(study: Study) -> Study:
-    """The study with all these results: at two poses, the ellipses at up to 25."""
+    """The study with all these results: at two poses, the ellipses at up to 25; calibrated."""
     spread = spread_over(study.poses, study.positions)
     two = study.poses[[study.n_pose // 2, -1]] if study.n_pose > 1 else study.poses
     return replace(
@@ -35,6 +36,7 @@ def sure_study(study: Study) -> Study:
         worst_case=worst_case(study.machine, two),
         bounds=bounds(study.machine, two),
         shares=shares(study.machine, two),
+        calibration=calibration(study.machine, study.poses),
     )
 
 

@@ -28,3 +28,25 @@ def pose(position: ArrayLike, rotation: NDArray[np.float64]) -> NDArray[np.float
 def pose_in_order(order: str, position: ArrayLike, angles: ArrayLike) -> NDArray[np.float64]:
     """(6,) pose from angles (a, b, c), rad, that a source multiplies in another order ("xyz")."""
     return pose(position, rotation_in_order(order, angles))
+
+
+def six_psu_deviations() -> dict[str, float]:
+    """Identified minus nominal of case D09 in the kernel's parameters, m and rad.
+
+    The nominal axis is z, whose two tangents are x and y; e = (ex, ey, 1) tilts by ex and ey.
+    """
+    data = case("d09_6psu_nominal_identified")
+    nominal, identified, mm = data["nominal"], data["identified"], 1e-3
+    moved: dict[str, float] = {}
+    for i in range(6):
+        for k, name in enumerate("xyz"):
+            moved[f"strut.{i + 1}.platform.{name}"] = (
+                identified["a"][i][k] - nominal["a"][i][k]
+            ) * mm
+            moved[f"drive.d{i + 1}.origin.{name}"] = (
+                identified["b"][i][k] - nominal["b"][i][k]
+            ) * mm
+        moved[f"strut.{i + 1}.length"] = (identified["l"][i] - nominal["l"][i]) * mm
+        moved[f"drive.d{i + 1}.axis.u"] = identified["e"][i][0]
+        moved[f"drive.d{i + 1}.axis.v"] = identified["e"][i][1]
+    return moved

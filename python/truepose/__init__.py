@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from truepose.budget.shares import shares
     from truepose.budget.uncertainty import uncertainty
     from truepose.budget.worst_case import worst_case
+    from truepose.calibration.calibrate import calibrate
     from truepose.controllers import export
     from truepose.controllers.gcode import correct_program
     from truepose.machine import Condition, Machine
@@ -41,9 +42,11 @@ _WHERE = {
     "Input": "truepose.budget.inputs",
     "Machine": "truepose.machine",
     "bounds": "truepose.budget.bounds",
+    "calibrate": "truepose.calibration.calibrate",
     "correct_program": "truepose.controllers.gcode",
     "export": "truepose.controllers",
     "monte_carlo": "truepose.budget.monte_carlo",
+    "plan": "truepose.calibration.planning.plan",
     "shares": "truepose.budget.shares",
     "threads": "truepose._kernel",
     "uncertainty": "truepose.budget.uncertainty",
@@ -57,6 +60,7 @@ __all__ = [
     "__version__",
     "bounds",
     "budget",
+    "calibrate",
     "compensate",
     "correct_program",
     "errors",
@@ -64,6 +68,7 @@ __all__ = [
     "load",
     "monte_carlo",
     "over_time",
+    "plan",
     "shares",
     "strain",
     "threads",

@@ -19,6 +19,7 @@ __all__ = [
     "GcodeError",
     "GcodeMoves",
     "GcodeReader",
+    "Identification",
     "KernelError",
     "Machine",
     "Study",
@@ -28,6 +29,7 @@ __all__ = [
     "elements",
     "gcode_codes",
     "instruction_set",
+    "least_squares",
     "threads",
     "toml_lines",
     "use_instruction_set",
@@ -295,6 +297,38 @@ class Machine:
         """
 
 @final
+class Identification:
+    """What instruments read of a machine, as a function of n unknowns; rows are poses.
+
+    `description`: `unknowns` (n); `joints`, `starts` (flat rows, the latter placements); `shifted`,
+    parameters, and `shifts` (flat, n_row or 1 rows); `terms`, (unknown, parameter), and their
+    `coefficients` (flat, n_row or 1 rows); `instruments`, each `frame` (placement), `target`,
+    `axis`, `zero` (3,), `on_platform`, `unknowns` (9 of its own: origin, rotation, target; or
+    None); `observations` in the order of rows: (row, instrument, observable, strut, bias or None).
+    """
+
+    def __new__(cls, machine: Machine, description: Mapping[str, Any]) -> Identification: ...
+    def predict(self, values: ArrayLike) -> _WithStatus:
+        """(readings (n_observation,), status (n_row,)) for values (n,)."""
+    def jacobian(self, values: ArrayLike) -> _WithStatus:
+        """(derivatives (n_observation, n), status (n_row,)); NaN where a row cannot be solved."""
+    def solve(
+        self,
+        measured: ArrayLike,
+        weights: ArrayLike,
+        prior_rows: ArrayLike,
+        prior_mean: ArrayLike,
+        start: ArrayLike,
+        tolerances: tuple[float, float, float],
+        most_evaluations: int,
+    ) -> tuple[_Floats, _Floats, list[str], list[int]]:
+        """(values (n_set, n), cost (n_set,), endings, evaluations), each set fitted from `start`.
+
+        `measured` (n_set, n_observation); `weights` multiply residuals; |prior_rows (u - mean)|^2
+        is added. Endings: cost, step, gradient; stalled, exhausted, unreachable.
+        """
+
+@final
 class Variables:
     """Independent or correlated variables t of mean zero, drawn by counter-based random numbers.
 
@@ -406,6 +440,34 @@ def instruction_set() -> str:
 
 def use_instruction_set(name: str) -> None:
     """Run batches on the named instruction set, or on the best there is ("best")."""
+
+def least_squares(
+    residual: Callable[[_Floats], ArrayLike],
+    jacobian: Callable[[_Floats], ArrayLike],
+    start: _Floats,
+    *,
+    weights: _Floats | None,
+    scale: _Floats | None,
+    cost: float,
+    step: float,
+    gradient: float,
+    most_evaluations: int,
+    first_radius: float,
+) -> tuple[
+    _Floats,
+    _Floats,
+    _Floats,
+    float,
+    Literal["cost", "step", "gradient", "stalled", "exhausted"],
+    int,
+    int,
+]:
+    """What `truepose.calibration.least_squares` is a face of.
+
+    Values (n,), weighted residual (m,) and Jacobian (m, n) there, cost, status, evaluations,
+    iterations. The first error of a callback is raised; `ValueError` for shapes that contradict
+    each other and a start where something is not finite. `first_radius` may be infinite.
+    """
 
 def _rebuild(table: Mapping[str, Any], replaced: Mapping[int, float]) -> Machine:
     """A machine from its pickle."""

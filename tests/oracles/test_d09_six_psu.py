@@ -16,7 +16,7 @@ import pytest
 
 from build_machine import MACHINES, SPATIAL, Description, described, description_of
 from machine_under_test import MachineUnderTest
-from oracle_cases import case, pose_in_order
+from oracle_cases import case, pose_in_order, six_psu_deviations
 from reference_kinematics import (
     Reference,
     rotation_in_order,
@@ -82,28 +82,7 @@ def test_actual_pose(one: dict[str, list[float]]) -> None:
     assert np.abs(difference - one["error_mm_mrad"]).max() < 1e-6
 
 
-def deviations() -> dict[str, float]:
-    """Identified minus nominal in the kernel's parameters.
-
-    The nominal axis is z, whose two tangents are x and y; e = (ex, ey, 1) tilts by ex and ey.
-    """
-    nominal, identified = CASE["nominal"], CASE["identified"]
-    moved: dict[str, float] = {}
-    for i in range(6):
-        for k, name in enumerate("xyz"):
-            moved[f"strut.{i + 1}.platform.{name}"] = (
-                identified["a"][i][k] - nominal["a"][i][k]
-            ) * MM
-            moved[f"drive.d{i + 1}.origin.{name}"] = (
-                identified["b"][i][k] - nominal["b"][i][k]
-            ) * MM
-        moved[f"strut.{i + 1}.length"] = (identified["l"][i] - nominal["l"][i]) * MM
-        moved[f"drive.d{i + 1}.axis.u"] = identified["e"][i][0]
-        moved[f"drive.d{i + 1}.axis.v"] = identified["e"][i][1]
-    return moved
-
-
-DEVIATIONS = deviations()
+DEVIATIONS = six_psu_deviations()
 SHARES = (1.0, 0.5, 0.25)
 
 

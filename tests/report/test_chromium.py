@@ -13,14 +13,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+import truepose
 from command_line import MACHINES
+from made_measurements import made_measurements, poses_within
 from system_package import missing
+from truepose.calibration import write_measurements
 from truepose.cli import run
 from truepose.report.figures import (
     FIGURES,
     _style,
+    calibration_correlation,
+    calibration_unknowns,
     distribution,
     machine_drawing,
     three_answers,
@@ -46,6 +52,9 @@ COLOURS = {
     "distribution": [distribution.WITHIN, distribution.OUTSIDE],
     "coverage_ellipses": [_style.SOURCE_COLOURS[0]],
     "tornado": [tornado.LOOKS["first"][1], tornado.LINEAR],
+    "calibration_residuals": [_style.BEFORE, _style.AFTER],
+    "calibration_unknowns": [calibration_unknowns.DATA, _style.AFTER],
+    "calibration_correlation": [calibration_correlation.SCALE[-1][1]],
     "internal_forces": [_style.BEFORE, _style.AFTER, *_style.SOURCE_COLOURS[:4]],
 }
 OVERCONSTRAINED = "overconstrained"
@@ -54,6 +63,13 @@ ONLY_OVERCONSTRAINED = {
     module.__name__.rpartition(".")[2]
     for module in FIGURES
     if getattr(module, "NEEDS", None) == "strain"
+}
+
+MEASURED = "hexapod"
+ONLY_MEASURED = {
+    module.__name__.rpartition(".")[2]
+    for module in FIGURES
+    if getattr(module, "NEEDS", None) == "calibration"
 }
 
 # In the page, so that no image library is needed: a picture -> how many pixels of which colour.
@@ -143,6 +159,20 @@ def visit(browser: Any, file: Path, figures: int) -> Visit:
     return seen
 
 
+def measurements(beside: Path) -> Path:
+    """Of a machine whose first drive is 50 um off, with 10 um of noise."""
+    machine = truepose.load(MACHINES / f"{MEASURED}.toml")
+    data = made_measurements(machine, "pose", poses_within(machine, 20), uncertainty=10e-6)
+    name = f"drive.{machine.drives[0].name}.offset"
+    at = machine.parameters.index(name)
+    actual = machine.replace({name: machine.nominal[at] + 50e-6})
+    shown = actual.forward(data.joints, machine.kernel.pose_of(data.placements)).ravel()
+    noise = np.random.default_rng(0).normal(0.0, data.uncertainty)
+    file = beside.with_name("measured.csv")
+    write_measurements(file, machine, data.with_values(shown + noise))
+    return file
+
+
 @pytest.fixture(scope="module", params=MACHINES_SHOWN)
 def report(
     request: pytest.FixtureRequest, browser: Any, tmp_path_factory: pytest.TempPathFactory
@@ -153,8 +183,10 @@ def report(
     log.write_text("time (min),default (degC)\n0,20\n10,27\n60,30\n", encoding="utf-8")
     machine = str(MACHINES / f"{request.param}.toml")
     setting = f"condition.temperature_log={log}"
-    assert run(["report", machine, "--set", setting, "--output", str(file)]) == 0
-    absent = () if request.param == OVERCONSTRAINED else ONLY_OVERCONSTRAINED
+    measured = [] if request.param != MEASURED else ["--measurements", str(measurements(file))]
+    assert run(["report", machine, "--set", setting, "--output", str(file), *measured]) == 0
+    absent = set() if request.param == OVERCONSTRAINED else ONLY_OVERCONSTRAINED
+    absent = absent if measured else absent | ONLY_MEASURED
     seen = visit(browser, file, len(FIGURE_NAMES) - len(absent))
     seen.absent = frozenset(absent)
     yield seen

@@ -9,6 +9,7 @@ pub mod batch;
 pub mod code;
 pub mod dispatch;
 pub mod element;
+pub mod identification;
 pub mod kinematics;
 pub mod linear;
 pub mod machine;

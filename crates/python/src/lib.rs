@@ -8,6 +8,8 @@ mod elements;
 mod evaluate;
 mod failure;
 mod gcode;
+mod identification;
+mod least_squares;
 mod machine;
 mod proof;
 mod sampling;
@@ -84,6 +86,7 @@ fn _kernel(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("KernelError", py.get_type::<failure::KernelError>())?;
     module.add_class::<machine::Machine>()?;
     gcode::register(module)?;
+    module.add_class::<identification::Identification>()?;
     module.add_class::<sampling::Variables>()?;
     module.add_class::<sampling::Tallies>()?;
     module.add_class::<sampling::Study>()?;
@@ -91,6 +94,7 @@ fn _kernel(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(instruction_set, module)?)?;
     module.add_function(wrap_pyfunction!(use_instruction_set, module)?)?;
     module.add_function(wrap_pyfunction!(elements::elements, module)?)?;
+    module.add_function(wrap_pyfunction!(least_squares::least_squares, module)?)?;
     module.add_function(wrap_pyfunction!(toml_lines::toml_lines, module)?)?;
     module.add_function(wrap_pyfunction!(machine::_rebuild, module)?)?;
     Ok(())

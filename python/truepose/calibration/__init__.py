@@ -2,6 +2,23 @@
 
 from __future__ import annotations
 
+from truepose.calibration.instruments import Frame, Instrument
 from truepose.calibration.least_squares import Solution, Tolerances, covariance, least_squares
+from truepose.calibration.measurements import Measurements
+from truepose.calibration.measurements.arrays import joined, measurements_of
+from truepose.calibration.measurements.reading import read_measurements
+from truepose.calibration.measurements.writing import write_measurements
 
-__all__ = ["Solution", "Tolerances", "covariance", "least_squares"]
+__all__ = [
+    "Frame",
+    "Instrument",
+    "Measurements",
+    "Solution",
+    "Tolerances",
+    "covariance",
+    "joined",
+    "least_squares",
+    "measurements_of",
+    "read_measurements",
+    "write_measurements",
+]

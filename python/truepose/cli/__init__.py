@@ -16,6 +16,9 @@ from truepose.cli._guard import INTERRUPTED, GuardedGroup
 COMMANDS: dict[str, str] = {
     "init": "truepose.cli.init",
     "check": "truepose.cli.check",
+    "plan": "truepose.cli.plan",
+    "calibrate": "truepose.cli.calibrate",
+    "compare": "truepose.cli.compare",
     "budget": "truepose.cli.budget",
     "compensate": "truepose.cli.compensate",
     "montecarlo": "truepose.cli.montecarlo",

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 import truepose
 from truepose.budget.poses import faults_text
 from truepose.cli._options import Request
-from truepose.cli._progress import progress
+from truepose.cli._progress import progress, waiting
 from truepose.cli._show import show_tables
 from truepose.errors import Problem, RequestError
 from truepose.machine.suggestion import counted
@@ -110,6 +110,15 @@ def with_time(study: Study) -> Study:
     thermal = study.position_norm(study.values("error")[:, study.sources.index("thermal")])
     chosen = list(dict.fromkeys([middle, where_highest(thermal)]))
     return replace(study, over_time=truepose.over_time(machine, study.poses[chosen]))
+
+
+def with_calibration(study: Study, measurements: Path | None) -> Study:
+    """The study with a calibration by the defaults, where there are measurements."""
+    if measurements is None:
+        return study
+    with waiting("calibration"):
+        found = truepose.calibrate(study.machine, measurements)
+    return replace(study, calibration=found.dataset)
 
 
 def with_strain(request: Request, study: Study) -> Study:

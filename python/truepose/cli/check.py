@@ -67,10 +67,12 @@ def command(**options: Any) -> int:
 
 
 def _tables(machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> list[Table]:
-    from truepose.report import inputs, reach, tables
+    from truepose.report import calibrated_files, inputs, reach, tables
 
+    made = calibrated_files.calibration(machine)
     shown = [
         inputs.machine(machine),
+        *([] if made is None else [made]),
         inputs.condition(machine),
         inputs.sources(machine),
         inputs.deviations(machine),
@@ -105,6 +107,9 @@ def _text(form: str, machine: Machine, found: Reach, answers: tuple[Answer, ...]
         {
             "command": "check",
             "machine": inputs.machine_data(machine),
+            "calibration": None
+            if machine.calibration is None
+            else machine.calibration.model_dump(),
             "sources": inputs.source_data(machine),
             "workspace": reach.as_data(machine, found),
             "answers": rows,

@@ -29,6 +29,13 @@ from truepose.cli._options import (
         type=click.Path(path_type=Path),
         help="Where the page goes; by default beside you, named after the machine file.",
     ),
+    click.option(
+        "--measurements",
+        metavar="FILE.csv",
+        type=click.Path(path_type=Path),
+        help="Measurements of the machine: the page then begins with a calibration, with the "
+        "defaults of `truepose calibrate`.",
+    ),
     strict_option,
     accuracy_option,
 )
@@ -42,16 +49,21 @@ def command(**options: Any) -> int:
     """
     from truepose.cli import _how_sure, _work
     from truepose.cli._show import show_tables
+    from truepose.output import require_writable
     from truepose.report import accuracy, how_sure, tables
 
     if options["output"] is None:
         options["output"] = Path(options["machine_file"].stem + ".html")
+    measurements: Path | None = options.pop("measurements")
     request = Request(**options)
     assert request.output is not None
     page = _work.report_page()
+    if measurements is not None:
+        require_writable(request.output, [".html"], [request.machine_file, measurements])
     machine = _work.read_machine(request, [".html"])
     study = _work.with_time(_work.study_of(request, machine))
     study = _how_sure.with_how_sure(_work.with_strain(request, study))
+    study = _work.with_calibration(study, measurements)
     text = request.machine_file.read_text(encoding="utf-8")
     page.write(study, request.output, text)
     answers = accuracy.answers(study)

@@ -15,7 +15,7 @@ import csv
 import hashlib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -47,12 +47,14 @@ class Column:
 
     `dimension`: a key of `DIMENSIONS`, whose unit the header must name (a `ratio` may do without);
     None for a column of words. `words`: those that may stand there, any where it is empty.
+    `blank`: whether a cell may be empty, which then is NaN, or a word of no letters.
     """
 
     name: str
     dimension: str | None
     required: bool = True
     words: tuple[str, ...] = ()
+    blank: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ class DataTable:
     """What a data file says: columns in SI, only those that the file has.
 
     `file` is its path for people, `name` what the machine file calls it. `numbers` by column name,
-    (n_row,) SI; `texts` likewise for columns of words. `lines` (n_row,): where each row stands.
-    `columns`: the names in the file's order.
+    (n_row,) SI; `texts` likewise for columns of words. `columns`: the names in the file's order.
+    `lines` (n_row,): where each row stands, `header_line` where the header does.
     """
 
     file: str
@@ -71,6 +73,7 @@ class DataTable:
     texts: Mapping[str, tuple[str, ...]]
     lines: NDArray[np.intp]
     units: Mapping[str, FileUnit]
+    header_line: int = 1
 
     @property
     def n_row(self) -> int:
@@ -101,6 +104,29 @@ class DataTable:
         return Problem(
             code, message, self.file, line, column, found=found, expected=expected, hint=hint
         )
+
+
+@dataclass(frozen=True)
+class ReadTable:
+    """A table as far as it could be read, and what is wrong with it.
+
+    `table` is None where there is no header that makes columns; rows of a wrong number of cells are
+    not in it. `unreadable` (n_row,) of each column: cells that are no value, or in no known unit.
+    """
+
+    table: DataTable | None
+    unreadable: Mapping[str, NDArray[np.bool_]]
+    problems: tuple[Problem, ...]
+
+
+def read_table(file: str, name: str, text: str, columns: Sequence[Column]) -> ReadTable:
+    """The table in the text of a file that no machine file names, problems and all.
+
+    `file`: its path for people, `name` its name without a folder.
+    """
+    reader = _Reader(file, name, tuple(columns))
+    reader.read(text)
+    return ReadTable(reader.table, reader.unreadable, tuple(reader.found()))
 
 
 @dataclass
@@ -153,20 +179,16 @@ class _Reader:
         self.file = file
         self.name = name
         self.columns = {column.name: column for column in columns}
-        self._problems: dict[tuple[str, str | None], list[Problem]] = {}
+        self.table: DataTable | None = None
+        self.unreadable: dict[str, NDArray[np.bool_]] = {}
+        self._problems: list[Problem] = []
 
     def found(self) -> list[Problem]:
         """Every problem; where one kind fills a column, the last one that is told counts on."""
-        told = []
-        for same in self._problems.values():
-            more = len(same) - MOST_PROBLEMS
-            told += same[:MOST_PROBLEMS]
-            if more > 0:
-                last = told.pop()
-                told.append(replace(last, message=f"{last.message}, and in {more} more rows"))
-        return told
+        return cut_short(self._problems)
 
     def read(self, text: str) -> DataTable | None:
+        """The table, None where it has a problem; as far as it could be read it is in `table`."""
         rows = self._rows(text)
         if rows is None:
             return None
@@ -188,15 +210,15 @@ class _Reader:
         texts: dict[str, tuple[str, ...]] = {}
         for column, at, unit in placed:
             cells = [cells[at].strip() for _, cells in even]
+            wrong = column.dimension is not None and unit is None
+            self.unreadable[column.name] = np.full(len(cells), wrong)
             if column.dimension is None:
                 texts[column.name] = self._words(column, cells, lines)
             else:
                 # Cells are looked at even where the unit is wrong: all problems at once.
                 units[column.name] = unit or FileUnit("1")
-                numbers[column.name] = self._numbers(column.name, cells, lines, units[column.name])
-        if self._problems:
-            return None
-        return DataTable(
+                numbers[column.name] = self._numbers(column, cells, lines, units[column.name])
+        self.table = DataTable(
             self.file,
             self.name,
             tuple(column.name for column, _, _ in placed),
@@ -204,7 +226,9 @@ class _Reader:
             MappingProxyType(texts),
             lines,
             MappingProxyType(units),
+            line,
         )
+        return None if self._problems else self.table
 
     def _rows(self, text: str) -> list[tuple[int, list[str]]] | None:
         """(line, cells) of every row that is neither blank nor a comment."""
@@ -357,17 +381,22 @@ class _Reader:
         return False
 
     def _numbers(
-        self, name: str, cells: list[str], lines: NDArray[np.intp], unit: FileUnit
+        self, column: Column, cells: list[str], lines: NDArray[np.intp], unit: FileUnit
     ) -> Floats:
-        """(n_row,) SI; where a cell is no number, that is a problem and the result is of no use."""
+        """(n_row,) SI; NaN where a cell may be empty and is, or is no number: that is a problem."""
+        name, unreadable = column.name, self.unreadable[column.name]
         values = np.full(len(cells), np.nan)
         for at, cell in enumerate(cells):
+            if column.blank and not cell:
+                continue
             try:
                 values[at] = _number(cell)
             except ValueError:
+                unreadable[at] = True
                 self._no_number(name, cell, int(lines[at]))
         result = unit.to_si(values)
         for at in np.flatnonzero(np.isfinite(values) & ~np.isfinite(result)).tolist():
+            unreadable[at] = True
             self._not_finite(name, cells[at], int(lines[at]))
         return result
 
@@ -411,7 +440,11 @@ class _Reader:
         )
 
     def _words(self, column: Column, cells: list[str], lines: NDArray[np.intp]) -> tuple[str, ...]:
-        for cell, line in zip(cells, lines.tolist(), strict=True):
+        unreadable = self.unreadable[column.name]
+        for at, (cell, line) in enumerate(zip(cells, lines.tolist(), strict=True)):
+            if column.blank and not cell:
+                continue
+            unreadable[at] = not cell or bool(column.words and cell not in column.words)
             if not cell:
                 self._refuse(
                     "empty-cell",
@@ -447,7 +480,22 @@ class _Reader:
         if column is not None:
             message = f"{column}: {message}"
         problem = Problem(code, message, self.file, line, column, found, expected, hint)
-        self._problems.setdefault((code, column), []).append(problem)
+        self._problems.append(problem)
+
+
+def cut_short(problems: Iterable[Problem]) -> list[Problem]:
+    """The first problems of every kind and column; the last one that is told counts the others."""
+    by_kind: dict[tuple[str, str | None], list[Problem]] = {}
+    for problem in problems:
+        by_kind.setdefault((problem.code, problem.path), []).append(problem)
+    told = []
+    for same in by_kind.values():
+        more = len(same) - MOST_PROBLEMS
+        told += same[:MOST_PROBLEMS]
+        if more > 0:
+            last = told.pop()
+            told.append(replace(last, message=f"{last.message}, and in {more} more rows"))
+    return told
 
 
 def _number(cell: str) -> float:

@@ -17,6 +17,7 @@ from truepose.machine.parts_of_machine import BODIES, Drive, Strut
 from truepose.machine.settings import apply
 from truepose.machine.tables import SCHEMA, owners
 from truepose.machine.tables.accuracy import AccuracyTable
+from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.machine import MachineTable
 from truepose.machine.temperature_log import read_temperature_log
@@ -142,6 +143,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         tool=tool,
         mounting=built_parts.mounting(validated),
         data_files=data_files.hashes,
+        calibration=validated.table(CalibrationTable),
     )
 
 

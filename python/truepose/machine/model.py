@@ -17,6 +17,7 @@ from truepose.machine.compliances import compliances, known
 from truepose.machine.condition import DEFAULT_PART, Condition
 from truepose.machine.parts_of_machine import BODIES, Body, Drive, Guide, Strut, Vector
 from truepose.machine.suggestion import did_you_mean, one_of
+from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.units import FileUnit
 from truepose.machine.workspace import Accuracy, Workspace
 
@@ -88,6 +89,8 @@ class Machine:
     data_files: Mapping[str, str] = field(default_factory=dict)
     """SHA-256 of each file of data that the machine file names."""
     replaced: Mapping[str, float] = field(default_factory=dict)
+    calibration: CalibrationTable | None = None
+    """Where the numbers of a calibrated machine file come from."""
 
     forward: Callable[..., Any] = field(init=False, repr=False)
     inverse: Callable[..., Any] = field(init=False, repr=False)

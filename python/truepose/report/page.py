@@ -9,10 +9,11 @@ import jinja2
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
+from truepose.calibration.gate.words import sentence
 from truepose.output import replacing
-from truepose.report import how_sure, inputs, tables
+from truepose.report import calibration, how_sure, inputs, tables
 from truepose.report.accuracy import AFTER, BEFORE, answers, met
-from truepose.report.figures import draw
+from truepose.report.figures import Drawn, draw
 from truepose.report.study import Study
 
 LIMITS = (
@@ -35,6 +36,7 @@ def render(study: Study, machine_text: str = "") -> str:
         lstrip_blocks=True,
         loader=jinja2.FunctionLoader(_resource),
     )
+    environment.filters["capitalise"] = sentence
     found = answers(study)
     results = [tables.ranking(study), tables.highest_absolute(study), tables.highest_percent(study)]
     if study.compensation is not None:
@@ -44,6 +46,7 @@ def render(study: Study, machine_text: str = "") -> str:
     left_out = tables.poses_left_out(study)
     if left_out is not None:
         results.append(left_out)
+    drawn = [(each, _embedded(each.name, each.figure)) for each in draw(study)]
     return environment.get_template("page.html.jinja").render(
         study=study,
         machine=study.machine,
@@ -52,7 +55,12 @@ def render(study: Study, machine_text: str = "") -> str:
         before=met(found, BEFORE),
         after=met(found, AFTER),
         total=tables.total(study),
-        figures=[(each, _embedded(each.name, each.figure)) for each in draw(study)],
+        figures=[pair for pair in drawn if not _of_calibration(pair[0])],
+        calibration=None if study.calibration is None else study.calibration.attrs,
+        calibration_figures=[pair for pair in drawn if _of_calibration(pair[0])],
+        calibration_tables=[]
+        if study.calibration is None
+        else calibration.of_page(study.calibration),
         results=results,
         inputs=[
             table(study.machine)
@@ -64,6 +72,11 @@ def render(study: Study, machine_text: str = "") -> str:
         css=_resource("page.css"),
         plotly_js=get_plotlyjs(),
     )
+
+
+def _of_calibration(drawn: Drawn) -> bool:
+    """Whether a figure stands with the calibration, before what the machine as filed does."""
+    return drawn.needs == "calibration"
 
 
 def write(study: Study, path: Path, machine_text: str = "") -> None:

@@ -29,7 +29,8 @@ class Study:
     log, `strain` that of `truepose.strain`, where the machine is over-constrained. `worst_case`,
     `monte_carlo`, `bounds` and `shares` are those of the functions of these names at a few of the
     poses, `ellipses` is a `monte_carlo` at more of them with fewer samples; `missing` says, by
-    name, why one of them is not there. All values here are SI.
+    name, why one of them is not there. `calibration` is that of `truepose.calibrate`, where there
+    are measurements. All values here are SI.
     """
 
     machine: Machine
@@ -43,12 +44,19 @@ class Study:
     bounds: xr.Dataset | None = None
     shares: xr.Dataset | None = None
     missing: Mapping[str, str] = field(default_factory=dict)
+    calibration: xr.Dataset | None = None
 
     @property
     def strained(self) -> xr.Dataset:
         """The internal forces, where the machine has any."""
         assert self.strain is not None
         return self.strain
+
+    @property
+    def calibrated(self) -> xr.Dataset:
+        """The calibration, where there is one."""
+        assert self.calibration is not None
+        return self.calibration
 
     @property
     def time(self) -> xr.Dataset:

@@ -1,7 +1,7 @@
 """`[[correlation]]`: variables of tolerances that are correlated, but not one and the same.
 
-Every pair of the variables that a row names has its coefficient, Pearson's. A variable is a
-parameter's own, or that of a group of tolerances.
+Every pair of the variables that a row names has its coefficient, Pearson's: one for all pairs, or a
+matrix of them. A variable is a parameter's own, or that of a group of tolerances.
 """
 
 from __future__ import annotations
@@ -31,8 +31,14 @@ class CorrelationTable(FileTable):
         description="What is correlated: parameter names or patterns over them, as in "
         "`[tolerance]`, or groups of tolerances; at least two variables in all.",
     )
-    coefficient: float = Field(
-        description="Pearson correlation coefficient of every two of them, from -1 to 1."
+    coefficient: float | None = Field(
+        None, description="Pearson correlation coefficient of every two of them, from -1 to 1."
+    )
+    matrix: list[list[float]] | None = Field(
+        None,
+        description="In its place, the coefficient of each two: the correlation matrix below its "
+        "diagonal, row by row. Its first row is the second name with the first, its second row "
+        "the third name with the first and the second, and so on. `between` is then full names.",
     )
 
 
@@ -51,15 +57,7 @@ def read_correlation(parts: FileParts, bands: Deviation) -> Floats | None:
     before = len(parts.problems)
     for index, row in enumerate(rows):
         path = f"correlation.#{index + 1}"
-        if not -1.0 <= row.coefficient <= 1.0:
-            parts.refuse(
-                "bad-correlation",
-                "a correlation coefficient is from -1 to 1",
-                f"{path}.coefficient",
-                found=f"{row.coefficient:g}",
-                expected="a number from -1 to 1",
-            )
-        pairs = list(combinations(names.numbers(row.between, path), 2))
+        pairs = _coefficients(parts, names, row, path)
         doubled = [pair for pair in pairs if pair in given]
         if doubled:
             one, other = (names.of_variable[number] for number in doubled[0])
@@ -71,8 +69,8 @@ def read_correlation(parts: FileParts, bands: Deviation) -> Floats | None:
                 expected="one coefficient for each pair",
             )
         given |= dict.fromkeys(pairs, path)
-        for i, j in pairs:
-            matrix[i, j] = matrix[j, i] = row.coefficient
+        for (i, j), coefficient in pairs.items():
+            matrix[i, j] = matrix[j, i] = coefficient
     if len(parts.problems) > before:
         return None
     problem = clash(names.of_variable, matrix)
@@ -87,6 +85,81 @@ def read_correlation(parts: FileParts, bands: Deviation) -> Floats | None:
         hint=problem.hint,
     )
     return None
+
+
+def _coefficients(
+    parts: FileParts, names: _Names, row: CorrelationTable, path: str
+) -> dict[tuple[int, int], float]:
+    """The coefficient of each pair of variables (the lower number first) that a row states.
+
+    None of them, and problems, where something is wrong.
+    """
+    if (row.coefficient is None) == (row.matrix is None):
+        given = row.coefficient is not None
+        parts.refuse(
+            "excluding-keys" if given else "missing-key",
+            "a correlation is given by one coefficient or by a matrix of them",
+            path,
+            found="coefficient and matrix" if given else "neither",
+            expected="coefficient or matrix",
+        )
+        return {}
+    if row.coefficient is not None:
+        _require_coefficients(parts, [row.coefficient], f"{path}.coefficient")
+        return dict.fromkeys(combinations(names.numbers(row.between, path), 2), row.coefficient)
+    assert row.matrix is not None
+    before = len(parts.problems)
+    _require_shape(parts, row.between, row.matrix, f"{path}.matrix")
+    for index, line in enumerate(row.matrix):
+        where = f"{row.between[index + 1]}: " if index + 1 < len(row.between) else ""
+        _require_coefficients(parts, line, f"{path}.matrix", where)
+    numbers = names.in_order(row.between, path)
+    if len(parts.problems) > before:
+        return {}
+    return {
+        (min(numbers[i + 1], numbers[j]), max(numbers[i + 1], numbers[j])): coefficient
+        for i, line in enumerate(row.matrix)
+        for j, coefficient in enumerate(line)
+    }
+
+
+def _require_coefficients(
+    parts: FileParts, coefficients: Sequence[float], path: str, where: str = ""
+) -> None:
+    """Record a problem for the first of them that is no number from -1 to 1."""
+    for each in coefficients:
+        if not -1.0 <= each <= 1.0:
+            parts.refuse(
+                "bad-correlation",
+                f"{where}a correlation coefficient is from -1 to 1",
+                path,
+                found=f"{each:g}",
+                expected="a number from -1 to 1",
+            )
+            return
+
+
+def _require_shape(
+    parts: FileParts, between: Sequence[str], matrix: Sequence[Sequence[float]], path: str
+) -> None:
+    """Record a problem where a matrix has not one row for each name after the first."""
+    found, wanted = [len(line) for line in matrix], list(range(1, len(between)))
+    if found == wanted:
+        return
+    shown = counted(len(matrix), "row")
+    message = f"a matrix of {shown} for {counted(len(between), 'name')}"
+    if len(found) == len(wanted):
+        row = next(at for at in range(len(found)) if found[at] != wanted[at])
+        shown = counted(found[row], "coefficient")
+        message = f"row {row + 1} ({between[row + 1]}) has {shown}"
+    parts.refuse(
+        "correlation-matrix-shape",
+        message,
+        path,
+        found=shown,
+        expected=f"{counted(len(wanted), 'row')} of 1, 2, ... coefficients: each name after the "
+        "first with all before it",
+    )
 
 
 class _Names:
@@ -137,6 +210,21 @@ class _Names:
                 expected="two parameters or more that vary by themselves, or groups",
             )
         return sorted(taken) if fine and len(taken) > 1 else []
+
+    def in_order(self, between: Sequence[str], path: str) -> list[int]:
+        """Numbers of the variables in the order named; none where one is wrong, or a pattern."""
+        if self.numbers(between, path) == []:
+            return []
+        for word in between:
+            if word not in self._groups and word not in self._variable:
+                self._parts.refuse(
+                    "correlation-pattern",
+                    f"{word!r} is a pattern, and a matrix has its names in their order",
+                    f"{path}.between",
+                    found=word,
+                    expected="full names of parameters, or groups",
+                )
+        return [self._groups.get(word, self._variable.get(word, -1)) for word in between]
 
     def _of(self, word: str, path: str) -> list[int]:
         """The variables that a group's name, a parameter's or a pattern stands for."""

@@ -175,6 +175,44 @@ def test_evaluations_are_counted_and_limited() -> None:
     assert found.evaluations == len(calls) == 5
 
 
+@pytest.mark.parametrize("scale", [None, [1e-3, 1e-3]])
+def test_a_root_of_rounding_ends(scale: list[float] | None) -> None:
+    # Small differences of large numbers, of unknowns that are nothing at the root.
+    generator = np.random.default_rng(1)
+    matrix, large = generator.normal(size=(40, 2)), generator.normal(0.0, 1e3, 40)
+
+    def residual(x: Array) -> Array:
+        return np.hypot(large + matrix @ x, 1.0) - np.hypot(large, 1.0)
+
+    def slope(x: Array) -> Array:
+        moved = large + matrix @ x
+        return (moved / np.hypot(moved, 1.0))[:, None] * matrix
+
+    for start in generator.normal(0.0, 1e-3, (5, 2)):
+        found = least_squares(residual, slope, start, scale=scale)
+        assert found.converged
+        assert found.evaluations < 300
+        assert np.abs(found.values).max() < 1e-12
+
+
+@pytest.mark.parametrize("where", [0, 3])
+@pytest.mark.parametrize("which", [0, 1])
+def test_what_a_callback_raises_is_passed_on(which: int, where: int) -> None:
+    calls = []
+
+    def broken(x: Array) -> Array:
+        calls.append(x)
+        if len(calls) > where:
+            raise KeyError("gone")
+        return (rosenbrock, rosenbrock_slope)[which](x)
+
+    functions = [rosenbrock, rosenbrock_slope]
+    functions[which] = broken
+    with pytest.raises(KeyError, match="gone"):
+        least_squares(*functions, [-1.2, 1.0])
+    assert len(calls) == where + 1
+
+
 def test_a_given_scale_holds_the_trust_region() -> None:
     # With a tiny scale on the first value it can hardly move in the first step.
     seen: list[Array] = []

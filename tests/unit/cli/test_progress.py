@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from truepose.cli import _progress
@@ -52,6 +54,21 @@ def test_nothing_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
     with _progress.progress("error budget") as report:
         assert report is None
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("patience", "seen"), [(0.0, True), (60.0, False)])
+def test_work_that_says_nothing_of_itself_shows_that_it_goes_on(
+    patience: float,
+    seen: bool,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setattr(_progress, "PATIENCE", patience)
+    monkeypatch.setenv("TERM", "xterm")
+    with _progress.waiting("calibration"):
+        time.sleep(0.3)
+    assert ("calibration" in capsys.readouterr().err) == seen
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from truepose.machine.data_file import MOST_PROBLEMS, Column, DataFiles, DataTable
+from truepose.machine.data_file import MOST_PROBLEMS, Column, DataFiles, DataTable, read_table
 from truepose.machine.document import Document
 
 COLUMNS = (
@@ -201,3 +201,33 @@ def test_any_bytes_are_a_table_or_problems(
         assert {len(each) for each in (*table.numbers.values(), *table.texts.values())} == {
             table.n_row
         }
+
+
+BLANKS = (
+    Column("x", "length"),
+    Column("y", "length", required=False, blank=True),
+    Column("word", None, required=False, words=("up", "down"), blank=True),
+)
+
+
+def test_cells_that_may_be_empty() -> None:
+    found = read_table("m.csv", "m.csv", "\n# c\nx (mm),y (mm),word\n1,,\n2,3,up\n", BLANKS)
+    assert found.problems == ()
+    assert found.table is not None
+    assert np.array_equal(found.table.numbers["y"], [np.nan, 0.003], equal_nan=True)
+    assert found.table.texts["word"] == ("", "up")
+    assert found.table.header_line == 3
+    assert not any(flags.any() for flags in found.unreadable.values())
+
+
+def test_a_table_as_far_as_it_can_be_read() -> None:
+    text = "x (mm),y (s),word\n,1,upp\n1,2\n2,,up\n3,nan,\n"
+    found = read_table("m.csv", "m.csv", text, BLANKS)
+    codes = {problem.code for problem in found.problems}
+    assert codes == {"wrong-dimension", "empty-cell", "unknown-choice", "ragged-row", "not-finite"}
+    assert found.table is not None
+    assert found.table.lines.tolist() == [2, 4, 5]
+    assert found.unreadable["x"].tolist() == [True, False, False]
+    assert found.unreadable["y"].all()  # the unit is none, so no number of it means anything
+    assert found.unreadable["word"].tolist() == [True, False, False]
+    assert read_table("m.csv", "m.csv", "", BLANKS).table is None

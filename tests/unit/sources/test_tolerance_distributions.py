@@ -206,6 +206,31 @@ def test_a_group_is_one_variable(tmp_path: Path) -> None:
         assert coefficients(load_text(tmp_path, text)) == expected
 
 
+def test_a_matrix_states_each_pair(tmp_path: Path) -> None:
+    """Below the diagonal, in the order of the names, whatever that of the parameters is."""
+    lines = (PAIR, '"tool.?" = 0.1', '"drive.*.offset" = { band = 0.1, group = "batch" }')
+    row = (
+        'between = ["tool.x", "batch", "strut.1.base.x"]\n'
+        "matrix = [[0.25], [-0.1234567890123456, 0.5]]"
+    )
+    assert coefficients(load_text(tmp_path, correlated(row, lines=lines))) == {
+        frozenset(("tool.x", "drive.d1.offset")): 0.25,
+        frozenset(("tool.x", "strut.1.base.x")): -0.1234567890123456,
+        frozenset(("strut.1.base.x", "drive.d1.offset")): 0.5,
+    }
+
+
+def test_all_that_is_wrong_with_a_matrix_is_said_at_once(tmp_path: Path) -> None:
+    row = 'between = ["strut.[1].base.x", "strut.2.base.x"]\nmatrix = [[2], [0.5]]'
+    with pytest.raises(MachineFileError) as caught:
+        load_text(tmp_path, correlated(row))
+    assert {problem.code for problem in caught.value.problems} == {
+        "correlation-matrix-shape",
+        "bad-correlation",
+        "correlation-pattern",
+    }
+
+
 def test_lengths_of_telescopic_struts_are_their_drives_offsets(tmp_path: Path) -> None:
     text = edited(HEXAPOD, ("[workspace]", "[tolerance]\n" + '"drive.*.offset" = 0.1\n'
                   '[[correlation]]\nbetween = ["drive.*.offset"]\ncoefficient = 0.9\n'
@@ -262,13 +287,36 @@ def test_the_budget_s_uncertainty_heeds_it_and_the_worst_case_does_not(tmp_path:
          "correlation-twice", "correlation.#2 and in correlation.#1"),
         (('between = ["strut.*.base.x", "batch"]\ncoefficient = -0.6',),
          "correlation-not-semidefinite", "times 0.833 would hold"),
+        (('between = ["strut.1.base.x", "strut.2.base.x"]\ncoefficient = 0.5\nmatrix = [[0.5]]',),
+         "excluding-keys", "coefficient and matrix"),
+        (('between = ["strut.1.base.x", "strut.2.base.x"]\nmatrix = 0.5',), "wrong-type", "a list"),
+        (('between = ["strut.1.base.x", "strut.2.base.x"]\nmatrix = [["1"]]',), "wrong-type",
+         "text"),
+        (('between = ["strut.1.base.x", "strut.2.base.x"]\nmatrix = [[-1.5]]',), "bad-correlation",
+         "strut.2.base.x: a correlation"),
+        (('between = ["strut.1.base.x", "strut.2.base.x", "batch"]\nmatrix = [[0.5]]',),
+         "correlation-matrix-shape", "1 row for 3 names"),
+        (('between = ["strut.1.base.x", "strut.2.base.x", "batch"]\nmatrix = [[0.5], [0, 0, 1]]',),
+         "correlation-matrix-shape", "row 2 (batch) has 3 coefficients"),
+        (('between = ["strut.1.base.x", "drive.1.*"]\nmatrix = [[0.5]]',),
+         "correlation-pattern", "drive.d1.*"),
+        (('between = ["batch", "drive.2.offset"]\nmatrix = [[0.5]]',),
+         "correlation-twice", "one variable"),
+        (('between = ["strut.1.base.x"]\nmatrix = []',), "correlation-too-few", "1 variable"),
+        (('between = ["strut.*.base.x"]\ncoefficient = 0.5',
+          'between = ["strut.2.base.x", "strut.1.base.x"]\nmatrix = [[0.5]]'),
+         "correlation-twice", "correlation.#2 and in correlation.#1"),
+        (('between = ["batch", "strut.2.base.x", "strut.1.base.x"]\n'
+          "matrix = [[0.9], [0.9, -0.9]]",),
+         "correlation-not-semidefinite", "would hold"),
     ],
 )  # fmt: skip
 def test_what_a_correlation_may_not_say(
     tmp_path: Path, rows: tuple[str, ...], code: str, words: str
 ) -> None:
     lines = (PAIR, '"drive.*.offset" = { band = 0.1, group = "batch" }')
-    rows = tuple(row.replace("drive.1.", "drive.d1.") for row in rows)
+    for number in "12":
+        rows = tuple(row.replace(f"drive.{number}.", f"drive.d{number}.") for row in rows)
     text = correlated(*rows, lines=lines)
     with pytest.raises(MachineFileError) as caught:
         load_text(tmp_path, text)

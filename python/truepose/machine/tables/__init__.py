@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from truepose.machine.elements import strut_geometry
 from truepose.machine.tables.accuracy import AccuracyTable
 from truepose.machine.tables.body import FrameTable, PlatformTable, ToolTable
+from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.drive import DriveTable
 from truepose.machine.tables.guide import GuideTable
@@ -69,6 +70,7 @@ def owners(added: Iterable[Mapping[str, type[BaseModel]]]) -> Owners:
         "condition": [ConditionTable],
         "workspace": [WorkspaceTable],
         "accuracy": [AccuracyTable],
+        "calibration": [CalibrationTable],
     }
     for tables in added:
         for table, model in tables.items():

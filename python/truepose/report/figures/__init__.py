@@ -15,6 +15,11 @@ import plotly.graph_objects as go
 
 from truepose.report.figures import (
     before_after,
+    calibration_correlation,
+    calibration_map,
+    calibration_residuals,
+    calibration_tool,
+    calibration_unknowns,
     coverage_ellipses,
     distribution,
     error_over_time,
@@ -30,6 +35,11 @@ from truepose.report.figures import (
 from truepose.report.study import Study
 
 FIGURES: tuple[ModuleType, ...] = (
+    calibration_residuals,
+    calibration_map,
+    calibration_unknowns,
+    calibration_correlation,
+    calibration_tool,
     machine_drawing,
     ranking,
     source_errors,
@@ -47,12 +57,13 @@ FIGURES: tuple[ModuleType, ...] = (
 
 @dataclass(frozen=True)
 class Drawn:
-    """One figure with its name (the module's), its title and its caption."""
+    """One figure with its name (the module's), its title, its caption and the result it needs."""
 
     name: str
     title: str
     caption: str
     figure: go.Figure
+    needs: str | None = None
 
 
 def draw(study: Study) -> Iterator[Drawn]:
@@ -66,4 +77,5 @@ def draw(study: Study) -> Iterator[Drawn]:
             title=module.TITLE,
             caption=module.caption(study),
             figure=module.figure(study),
+            needs=needed,
         )

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from truepose.report.display import MICRO, is_position, pose_unit, shown_poses
-from truepose.report.figures._style import COLOUR_SCALE, drawn_poses, finish, small, thinning_note
+from truepose.report.display import MICRO
+from truepose.report.figures._maps import Places, label_map_axes, map_trace, places_of
+from truepose.report.figures._style import COLOUR_SCALE, drawn_poses, finish, thinning_note
 from truepose.report.study import Study
 
 TITLE = "Where in the workspace"
@@ -33,22 +33,9 @@ class Map:
     worst: Array
 
 
-@dataclass(frozen=True)
-class Places:
-    """Where the maps have values: coordinates that vary (2 or 3 of them), shown units.
-
-    `points` (n_place, n_axis). `of_pose` (n_pose,) is the place of each pose: poses that differ
-    only in coordinates that no axis shows share a place.
-    """
-
-    axes: tuple[str, ...]
-    points: Array
-    of_pose: NDArray[np.intp]
-
-
 def caption(study: Study) -> str:
     """What the colour is, and what is not shown."""
-    places = _places(study)
+    places = places_of(study.poses, study.machine.commanded)
     hidden = [
         name
         for index, name in enumerate(study.machine.commanded)
@@ -69,7 +56,7 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """A map for all sources together, one for each source, one for what compensation leaves."""
-    places = _places(study)
+    places = places_of(study.poses, study.machine.commanded)
     maps = _maps(study, places)
     drawn = _drawn(study, places)
     spatial = len(places.axes) == 3
@@ -85,12 +72,12 @@ def figure(study: Study) -> go.Figure:
     )
     for number, each in enumerate(maps):
         figure.add_trace(
-            _trace(places, drawn, each.worst),
+            map_trace(places, drawn, each.worst),
             row=number // columns + 1,
             col=number % columns + 1,
         )
     finish(figure, 80 + TITLE_MARGIN + ROW_HEIGHT[len(places.axes)] * rows)
-    _label_axes(figure, places, len(maps))
+    label_map_axes(figure, places, len(maps))
     highest = max(float(np.nanmax(each.worst)) for each in maps)
     figure.update_layout(
         coloraxis={
@@ -104,20 +91,6 @@ def figure(study: Study) -> go.Figure:
         else {"l": 70, "t": 40 + TITLE_MARGIN, "b": 55},
     )
     return figure
-
-
-def _places(study: Study) -> Places:
-    """The coordinates that vary, positions first, at most three; at least two for a plane."""
-    names = study.machine.commanded
-    poses = shown_poses(study.poses, names)
-    varying = [index for index in range(len(names)) if np.ptp(poses[:, index]) > 0]
-    positions = [index for index in range(len(names)) if is_position(names[index])]
-    moving = [index for index in positions if index in varying]
-    # A line of poses, or one pose, is still drawn on a plane.
-    spare = [index for index in [*varying, *positions, *range(len(names))] if index not in moving]
-    chosen = (moving + list(dict.fromkeys(spare))[: max(0, 2 - len(moving))])[:3]
-    points, of_pose = np.unique(poses[:, sorted(chosen)], axis=0, return_inverse=True)
-    return Places(tuple(names[index] for index in sorted(chosen)), points, of_pose.reshape(-1))
 
 
 def _maps(study: Study, places: Places) -> list[Map]:
@@ -140,72 +113,3 @@ def _maps(study: Study, places: Places) -> list[Map]:
 def _drawn(study: Study, places: Places) -> NDArray[np.intp]:
     """Indices of the places to draw."""
     return drawn_poses(_maps(study, places)[0].worst)
-
-
-def _trace(places: Places, drawn: NDArray[np.intp], worst: Array) -> go.Scatter | go.Heatmap:
-    """Squares of a full grid in a plane as a heat map, anything else as coloured points."""
-    points, values = places.points[drawn], worst[drawn]
-    if len(places.axes) == 3:
-        first, second, third = places.axes
-        return go.Scatter3d(
-            x=small(points[:, 0]),
-            y=small(points[:, 1]),
-            z=small(points[:, 2]),
-            mode="markers",
-            marker={
-                "size": 5 if len(drawn) <= 1000 else 2.5,
-                "color": small(values),
-                "coloraxis": "coloraxis",
-            },
-            hovertemplate=f"{first} %{{x:.2f}}, {second} %{{y:.2f}}, {third} %{{z:.2f}}"
-            "<br>%{marker.color:.2f} µm<extra></extra>",
-            showlegend=False,
-        )
-    first, second = places.axes
-    hover = f"{first} %{{x:.2f}}, {second} %{{y:.2f}}<br>"
-    across, down = np.unique(points[:, 0]), np.unique(points[:, 1])
-    if len(across) > 1 and len(down) > 1 and len(across) * len(down) == len(points):
-        # Places are sorted by the first axis, then by the second.
-        return go.Heatmap(
-            x=small(across),
-            y=small(down),
-            z=small(values.reshape(len(across), len(down)).T),
-            coloraxis="coloraxis",
-            hovertemplate=hover + "%{z:.2f} µm<extra></extra>",
-        )
-    return go.Scatter(
-        x=small(points[:, 0]),
-        y=small(points[:, 1]),
-        mode="markers",
-        marker={"size": 9, "color": small(values), "coloraxis": "coloraxis", "symbol": "square"},
-        hovertemplate=hover + "%{marker.color:.2f} µm<extra></extra>",
-        showlegend=False,
-    )
-
-
-def _label_axes(figure: go.Figure, places: Places, n_map: int) -> None:
-    labels = [f"{name}, {pose_unit(name)}" for name in places.axes]
-    same_unit = len({pose_unit(name) for name in places.axes}) == 1
-    if len(places.axes) == 2:
-        figure.update_xaxes(title_text=labels[0], constrain="domain", showgrid=False)
-        figure.update_yaxes(title_text=labels[1], showgrid=False)
-        if same_unit:
-            for number in range(n_map):
-                anchor = "x" if number == 0 else f"x{number + 1}"
-                figure.layout[f"yaxis{number + 1 if number else ''}"].update(
-                    scaleanchor=anchor, scaleratio=1, constrain="domain"
-                )
-        return
-    axis: dict[str, Any] = {
-        "gridcolor": "#D5DBE5",
-        "backgroundcolor": "#F6F8FB",
-        "tickfont": {"size": 10},
-        "nticks": 4,
-    }
-    figure.update_scenes(
-        aspectmode="cube",
-        camera={"eye": {"x": 1.95, "y": -2.45, "z": 1.3}, "center": {"x": 0, "y": 0, "z": -0.1}},
-        xaxis={"title": {"text": labels[0], "font": {"size": 12}}, **axis},
-        yaxis={"title": {"text": labels[1], "font": {"size": 12}}, **axis},
-        zaxis={"title": {"text": labels[2], "font": {"size": 12}}, **axis},
-    )

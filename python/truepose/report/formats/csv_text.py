@@ -2,7 +2,7 @@
 
 An error over time has one row for each moment and pose, with the temperatures of the moment; shares
 of the variance one for each pose and parameter, then one for each source; bounds over a region one
-for each component and magnitude.
+for each component and magnitude, a calibration one for each unknown.
 
 Where there are sources, a further row of the source "overall" has what all do together. Poses
 that cannot be used have one row with their status and nothing else. What is not over poses (the
@@ -44,6 +44,11 @@ class Column:
 def text(result: Result) -> Iterator[str]:
     """The file in pieces of some thousand rows."""
     sizes = result.dataset.sizes
+    if "unknown" in sizes:
+        from truepose.report import calibration
+
+        yield from calibration.csv_text(result)
+        return
     for dim, other_form in (("time", _over_time), ("parameter", _shares), ("commanded", _region)):
         if dim in sizes:
             yield from other_form(result)

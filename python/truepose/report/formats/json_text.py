@@ -6,6 +6,7 @@ Numbers have the digits that give the same double back; what is missing is null.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
@@ -80,7 +81,9 @@ def _rows(block: NDArray[np.generic]) -> str:
 
 
 def _plain(value: object) -> object:
-    return value.item() if isinstance(value, np.generic | np.ndarray) else value
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _dumped(value: object) -> str:

@@ -1,0 +1,161 @@
+"""42 parameters of a hexapod from 50 poses: truepose against SciPy's `least_squares`.
+
+The same readings (position and angles, as by a tracker), the same residuals, the same start, both
+to convergence and to the same values. SciPy is given NumPy forward kinematics, vectorised over the
+poses, and works derivatives out by differences, as calibration scripts do. Besides, for comparison,
+the other way that scripts go: the readings put into the closures, which needs no forward kinematics
+but weighs what was read wrongly, so that its values are others.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from benchmarks import numpy_hexapod
+from benchmarks.hexapod import N_STRUT, Array, Batch
+from benchmarks.rows import Row
+from benchmarks.timing import DisagreementError, best_seconds
+from truepose.calibration.identification.problem import Prior, Problem
+from truepose.calibration.identification.unknowns import unknowns_of
+from truepose.calibration.instruments import Frame, Instrument
+from truepose.calibration.measurements import Measurements
+from truepose.machine import Condition
+
+POSES = 50
+NOISE = {"m": 2e-6, "rad": 10e-6}
+ASKED = 300.0
+AGREED = 1e-9
+"""Of the geometry's size: what the two optima may differ by."""
+
+
+def measurements_of(batch: Batch) -> Measurements:
+    """Position and angles at every pose, without values yet."""
+    count = batch.count
+    instrument = Instrument("tracker", "pose", Frame(), uncertainty=NOISE)
+    return Measurements(
+        (instrument,),
+        batch.joints,
+        batch.placements,
+        np.zeros(count, np.intp),
+        (Condition(),) * count,  # at the reference temperature, nothing on the tool
+        np.zeros(count, np.bool_),
+        np.repeat(np.arange(count), 6),
+        np.tile(np.arange(6), count),
+        np.full(6 * count, -1, np.intp),
+        np.zeros(6 * count),
+        np.tile([NOISE["m"]] * 3 + [NOISE["rad"]] * 3, count),
+        np.zeros(count, np.intp),
+    )
+
+
+def readings(placements: Array, strokes: Array, values: Array) -> Array:
+    """(n, 6) position and angles of hexapods with geometry `values` (42,), in NumPy."""
+    base, platform, offset = np.split(values, (18, 36))
+    error, _ = numpy_hexapod.displacement(
+        placements,
+        base.reshape(N_STRUT, 3),
+        platform.reshape(N_STRUT, 3),
+        strokes + offset,
+    )
+    return poses_of(placements, error)
+
+
+def poses_of(placements: Array, error: Array) -> Array:
+    """(n, 6) position and angles a, b, c, where placements are displaced by `error` (n, 6)."""
+    turned = numpy_hexapod.turned_by(placements[:, 3:], error[:, 3:])
+    r = numpy_hexapod.rotation_matrices(turned)
+    level = np.hypot(r[:, 0, 0], r[:, 1, 0])
+    angles = np.stack(
+        [
+            np.arctan2(r[:, 2, 1], r[:, 2, 2]),
+            np.arctan2(-r[:, 2, 0], level),
+            np.arctan2(r[:, 1, 0], r[:, 0, 0]),
+        ],
+        axis=1,
+    )
+    return np.hstack([placements[:, :3] + error[:, :3], angles])
+
+
+def measure() -> list[Row]:
+    """Both to the same optimum, and how long they take."""
+    batch = Batch.of(POSES)
+    measurements = measurements_of(batch)
+    unknowns = unknowns_of(batch.machine, measurements)
+    problem = Problem(batch.machine, measurements, unknowns)
+    random = np.random.default_rng(7)
+    # Each unknown is one parameter: where it stands among the benchmark's columns.
+    order = [int(np.flatnonzero(unknowns.effects[list(unknowns.columns).index(column)])[0])
+             for column in batch.columns]  # fmt: skip
+    truth = np.empty(unknowns.count)
+    truth[order] = batch.deviations[0]
+    read = problem.predict(truth) + measurements.uncertainty * random.standard_normal(6 * POSES)
+    nothing = Prior.none(unknowns.count)
+    start = batch.machine.nominal[batch.columns]
+    table, sigma = read.reshape(POSES, 6), measurements.uncertainty.reshape(POSES, 6)
+
+    def ours():
+        solved = problem.solve(read, prior=nothing)
+        if solved.ending[0] not in ("cost", "step", "gradient"):
+            raise RuntimeError(f"the benchmark's fit ended as {solved.ending[0]}")
+        return solved.values[0]
+
+    def by_pose(values: Array) -> Array:
+        return ((readings(batch.placements, batch.joints, values) - table) / sigma).ravel()
+
+    def scipy_pose():
+        return least_squares(by_pose, start, method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13)
+
+    def by_closure(values: Array) -> Array:
+        base, platform, offset = np.split(values, (18, 36))
+        seen = numpy_hexapod.rotation_matrices(quaternions_of(table[:, 3:]))
+        arms = platform.reshape(N_STRUT, 3) @ seen.transpose(0, 2, 1)
+        struts = table[:, None, :3] + arms - base.reshape(N_STRUT, 3)
+        return (np.linalg.norm(struts, axis=-1) - batch.joints - offset).ravel()
+
+    def scipy_closure():
+        return least_squares(by_closure, start, method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13)
+
+    found = ours()[order] + start
+    peer = scipy_pose()
+    gap = float(np.abs(found - peer.x).max()) / float(np.abs(start).max())
+    if not gap <= AGREED:
+        raise DisagreementError(f"calibration: the optima differ by {gap:.3g} of the geometry")
+    calls = {"ours": ours, "scipy": scipy_pose, "closure": scipy_closure}
+    best = best_seconds(calls, rounds=5, repeats={"ours": 50})
+    evaluations = problem.solve(read, prior=nothing).evaluations[0]
+    size = f"42 parameters from {POSES} poses"
+    return [
+        Row(
+            "calibration, over SciPy's least_squares on the same residuals",
+            best["scipy"] / best["ours"],
+            "x",
+            "at least",
+            ASKED,
+            f"{1e6 * best['ours']:.0f} us ({evaluations} evaluations) against "
+            f"{1e3 * best['scipy']:.0f} ms ({peer.nfev}); {size}, optima equal to {gap:.1e}",
+        ),
+        Row(
+            "calibration, over SciPy on closures that the readings are put into",
+            best["closure"] / best["ours"],
+            "x",
+            "at least",
+            None,
+            f"{1e6 * best['ours']:.0f} us against {1e3 * best['closure']:.0f} ms; another "
+            "optimum, for it weighs readings wrongly",
+        ),
+    ]
+
+
+def quaternions_of(angles: Array) -> Array:
+    """(n, 4) of angles a, b, c (n, 3): R = Rz(c) Ry(b) Rx(a)."""
+    (sa, sb, sc), (ca, cb, cc) = np.sin(0.5 * angles).T, np.cos(0.5 * angles).T
+    return np.stack(
+        [
+            cc * cb * ca + sc * sb * sa,
+            cc * cb * sa - sc * sb * ca,
+            cc * sb * ca + sc * cb * sa,
+            sc * cb * ca - cc * sb * sa,
+        ],
+        axis=1,
+    )

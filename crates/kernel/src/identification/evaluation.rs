@@ -1,0 +1,391 @@
+//! What the instruments read for given unknowns, and its derivatives; normal equations in one pass.
+
+use super::design::{Design, Prepared};
+use super::observation::{Placed, Reading, Sight, StrutSight, of_strut};
+use crate::batch::{Deviations, Rows, Samples, Sensitivity, first_order, forward_poses};
+use crate::dispatch::{Work, dispatch};
+use crate::linear::SIX;
+use crate::machine::chosen;
+use crate::scalar::Real;
+use crate::spatial::Pose;
+use crate::status::Status;
+
+/// Numbers of a row of derivatives are padded to a multiple of this: whole lanes.
+const PAD: usize = 8;
+
+/// How many numbers a row of `count` has with its padding.
+pub fn padded(count: usize) -> usize {
+    count.next_multiple_of(PAD)
+}
+
+/// Scratch of one solution: nothing is allocated from step to step.
+pub struct Evaluation<'a> {
+    /// The design that it evaluates.
+    pub prepared: &'a Prepared,
+    deviations: Vec<f64>,
+    /// Where to start: the poses last accepted.
+    starts: Vec<f64>,
+    /// The poses of the last prediction.
+    poses: Vec<f64>,
+    /// What became of them.
+    pub status: Vec<Status>,
+    placed: Vec<Placed>,
+    sights: Vec<Sight>,
+    sensitivities: Vec<f64>,
+}
+
+/// Normal equations of weighted residuals, without what priors add.
+pub struct Normal {
+    /// (unknown, unknown), rows padded; the upper triangle, by whole lanes.
+    pub matrix: Vec<f64>,
+    /// Slope transposed times residual, padded.
+    pub gradient: Vec<f64>,
+    /// How many unknowns there are.
+    pub count: usize,
+}
+
+impl Normal {
+    /// Of no equations.
+    pub fn new(count: usize) -> Self {
+        let stride = padded(count);
+        Normal { matrix: vec![0.0; count * stride], gradient: vec![0.0; stride], count }
+    }
+}
+
+impl<'a> Evaluation<'a> {
+    /// For a design.
+    pub fn new(prepared: &'a Prepared) -> Self {
+        let Design { poses, starts, machine, .. } = &prepared.design;
+        let width = machine.dof_count() * prepared.columns.len();
+        Evaluation {
+            prepared,
+            deviations: Vec::new(),
+            starts: starts.clone(),
+            poses: vec![0.0; 7 * poses],
+            status: vec![Status::Ok; *poses],
+            placed: Vec::new(),
+            sights: Vec::new(),
+            sensitivities: vec![0.0; poses * width],
+        }
+    }
+
+    fn samples<'b>(&'b self, poses: &'b [f64]) -> Samples<'b> {
+        let (prepared, design) = (self.prepared, &self.prepared.design);
+        let deviations = &self.deviations;
+        let columns = prepared.columns.len();
+        let values = if prepared.shared {
+            Rows::shared(deviations)
+        } else {
+            Rows::each(deviations, columns)
+        };
+        Samples {
+            count: design.poses,
+            joints: Rows::each(&design.joints, design.machine.drives.len()),
+            poses: Rows::each(poses, 7),
+            deviations: Deviations { columns: &prepared.columns, values },
+        }
+    }
+
+    /// Solves all poses for these values; whether all could be.
+    pub fn place(&mut self, values: &[f64]) -> bool {
+        let mut deviations = std::mem::take(&mut self.deviations);
+        self.prepared.deviations(values, &mut deviations);
+        self.deviations = deviations;
+        let mut poses = std::mem::take(&mut self.poses);
+        let mut status = std::mem::take(&mut self.status);
+        let samples = self.samples(&self.starts);
+        forward_poses(&self.prepared.design.machine, &samples, &mut poses, &mut status);
+        (self.poses, self.status) = (poses, status);
+        self.placed.clear();
+        let instruments = &self.prepared.design.instruments;
+        self.placed.extend(instruments.iter().map(|instrument| instrument.placed(values)));
+        self.sights.clear();
+        for &(pose, instrument, with_angles) in &self.prepared.sighted {
+            let at = self.pose(pose);
+            self.sights.push(Sight::new(&self.placed[instrument], &at, with_angles));
+        }
+        self.status.iter().all(|status| *status == Status::Ok)
+    }
+
+    /// Starts from the poses of the last [`Self::place`] from now on.
+    pub fn accept(&mut self) {
+        self.starts.copy_from_slice(&self.poses);
+    }
+
+    fn pose(&self, number: usize) -> Pose<f64> {
+        Pose::from_row(&self.poses[7 * number..7 * number + 7])
+    }
+
+    /// Parameters and joints of one pose, for readings of struts.
+    fn inputs(&self, pose: usize, parameters: &mut Vec<f64>) -> &'a [f64] {
+        let (prepared, design) = (self.prepared, &self.prepared.design);
+        parameters.clear();
+        parameters.extend_from_slice(&design.machine.nominal);
+        let width = prepared.columns.len();
+        let first = if prepared.shared { 0 } else { pose * width };
+        for (&column, value) in prepared.columns.iter().zip(&self.deviations[first..first + width])
+        {
+            parameters[column] += value;
+        }
+        let joints = design.machine.drives.len();
+        &design.joints[pose * joints..(pose + 1) * joints]
+    }
+
+    /// What is read at the poses of the last [`Self::place`].
+    pub fn predict(&self, values: &[f64], out: &mut [f64]) {
+        let design = &self.prepared.design;
+        let mut parameters = Vec::new();
+        let mut last = usize::MAX;
+        let mut joints: &[f64] = &[];
+        let sights = &self.prepared.sights;
+        for ((observation, sight), out) in design.observations.iter().zip(sights).zip(out) {
+            if self.status[observation.pose] != Status::Ok {
+                *out = f64::NAN;
+                continue;
+            }
+            let placed = &self.placed[observation.instrument];
+            let reading = if let Some(sight) = *sight {
+                self.sights[sight].value(observation.observable, placed)
+            } else {
+                if last != observation.pose {
+                    joints = self.inputs(observation.pose, &mut parameters);
+                    last = observation.pose;
+                }
+                let instrument = &design.instruments[observation.instrument];
+                let what = (observation.observable, observation.strut);
+                let inputs = (parameters.as_slice(), joints);
+                let pose = self.pose(observation.pose);
+                of_strut(&design.machine, what, (instrument, placed), inputs, &pose)
+            };
+            *out = reading + observation.bias.map_or(0.0, |index| values[index]);
+        }
+    }
+
+    /// Sensitivities of the poses of the last [`Self::place`] to the parameters; whether all exist.
+    fn differentiate(&mut self) -> bool {
+        let mut sensitivities = std::mem::take(&mut self.sensitivities);
+        let mut status = std::mem::take(&mut self.status);
+        let machine = &self.prepared.design.machine;
+        let quantity = Sensitivity::new(machine, &self.prepared.columns);
+        first_order(
+            machine,
+            &self.samples(&self.poses),
+            &quantity,
+            &mut sensitivities,
+            &mut status,
+        );
+        (self.sensitivities, self.status) = (sensitivities, status);
+        self.status.iter().all(|status| *status == Status::Ok)
+    }
+
+    /// Derivatives of everything read to the unknowns, (observation, unknown), at the poses of the last
+    /// [`Self::place`]; false where a pose is singular.
+    pub fn jacobian(&mut self, out: &mut [f64]) -> bool {
+        if !self.differentiate() {
+            return false;
+        }
+        let count = self.prepared.design.unknowns;
+        let ones = vec![1.0; self.prepared.design.observations.len()];
+        self.rows(Each { ones: &ones, count, out });
+        true
+    }
+
+    /// Normal equations of `weights` times `residuals`, at the poses of the last [`Self::place`]; false
+    /// where a pose is singular.
+    pub fn normal(&mut self, weights: &[f64], residuals: &[f64], normal: &mut Normal) -> bool {
+        if !self.differentiate() {
+            return false;
+        }
+        normal.matrix.fill(0.0);
+        normal.gradient.fill(0.0);
+        self.rows(Summed { weights, residuals, normal });
+        true
+    }
+
+    fn rows(&mut self, receiver: impl Receiver) {
+        dispatch(RowsOf { evaluation: self, receiver });
+    }
+}
+
+/// What takes the rows of derivatives, pose by pose.
+trait Receiver {
+    /// By what a row is multiplied.
+    fn weight(&self, observation: usize) -> f64;
+    /// The weighted rows of `observed` observations from `first` on, padded; after them rows of zeros, so
+    /// that there are a multiple of [`TOGETHER`].
+    fn take<S: Real>(&mut self, first: usize, observed: usize, rows: &[f64], stride: usize);
+}
+
+struct Each<'a> {
+    ones: &'a [f64],
+    count: usize,
+    out: &'a mut [f64],
+}
+
+impl Receiver for Each<'_> {
+    fn weight(&self, observation: usize) -> f64 {
+        self.ones[observation]
+    }
+    #[inline(always)]
+    fn take<S: Real>(&mut self, first: usize, observed: usize, rows: &[f64], stride: usize) {
+        for (number, row) in rows.chunks_exact(stride).take(observed).enumerate() {
+            let start = (first + number) * self.count;
+            self.out[start..start + self.count].copy_from_slice(&row[..self.count]);
+        }
+    }
+}
+
+struct Summed<'a> {
+    weights: &'a [f64],
+    residuals: &'a [f64],
+    normal: &'a mut Normal,
+}
+
+/// Rows that are taken into the normal equations together.
+const TOGETHER: usize = 6;
+
+impl Receiver for Summed<'_> {
+    fn weight(&self, observation: usize) -> f64 {
+        self.weights[observation]
+    }
+    #[inline(always)]
+    fn take<S: Real>(&mut self, first: usize, observed: usize, rows: &[f64], stride: usize) {
+        let Normal { matrix, gradient, count } = &mut *self.normal;
+        let residuals = &self.residuals[first..first + observed];
+        for (row, residual) in rows.chunks_exact(stride).zip(residuals) {
+            let residual = S::splat(*residual);
+            let sums = gradient.chunks_exact_mut(S::WIDTH);
+            for (sums, cells) in sums.zip(row.chunks_exact(S::WIDTH)) {
+                residual.mul_add(S::load(cells), S::load(sums)).store(sums);
+            }
+        }
+        for part in rows.chunks_exact(TOGETHER * stride) {
+            let row = |k: usize| &part[k * stride..(k + 1) * stride];
+            let each = [row(0), row(1), row(2), row(3), row(4), row(5)];
+            for column in (0..stride).step_by(S::WIDTH) {
+                let right = each.map(|row| S::load(&row[column..column + S::WIDTH]));
+                let [a, b, c, d, e, f] = each.map(|row| row.iter());
+                let left = a.zip(b).zip(c).zip(d).zip(e).zip(f);
+                let sums = matrix.chunks_exact_mut(stride).zip(left);
+                for (sums, (((((a, b), c), d), e), f)) in sums.take((*count).min(column + S::WIDTH))
+                {
+                    let cells = &mut sums[column..column + S::WIDTH];
+                    let mut sum = S::load(cells);
+                    sum = S::splat(*a).mul_add(right[0], sum);
+                    sum = S::splat(*b).mul_add(right[1], sum);
+                    sum = S::splat(*c).mul_add(right[2], sum);
+                    sum = S::splat(*d).mul_add(right[3], sum);
+                    sum = S::splat(*e).mul_add(right[4], sum);
+                    S::splat(*f).mul_add(right[5], sum).store(cells);
+                }
+            }
+        }
+    }
+}
+
+struct RowsOf<'a, 'b, R> {
+    evaluation: &'a Evaluation<'b>,
+    receiver: R,
+}
+
+impl<R: Receiver> Work for RowsOf<'_, '_, R> {
+    #[inline(always)]
+    fn run<S: Real>(mut self) {
+        let evaluation = self.evaluation;
+        let (prepared, design) = (evaluation.prepared, &evaluation.prepared.design);
+        let components = chosen(&design.machine.dof);
+        let columns = prepared.columns.len();
+        let stride = padded(design.unknowns);
+        let mut twists = vec![0.0; SIX * stride];
+        let mut rows = Vec::new();
+        let mut parameters = Vec::new();
+        for pose in 0..design.poses {
+            let observed = prepared.of_pose[pose]..prepared.of_pose[pose + 1];
+            if observed.is_empty() {
+                continue;
+            }
+            let width = components.len() * columns;
+            let sensitivity = &evaluation.sensitivities[pose * width..(pose + 1) * width];
+            if prepared.one_to_one {
+                // The same cells at every pose.
+                for (number, &component) in components.iter().enumerate() {
+                    let given = &sensitivity[number * columns..(number + 1) * columns];
+                    twists[component * stride..component * stride + columns].copy_from_slice(given);
+                }
+            } else if !design.terms.is_empty() {
+                twists.fill(0.0);
+                let factors = design.coefficients.row(pose);
+                for (number, &component) in components.iter().enumerate() {
+                    let twist = &mut twists[component * stride..(component + 1) * stride];
+                    let given = &sensitivity[number * columns..(number + 1) * columns];
+                    for (at, term) in design.terms.iter().enumerate() {
+                        let column = prepared.term_columns[at];
+                        twist[term.unknown] += factors[at] * given[column];
+                    }
+                }
+            }
+            rows.clear();
+            rows.resize(observed.len().next_multiple_of(TOGETHER) * stride, 0.0);
+            let at = evaluation.pose(pose);
+            let mut joints: Option<&[f64]> = None;
+            let mut strut: Option<(usize, StrutSight)> = None;
+            for (number, row) in observed.clone().zip(rows.chunks_exact_mut(stride)) {
+                let observation = &design.observations[number];
+                let instrument = &design.instruments[observation.instrument];
+                let placed = &evaluation.placed[observation.instrument];
+                let weight = self.receiver.weight(number);
+                let reading = if let Some(sight) = prepared.sights[number] {
+                    evaluation.sights[sight].reading(observation.observable, placed)
+                } else {
+                    let q = *joints.get_or_insert_with(|| evaluation.inputs(pose, &mut parameters));
+                    if strut.as_ref().is_none_or(|(index, _)| *index != observation.strut) {
+                        let inputs = (parameters.as_slice(), q);
+                        let seen = StrutSight::new(&design.machine, observation.strut, inputs, &at);
+                        strut = Some((observation.strut, seen));
+                    }
+                    let Some((_, seen)) = &strut else { continue };
+                    let (reading, to_parameters) =
+                        seen.reading(observation.observable, (instrument, placed));
+                    for (parameter, derivative) in to_parameters {
+                        for &mover in &prepared.movers[parameter] {
+                            let factor = design.coefficients.row(pose)[mover];
+                            row[design.terms[mover].unknown] += weight * derivative * factor;
+                        }
+                    }
+                    reading
+                };
+                add_twists::<S>(&reading, weight, &twists, row);
+                for (unknown, derivative) in instrument.unknowns.iter().zip(reading.to_own) {
+                    if let Some(unknown) = *unknown {
+                        row[unknown] += weight * derivative;
+                    }
+                }
+                if let Some(bias) = observation.bias {
+                    row[bias] += weight;
+                }
+            }
+            self.receiver.take::<S>(observed.start, observed.len(), &rows, stride);
+        }
+    }
+}
+
+/// Adds the weighted derivatives by way of the platform's twist to a row.
+#[inline(always)]
+fn add_twists<S: Real>(reading: &Reading, weight: f64, twists: &[f64], row: &mut [f64]) {
+    let stride = row.len();
+    for component in 0..SIX {
+        let factor = weight * reading.to_twist[component];
+        if factor == 0.0 {
+            continue;
+        }
+        let factor = S::splat(factor);
+        let twist = &twists[component * stride..(component + 1) * stride];
+        let mut column = 0;
+        while column < stride {
+            let cells = &mut row[column..column + S::WIDTH];
+            let sum = factor.mul_add(S::load(&twist[column..column + S::WIDTH]), S::load(cells));
+            sum.store(cells);
+            column += S::WIDTH;
+        }
+    }
+}

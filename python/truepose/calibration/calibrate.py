@@ -1,0 +1,207 @@
+"""`tp.calibrate`: from measurements to a machine that may be used, or a reason why not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truepose.calibration.gate.verdict import MARGIN, Gate, HeldOut, judge
+from truepose.calibration.identification.fit import Fit, fit
+from truepose.calibration.identification.robust import Outlier, outliers
+from truepose.calibration.identification.tool_effects import (
+    candidates,
+    tool_effects,
+    workspace_poses,
+)
+from truepose.calibration.identification.unknowns import unknowns_of
+from truepose.calibration.identification.validate import Validation, validate
+from truepose.calibration.instruments import REGISTRY
+from truepose.calibration.measurements import Measurements
+from truepose.calibration.measurements.reading import read_measurements
+from truepose.calibration.suspicions import Suspicion, suspicions
+from truepose.errors import RequestError
+from truepose.machine import Machine
+from truepose.sources._base import Flags, Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_ANGLES = {"rx": "a", "ry": "b", "rz": "c"}
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What measurements say of a machine, and whether it may be used.
+
+    `gate.accepted` is the answer, `gate.words` says why. `suspicions` are blunders that the data
+    look like; `outliers` readings that do not fit; `validation` None where there was too little to
+    hold anything back. `poses` (n, n_commanded): where the tool was looked at, those that are
+    `usable` (n,): the calibrated machine reaches them too. `seed`: of the folds.
+    """
+
+    machine: Machine
+    measurements: Measurements
+    fit: Fit
+    gate: Gate
+    outliers: tuple[Outlier, ...]
+    suspicions: tuple[Suspicion, ...]
+    validation: Validation | None
+    poses: Floats
+    usable: Flags
+    seed: int = 0
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the calibrated machine may be used."""
+        return self.gate.accepted and not any(each.refuses for each in self.suspicions)
+
+    def calibrated(self) -> Machine:
+        """The machine with the values found for its parameters; its bands are the file's still."""
+        unknowns = self.fit.unknowns
+        change = unknowns.parameter_change(self.fit.values)
+        nominal = self.machine.nominal[unknowns.columns] + change
+        names = [self.machine.parameters[column] for column in unknowns.columns]
+        return self.machine.replace(dict(zip(names, nominal.tolist(), strict=True)))
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Everything as data; `docs/calibration.md` has the schema."""
+        from truepose.calibration.dataset import dataset_of
+
+        return dataset_of(self)
+
+
+def calibrate(
+    machine: Machine,
+    data: Measurements | str | Path,
+    *,
+    identify: Sequence[str] = (),
+    use_prior: bool = True,
+    robust: bool = True,
+    poses: ArrayLike | None = None,
+    folds: int = 5,
+    seed: int = 0,
+    margin: float = MARGIN,
+) -> Calibration:
+    """Find the machine's parameters from measurements, and judge what was found.
+
+    `data`: measurements, or the file of them. `identify`: what is to be found, patterns over
+    parameters, groups of tolerances, `strut.*.expansion`, `strut.*.compliance`, each with a half
+    band where one is given (`"strut.1.length=0.5 mm"`); nothing: all that has a tolerance.
+    `use_prior`: tolerances count as knowledge; without it the measurements alone decide. `robust`:
+    readings beyond three standard uncertainties lose weight. `poses` (n, n_commanded): where the
+    tool counts, m and rad, default the file's workspace. `folds`, `seed`: how rows are held back
+    for validation, where the measurements state none. `margin`: what is left of the tool's
+    uncertainty must be less than this share.
+
+    Raises `MachineFileError` for a file of measurements that cannot be read, `RequestError`
+    (unknown-parameter, no-unknowns, bad-band, too-few-measurements, no-fit, no-workspace),
+    `TrueposeError` where a row's temperatures or loads ask for what the machine does not say.
+    """
+    whole = data if isinstance(data, Measurements) else read_measurements(data, machine)
+    suspected = suspicions(machine, whole)
+    table, joints, placements = workspace_poses(machine, poses)
+    unknowns = unknowns_of(machine, whole, identify)
+    used = whole.select(~whole.held_out) if whole.held_out.any() else whole
+    try:
+        fitted = fit(machine, used, unknowns, use_prior=use_prior, robust=robust)
+    except RequestError as failure:
+        raise _with_suspicions(failure, suspected) from failure
+    checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
+    effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
+    gate = _judged(machine, fitted, checked, effects, placements[usable, :3], margin)
+    return Calibration(
+        machine,
+        whole,
+        fitted,
+        gate,
+        outliers(machine, fitted),
+        suspected,
+        checked,
+        table,
+        usable,
+        seed,
+    )
+
+
+def _with_suspicions(failure: RequestError, suspected: Sequence[Suspicion]) -> RequestError:
+    """What stopped the fit, with what the measurements look like in the place of the hint."""
+    said = "; ".join(each.sentence for each in suspected if each.refuses)
+    if not said or any(each.code != "no-fit" for each in failure.problems):
+        return failure
+    return RequestError(*(replace(each, hint=said) for each in failure.problems))
+
+
+def _judged(
+    machine: Machine,
+    fitted: Fit,
+    checked: Validation | None,
+    effects: Floats,
+    positions: Floats,
+    margin: float,
+) -> Gate:
+    unknowns = fitted.unknowns
+    accuracy = machine.accuracy
+    return judge(
+        unknowns,
+        values=fitted.values,
+        jacobian=fitted.jacobian,
+        residual=fitted.residual,
+        before=fitted.before,
+        use_prior=fitted.use_prior,
+        tool=effects,
+        components=[_ANGLES.get(name, name) for name in machine.components],
+        positions=positions,
+        weights=fitted.weights,
+        by=phrases(machine, fitted.measurements),
+        nominal=_nominal(machine, fitted),
+        held_out=_held_out(checked),
+        target=(accuracy.target, accuracy.angle_target),
+        candidates=candidates(machine, fitted),
+        margin=margin,
+    )
+
+
+def _held_out(checked: Validation | None) -> tuple[HeldOut, ...]:
+    if checked is None or not checked.used.any():
+        return ()
+    return (HeldOut(checked.rms_before, checked.rms_after),)
+
+
+def phrases(machine: Machine, measurements: Measurements) -> list[str]:
+    """How each instrument says where the machine is: "by heights alone"."""
+    found = []
+    for number, instrument in enumerate(measurements.instruments):
+        read = measurements.observables(number)
+        if not read:
+            continue
+        phrase = REGISTRY[instrument.kind].phrase(read)
+        rows = measurements.instrument == number
+        heights = measurements.placements[rows, 2]
+        if read == ("z",) and np.ptp(heights) < 1e-3 * machine.characteristic_length:
+            phrase = "by a flat bed"
+        found.append(phrase)
+    return list(dict.fromkeys(found))
+
+
+def _nominal(machine: Machine, fitted: Fit) -> Floats:
+    """(n_machine,) the parameter that an unknown moves alone; NaN for groups and properties."""
+    unknowns = fitted.unknowns
+    found = np.full(unknowns.n_machine, np.nan)
+    for number in range(unknowns.n_machine):
+        moved = np.flatnonzero(unknowns.effects[:, number])
+        values = machine.nominal[unknowns.columns[moved]]
+        # Rods that are equal are one number for people, coordinates that move apart are not.
+        same = np.ptp(values) <= 1e-9 * np.abs(values).max() if moved.size else False
+        equal = moved.size and (unknowns.effects[moved, number] == 1.0).all()
+        if same and equal:
+            found[number] = values[0]
+    return found
+
+
+__all__ = ["Calibration", "calibrate", "phrases"]

@@ -1,0 +1,1 @@
+"""What is to be found, and the fit that finds it."""

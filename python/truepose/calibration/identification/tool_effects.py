@@ -1,0 +1,205 @@
+"""What unknowns do at the tool over the workspace, and what could be measured besides."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truepose.budget.poses import OK, requested_poses
+from truepose.calibration.gate import Candidate
+from truepose.calibration.identification.fit import Fit
+from truepose.calibration.identification.problem import Problem, property_effects, row_shifts
+from truepose.calibration.identification.unknowns import Unknowns
+from truepose.calibration.instruments._base import Frame, Instrument
+from truepose.calibration.measurements import Measurements
+from truepose.calibration.observables import OBSERVABLES
+from truepose.errors import Problem as Refused
+from truepose.errors import RequestError
+from truepose.machine import Condition, Machine
+from truepose.sources._base import Floats
+
+MOST_POSES = 300
+"""Poses of the workspace at which the tool is looked at; more are thinned evenly."""
+
+FURTHER = (5, 20)
+"""Numbers of further poses that are tried as a remedy."""
+
+
+def workspace_poses(machine: Machine, poses: ArrayLike | None) -> tuple[Floats, Floats, Floats]:
+    """(poses (n, n_commanded), joints, placements) that the machine can take, thinned evenly.
+
+    Raises `RequestError` (no-workspace, no-pose-left).
+    """
+    table = machine.poses() if poses is None else requested_poses(machine, poses)
+    if len(table) > MOST_POSES:
+        table = table[np.linspace(0, len(table) - 1, MOST_POSES).round().astype(np.intp)]
+    joints, placements, status = machine.kernel.place(table)
+    usable = status == OK
+    if not usable.any():
+        raise RequestError(
+            Refused(
+                "no-pose-left",
+                "the machine can reach none of the poses",
+                machine.file,
+                found=f"{len(table)} poses",
+                expected="poses of the workspace that it reaches",
+            )
+        )
+    return table[usable], joints[usable], placements[usable]
+
+
+def tool_effects(
+    machine: Machine, unknowns: Unknowns, values: Floats, joints: Floats, placements: Floats
+) -> tuple[Floats, np.ndarray]:
+    """d(error of the tool)/d(unknown) (n_usable, n_component, n_machine), once calibrated.
+
+    And which poses (n_pose,) are usable: those that the calibrated machine still reaches.
+    Properties act as the machine's own condition lets them.
+    """
+    change = unknowns.parameter_change(values)
+    columns, moved = unknowns.columns, unknowns.columns
+    found = np.zeros((len(joints), len(machine.components), unknowns.n_machine))
+    slopes, status = machine.kernel.sensitivity_moved(
+        joints, placements, columns, moved, change[np.newaxis, :]
+    )
+    found += slopes @ unknowns.effects[:, : unknowns.n_machine]
+    if unknowns.properties:
+        rows = _plain(joints, placements, (machine.condition,) * len(joints))
+        base = row_shifts(machine, rows, unknowns)
+        for number, (own, amounts) in property_effects(machine, rows, unknowns, base):
+            sensitivity, _ = machine.kernel.sensitivity_at(joints, placements, own)
+            found[:, :, number] = np.einsum("pck,pk->pc", sensitivity, amounts)
+    usable = status == OK
+    return found[usable], usable
+
+
+def _plain(joints: Floats, placements: Floats, conditions: tuple[Condition, ...]) -> Measurements:
+    """Rows without a reading."""
+    count = len(joints)
+    nothing = np.empty(0, np.intp)
+    return Measurements(
+        (),
+        joints,
+        placements,
+        np.zeros(count, np.intp),
+        conditions,
+        np.zeros(count, np.bool_),
+        nothing,
+        nothing,
+        nothing,
+        np.empty(0),
+        np.empty(0),
+        np.zeros(count, np.intp),
+    )
+
+
+def candidates(machine: Machine, fit: Fit) -> list[Candidate]:
+    """Measurements that could be added: more coordinates, more poses, all three coordinates.
+
+    Their cost is the number of readings.
+    """
+    found = []
+    data = fit.measurements
+    for number, instrument in enumerate(data.instruments):
+        read = data.observables(number)
+        missing = [axis for axis in "xyz" if axis not in read and axis in machine.components]
+        if instrument.kind == "coordinate" and missing:
+            what = " and ".join(missing)
+            rows = _added(machine, fit, number, missing)
+            found.append(
+                Candidate(f"{instrument.name}: {what}", len(rows), f"probe in {what} too", rows)
+            )
+    for number, instrument in enumerate(data.instruments):
+        for count in FURTHER:
+            more = _further(machine, fit, number, count)
+            if more is not None:
+                sentence = (
+                    f"measure {count} more poses over the whole workspace with {instrument.name}"
+                )
+                name = f"{instrument.name}: {count} poses"
+                found.append(Candidate(name, len(more), sentence, more))
+    axes = [axis for axis in "xyz" if axis in machine.components]
+    if not any(set(axes) <= set(data.observables(at)) for at in range(len(data.instruments))):
+        rows = _tracked(machine, fit, axes)
+        sentence = f"measure {', '.join(axes)} of the tool at these poses, as a laser tracker does"
+        found.append(Candidate("tracker", 2 * len(rows), sentence, rows))
+    return [each for each in found if np.isfinite(each.rows).all()]
+
+
+def _rows(machine: Machine, fit: Fit, data: Measurements) -> Floats:
+    """(m, n) whitened derivatives of other readings, at the fitted values."""
+    problem = Problem(machine, data, fit.unknowns)
+    jacobian: Floats = problem.jacobian(fit.values) / data.uncertainty[:, np.newaxis]
+    return jacobian
+
+
+def _observing(
+    data: Measurements, rows: np.ndarray, observables: list[str], uncertainty: float, by: int
+) -> Measurements:
+    """The rows `rows` of data, each with these observables and no values."""
+    chosen = data.select(np.isin(np.arange(data.n_row), rows))
+    codes = np.array([OBSERVABLES.index(each) for each in observables], np.intp)
+    count = chosen.n_row * codes.size
+    return dataclasses.replace(
+        chosen,
+        instrument=np.full(chosen.n_row, by, np.intp),
+        row=np.repeat(np.arange(chosen.n_row), codes.size),
+        observable=np.tile(codes, chosen.n_row),
+        strut=np.full(count, -1, np.intp),
+        value=np.zeros(count),
+        uncertainty=np.full(count, uncertainty),
+    )
+
+
+def _typical(data: Measurements, number: int) -> float:
+    mine = data.instrument[data.row] == number
+    return float(np.median(data.uncertainty[mine])) if mine.any() else 1e-5
+
+
+def _added(machine: Machine, fit: Fit, number: int, axes: list[str]) -> Floats:
+    data = fit.measurements
+    rows = np.flatnonzero(data.instrument == number)
+    return _rows(machine, fit, _observing(data, rows, axes, _typical(data, number), number))
+
+
+def _further(machine: Machine, fit: Fit, number: int, count: int) -> Floats | None:
+    """More rows of one instrument, of the kind that it has most, over the workspace."""
+    data = fit.measurements
+    mine = np.flatnonzero(data.instrument == number)
+    if machine.workspace is None or not mine.size:
+        return None
+    poses = machine.poses()
+    poses = poses[np.linspace(0, len(poses) - 1, count).round().astype(np.intp)]
+    joints, placements, status = machine.kernel.place(poses)
+    usable = status == OK
+    joints, placements = joints[usable], placements[usable]
+    first = mine[0]
+    of_first = data.row == first
+    size = int(of_first.sum())
+    total = len(joints)
+    more = dataclasses.replace(
+        data,
+        joints=joints,
+        placements=placements,
+        instrument=np.full(total, number, np.intp),
+        conditions=(data.conditions[first],) * total,
+        held_out=np.zeros(total, np.bool_),
+        row=np.repeat(np.arange(total), size),
+        observable=np.tile(data.observable[of_first], total),
+        strut=np.tile(data.strut[of_first], total),
+        value=np.zeros(total * size),
+        uncertainty=np.tile(data.uncertainty[of_first], total),
+        lines=np.zeros(total, np.intp),
+    )
+    return _rows(machine, fit, more) if total else None
+
+
+def _tracked(machine: Machine, fit: Fit, axes: list[str]) -> Floats:
+    """Coordinates of the tool point in the base frame at every row, to 10 um."""
+    data = fit.measurements
+    tracker = Instrument("tracker", "position", Frame())
+    wide = dataclasses.replace(data, instruments=(*data.instruments, tracker))
+    rows = np.arange(data.n_row)
+    return _rows(machine, fit, _observing(wide, rows, axes, 10e-6, len(data.instruments)))

@@ -1,0 +1,385 @@
+"""What is to be found: variables of the tolerances, further parameters, properties, instruments.
+
+An unknown moves parameters in proportion to itself. One of a tolerance is the tolerance's own
+variable, be it one parameter's or a group's, in the unit of the parameter that it moves most; the
+band about it is what is known beforehand:
+
+    mean = shift,  standard deviation = half / sigmas,  correlations as the file states them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from truepose.calibration.identification.properties import Property, properties_of
+from truepose.calibration.instruments._base import Instrument
+from truepose.calibration.measurements import Measurements
+from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.errors import Problem, RequestError
+from truepose.machine import Machine
+from truepose.machine.suggestion import did_you_mean
+from truepose.machine.units import QuantityError, UnitSystem
+from truepose.sources import Deviation
+from truepose.sources._base import Floats, Indices
+from truepose.sources.tolerance import Tolerance
+
+SCREEN = 1e-9
+"""Middles of a group's bands may be this far, of its half band, from moving together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """What is to be found, n numbers in SI; the first `n_machine` are the machine's.
+
+    `names`, `units` and `labels` (for people). `columns` (k,): parameters that machine unknowns
+    move, each by `effects` (k, n) times the unknown's value; the largest effect of an unknown is
+    +-1. Properties have none there: what they move differs from row to row. `prior_mean` (n,),
+    `prior_covariance` (n, n): infinite on the diagonal where nothing is known beforehand. `half`
+    (n,): half bands, infinite likewise. `properties`: by the number of their unknown.
+    `readings`: of each unknown bias what it is added to, (instrument, observable, strut or -1).
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    labels: tuple[str, ...]
+    n_machine: int
+    columns: Indices
+    effects: Floats
+    prior_mean: Floats
+    prior_covariance: Floats
+    half: Floats
+    properties: dict[int, Property] = dataclasses.field(default_factory=dict)
+    frames: dict[int, tuple[int | None, ...]] = dataclasses.field(default_factory=dict)
+    """Of each instrument the unknowns of its origin x y z, rotation x y z and target x y z."""
+    biases: dict[tuple[int, int, int], int] = dataclasses.field(default_factory=dict)
+    """(instrument, observable, strut) -> the unknown that is added to the reading."""
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.names)
+
+    @property
+    def has_prior(self) -> np.ndarray:
+        """(n,) of which something is known beforehand."""
+        flags: np.ndarray = np.isfinite(np.diagonal(self.prior_covariance))
+        return flags
+
+    def parameter_change(self, values: Floats) -> Floats:
+        """(k,) by how much the parameters `columns` differ from nominal, for values (n,)."""
+        change: Floats = self.effects @ values
+        return change
+
+    @property
+    def of_instruments(self) -> Unknowns:
+        """The instruments' alone; the machine stays as its file has it."""
+        kept = slice(self.n_machine, None)
+        less = self.n_machine
+
+        def renumbered(number: int | None) -> int | None:
+            return None if number is None else number - less
+
+        return Unknowns(
+            self.names[kept],
+            self.units[kept],
+            self.labels[kept],
+            0,
+            np.empty(0, np.intp),
+            np.empty((0, self.count - less)),
+            self.prior_mean[kept],
+            self.prior_covariance[kept, kept],
+            self.half[kept],
+            {},
+            {key: tuple(map(renumbered, own)) for key, own in self.frames.items()},
+            {key: number - less for key, number in self.biases.items()},
+        )
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """One unknown of the machine, before all are put together."""
+
+    name: str
+    unit: str
+    label: str
+    effects: dict[int, float]
+    mean: float
+    sigma: float
+    half: float
+    variable: int | None = None
+    property: Property | None = None
+
+
+def unknowns_of(
+    machine: Machine, measurements: Measurements, identify: Sequence[str] = ()
+) -> Unknowns:
+    """The unknowns of a machine and of the instruments that measured it.
+
+    `identify`: names, groups or patterns (`strut.*.length`), each with a half band of its own where
+    one is given (`strut.*.expansion=2e-6 1/K`, `strut.1.length=0.5 mm`); nothing: everything that
+    has a tolerance. What is named without having a tolerance, and without a band, is found from the
+    measurements alone.
+
+    Raises `RequestError` (unknown-parameter, no-unknowns, bad-band, no-stiffness, bad-prior).
+    """
+    bands = _bands(machine)
+    tolerated = _of_tolerances(machine, bands)
+    wanted = _wanted(machine, tolerated, identify)
+    if not wanted:
+        raise RequestError(
+            Problem(
+                "no-unknowns",
+                "there is nothing to identify: no parameter has a tolerance, and none is named",
+                machine.file,
+                found="no [tolerance] and no name",
+                expected="tolerances in the machine file, or names of parameters to identify",
+                hint='--identify "strut.*.length"',
+            )
+        )
+    columns = sorted({column for each in wanted for column in each.effects})
+    place = {column: at for at, column in enumerate(columns)}
+    instruments = _of_instruments(machine, measurements, len(wanted))
+    count = len(wanted) + len(instruments.names)
+    effects = np.zeros((len(columns), count))
+    covariance = np.diag(np.full(count, np.inf))
+    for number, each in enumerate(wanted):
+        for column, effect in each.effects.items():
+            effects[place[column], number] = effect
+        covariance[number, number] = each.sigma**2
+    if bands is not None and bands.correlation is not None:
+        _correlate(covariance, wanted, bands)
+    extra = len(instruments.names)
+    return Unknowns(
+        tuple(each.name for each in wanted) + tuple(instruments.names),
+        tuple(each.unit for each in wanted) + tuple(instruments.units),
+        tuple(each.label for each in wanted) + tuple(instruments.labels),
+        len(wanted),
+        np.array(columns, np.intp),
+        effects,
+        np.array([each.mean for each in wanted] + [0.0] * extra),
+        covariance,
+        np.array([each.half for each in wanted] + [np.inf] * extra),
+        {at: each.property for at, each in enumerate(wanted) if each.property is not None},
+        instruments.frames,
+        instruments.biases,
+    )
+
+
+def _bands(machine: Machine) -> Deviation | None:
+    for source in machine.sources:
+        if isinstance(source, Tolerance):
+            return source.bands
+    return None
+
+
+def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
+    """One unknown for each variable that has a band, in the order of the parameters."""
+    if bands is None:
+        return []
+    found = []
+    swing, shift = bands.signed_half[0], bands.shift[0]
+    for variable in dict.fromkeys(bands.variables[bands.banded].tolist()):
+        members = np.flatnonzero(bands.variables == variable)
+        leader = members[np.argmax(np.abs(swing[members]))]
+        half = float(abs(swing[leader]))
+        effects = swing[members] / half
+        group = bands.group_names.get(int(bands.groups[leader]))
+        mean = float(shift[leader] * np.sign(effects[members == leader][0]))
+        if np.abs(shift[members] - effects * mean).max() > SCREEN * half:
+            raise RequestError(
+                Problem(
+                    "bad-prior",
+                    f"the middles of the bands of group {group!r} do not move as the group does",
+                    machine.file,
+                    path="tolerance",
+                    found="middles that differ",
+                    expected="symmetric bands, or middles in the ratio of the half bands",
+                )
+            )
+        parameter = int(bands.parameters[leader])
+        name = machine.parameters[parameter] if group is None else group
+        found.append(
+            _Wanted(
+                name,
+                machine.units[parameter],
+                label_of(name) if group is None else group,
+                dict(zip(bands.parameters[members].tolist(), effects.tolist(), strict=True)),
+                mean,
+                half / bands.distribution[leader].sigmas,
+                half,
+                int(variable),
+            )
+        )
+    return found
+
+
+def _wanted(
+    machine: Machine, tolerated: Sequence[_Wanted], identify: Sequence[str]
+) -> list[_Wanted]:
+    if not identify:
+        return list(tolerated)
+    known: dict[str, _Wanted] = {}
+    for name, unit, column in zip(
+        machine.parameters, machine.units, range(len(machine.parameters)), strict=True
+    ):
+        known[name] = _Wanted(name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf)
+    for name, each in properties_of(machine).items():
+        unit, label = each.unit, each.label(machine)
+        known[name] = _Wanted(name, unit, label, {}, 0.0, np.inf, np.inf, None, each)
+    # A member of a group stands for its group: one cannot move without the other.
+    of_group = {
+        machine.parameters[column]: each.name for each in tolerated for column in each.effects
+    }
+    known |= {each.name: each for each in tolerated}
+    chosen: dict[str, _Wanted] = {}
+    problems = []
+    for text in identify:
+        pattern, _, band = (part.strip() for part in text.partition("="))
+        if pattern in known:
+            names = [pattern]
+        else:
+            names = [name for name in known if fnmatchcase(name, pattern)]
+        if not names:
+            problems.append(_no_parameter(machine, pattern, known))
+        for name in dict.fromkeys(of_group.get(name, name) for name in names):
+            try:
+                chosen[name] = _with_band(machine, known[name], band)
+            except QuantityError as error:
+                problems.append(
+                    Problem(
+                        "bad-band",
+                        f"the half band of {name} cannot be read: {error.message}",
+                        path=name,
+                        found=band,
+                        expected=f"a positive quantity in a unit of {known[name].unit}",
+                        hint=error.hint,
+                    )
+                )
+                break
+        for name in names:
+            wanted = known[of_group.get(name, name)].property
+            if wanted is not None and wanted.changed(machine, 0.0) is None:
+                problems.append(_no_stiffness(machine, name))
+    if problems:
+        raise RequestError(*problems)
+    order = {name: at for at, name in enumerate([each.name for each in tolerated] + list(known))}
+    return sorted(chosen.values(), key=lambda each: order[each.name])
+
+
+_DIMENSION_OF_UNIT = {"m": "length", "rad": "angle", "1/K": "expansion", "1": "ratio"}
+
+
+def _with_band(machine: Machine, wanted: _Wanted, band: str) -> _Wanted:
+    """The unknown with a half band of its own, uniform. Raises `QuantityError`."""
+    if not band:
+        return wanted
+    half = UnitSystem(machine.file_units).read(band, _DIMENSION_OF_UNIT[wanted.unit])
+    if not (np.isfinite(half) and half > 0.0):
+        raise QuantityError("not-positive", "a half band is above zero", found=band)
+    return dataclasses.replace(wanted, half=half, sigma=half / np.sqrt(3.0), variable=None)
+
+
+def _no_parameter(machine: Machine, pattern: str, known: Iterable[str]) -> Problem:
+    return Problem(
+        "unknown-parameter",
+        f"nothing that can be identified is called {pattern}",
+        machine.file,
+        path=pattern,
+        found=pattern,
+        expected="a parameter, a group of tolerances, a pattern over them, strut.<name>.expansion "
+        "or strut.<name>.compliance",
+        hint=did_you_mean(pattern, list(known)),
+    )
+
+
+def _no_stiffness(machine: Machine, name: str) -> Problem:
+    return Problem(
+        "no-stiffness",
+        f"{name} is a relative change, and nothing says how stiff the strut is",
+        machine.file,
+        path=name.rpartition(".")[0],
+        found="no stiffness",
+        expected="stiffness, or modulus and section_area, of the strut, to start from",
+    )
+
+
+def _correlate(covariance: Floats, wanted: Sequence[_Wanted], bands: Deviation) -> None:
+    assert bands.correlation is not None
+    for i, one in enumerate(wanted):
+        for j, other in enumerate(wanted):
+            if i != j and one.variable is not None and other.variable is not None:
+                coefficient = bands.correlation[one.variable, other.variable]
+                covariance[i, j] = coefficient * one.sigma * other.sigma
+
+
+@dataclass
+class _OfInstruments:
+    names: list[str]
+    units: list[str]
+    labels: list[str]
+    frames: dict[int, tuple[int | None, ...]]
+    biases: dict[tuple[int, int, int], int]
+
+
+def _of_instruments(machine: Machine, measurements: Measurements, first: int) -> _OfInstruments:
+    """Unknowns of the instruments that measured anything, numbered from `first` on."""
+    found = _OfInstruments([], [], [], {}, {})
+
+    def take(name: str, unit: str, label: str) -> int:
+        found.names.append(name)
+        found.units.append(unit)
+        found.labels.append(label)
+        return first + len(found.names) - 1
+
+    by = measurements.instrument[measurements.row]
+    for number, instrument in enumerate(measurements.instruments):
+        mine = by == number
+        if not mine.any():
+            continue
+        found.frames[number] = _frame_and_target(instrument, take)
+        if not instrument.bias_unknown:
+            continue
+        read = zip(measurements.observable[mine], measurements.strut[mine], strict=True)
+        for observable, strut in sorted({(int(one), int(other)) for one, other in read}):
+            what = OBSERVABLES[observable]
+            part = f"strut.{machine.struts[strut].name}." if what in OF_STRUTS else ""
+            found.biases[number, observable, strut] = take(
+                f"{instrument.name}.bias.{part}{what}",
+                UNITS[observable],
+                f"constant that {instrument.name} adds to {part}{what}",
+            )
+    return found
+
+
+def _frame_and_target(instrument: Instrument, take: object) -> tuple[int | None, ...]:
+    assert callable(take)
+    own: list[int | None] = []
+    named = [(f"frame.{axis}", "m", f"origin {axis}") for axis in "xyz"]
+    named += [(f"frame.r{axis}", "rad", f"rotation about {axis}") for axis in "xyz"]
+    for (key, unit, what), unknown in zip(named, instrument.frame.unknown, strict=True):
+        name, label = f"{instrument.name}.{key}", f"frame of {instrument.name}, {what}"
+        own.append(take(name, unit, label) if unknown else None)
+    for axis in "xyz":
+        name, label = f"{instrument.name}.target.{axis}", f"target of {instrument.name}, {axis}"
+        own.append(take(name, "m", label) if instrument.target_unknown else None)
+    return tuple(own)
+
+
+_POINTS = {"base": "base joint", "platform": "platform joint", "origin": "origin"}
+
+
+def label_of(parameter: str) -> str:
+    """A parameter for people: "length of strut 1", "base joint x of strut 1", "tool x"."""
+    words = parameter.split(".")
+    if words[0] == "tool":
+        return f"tool point {words[1]}"
+    *middle, last = words[2:]
+    what = " ".join([_POINTS.get(word, word.replace("_", " ")) for word in middle] + [last])
+    if last in ("u", "v"):
+        what = " ".join([word.replace("_", " ") for word in middle] + [f"tilt {last}"])
+    return f"{what} of {words[0]} {words[1]}"

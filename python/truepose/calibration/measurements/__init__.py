@@ -1,0 +1,5 @@
+"""Measurements: their form, reading and writing their files, making them from arrays."""
+
+from truepose.calibration.measurements.form import Measurements
+
+__all__ = ["Measurements"]

@@ -1,0 +1,334 @@
+"""Arrays -> `Measurements`, checked as a file is; several made one."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truepose.calibration.instruments import REGISTRY, Instrument
+from truepose.calibration.measurements.checked import (
+    UNCERTAINTY,
+    Reading,
+    Rows,
+    measurements_in,
+    reading_columns,
+)
+from truepose.calibration.measurements.form import Floats, Measurements
+from truepose.calibration.measurements.header import (
+    expected_name,
+    name_is_good,
+    reserved_names,
+)
+from truepose.errors import Problem, RequestError
+from truepose.machine import Condition, Machine
+from truepose.machine.data_file import cut_short
+from truepose.machine.suggestion import did_you_mean, one_of
+
+
+def measurements_of(
+    machine: Machine,
+    instrument: Instrument,
+    *,
+    poses: ArrayLike | None = None,
+    joints: ArrayLike | None = None,
+    values: Mapping[str, ArrayLike] | None = None,
+    uncertainty: float | Mapping[str, ArrayLike] | None = None,
+    condition: Condition | Sequence[Condition] | None = None,
+    held_out: ArrayLike | None = None,
+    frame_unknown: bool = False,
+) -> Measurements:
+    """Measurements of one instrument, from arrays; SI, radians and kelvin.
+
+        tracker = Instrument("tracker", "position", Frame())
+        measurements_of(
+            machine, tracker, poses=poses, values={"x": x, "y": y, "z": z},
+            uncertainty=10e-6, frame_unknown=True,
+        )
+
+    Commanded `poses` (n_row, n_commanded), or `joints` (n_row, n_joint). `values`: (n_row,) by the
+    columns of a file ("x", "strut.1.length"), NaN where nothing was read; none of a contact.
+    `uncertainty`: standard, one for all, or by column one or (n_row,); default the instrument's.
+    `condition`: of all rows or of each; default cold and without a load on the tool. `held_out`
+    (n_row,): kept from the fit. `frame_unknown`: all of the instrument's frame that its kind sees
+    is to be found, from the frame given on.
+
+    Raises `RequestError` with everything that is wrong.
+    """
+    problems: list[Problem] = []
+    maker = _Maker(machine, instrument, problems)
+    columns = maker.columns(values or {})
+    commanded = maker.commanded(poses, joints)
+    if problems or commanded is None:
+        raise RequestError(*problems)
+    n = len(commanded)
+    table = {name: maker.of_rows(name, given, n) for name, given in columns.items()}
+    stated = maker.uncertainties(uncertainty, table, n)
+    flags = np.zeros(n, np.bool_) if held_out is None else np.array(held_out, np.bool_)
+    if flags.shape != (n,):
+        maker.refuse("held_out", f"shape {flags.shape}", f"({n},) flags")
+    conditions = maker.conditions(condition, n)
+    if problems:
+        raise RequestError(*problems)
+    rows = Rows(
+        instrument=np.zeros(n, np.intp),
+        readings=table,
+        uncertainties=stated,
+        held_out=flags,
+        lines=np.zeros(n, np.intp),
+        commands=commanded if poses is not None else None,
+        joints=commanded if poses is None else None,
+        whole=frozenset({instrument.name} if frame_unknown else ()),
+    )
+    found = measurements_in(machine, (instrument,), rows, _Report(problems, rows))
+    if problems:
+        raise RequestError(*cut_short(problems))
+    return found if conditions is None else dataclasses.replace(found, conditions=conditions)
+
+
+def joined(*several: Measurements) -> Measurements:
+    """Measurements of one machine, one after the other; instruments that are alike become one.
+
+    Raises `RequestError` (bad-measurements) where there are none, where their joints are not as
+    many, and where different instruments have one name.
+    """
+    if not several:
+        raise RequestError(_bad("measurements", "nothing", "one or more"))
+    instruments: dict[str, Instrument] = {}
+    for each in several:
+        for instrument in each.instruments:
+            if instruments.setdefault(instrument.name, instrument) != instrument:
+                raise RequestError(
+                    _bad(
+                        "instruments",
+                        f"two instruments that differ, both named {instrument.name}",
+                        "a name of its own for each instrument",
+                    )
+                )
+    if len({each.joints.shape[1] for each in several}) > 1:
+        raise RequestError(
+            _bad("joints", "measurements of machines with other joints", "those of one machine")
+        )
+    names = list(instruments)
+    numbers = [np.array([names.index(i.name) for i in e.instruments], np.intp) for e in several]
+    first = np.cumsum([0, *(each.n_row for each in several)])[:-1].tolist()
+    files = dict.fromkeys(each.file for each in several)
+    return Measurements(
+        instruments=tuple(instruments.values()),
+        joints=np.concatenate([each.joints for each in several]),
+        placements=np.concatenate([each.placements for each in several]),
+        instrument=np.concatenate(
+            [of[each.instrument] for of, each in zip(numbers, several, strict=True)]
+        ),
+        conditions=_same_objects([c for each in several for c in each.conditions]),
+        held_out=np.concatenate([each.held_out for each in several]),
+        row=np.concatenate([each.row + at for each, at in zip(several, first, strict=True)]),
+        observable=np.concatenate([each.observable for each in several]),
+        strut=np.concatenate([each.strut for each in several]),
+        value=np.concatenate([each.value for each in several]),
+        uncertainty=np.concatenate([each.uncertainty for each in several]),
+        lines=np.concatenate([each.lines for each in several]),
+        file=", ".join(each for each in files if each),
+        file_hash=", ".join(dict.fromkeys(each.file_hash for each in several if each.file_hash)),
+    )
+
+
+def _same_objects(conditions: Sequence[Condition]) -> tuple[Condition, ...]:
+    """The conditions, equal ones as one object."""
+    kept: list[Condition] = []
+    by_identity: dict[int, Condition] = {}
+    for condition in conditions:
+        if id(condition) not in by_identity:
+            same = next((each for each in kept if each == condition), None)
+            if same is None:
+                kept.append(condition)
+            by_identity[id(condition)] = condition if same is None else same
+    return tuple(by_identity[id(each)] for each in conditions)
+
+
+def _bad(path: str, found: str, expected: str, hint: str | None = None) -> Problem:
+    return Problem(
+        "bad-measurements",
+        f"{path}: this is not what measurements are made of",
+        path=path,
+        found=found,
+        expected=expected,
+        hint=hint,
+    )
+
+
+@dataclass
+class _Maker:
+    """Arrays as the caller gave them -> arrays of the right shape, or problems."""
+
+    machine: Machine
+    instrument: Instrument
+    problems: list[Problem]
+    known: dict[str, Reading] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.known = reading_columns(self.machine)
+
+    def refuse(self, path: str, found: str, expected: str, hint: str | None = None) -> None:
+        """Note what is wrong with an argument."""
+        self.problems.append(_bad(path, found, expected, hint))
+
+    def columns(self, values: Mapping[str, ArrayLike]) -> dict[str, ArrayLike]:
+        """The readings of known columns."""
+        if self.instrument.kind not in REGISTRY:
+            hint = did_you_mean(self.instrument.kind, REGISTRY)
+            self.refuse("instrument.kind", self.instrument.kind, one_of(REGISTRY), hint)
+        reserved = reserved_names(self.machine)
+        if not name_is_good(self.instrument.name, reserved):
+            self.refuse("instrument.name", self.instrument.name, expected_name(reserved))
+        for path, vector in (
+            ("frame.origin", self.instrument.frame.origin),
+            ("frame.rotation", self.instrument.frame.rotation),
+            ("target", self.instrument.target),
+            ("axis", self.instrument.axis),
+            ("zero", self.instrument.zero),
+        ):
+            wanted = 4 if path == "frame.rotation" else 3
+            if len(vector) != wanted or not np.isfinite(vector).all():
+                self.refuse(f"instrument.{path}", str(vector), f"{wanted} finite numbers")
+            elif wanted == 4 and abs(float(np.linalg.norm(vector)) - 1.0) > 1e-9:
+                self.refuse(f"instrument.{path}", str(vector), "a unit quaternion w x y z")
+        if len(self.instrument.frame.unknown) != 6:
+            self.refuse("instrument.frame.unknown", str(self.instrument.frame.unknown), "6 flags")
+        for name, amount in self.instrument.uncertainty.items():
+            if not (np.isfinite(amount) and amount > 0.0):
+                self.problems.append(_not_positive(f"instrument.uncertainty.{name}", float(amount)))
+        for name in values:
+            if name not in self.known:
+                hint = did_you_mean(name, self.known)
+                self.refuse(f"values.{name}", name, one_of(self.known, limit=16), hint)
+        return {name: given for name, given in values.items() if name in self.known}
+
+    def commanded(self, poses: ArrayLike | None, joints: ArrayLike | None) -> Floats | None:
+        """(n_row, n_commanded) poses or (n_row, n_joint) joints, whichever is given."""
+        if (poses is None) == (joints is None):
+            found = "neither" if poses is None else "both"
+            self.refuse("poses", found, "either poses or joints, as they were commanded")
+            return None
+        path, given = ("poses", poses) if joints is None else ("joints", joints)
+        names = self.machine.commanded if joints is None else self.machine.joints
+        table = self._numbers(path, given)
+        if table is None:
+            return None
+        expected = f"(n_row, {len(names)}) finite numbers: {', '.join(names)}"
+        if table.ndim != 2 or table.shape[1] != len(names) or not len(table):
+            self.refuse(path, f"shape {table.shape}", expected)
+            return None
+        if not np.isfinite(table).all():
+            row = int(np.flatnonzero(~np.isfinite(table).all(axis=1))[0])
+            self.refuse(path, f"a number that is not finite, in row {row}", expected)
+            return None
+        return table
+
+    def of_rows(self, name: str, given: ArrayLike, n: int, what: str = "values") -> Floats:
+        """(n_row,) of one column; one number stands for all rows."""
+        table = self._numbers(f"{what}.{name}", given)
+        if table is not None and table.shape in ((), (n,)) and not np.isinf(table).any():
+            return np.broadcast_to(table, (n,)).copy()
+        if table is not None:
+            found = f"shape {table.shape}" if table.shape not in ((), (n,)) else "an infinity"
+            self.refuse(f"{what}.{name}", found, f"({n},) numbers, NaN where nothing was read")
+        return np.full(n, np.nan)
+
+    def uncertainties(
+        self,
+        given: float | Mapping[str, ArrayLike] | None,
+        readings: Mapping[str, Floats],
+        n: int,
+    ) -> dict[str, Floats]:
+        """Columns of uncertainties, by the name that they have in a file."""
+        if given is None or self.instrument.kind not in REGISTRY:
+            return {}
+        kind = REGISTRY[self.instrument.kind]
+        own = [name for name, each in self.known.items() if each.word in kind.reads] or kind.fixed
+        read = [name for name in own if name in readings or kind.fixed or kind.optional]
+        by_column: Mapping[str, ArrayLike]
+        by_column = given if isinstance(given, Mapping) else dict.fromkeys(read, given)
+        result = {}
+        for name, amount in by_column.items():
+            if name not in self.known:
+                hint = did_you_mean(name, self.known)
+                self.refuse(f"uncertainty.{name}", name, one_of(read, limit=16), hint)
+                continue
+            column = self.of_rows(name, amount, n, "uncertainty")
+            if name in readings and not isinstance(given, Mapping):
+                column[np.isnan(readings[name]) & (not kind.optional)] = np.nan
+            result[name + UNCERTAINTY] = column
+        return result
+
+    def conditions(
+        self, given: Condition | Sequence[Condition] | None, n: int
+    ) -> tuple[Condition, ...] | None:
+        """(n_row,) conditions, of parts that the machine has; None: the default."""
+        if given is None:
+            return None
+        every = (given,) * n if isinstance(given, Condition) else tuple(given)
+        if len(every) != n:
+            self.refuse(
+                "condition", f"{len(every)} conditions", f"one, or one for each of {n} rows"
+            )
+            return None
+        same = _same_objects(every)
+        for condition in {id(each): each for each in same}.values():
+            try:
+                self.machine.check_condition(condition)
+            except RequestError as error:
+                self.problems += error.problems
+        return same
+
+    def _numbers(self, path: str, given: ArrayLike | None) -> Floats | None:
+        try:
+            return np.array(given, np.float64)
+        except (TypeError, ValueError):
+            self.refuse(path, "something that is not an array of numbers", "numbers")
+            return None
+
+
+def _not_positive(path: str, found: float) -> Problem:
+    return Problem(
+        "not-positive",
+        f"{path}: a standard uncertainty is above zero",
+        path=path,
+        found=str(found),
+        expected="a standard uncertainty above zero, SI",
+    )
+
+
+@dataclass
+class _Report:
+    """Problems of rows, by their number."""
+
+    problems: list[Problem]
+    rows: Rows
+
+    def __call__(
+        self,
+        code: str,
+        message: str,
+        *,
+        row: int | None = None,
+        column: str | None = None,
+        found: str | None = None,
+        expected: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        where = "" if row is None else f" (row {row})"
+        message = message if column is None else f"{column}: {message}"
+        self.problems.append(
+            Problem(code, message + where, path=column, found=found, expected=expected, hint=hint)
+        )
+
+    def shown(self, column: str, row: int) -> str:
+        """A number as it was given, SI."""
+        if column.startswith("joint.") and self.rows.joints is not None:
+            return str(self.rows.joints[row].tolist())
+        table = self.rows.uncertainties if column.endswith(UNCERTAINTY) else self.rows.readings
+        return f"{table[column][row]:.10g}" if column in table else "nothing"

@@ -1,0 +1,114 @@
+"""Measurements: what instruments read of a machine, row by row, ready to be fitted.
+
+A row is one pose at which one instrument measured; an observation is one number of a row.
+`measurement_file.py` reads them from a file, `measurement_arrays.py` makes them from arrays, and
+`measurement_writer.py` writes them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from truepose.calibration.instruments._base import Instrument
+from truepose.calibration.observables import OBSERVABLES
+from truepose.machine.condition import Condition
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """What instruments read of a machine; SI, radians and kelvin.
+
+    Rows: `joints` (n_row, n_joint) commanded; `placements` (n_row, 7) where the nominal machine
+    then is, tool point and quaternion; `instrument` (n_row,) which of `instruments` measured;
+    `conditions` (n_row,), equal ones the same object; `held_out` (n_row,): kept from the fit;
+    `lines` (n_row,) of the file, 0 where there is none.
+
+    Observations: `row` (n_observation,) of each, `observable`: its index in `OBSERVABLES`, `strut`:
+    which, or -1; `value` and standard `uncertainty`, above zero.
+    """
+
+    instruments: tuple[Instrument, ...]
+    joints: Floats
+    placements: Floats
+    instrument: Indices
+    conditions: tuple[Condition, ...]
+    held_out: Flags
+    row: Indices
+    observable: Indices
+    strut: Indices
+    value: Floats
+    uncertainty: Floats
+    lines: Indices
+    file: str = ""
+    file_hash: str = ""
+
+    @property
+    def n_row(self) -> int:
+        """How many rows there are."""
+        return len(self.instrument)
+
+    @property
+    def n_observation(self) -> int:
+        """How many numbers were measured."""
+        return len(self.value)
+
+    def observables(self, instrument: int) -> tuple[str, ...]:
+        """Names of what an instrument, by its index, read in any row, in the order of the table."""
+        mine = self.observable[self.instrument[self.row] == instrument]
+        return tuple(OBSERVABLES[each] for each in np.unique(mine).tolist())
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the file's bytes, or of the numbers where there is no file."""
+        if self.file_hash:
+            return self.file_hash
+        arrays = (self.joints, self.row, self.observable, self.strut, self.value, self.uncertainty)
+        parts = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
+        return hashlib.sha256(parts).hexdigest()
+
+    def select(self, rows: ArrayLike) -> Measurements:
+        """Only the rows where `rows` (n_row,) is true; the instruments stay as they are."""
+        wanted = np.asarray(rows, np.bool_)
+        if wanted.shape != (self.n_row,):
+            raise ValueError(f"flags of shape {wanted.shape}, expected ({self.n_row},)")
+        kept = wanted[self.row]
+        number = np.cumsum(wanted) - 1
+        return dataclasses.replace(
+            self,
+            joints=self.joints[wanted],
+            placements=self.placements[wanted],
+            instrument=self.instrument[wanted],
+            conditions=tuple(self.conditions[at] for at in np.flatnonzero(wanted).tolist()),
+            held_out=self.held_out[wanted],
+            lines=self.lines[wanted],
+            row=number[self.row[kept]].astype(np.intp),
+            observable=self.observable[kept],
+            strut=self.strut[kept],
+            value=self.value[kept],
+            uncertainty=self.uncertainty[kept],
+        )
+
+    def with_values(self, value: ArrayLike, uncertainty: ArrayLike | None = None) -> Measurements:
+        """The same with other values (n_observation,), and standard uncertainties where given.
+
+        One uncertainty stands for all. Raises `ValueError` for other shapes, values that are not
+        finite, and uncertainties that are not above zero.
+        """
+        values = np.array(value, np.float64)
+        if values.shape != self.value.shape or not np.isfinite(values).all():
+            raise ValueError(f"expected {self.n_observation} finite values")
+        stated = self.uncertainty
+        if uncertainty is not None:
+            stated = np.broadcast_to(np.asarray(uncertainty, np.float64), values.shape).copy()
+            if not (np.isfinite(stated) & (stated > 0.0)).all():
+                raise ValueError("expected finite uncertainties above zero")
+        return dataclasses.replace(self, value=values, uncertainty=stated)

@@ -1,0 +1,126 @@
+"""What a machine file knows of its parameters: the bands of its tolerances as one covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.machine import Machine
+from truepose.sources._base import Deviation, Floats, Indices
+from truepose.sources.tolerance import Tolerance
+
+
+def bands_of(machine: Machine) -> Deviation | None:
+    """The bands of the machine's tolerances; None where its file has none."""
+    return next((each.bands for each in machine.sources if isinstance(each, Tolerance)), None)
+
+
+@dataclass(frozen=True)
+class Known:
+    """What tolerances say of the n parameters: `shift` (n,), and what varies about it.
+
+    `effects` (n, v): +-1 times the standard deviation of each parameter, by the variable that it
+    has; `correlation` (v, v) of the variables.
+    """
+
+    shift: Floats
+    effects: Floats
+    correlation: Floats
+
+    @property
+    def covariance(self) -> Floats:
+        """(n, n) of all parameters, SI; zero where there is no tolerance."""
+        return np.asarray(self.effects @ self.correlation @ self.effects.T)
+
+
+def known(machine: Machine) -> Known:
+    """What the tolerances of a machine's file say of its parameters."""
+    count = len(machine.parameters)
+    bands = bands_of(machine)
+    if bands is None:
+        return Known(np.zeros(count), np.zeros((count, 0)), np.zeros((0, 0)))
+    shift = np.zeros(count)
+    np.add.at(shift, bands.parameters, bands.shift[0])
+    effects = np.zeros((count, bands.n_variable))
+    sigmas = np.array([each.sigmas for each in bands.distribution], np.float64)
+    np.add.at(effects, (bands.parameters, bands.variables), bands.signed_half[0] / sigmas)
+    correlation = np.eye(bands.n_variable) if bands.correlation is None else bands.correlation
+    return Known(shift, effects, correlation)
+
+
+@dataclass(frozen=True)
+class Banded:
+    """Bands to be written: one variable for each column, or for the columns of a group.
+
+    `columns` (k,): parameters; `effects` (k, v): what one standard deviation of its one variable
+    does to each; `correlation` (v, v); `names` (v,) of the groups, empty for a variable of one
+    parameter.
+    """
+
+    columns: Indices
+    effects: Floats
+    correlation: Floats
+    names: tuple[str, ...]
+
+
+_ROUNDING = 1e-12
+"""Of the largest effect of an unknown: what is below is left by turning directions."""
+
+
+def banded(columns: Indices, effects: Floats, covariance: Floats, names: tuple[str, ...]) -> Banded:
+    """Variables for unknowns with `effects` (k, n) on columns (k,) and `covariance` (n, n).
+
+    An unknown that shares its parameters with no other becomes a variable, of a group where it
+    moves several. Where unknowns share parameters, which a machine file cannot say, each of these
+    parameters has a variable of its own, and the covariance is the same.
+    """
+    effects = np.where(np.abs(effects) > _ROUNDING * np.abs(effects).max(axis=0), effects, 0.0)
+    effects = effects * (np.diagonal(covariance) > 0.0)
+    moved = np.flatnonzero(effects.any(axis=1))
+    rows: list[Floats] = []
+    called: list[str] = []
+    mixed: list[int] = []
+    shared = _shared(effects)
+    column_effects: list[tuple[int, int, float]] = []
+    for unknown in range(effects.shape[1]):
+        members: list[int] = np.flatnonzero(effects[:, unknown]).tolist()
+        if shared[unknown]:
+            mixed += members
+        if shared[unknown] or not members:
+            continue
+        row = np.zeros(effects.shape[1])
+        # A parameter's own variable is its deviation; a group's is the unknown, whatever the signs.
+        row[unknown] = np.sign(effects[members[0], unknown]) if len(members) == 1 else 1.0
+        for each in members:
+            effect = float(effects[each, unknown] * row[unknown])
+            column_effects.append((each, len(rows), effect))
+        rows.append(row)
+        called.append(names[unknown] if len(members) > 1 else "")
+    for each in dict.fromkeys(mixed):
+        column_effects.append((each, len(rows), 1.0))
+        rows.append(effects[each])
+        called.append("")
+    to_variables = np.array(rows).reshape(len(rows), effects.shape[1])
+    of_variables = to_variables @ covariance @ to_variables.T
+    deviation = np.sqrt(np.diagonal(of_variables))
+    scale = np.where(deviation > 0.0, deviation, 1.0)
+    correlation = of_variables / np.outer(scale, scale)
+    correlation = np.clip(0.5 * (correlation + correlation.T), -1.0, 1.0)
+    np.fill_diagonal(correlation, 1.0)
+    found = np.zeros((len(columns), len(rows)))
+    for at, variable, effect in column_effects:
+        found[at, variable] = effect * deviation[variable]
+    return Banded(columns[moved], found[moved], correlation, tuple(called))
+
+
+def _shared(effects: Floats) -> list[bool]:
+    """(n,) whether an unknown moves a parameter that others move too, or one linked to such."""
+    linked = effects != 0.0
+    shared = (linked & (linked.sum(axis=1) > 1)[:, np.newaxis]).any(axis=0)
+    while True:
+        touched = linked[:, shared].any(axis=1)
+        more = (linked & touched[:, np.newaxis]).any(axis=0)
+        if np.array_equal(more, shared):
+            return [bool(each) for each in shared]
+        shared = more

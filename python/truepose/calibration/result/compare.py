@@ -1,0 +1,407 @@
+"""Whether a machine changed between two machine files of it, such as two dated calibrations.
+
+Parameter by parameter and at the tool, with what both files say of their uncertainty: the bands of
+their tolerances. The two are taken to be independent. Where they share prior knowledge or
+measurements that is on the safe side: a change is then called certain too seldom, not too often.
+
+    difference = new - old,    covariance = covariance of old + covariance of new
+
+Two tests are made, each with half of the probability `ALPHA` that a machine which did not change
+is said to have changed: every parameter by itself (its share of the probability by Bonferroni), and
+all together by difference^T covariance^-1 difference, a chi-square, which also sees what shows only
+in how parameters differ with each other. What is not determined has a wide band, and decides
+nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from truepose.budget.poses import LeftOut, Walk, no_pose_left, requested_poses
+from truepose.calibration.result.bands import known
+from truepose.calibration.result.directions import deviation_of, directions, tilted, turned
+from truepose.errors import Problem, RequestError
+from truepose.machine import Machine
+from truepose.sources._base import Floats
+from truepose.sources.quantiles import normal_quantile
+
+ALPHA = 0.05
+"""Probability that a machine that did not change is said to have changed."""
+
+_ROUNDING = 1e-12
+"""Of the number of parameters: an eigenvalue so small, of a correlation matrix, is zero."""
+
+_CERTAIN = 1e-3
+"""Standard deviations: from here on it counts along what neither file has an uncertainty of."""
+
+_EXACT = 1e-12
+"""Relative to a parameter: a smaller difference is rounding."""
+
+_ROUNDED = 1e-15
+"""m, rad: the same of what is near zero, and has no size to be exact to."""
+
+_TURNED = 0.5
+"""Cosine of the angle by which a direction may have turned."""
+
+_QUANTITIES = {"position": "m", "orientation": "rad"}
+_NAMED = 3
+"""Parameters that the verdict names; more are counted."""
+
+
+@dataclass(frozen=True)
+class _Change:
+    """What changed of the parameters (n,): both estimates, their uncertainties, and both tests."""
+
+    old: Floats
+    new: Floats
+    old_uncertainty: Floats
+    new_uncertainty: Floats
+    covariance: Floats
+    normalised: Floats
+    limit: float
+    chi_square: float
+    dof: int
+    probability: float
+
+    @property
+    def each(self) -> np.ndarray:
+        """(n,) which changed, each for itself."""
+        return np.asarray(np.abs(self.normalised) > self.limit)
+
+    @property
+    def changed(self) -> bool:
+        """Whether the machine did."""
+        return bool(self.each.any()) or self.probability < 0.5 * ALPHA
+
+
+def compare(old: Machine, new: Machine, poses: ArrayLike | None = None) -> xr.Dataset:
+    """Compare two machine files of one machine, SI.
+
+    `poses` (..., n_commanded): where the tool is looked at, by default the workspace of `old`.
+    The estimate of a parameter is its nominal value and the middle of its band; a direction's tilts
+    are those from the old axis. `displacement` (pose, component) is what the change does to the
+    tool: commanded by the old estimate, where the new one goes, exactly; `displacement_uncertainty`
+    is first order. `moved` and `moved_uncertainty` (pose, quantity): its length, and its
+    uncertainty along itself. The attribute `changed` is the answer, `verdict` a sentence of it.
+
+    Raises `RequestError` (not-the-same-machine, bad-poses, no-workspace, no-pose-left).
+    """
+    _require_same(old, new)
+    before, after, change = _change(old, new)
+    requested = requested_poses(old, poses)
+    walk = Walk(before, requested, old.condition)
+    columns = np.arange(len(old.parameters))
+    blocks = []
+    for block in walk:
+        kernel = after.kernel
+        moved, solved = kernel.displacement(
+            block.joints, block.placements, columns[:1], np.zeros((1, 1))
+        )
+        usable = walk.keep(block.indices, solved)
+        slopes, _ = before.kernel.sensitivity_at(block.joints, block.placements, columns)
+        spread = slopes[usable] @ change.covariance @ slopes[usable].transpose(0, 2, 1)
+        blocks.append((block.indices[usable], moved[usable], spread))
+    if not sum(len(indices) for indices, _, _ in blocks):
+        raise no_pose_left(before, requested, walk.left_out, of_file=poses is None)
+    indices, moved, spread = (np.concatenate(each) for each in zip(*blocks, strict=True))
+    return _dataset(old, new, change, requested, walk.left_out, indices, moved, spread)
+
+
+def _require_same(old: Machine, new: Machine) -> None:
+    """Raise where the two are not the same machine with other numbers."""
+    for what in ("dof", "commanded", "joints", "parameters"):
+        one, other = getattr(old, what), getattr(new, what)
+        if one != other:
+            lacking = sorted(set(one) ^ set(other)) or list(one)
+            raise _not_same(old, new, f"their {what} differ: {', '.join(lacking[:6])}")
+    kinds = [[(each.name, each.kind) for each in machine.drives] for machine in (old, new)]
+    if kinds[0] != kinds[1]:
+        raise _not_same(old, new, "their drives are of other kinds")
+
+
+def _not_same(old: Machine, new: Machine, why: str) -> RequestError:
+    return RequestError(
+        Problem(
+            "not-the-same-machine",
+            f"{old.file} and {new.file} do not describe the same machine",
+            new.file,
+            found=why,
+            expected="two files of one machine, with other values",
+        )
+    )
+
+
+def _change(old: Machine, new: Machine) -> tuple[Machine, Machine, _Change]:
+    """Both machines at their estimates, and what differs, in the old one's axes."""
+    was, found = known(old), known(new)
+    values = [machine.nominal + what.shift for machine, what in ((old, was), (new, found))]
+    names = old.parameters
+    before, after = (
+        machine.replace(dict(zip(names, map(float, each), strict=True)))
+        for machine, each in zip((old, new), values, strict=True)
+    )
+    effects, first, second = found.effects.copy(), values[0], values[1].copy()
+    for one, other in zip(directions(old), directions(new), strict=True):
+        at = list(one.columns)
+        if np.array_equal(one.axis, other.axis):
+            continue
+        along = tilted(other.axis, second[at])
+        if one.axis @ along < _TURNED:
+            where = f"{one.table}.{one.part}.{one.key}"
+            raise _not_same(old, new, f"{where} points quite another way")
+        effects[at] = turned(other.axis, second[at], one.axis) @ effects[at]
+        second[at] = deviation_of(one.axis, along)
+    after_covariance = effects @ found.correlation @ effects.T
+    return before, after, _tested(first, second, was.covariance, after_covariance)
+
+
+def _tested(old: Floats, new: Floats, was: Floats, found: Floats) -> _Change:
+    difference = new - old
+    scale = np.maximum(np.abs(old), np.abs(new))
+    difference[np.abs(difference) <= _EXACT * scale + _ROUNDED] = 0.0
+    covariance = was + found
+    deviation = np.sqrt(np.diagonal(covariance))
+    scaled = np.where(deviation > 0.0, deviation, 1.0)
+    moved = difference != 0.0
+    normalised = np.zeros(len(difference))
+    np.divide(difference, deviation, out=normalised, where=deviation > 0.0)
+    normalised[moved & (deviation == 0.0)] = np.inf
+    banded = np.flatnonzero(deviation)
+    compared = int(np.count_nonzero(moved | (deviation > 0.0)))
+    limit = float(normal_quantile(1.0 - 0.25 * ALPHA / max(compared, 1)))
+    correlation = (covariance / np.outer(scaled, scaled))[np.ix_(banded, banded)]
+    chi_square, dof, certain = _chi_square(normalised[banded], correlation)
+    certain = certain or bool(np.isinf(normalised).any())
+    return _Change(
+        old,
+        new,
+        np.sqrt(np.diagonal(was)),
+        np.sqrt(np.diagonal(found)),
+        covariance,
+        normalised,
+        limit,
+        chi_square,
+        dof,
+        0.0 if certain else chi_square_tail(chi_square, dof),
+    )
+
+
+def _chi_square(normalised: Floats, correlation: Floats) -> tuple[float, int, bool]:
+    """Sum of squares of independent parts, how many, and whether one without uncertainty moved."""
+    if normalised.size == 0:
+        return 0.0, 0, False
+    values, vectors = np.linalg.eigh(correlation)
+    along = vectors.T @ normalised
+    known_part = values > _ROUNDING * len(values)
+    chi_square = float(np.sum(np.square(along[known_part]) / values[known_part]))
+    certain = bool((np.abs(along[~known_part]) > _CERTAIN).any())
+    return chi_square, int(np.count_nonzero(known_part)), certain
+
+
+def chi_square_tail(value: float, dof: int) -> float:
+    """Probability that a chi-square variable of whole `dof` degrees of freedom is above `value`.
+
+    M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 26.4.4 and 26.4.5.
+    """
+    if value <= 0.0 or dof <= 0:
+        return 1.0
+    half = 0.5 * value
+    odd = dof % 2 == 1
+    total = math.erfc(math.sqrt(half)) if odd else 0.0
+    start = 0.5 if odd else 0.0
+    for step in range(dof // 2):
+        power = start + step
+        total += math.exp(power * math.log(half) - half - math.lgamma(power + 1.0))
+    return min(total, 1.0)
+
+
+def _dataset(
+    old: Machine,
+    new: Machine,
+    change: _Change,
+    requested: Floats,
+    left_out: LeftOut,
+    indices: np.ndarray,
+    displacement: Floats,
+    spread: Floats,
+) -> xr.Dataset:
+    turning = np.array([name.startswith("r") for name in old.components])
+    uncertainty = np.sqrt(np.maximum(np.einsum("ncc->nc", spread), 0.0))
+    sizes, along = [], []
+    chosen = [(name, part) for name, part in zip(_QUANTITIES, (~turning, turning), strict=True)]
+    chosen = [(name, part) for name, part in chosen if part.any()]
+    for _, part in chosen:
+        size, deviation = _along(displacement[:, part], spread[:, part][:, :, part])
+        sizes.append(size)
+        along.append(deviation)
+    component = ["rad" if turns else "m" for turns in turning]
+    numbers, status = left_out.sorted()
+    n = ("parameter",)
+    data = {
+        "old": (n, change.old, "parameter", "value in the old file, middle of its band"),
+        "new": (n, change.new, "parameter", "value in the new file"),
+        "difference": (n, change.new - change.old, "parameter", "new less old"),
+        "old_uncertainty": (n, change.old_uncertainty, "parameter", "standard, of the old file"),
+        "new_uncertainty": (n, change.new_uncertainty, "parameter", "standard, of the new file"),
+        "standard_uncertainty": (
+            n,
+            np.sqrt(np.diagonal(change.covariance)),
+            "parameter",
+            "of the difference, the files independent",
+        ),
+        "normalised_difference": (
+            n,
+            change.normalised,
+            "1",
+            "difference divided by its standard uncertainty",
+        ),
+        "parameter_changed": (n, change.each, "1", "whether it changed, judged for itself"),
+        "displacement": (
+            ("pose", "component"),
+            displacement,
+            "component",
+            "what the change does to the tool, exact",
+        ),
+        "displacement_uncertainty": (
+            ("pose", "component"),
+            uncertainty,
+            "component",
+            "standard uncertainty of it, first order",
+        ),
+        "moved": (("pose", "quantity"), np.stack(sizes, -1), "quantity", "size of displacement"),
+        "moved_uncertainty": (
+            ("pose", "quantity"),
+            np.stack(along, -1),
+            "quantity",
+            "standard uncertainty along the displacement",
+        ),
+    }
+    made = {}
+    for name, (dims, values, units, text) in data.items():
+        attrs = {"units": units, "long_name": text}
+        if units in ("parameter", "component", "quantity"):
+            attrs = {"units_by": f"{units}_units", "long_name": text}
+        made[name] = xr.Variable(dims, values, attrs)
+    quantities = [name for name, _ in chosen]
+    coordinates: dict[str, object] = {
+        "parameter": list(old.parameters),
+        "parameter_units": ("parameter", list(old.units)),
+        "pose": indices,
+        "component": list(old.components),
+        "component_units": ("component", component),
+        "quantity": quantities,
+        "quantity_units": ("quantity", [_QUANTITIES[name] for name in quantities]),
+        "left_out_index": ("left_out", numbers),
+        "left_out_status": ("left_out", np.asarray(status, object)),
+    }
+    for at, name in enumerate(old.commanded):
+        unit = {"units": "m" if name in "xyz" else "rad"}
+        coordinates[f"pose_{name}"] = ("pose", requested[indices, at], unit)
+        coordinates[f"left_out_{name}"] = ("left_out", requested[numbers, at], unit)
+    dataset = xr.Dataset(made, coordinates)
+    dataset.attrs = {
+        "truepose_version": version("truepose"),
+        **_provenance("old", old),
+        **_provenance("new", new),
+        "alpha": ALPHA,
+        "parameter_limit": change.limit,
+        "chi_square": change.chi_square,
+        "chi_square_dof": change.dof,
+        "chi_square_probability": change.probability,
+        "changed": int(change.changed),
+        "poses_used": len(indices),
+        "poses_left_out": len(numbers),
+    }
+    dataset.attrs["verdict"] = verdict(dataset)
+    return dataset
+
+
+def _along(displacement: Floats, spread: Floats) -> tuple[Floats, Floats]:
+    """Length (n,) of displacements (n, k), and their standard uncertainty along themselves."""
+    size = np.linalg.norm(displacement, axis=1)
+    unit = np.divide(
+        displacement,
+        size[:, np.newaxis],
+        out=np.zeros_like(displacement),
+        where=size[:, np.newaxis] > 0.0,
+    )
+    variance = np.einsum("nc,ncd,nd->n", unit, spread, unit)
+    # What does not move has no direction: the largest uncertainty of any.
+    largest = np.linalg.eigvalsh(spread)[:, -1]
+    return size, np.sqrt(np.maximum(np.where(size > 0.0, variance, largest), 0.0))
+
+
+def _provenance(which: str, machine: Machine) -> dict[str, str]:
+    made = machine.calibration
+    return {
+        f"{which}_file": machine.file,
+        f"{which}_hash": machine.file_hash,
+        f"{which}_date": "" if made is None else made.date,
+        f"{which}_data": "" if made is None else made.data,
+        f"{which}_data_hash": "" if made is None else made.data_hash,
+        f"{which}_warning": "" if made is None else "; ".join(made.warning),
+    }
+
+
+def verdict(found: xr.Dataset) -> str:
+    """One sentence on what `compare` found, for people."""
+    tool = _at_tool(found)
+    if not found.attrs["changed"]:
+        normalised = np.abs(found["normalised_difference"].values)
+        largest = int(normalised.argmax())
+        if not normalised[largest]:
+            return "No change beyond uncertainty: no parameter differs."
+        name = str(found["parameter"].values[largest])
+        return (
+            f"No change beyond uncertainty: {name} differs most, by {normalised[largest]:.2g} "
+            f"standard uncertainties; {tool}."
+        )
+    each = found["parameter_changed"].values
+    if not each.any():
+        return (
+            "The machine changed: no parameter stands out by itself, but all together differ by "
+            f"more than their uncertainty (chi-square {found.attrs['chi_square']:.4g} of "
+            f"{found.attrs['chi_square_dof']}); {tool}."
+        )
+    order = np.argsort(-np.abs(found["normalised_difference"].values), kind="stable")
+    order = order[: int(each.sum())]
+    parts = [
+        _amount(
+            str(found["parameter"].values[at]),
+            float(found["difference"].values[at]),
+            float(found["standard_uncertainty"].values[at]),
+            str(found["parameter_units"].values[at]),
+        )
+        for at in order[:_NAMED]
+    ]
+    more = f" and {len(order) - _NAMED} more" if len(order) > _NAMED else ""
+    return f"The machine changed: {', '.join(parts)}{more}; {tool}."
+
+
+_SHOWN = {"m": "\N{MICRO SIGN}m", "rad": "\N{MICRO SIGN}rad", "1": "ppm"}
+
+
+def _amount(name: str, value: float, deviation: float, unit: str) -> str:
+    shown = _SHOWN[unit]
+    sign = "\N{PLUS-MINUS SIGN}"
+    return f"{name} by {1e6 * value:.4g} {shown} ({sign} {2e6 * deviation:.2g})"
+
+
+def _at_tool(found: xr.Dataset) -> str:
+    quantity = str(found["quantity"].values[0])
+    sizes = found["moved"].values[:, 0]
+    at = int(sizes.argmax())
+    shown = _SHOWN[_QUANTITIES[quantity]]
+    deviation = float(found["moved_uncertainty"].values[at, 0])
+    verb = "moves" if quantity == "position" else "turns"
+    sign = "\N{PLUS-MINUS SIGN}"
+    return (
+        f"the tool {verb} by up to {1e6 * sizes[at]:.4g} {shown} "
+        f"({sign} {2e6 * deviation:.2g}, k = 2)"
+    )

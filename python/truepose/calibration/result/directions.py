@@ -1,0 +1,90 @@
+"""Directions of parts and the two angles in which they deviate, as the kernel has them.
+
+A direction has two parameters `u`, `v`: it points along `axis + u t1 + v t2`, where the tangents t1
+and t2 follow from the nominal axis alone (`tangents` in `crates/kernel/src/spatial/vector.rs`). A
+machine file has the axis only. So a direction that was found to be off is written as a new axis,
+from which its deviations then count about new tangents: what is known of `u`, `v` has to be turned
+with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truepose.machine import Drive, Guide, Machine
+from truepose.sources._base import Floats
+
+_FIRST, _SECOND = ".u", ".v"
+
+
+@dataclass(frozen=True)
+class PartDirection:
+    """A direction: `table`, `part` and `key` in its file, its two columns, its unit axis (3,)."""
+
+    table: str
+    part: str
+    key: str
+    columns: tuple[int, int]
+    axis: Floats
+
+
+def directions(machine: Machine) -> Iterator[PartDirection]:
+    """All directions of a machine whose deviations are parameters, in the parameters' order."""
+    parts: tuple[Drive | Guide, ...] = (*machine.drives, *machine.guides)
+    rows = {each.part: each for each in parts}
+    names = machine.parameters
+    for column, name in enumerate(names):
+        if not name.endswith(_FIRST):
+            continue
+        path, _, key = name.removesuffix(_FIRST).rpartition(".")
+        table, _, part = path.partition(".")
+        other = names.index(name.removesuffix(_FIRST) + _SECOND)
+        axis = np.array(rows[path].fields[key], np.float64)
+        yield PartDirection(table, part, key, (column, other), axis / np.linalg.norm(axis))
+
+
+def tangents(axis: ArrayLike) -> Floats:
+    """(2, 3) the unit vectors in which a direction with the unit `axis` (3,) deviates."""
+    unit = np.asarray(axis, np.float64)
+    least = 0
+    for k in (1, 2):  # the first of equal ones, as the kernel takes it
+        if abs(unit[k]) < abs(unit[least]):
+            least = k
+    first = -unit[least] * unit
+    first[least] += 1.0
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(unit, first)])
+
+
+def tilted(axis: ArrayLike, deviation: ArrayLike) -> Floats:
+    """(3,) the unit vector at the deviations (2,) `u`, `v` from the unit `axis` (3,)."""
+    moved: Floats = np.asarray(axis, np.float64) + np.asarray(deviation) @ tangents(axis)
+    return moved / np.linalg.norm(moved)
+
+
+def deviation_of(axis: ArrayLike, direction: ArrayLike) -> Floats:
+    """(2,) the `u`, `v` at which a direction with `axis` (3,) points along `direction` (3,).
+
+    The two are at less than a right angle.
+    """
+    unit, along = np.asarray(axis, np.float64), np.asarray(direction, np.float64)
+    found: Floats = (tangents(unit) @ along) / (unit @ along)
+    return found
+
+
+def turned(axis: ArrayLike, deviation: ArrayLike, new_axis: ArrayLike) -> Floats:
+    """(2, 2) change of the `u`, `v` about `new_axis` for one of those about `axis`.
+
+    Where the direction is at the deviation (2,) from `axis`.
+    """
+    across, unit = tangents(axis), np.asarray(new_axis, np.float64)
+    along = np.asarray(axis, np.float64) + np.asarray(deviation) @ across
+    length = np.linalg.norm(along)
+    along /= length
+    moved = (across - np.outer(across @ along, along)) / length
+    seen = deviation_of(unit, along)
+    return np.asarray((tangents(unit) - np.outer(seen, unit)) @ moved.T / (unit @ along))

@@ -1,0 +1,431 @@
+"""The calibrated machine as a machine file: the original's text, with what was found written in.
+
+Every parameter that the unknowns move has its identified value, or, with `as_shifts`, keeps the one
+that the controller has and gets the deviation as the middle of its band. Bands are normal, of the
+identified covariance, with all correlations. What the file says besides, comments included, stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import tomlkit
+
+from truepose.calibration.identification.properties import Property
+from truepose.calibration.result.bands import Banded, Known, banded, bands_of, known
+from truepose.calibration.result.directions import PartDirection, directions, tilted, turned
+from truepose.calibration.result.toml_edits import MachineText, warning_comment
+from truepose.errors import MachineFileError, Problem, RequestError
+from truepose.machine import Machine, load
+from truepose.output import replacing, require_writable
+from truepose.sources import REGISTRY
+from truepose.sources._base import Deviation, Floats, Indices
+
+DEFAULT_COVERAGE = 2.0
+"""Half bands in standard deviations."""
+
+ENDING = ".toml"
+
+_SAME = 4e-15
+"""Relative to the value: what writing and reading a number may change."""
+
+_NAMED = 6
+"""Unknowns that a message names; more are counted."""
+
+_SAME_BAND = 1e-9
+"""Relative to the standard deviations: the same of a covariance."""
+
+_PROPERTY_KEYS = {"expansion": "expansion", "stiffness": "stiffness", "modulus": "stress"}
+"""Keys of a strut that identified properties are written to, with their dimension."""
+
+
+class MachineUnknowns(Protocol):
+    """What is read of the unknowns of a fit: those of the machine come first."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """(n,) by which groups are called."""
+        ...
+
+    @property
+    def n_machine(self) -> int:
+        """How many are the machine's."""
+        ...
+
+    @property
+    def columns(self) -> Indices:
+        """(k,) parameters that they move."""
+        ...
+
+    @property
+    def effects(self) -> Floats:
+        """(k, n) by how much."""
+        ...
+
+    @property
+    def properties(self) -> Mapping[int, Property]:
+        """Those that move no parameter, by number."""
+        ...
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a calibration comes from. Residuals are divided by their uncertainties.
+
+    `data`: name of the file of measurements, `data_hash` its SHA-256. `date`: as the caller gives
+    it; nothing here reads a clock. `observations`: measured numbers that were fitted.
+    """
+
+    data: str
+    data_hash: str
+    date: str
+    observations: int
+    residual_rms_before: float
+    residual_rms_after: float
+    residual_rms_held_out: float | None = None
+
+
+class PropertyEdit(NamedTuple):
+    """A property to be written: `strut.1.expansion`, its dimension, its value in SI."""
+
+    path: str
+    dimension: str
+    value: float
+
+
+def write_calibrated(
+    path: str | Path,
+    machine: Machine,
+    unknowns: MachineUnknowns,
+    values: Floats,
+    covariance: Floats,
+    provenance: Provenance,
+    *,
+    original: str | Path,
+    coverage: float = DEFAULT_COVERAGE,
+    as_shifts: bool = False,
+    warnings: Sequence[str] = (),
+) -> Machine:
+    """Write the calibrated machine to `path` and return it as it is read from there.
+
+    `values` (n,) and `covariance` (n, n) of the unknowns, SI; those of instruments are not read.
+    `original`: the file that `machine` was read from. `coverage`: half bands in standard
+    deviations. `warnings` go into the file, for a result that was forced.
+
+    Raises `RequestError` (`output-*`, calibration-undetermined, calibration-file-changed,
+    calibration-not-written), and writes the file whole or not at all.
+    """
+    path, original = Path(path), Path(original)
+    require_writable(path, [ENDING], [original])
+    given = np.asarray(values, np.float64)[: unknowns.n_machine]
+    spread = np.asarray(covariance, np.float64)[: unknowns.n_machine, : unknowns.n_machine]
+    _require_determined(path, unknowns, given, spread)
+    result = _Result.of(machine, unknowns, given, spread, as_shifts)
+    text = MachineText(original, machine, _changed(original, machine))
+    _write_values(text, machine, result)
+    for edit in property_edits(machine, unknowns, given):
+        text.set_property(*edit)
+    _write_bands(text, machine, result, coverage)
+    text.move_to(path.parent)
+    _write_provenance(text, machine, provenance, warnings)
+    with replacing(path) as temporary:
+        temporary.write_text(text.text(), encoding="utf-8")
+        try:
+            written = load(temporary, registry=REGISTRY)
+        except MachineFileError as error:
+            problem = error.problems[0]
+            raise _not_written(path, f"{problem.code}: {problem.message}") from error
+        filed = load(original, settings=dict(machine.settings), registry=REGISTRY)
+        _require_same(path, filed, result, written)
+    return load(path, registry=REGISTRY)
+
+
+def property_edits(
+    machine: Machine, unknowns: MachineUnknowns, values: Floats
+) -> list[PropertyEdit]:
+    """What the identified properties change in the file, for values (n_machine,) of all."""
+    edits = []
+    for number, identified in unknowns.properties.items():
+        changed = identified.changed(machine, float(values[number]))
+        if changed is None:
+            continue
+        before, after = machine.struts[identified.strut], changed.struts[identified.strut]
+        edits += [
+            PropertyEdit(f"{after.part}.{key}", dimension, float(getattr(after, key)))
+            for key, dimension in _PROPERTY_KEYS.items()
+            if getattr(after, key) != getattr(before, key)
+        ]
+    return edits
+
+
+@dataclass(frozen=True)
+class _Result:
+    """What the file is to say: nominal values and axes, shifts of all parameters, bands.
+
+    `nominal` (n_parameter,) has 0 for the tilts of the directions that `axes` gives anew; `moved`
+    (k,) are the parameters whose tolerance is replaced.
+    """
+
+    nominal: Floats
+    axes: tuple[tuple[PartDirection, Floats], ...]
+    shift: Floats
+    bands: Banded
+    moved: Indices
+    forgotten: Deviation | None
+
+    @classmethod
+    def of(
+        cls,
+        machine: Machine,
+        unknowns: MachineUnknowns,
+        values: Floats,
+        covariance: Floats,
+        as_shifts: bool,
+    ) -> _Result:
+        count = len(machine.parameters)
+        effects = np.zeros((count, unknowns.n_machine))
+        np.add.at(effects, np.asarray(unknowns.columns), unknowns.effects[:, : unknowns.n_machine])
+        moved = np.asarray(effects.any(axis=1), np.bool_)
+        deviation = effects @ values
+        nominal = np.array(machine.nominal) + (0.0 if as_shifts else deviation)
+        axes = []
+        for each in directions(machine):
+            at = list(each.columns)
+            if not nominal[at].any():
+                continue
+            axis = tilted(each.axis, nominal[at])
+            if moved[at].any():
+                effects[at] = turned(each.axis, nominal[at], axis) @ effects[at]
+                if as_shifts:
+                    deviation[at] = effects[at] @ values
+                moved[at] = True
+            nominal[at] = 0.0
+            axes.append((each, axis))
+        columns = np.flatnonzero(moved)
+        bands = banded(columns, effects[columns], covariance, unknowns.names[: unknowns.n_machine])
+        shift = deviation if as_shifts else np.zeros(count)
+        return cls(nominal, tuple(axes), shift, bands, columns, bands_of(machine))
+
+
+def _write_values(text: MachineText, machine: Machine, result: _Result) -> None:
+    """Nominal values and directions that differ from those of the file."""
+    turned_columns = {column for each, _ in result.axes for column in each.columns}
+    filed = np.array(machine.nominal)
+    for name in machine.replaced:
+        filed[machine.parameters.index(name)] = np.nan
+    for column, name in enumerate(machine.parameters):
+        same = result.nominal[column] == filed[column]
+        if not same and column not in turned_columns and not name.endswith((".u", ".v")):
+            text.set_parameter(name, float(result.nominal[column]))
+    for each, axis in result.axes:
+        text.set_direction(each.table, each.part, each.key, axis)
+
+
+def _write_bands(text: MachineText, machine: Machine, result: _Result, coverage: float) -> None:
+    """The bands of what was identified, in place of those of the file, and their correlations."""
+    names, bands, old = machine.parameters, result.bands, result.forgotten
+    variables = _variable_names(machine, bands)
+    member = {
+        int(column): int(np.flatnonzero(row)[0])
+        for column, row in zip(bands.columns, bands.effects, strict=True)
+    }
+    at = {int(column): index for index, column in enumerate(bands.columns)}
+    covered = set() if old is None else set(old.parameters.tolist())
+    for column in result.moved.tolist():
+        shift = float(result.shift[column])
+        if column in member:
+            effect = float(bands.effects[at[column], member[column]])
+            grouped = bands.names[member[column]]
+            text.set_tolerance(
+                names[column],
+                _normal(shift, effect, coverage, variables[member[column]] if grouped else None),
+            )
+        elif shift or column in covered:
+            text.set_tolerance(names[column], {"band": [shift, shift]})
+    _forget_correlations(text, machine, result)
+    # What is independent of all others needs no row of zeros.
+    linked = (bands.correlation != 0.0).sum(axis=1) > 1
+    if linked.any():
+        between = [name for name, link in zip(variables, linked, strict=True) if link]
+        text.add_correlation(between, bands.correlation[np.ix_(linked, linked)])
+
+
+def _normal(shift: float, effect: float, coverage: float, group: str | None) -> dict[str, Any]:
+    """A normal tolerance as the table of a file, SI."""
+    deviation = abs(effect)
+    if shift:
+        half = coverage * deviation
+        stated: dict[str, Any] = {"band": [shift - half, shift + half], "distribution": "normal"}
+    else:
+        stated = {"standard_deviation": deviation}
+    stated["sigmas"] = float(coverage)
+    if group is not None:
+        stated["group"] = group
+        if effect < 0.0:
+            stated["sign"] = -1
+    return stated
+
+
+def _variable_names(machine: Machine, bands: Banded) -> list[str]:
+    """What each variable is called: its parameter, or its group, which is called as no other is."""
+    columns = [int(np.flatnonzero(bands.effects[:, v])[0]) for v in range(len(bands.names))]
+    found = []
+    for column, name in zip(columns, bands.names, strict=True):
+        taken = name in machine.parameters
+        own = machine.parameters[bands.columns[column]]
+        found.append((f"{name} as calibrated" if taken else name) if name else own)
+    return found
+
+
+def _forget_correlations(text: MachineText, machine: Machine, result: _Result) -> None:
+    """Take what was identified out of the correlations that the file has already."""
+    old = result.forgotten
+    if old is None or old.correlation is None:
+        return
+    moved = set(result.moved.tolist())
+    gone: set[str] = set()
+    kept: dict[str, int] = {}
+    columns = zip(old.parameters.tolist(), old.groups.tolist(), old.variables, strict=True)
+    for parameter, group, number in columns:
+        names = [machine.parameters[parameter]]
+        names += [old.group_names[group]] if group in old.group_names else []
+        if parameter in moved:
+            gone |= set(names)
+        else:
+            kept |= dict.fromkeys(names, int(number))
+    kept = {name: number for name, number in kept.items() if name not in gone}
+    comments = text.forget_correlations(gone, kept)
+    if comments:
+        text.append("\n".join(comments) + "\n")
+
+
+def _write_provenance(
+    text: MachineText, machine: Machine, provenance: Provenance, warnings: Sequence[str]
+) -> None:
+    if "calibration" in text.toml:
+        del text.toml["calibration"]
+    table = tomlkit.table()
+    table["data"] = provenance.data or "measurements"
+    table["data_hash"] = provenance.data_hash
+    table["machine"] = machine.file
+    table["machine_hash"] = machine.file_hash
+    table["date"] = provenance.date
+    table["version"] = version("truepose")
+    table["observations"] = int(provenance.observations)
+    table["residual_rms_before"] = float(provenance.residual_rms_before)
+    table["residual_rms_after"] = float(provenance.residual_rms_after)
+    if provenance.residual_rms_held_out is not None:
+        table["residual_rms_held_out"] = float(provenance.residual_rms_held_out)
+    if warnings:
+        table["warning"] = list(warnings)
+    text.append(tomlkit.dumps({"calibration": table}))
+    lines = "".join(f"{warning_comment(each)}\n" for each in warnings)
+    text.toml = tomlkit.parse(lines + text.text())
+
+
+def _require_same(path: Path, filed: Machine, result: _Result, written: Machine) -> None:
+    """Refuse a file that, read again, is not the machine that was to be written.
+
+    `filed`: the original with its settings, whose condition may not be the one calibrated in.
+    """
+    if written.parameters != filed.parameters:
+        raise _not_written(path, "the parameters have other names")
+    off = np.abs(written.nominal - result.nominal) > _SAME * np.abs(result.nominal)
+    if off.any():
+        raise _not_written(path, f"{filed.parameters[int(np.flatnonzero(off)[0])]} differs")
+    axes = {each.columns: axis for each, axis in result.axes}
+    for each in directions(written):
+        wanted = axes.get(each.columns)
+        if wanted is not None and np.abs(each.axis - wanted).max() > _SAME:
+            raise _not_written(path, f"{each.table}.{each.part}.{each.key} differs")
+    _require_same_bands(path, filed, result, written)
+    if written.accuracy != filed.accuracy or written.condition != filed.condition:
+        raise _not_written(path, "condition or accuracy differ")
+    strange = set(written.data_files.values()) - set(filed.data_files.values())
+    if strange:
+        raise _not_written(path, "the data files differ")
+
+
+def _require_same_bands(path: Path, machine: Machine, result: _Result, written: Machine) -> None:
+    found, old, moved, bands = known(written), known(machine), result.moved, result.bands
+    count = len(machine.parameters)
+    wanted = np.zeros((count, count))
+    wanted[np.ix_(bands.columns, bands.columns)] = (
+        bands.effects @ bands.correlation @ bands.effects.T
+    )
+    deviation = np.sqrt(np.diagonal(wanted))[moved]
+    # Of a band about a shift the ends are written, which have the shift's rounding.
+    slack = _SAME_BAND * deviation + _SAME * np.abs(result.shift[moved])
+    most = np.outer(slack, deviation) + np.outer(deviation, slack)
+    off = np.abs(found.covariance - wanted)[np.ix_(moved, moved)] > most
+    if off.any():
+        raise _not_written(
+            path, f"the band of {_first(machine, moved, np.asarray(off.any(axis=1)))} differs"
+        )
+    shifted = np.asarray(np.abs(found.shift - result.shift)[moved] > slack)
+    if shifted.any():
+        raise _not_written(path, f"the shift of {_first(machine, moved, shifted)} differs")
+    others = np.setdiff1d(np.arange(count), moved)
+    lost = _has_band(found)[others] != _has_band(old)[others]
+    if lost.any():
+        raise _not_written(path, f"the tolerance of {_first(machine, others, lost)} differs")
+
+
+def _has_band(of: Known) -> np.ndarray:
+    return np.asarray(of.effects.any(axis=1))
+
+
+def _first(machine: Machine, columns: Indices, flagged: np.ndarray) -> str:
+    return machine.parameters[int(columns[np.flatnonzero(flagged)[0]])]
+
+
+def _require_determined(
+    path: Path, unknowns: MachineUnknowns, values: Floats, covariance: Floats
+) -> None:
+    """Refuse what has no finite value or covariance: no machine file can say it."""
+    fine = np.isfinite(values) & np.isfinite(covariance).all(axis=1)
+    if fine.all():
+        return
+    named = [unknowns.names[at] for at in np.flatnonzero(~fine)]
+    more = f" and {len(named) - _NAMED} more" if len(named) > _NAMED else ""
+    raise RequestError(
+        Problem(
+            "calibration-undetermined",
+            "what is not determined cannot be written as a band",
+            str(path),
+            found=f"no finite uncertainty of {', '.join(named[:_NAMED])}{more}",
+            expected="a finite value and covariance of every unknown of the machine",
+            hint="give it a tolerance, or leave it out of what is identified",
+        )
+    )
+
+
+def _changed(original: Path, machine: Machine) -> RequestError:
+    return RequestError(
+        Problem(
+            "calibration-file-changed",
+            "the machine file is not the one that was read for the calibration",
+            str(original),
+            found="another content than when it was read",
+            expected=f"the file with the SHA-256 {machine.file_hash[:12]}...",
+            hint="calibrate again with the file as it is now",
+        )
+    )
+
+
+def _not_written(path: Path, why: str) -> RequestError:
+    return RequestError(
+        Problem(
+            "calibration-not-written",
+            f"the calibrated file, read again, is not the calibrated machine: {why}",
+            str(path),
+            found=why,
+            expected="the same machine",
+            hint="nothing was written; please report it with the machine file",
+        )
+    )

@@ -1,0 +1,97 @@
+"""From a calibration to its machine file, unless the answer is no."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from truepose.calibration.calibrate import Calibration
+from truepose.calibration.dataset import covariance_of, determined_covariance, verdict_of
+from truepose.calibration.result.file import DEFAULT_COVERAGE, Provenance, write_calibrated
+from truepose.errors import Problem, RequestError
+from truepose.machine import Machine
+from truepose.sources._base import Floats
+
+
+def save(
+    calibration: Calibration,
+    path: str | Path,
+    *,
+    original: str | Path,
+    date: str,
+    as_shifts: bool = False,
+    force: bool = False,
+    coverage: float = DEFAULT_COVERAGE,
+) -> Machine:
+    """Write the calibrated machine to `path`; the machine as it is read from there.
+
+    `original`: the file that was calibrated; `date`: the caller's, written as it is. `as_shifts`:
+    nominal values stay, what was found becomes the middle of their bands. `force`: write it though
+    the answer is no, with the verdict as a warning inside. `coverage`: half bands in standard
+    deviations.
+
+    Raises `RequestError` (calibration-refused, and what `write_calibrated` raises).
+    """
+    said = verdict_of(calibration)
+    if not (calibration.accepted or force):
+        raise RequestError(
+            Problem(
+                "calibration-refused",
+                "this calibration must not be used as it is",
+                str(path),
+                found=said,
+                expected="a calibration that the gate accepts",
+                hint="force=True writes it with the warning inside",
+            )
+        )
+    fit, checked = calibration.fit, calibration.validation
+    data = calibration.measurements
+    provenance = Provenance(
+        data=Path(data.file).name or "arrays of numbers",
+        data_hash=data.digest,
+        date=date,
+        observations=fit.measurements.n_observation,
+        residual_rms_before=calibration.gate.rms_before,
+        residual_rms_after=calibration.gate.rms,
+        residual_rms_held_out=None
+        if checked is None or not np.isfinite(checked.rms_after)
+        else checked.rms_after,
+    )
+    return write_calibrated(
+        path,
+        calibration.machine,
+        fit.unknowns,
+        fit.values,
+        _covariance(calibration),
+        provenance,
+        original=original,
+        coverage=coverage,
+        as_shifts=as_shifts,
+        warnings=() if calibration.accepted else (said,),
+    )
+
+
+def _covariance(calibration: Calibration) -> Floats:
+    """(n_machine, n_machine) for the file: along what nothing determines, the tolerances' own.
+
+    So it is by itself where they were used; without them the fit leaves such directions as filed.
+    Infinite where an unknown of such a direction has no tolerance.
+    """
+    fit = calibration.fit
+    n = fit.unknowns.n_machine
+    stated = covariance_of(calibration)
+    open_ = (fit.null_space * fit.scale)[:, :n]
+    known = np.flatnonzero(fit.unknowns.has_prior[:n])
+    members = np.flatnonzero((np.abs(fit.null_space[:, :n]) > 1e-6).any(axis=0))
+    if np.isfinite(stated).all() or not np.isin(members, known).all():
+        return stated
+    information = np.zeros((n, n))
+    prior = fit.unknowns.prior_covariance[np.ix_(known, known)]
+    information[np.ix_(known, known)] = np.linalg.inv(prior)
+    left = np.linalg.pinv(open_ @ information @ open_.T, hermitian=True)
+    covariance: Floats = determined_covariance(calibration) + open_.T @ left @ open_
+    return covariance
+
+
+__all__ = ["save"]

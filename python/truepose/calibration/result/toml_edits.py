@@ -1,0 +1,312 @@
+"""Edits of a machine file's text that leave all else as its author wrote it, comments included."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Collection, Mapping, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.items import AoT, Array, InlineTable, Table
+
+from truepose.errors import RequestError
+from truepose.machine import Machine, validation
+from truepose.machine.dimensions import BY_UNIT, DIMENSIONS
+from truepose.machine.document import Document, read
+from truepose.machine.each import share_each
+from truepose.machine.settings import apply
+from truepose.machine.tables import owners
+from truepose.machine.text_file import FileKind, read_text
+from truepose.machine.units import UnitSystem
+from truepose.sources import REGISTRY
+from truepose.sources._base import Floats
+
+_NAMES_A_FILE = ("table", "data", "poses", "temperature_log")
+"""Keys whose value may be the name of a CSV file."""
+
+_NUMBER_AND_UNIT = re.compile(r"\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*(.*?)\s*\Z")
+_LENGTH_TOLERANCE = "length_tolerance"
+_XYZ = "xyz"
+
+CORRELATION_NOTE = "# of what was calibrated: row i has name i + 1 with names 1 to i"
+
+
+class MachineText:
+    """The text of a machine file, with the machine's settings written into it.
+
+    Raises `RequestError` (calibration-file-changed) where the file is not the one that the machine
+    was read from.
+    """
+
+    def __init__(self, original: Path, machine: Machine, changed: RequestError) -> None:
+        _, text = read_text(original, FileKind("a machine file (TOML)", ".toml"))
+        self._document = read(original)
+        if self._document.file_hash != machine.file_hash:
+            raise changed
+        owned = owners(source.tables for source in REGISTRY)
+        self.toml = tomlkit.parse(_without_warnings(text, machine))
+        # The settings go into the text, and into what was read, which says what rows share.
+        written = Document(self._document.file, self._document.name, "", self.toml)
+        apply(written, dict(machine.settings), owned.free_tables)
+        share_each(self._document, dict(machine.settings), owned.free_tables)
+        apply(self._document, dict(machine.settings), owned.free_tables)
+        self._units: UnitSystem = validation.validate(self._document, owned)[0].units
+        self._machine = machine
+        self._folder = original.parent
+
+    # --- values
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Write a parameter (no direction's) of the kernel, SI."""
+        table, part, key, component = _place(name)
+        row = self._row(table, part)
+        dimension = BY_UNIT[self._machine.units[self._machine.parameters.index(name)]]
+        if component is None:
+            row[key] = self._written(value, dimension, row.get(key))
+            return
+        self._own_list(row, table, part, key, dimension)
+        at = _XYZ.index(component)
+        row[key][at] = self._written(value, dimension, row[key][at])
+
+    def set_direction(self, table: str, part: str, key: str, axis: Floats) -> None:
+        """Write a direction (3,), plain numbers."""
+        row = self._row(table, part)
+        if isinstance(row.get(key), Array):
+            for at, component in enumerate(axis):
+                row[key][at] = float(component)
+        else:
+            row[key] = [float(component) for component in axis]
+
+    def set_property(self, path: str, dimension: str, value: float) -> None:
+        """Write a property of a part, such as `strut.1.expansion`, SI."""
+        path, _, key = path.rpartition(".")
+        table, _, part = path.partition(".")
+        row = self._row(table, part)
+        row[key] = self._written(value, dimension, row.get(key))
+
+    # --- tolerances
+
+    def set_tolerance(self, name: str, stated: Mapping[str, Any]) -> None:
+        """Write the tolerance of a parameter, in place of all that the file says of it.
+
+        `stated`: keys of a tolerance's table, `standard_deviation` and `band` in SI.
+        """
+        at = self._machine.parameters.index(name)
+        dimension = BY_UNIT[self._machine.units[at]]
+        written: dict[str, Any] = dict(stated)
+        if "band" in written:
+            written["band"] = [self._written(each, dimension, None) for each in written["band"]]
+        if "standard_deviation" in written:
+            deviation = self._written(written["standard_deviation"], dimension, None)
+            written["standard_deviation"] = deviation
+        inline = _inline(written)
+        for index, column in enumerate(self._machine.kernel.length_parameters[: self._n_strut]):
+            if column == at and _LENGTH_TOLERANCE in self._document.data["strut"][index]:
+                _put(self.toml["strut"][index], _LENGTH_TOLERANCE, inline)
+                return
+        if "tolerance" not in self.toml:
+            self.toml["tolerance"] = tomlkit.table()
+        _put(self.toml["tolerance"], name, inline)
+
+    @property
+    def _n_strut(self) -> int:
+        return len(self._machine.struts)
+
+    def forget_correlations(self, names: Collection[str], kept: Mapping[str, int]) -> list[str]:
+        """Take what is called `names` (parameters and groups) out of all correlations.
+
+        `kept`: names of the other parameters and groups, with the number of their variable. Returns
+        the comments of the tables that are gone.
+        """
+        rows = self.toml.get("correlation")
+        comments: list[str] = []
+        if rows is None:
+            return comments
+        for index in reversed(range(len(rows))):
+            left = _without(rows[index], names, kept)
+            if left is None:
+                continue
+            if left:
+                rows[index].update(left)
+                for key in [key for key in rows[index] if key not in left]:
+                    del rows[index][key]
+                continue
+            text = rows[index].as_string().splitlines() if isinstance(rows, AoT) else []
+            found = [line.strip() for line in text if line.strip().startswith("#")]
+            comments = [line for line in found if line != CORRELATION_NOTE] + comments
+            del rows[index]
+        if not rows:
+            del self.toml["correlation"]
+        return comments
+
+    def add_correlation(self, between: Sequence[str], correlation: Floats) -> None:
+        """Write the correlation matrix (n, n) of the variables called `between`, all digits."""
+        lines = [
+            "[" + ", ".join(repr(float(each)) for each in correlation[at, :at]) + "]"
+            for at in range(1, len(between))
+        ]
+        names = ", ".join(tomlkit.item(name).as_string() for name in between)
+        matrix = "".join(f"    {line},\n" for line in lines)
+        body = f"between = [{names}]\nmatrix = [\n{matrix}]\n"
+        rows = self.toml.get("correlation")
+        if rows is None or isinstance(rows, AoT):
+            self.append(f"[[correlation]]\n{CORRELATION_NOTE}\n{body}")
+            return
+        rows.append(_inline(tomlkit.parse(body).unwrap()))
+
+    # --- the file
+
+    def append(self, text: str) -> None:
+        """Write whole tables at the end."""
+        before = self.text()
+        between = "" if before.endswith("\n\n") else "\n" if before.endswith("\n") else "\n\n"
+        self.toml = tomlkit.parse(f"{before}{between}{text}")
+
+    def move_to(self, folder: Path) -> None:
+        """Rewrite relative names of data files for a machine file in another folder."""
+        old, new = self._folder.resolve(), folder.resolve()
+        if old == new:
+            return
+        names = {
+            name: Path(os.path.relpath(old / name, new)).as_posix()
+            for name in self._machine.data_files
+            if not Path(name).is_absolute()
+        }
+        for key, value in self.toml.items():
+            if key != "calibration":
+                _rename(value, names)
+
+    def text(self) -> str:
+        """The text as it stands."""
+        return tomlkit.dumps(self.toml)
+
+    # --- inside
+
+    def _row(self, table: str, part: str) -> Any:
+        """The row or table of the text that a part's keys are written in."""
+        if table == "tool":
+            return self.toml["machine"]
+        if not part:
+            if table not in self.toml:
+                self.toml[table] = tomlkit.table()
+            return self.toml[table]
+        return next(row for row in self.toml[table] if row.get("name") == part)
+
+    def _own_list(self, row: Any, table: str, part: str, key: str, dimension: str) -> None:
+        """Give a row a list of its own where it has the shared or the usual one."""
+        if key in row:
+            return
+        path = f"{table}.{part}.{key}" if part else f"{table}"
+        names = [f"{path}.{axis}" for axis in _XYZ]
+        shared = self._document.value((*self._document.key(f"{table}.{part}"), key))
+        values = dict(zip(self._machine.parameters, self._machine.kernel.nominal, strict=True))
+        given = shared if isinstance(shared, list) else [None] * len(_XYZ)
+        row[key] = [
+            each if each is not None else self._written(float(values[name]), dimension, None)
+            for name, each in zip(names, given, strict=True)
+        ]
+
+    def _written(self, value: float, dimension: str, old: Any) -> float | str:
+        """An SI value as the file writes such: with the unit of the `old` one, or the declared.
+
+        Of the numbers next to it the one that is read nearest.
+        """
+        unit = None
+        match = _NUMBER_AND_UNIT.match(old) if isinstance(old, str) else None
+        if match is not None and match[1]:
+            unit = match[1]
+        elif dimension not in self._units.declared and dimension != "ratio":
+            unit = DIMENSIONS[dimension].si
+
+        def form(number: float) -> float | str:
+            return number if unit is None else f"{number!r} {unit}"
+
+        # Where the scale has no offset, which no parameter's has, reading is a multiplication.
+        scale = self._units.read(form(1.0), dimension)
+        start = value / scale
+        near = [start, math.nextafter(start, math.inf), math.nextafter(start, -math.inf)]
+        return form(
+            min(near, key=lambda each: abs(self._units.read(form(each), dimension) - value))
+        )
+
+
+def _place(name: str) -> tuple[str, str, str, str | None]:
+    """Table, part, key and component of a parameter that is no direction's."""
+    words = name.split(".")
+    if words[0] == "tool":
+        return "tool", "", "tool", words[1]
+    return words[0], words[1], words[2], words[3] if len(words) > 3 else None
+
+
+def _put(table: Any, key: str, inline: InlineTable) -> None:
+    """Write a value; one that stands as a table of its own stays one."""
+    old = table.get(key)
+    if isinstance(old, Table):
+        old.clear()
+        old.update(inline.unwrap())
+    else:
+        table[key] = inline
+
+
+def _inline(values: Mapping[str, Any]) -> InlineTable:
+    """An inline table, with the spaces that people put into one."""
+    keys = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in values.items())
+    found = tomlkit.value(f"{{ {keys} }}")
+    assert isinstance(found, InlineTable)
+    return found
+
+
+def _without(
+    row: Mapping[str, Any], names: Collection[str], kept: Mapping[str, int]
+) -> dict[str, Any] | None:
+    """A row of `[[correlation]]` without `names`; None where it has none, empty if none stay."""
+    every = [*names, *kept]
+    found = [
+        name
+        for word in row["between"]
+        for name in ([word] if word in every else [n for n in every if fnmatchcase(n, word)])
+    ]
+    if not any(name in names for name in found):
+        return None
+    stay = [at for at, name in enumerate(found) if name not in names]
+    # A group is one variable, of which one name is enough.
+    single = list({kept[found[at]]: at for at in reversed(stay)}.values())[::-1]
+    if len(single) < 2:
+        return {}
+    left: dict[str, Any] = {"between": [found[at] for at in single]}
+    if "coefficient" in row:
+        return left | {"coefficient": row["coefficient"]}
+    matrix = row["matrix"]
+    return left | {
+        "matrix": [[matrix[i - 1][j] for j in single if j < i] for i in single if i != single[0]]
+    }
+
+
+def _rename(value: Any, names: Mapping[str, str]) -> None:
+    """Write new names of data files wherever a key names one."""
+    if isinstance(value, Mapping):
+        for key, each in value.items():
+            if isinstance(each, str) and key in _NAMES_A_FILE and each in names:
+                value[key] = names[each]  # type: ignore[index]
+            else:
+                _rename(each, names)
+    elif isinstance(value, list):
+        for each in value:
+            _rename(each, names)
+
+
+def warning_comment(warning: str) -> str:
+    """The line at the top of a file that was forced."""
+    return "# WARNING: " + " ".join(warning.split())
+
+
+def _without_warnings(text: str, machine: Machine) -> str:
+    """The text without the warnings of an earlier calibration, which the new one supersedes."""
+    if machine.calibration is None:
+        return text
+    gone = {warning_comment(each) for each in machine.calibration.warning}
+    return "".join(line for line in text.splitlines(keepends=True) if line.strip() not in gone)

@@ -1,0 +1,233 @@
+"""`truepose calibrate`: the machine from measurements of it, or why not."""
+
+from __future__ import annotations
+
+import datetime as dt
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from truepose.cli._options import (
+    Request,
+    format_option,
+    machine_argument,
+    output_option,
+    seed_option,
+    set_option,
+    takes,
+)
+
+if TYPE_CHECKING:
+    from truepose.calibration.calibrate import Calibration
+    from truepose.machine import Machine
+
+_FILE = click.Path(path_type=Path)
+
+
+class _Day(click.ParamType):  # type: ignore[type-arg]
+    """A day, YYYY-MM-DD."""
+
+    name = "day"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """The text as it is; click's usage error for what is no day."""
+        try:
+            return dt.date.fromisoformat(str(value)).isoformat()
+        except ValueError:
+            self.fail(f"{value!r} is not a day, such as 2025-03-31.", param, ctx)
+
+
+@click.command("calibrate")
+@takes(
+    machine_argument,
+    click.argument("data", metavar="MEASUREMENTS.csv", type=_FILE),
+    click.option(
+        "--identify",
+        metavar="PATTERN[=BAND]",
+        multiple=True,
+        help="What is to be found: a parameter, a group of tolerances, a pattern such as "
+        "'strut.*.length', strut.1.expansion; with a half band of its own as in "
+        "'strut.*.length=0.5 mm'. May be repeated. Default: all that has a tolerance.",
+    ),
+    click.option(
+        "--no-prior",
+        is_flag=True,
+        help="The measurements alone decide; tolerances do not count as knowledge.",
+    ),
+    click.option(
+        "--no-robust",
+        is_flag=True,
+        help="Readings beyond three standard uncertainties keep their full weight.",
+    ),
+    click.option(
+        "--folds",
+        type=click.IntRange(2),
+        default=5,
+        show_default=True,
+        help="Into how many parts the rows are divided, each predicted by the others, where the "
+        "file keeps none from the fit.",
+    ),
+    seed_option,
+    click.option(
+        "--margin",
+        type=click.FloatRange(0.0, 1.0, min_open=True),
+        default=0.8,
+        show_default=True,
+        help="What is left of the tool's uncertainty must be less than this share.",
+    ),
+    click.option(
+        "--machine-output",
+        metavar="CALIBRATED.toml",
+        type=_FILE,
+        help="Write the calibrated machine file; needs --date.",
+    ),
+    click.option("--date", type=_Day(), metavar="YYYY-MM-DD", help="The day of the measurements."),
+    click.option(
+        "--as-shifts",
+        is_flag=True,
+        help="In the calibrated file nominal values stay, as a controller has them, and what was "
+        "found is the middle of their bands.",
+    ),
+    click.option(
+        "--force",
+        is_flag=True,
+        help="Write the file though the answer is no, with the warning inside; exit code 0.",
+    ),
+    click.option(
+        "--report",
+        metavar="PAGE.html",
+        type=_FILE,
+        help="Write a page with the calibration's figures and tables too.",
+    ),
+    set_option,
+    format_option,
+    output_option,
+)
+def command(**options: Any) -> int:
+    """Find the machine's parameters from measurements of it.
+
+    May the result be used? Exit code 0: yes. Exit code 1: no, with the reasons and the cheapest
+    measurement that would help; no machine file is written then. Tolerances are what is known
+    beforehand. All that is found comes with its uncertainty, how much of it the measurements say,
+    and what it is worth at the tool over the whole workspace.
+    """
+    asked = _Asked(options)
+    asked.check()
+    from truepose.calibration.calibrate import calibrate
+    from truepose.cli import _work
+    from truepose.cli._progress import waiting
+    from truepose.output import require_writable
+    from truepose.report.result import Result
+
+    request = asked.request
+    if asked.page is not None:
+        _work.report_page()
+    inputs = [request.machine_file, asked.data]
+    for path, endings in ((asked.machine_output, [".toml"]), (asked.page, [".html"])):
+        if path is not None:
+            require_writable(path, endings, inputs)
+    if request.output is not None:
+        require_writable(request.output, [".nc", ".json", ".csv"], inputs)
+    machine = _work.read_machine(request)
+    with waiting("calibration"):
+        found = calibrate(
+            machine,
+            asked.data,
+            identify=options["identify"],
+            use_prior=not options["no_prior"],
+            robust=not options["no_robust"],
+            folds=options["folds"],
+            seed=options["seed"],
+            margin=options["margin"],
+        )
+        dataset = found.dataset
+    shown = []
+    if request.format == "table":
+        from truepose.report.calibration import tables
+
+        click.echo(_folded(dataset.attrs["answer"]) + "\n")
+        shown = tables(dataset)
+    _work.deliver(request, Result("calibrate", machine, dataset), shown)
+    if asked.page is not None:
+        _write_page(request, machine, dataset, asked.page)
+    if asked.machine_output is not None:
+        _write_machine(asked, found)
+    return 0 if found.accepted or options["force"] else 1
+
+
+class _Asked:
+    """The options of the command, sorted."""
+
+    def __init__(self, options: dict[str, Any]) -> None:
+        self.data: Path = options["data"]
+        self.machine_output: Path | None = options["machine_output"]
+        self.page: Path | None = options["report"]
+        self.date: str | None = options["date"]
+        self.as_shifts: bool = options["as_shifts"]
+        self.force: bool = options["force"]
+        names = ("machine_file", "settings", "format", "output")
+        self.request = Request(**{name: options[name] for name in names})
+
+    def check(self) -> None:
+        """Refuse options that ask for a file, or need a date, without the other."""
+        if self.machine_output is not None:
+            if self.date is None:
+                raise click.UsageError(
+                    "--machine-output needs --date YYYY-MM-DD: the day of the measurements stands "
+                    "in the file, and no clock is asked."
+                )
+            return
+        for given, name in (
+            (self.date is not None, "--date"),
+            (self.as_shifts, "--as-shifts"),
+            (self.force, "--force"),
+        ):
+            if given:
+                raise click.UsageError(f"{name} is for a machine file: give --machine-output too.")
+
+
+def _folded(text: str) -> str:
+    """A long sentence in lines that can be read."""
+    import textwrap
+
+    return textwrap.fill(text, 100)
+
+
+def _write_machine(asked: _Asked, found: Calibration) -> None:
+    """The calibrated file, unless the answer is no and nobody forces it."""
+    from truepose.calibration.result.save import save
+    from truepose.cli._work import note_written
+
+    assert asked.machine_output is not None
+    assert asked.date is not None
+    if not (found.accepted or asked.force):
+        click.echo(
+            f"{asked.machine_output} is not written, since the answer is no; --force writes it "
+            "with the warning inside.",
+            err=True,
+        )
+        return
+    save(
+        found,
+        asked.machine_output,
+        original=asked.request.machine_file,
+        date=asked.date,
+        as_shifts=asked.as_shifts,
+        force=asked.force,
+    )
+    note_written(asked.machine_output)
+    if not found.accepted:
+        click.echo("The answer is NO: the file was forced, and says so inside.", err=True)
+
+
+def _write_page(request: Request, machine: Machine, dataset: Any, page: Path) -> None:
+    """The report of the machine as filed, with the calibration on top."""
+    from dataclasses import replace
+
+    from truepose.cli import _work
+
+    study = replace(_work.study_of(request, machine), calibration=dataset)
+    text = request.machine_file.read_text(encoding="utf-8")
+    _work.report_page().write(study, page, text)
+    _work.note_written(page)

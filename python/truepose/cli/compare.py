@@ -1,0 +1,64 @@
+"""`truepose compare`: whether a machine changed between two files of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from truepose.cli._options import format_option, output_option_of, takes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from truepose.report.result import Result
+
+_FILE = click.Path(path_type=Path)
+
+
+@click.command("compare")
+@click.argument("old_file", metavar="OLD.toml", type=_FILE)
+@click.argument("new_file", metavar="NEW.toml", type=_FILE)
+@takes(format_option, output_option_of(".json or .csv"))
+def command(old_file: Path, new_file: Path, **options: Any) -> int:
+    """Tell whether a machine changed between two files of it.
+
+    Is it still the same? Exit code 0: it did not change beyond what both files say of their
+    uncertainty. Exit code 1: it did. Compares parameter by parameter, all parameters together, and
+    where the tool goes. Two calibrations of an unchanged machine are told apart by chance in 5 % of
+    cases.
+    """
+    import truepose
+    from truepose.calibration.result.compare import compare
+    from truepose.cli import _work
+    from truepose.output import replacing, require_writable
+    from truepose.report.result import Result
+
+    form, output = options["format"], options["output"]
+    if output is not None:
+        require_writable(output, [".json", ".csv"], [old_file, new_file])
+    old, new = truepose.load(old_file), truepose.load(new_file)
+    result = Result("compare", old, compare(old, new))
+    if form == "table":
+        from truepose.cli._show import show_tables
+        from truepose.report import calibrated_files
+
+        show_tables(calibrated_files.tables(result.dataset))
+        click.echo(result.dataset.attrs["verdict"])
+    else:
+        click.echo("".join(_text(result, form)), nl=False)
+    if output is not None:
+        with replacing(output) as temporary:
+            ending = output.suffix.lower().removeprefix(".")
+            temporary.write_text("".join(_text(result, ending)), encoding="utf-8")
+        _work.note_written(output)
+    return int(result.dataset.attrs["changed"])
+
+
+def _text(result: Result, form: str) -> Iterator[str]:
+    """The result as JSON, or its parameters as CSV."""
+    from truepose.report import calibrated_files
+    from truepose.report.formats import json_text
+
+    return json_text.text(result) if form == "json" else calibrated_files.csv_text(result)

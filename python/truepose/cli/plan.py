@@ -1,0 +1,246 @@
+"""`truepose plan`: which poses to measure, and what each buys."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from truepose.cli._options import (
+    Request,
+    WholeNumber,
+    format_option,
+    machine_argument,
+    output_option,
+    seed_option,
+    set_option,
+    takes,
+)
+
+if TYPE_CHECKING:
+    from truepose.calibration.instruments import Instrument
+    from truepose.errors import Problem
+    from truepose.machine import Machine
+
+_FILE = click.Path(path_type=Path)
+_PER = {"s": 1.0, "min": 60.0}
+_INSTRUMENT = (
+    "position=10um, coordinate:z=10um, distance=2um: a kind and the standard uncertainty of its "
+    "readings, its frame unknown; or FILE.csv[:NAME], what the head of a file of measurements "
+    "declares."
+)
+
+
+@click.command("plan")
+@takes(
+    machine_argument,
+    click.option(
+        "--instrument",
+        "instruments",
+        metavar="WHAT",
+        required=True,
+        multiple=True,
+        help=f"{_INSTRUMENT} May be repeated: all read at every pose.",
+    ),
+    click.option(
+        "--poses",
+        "count",
+        metavar="N",
+        type=WholeNumber(),
+        required=True,
+        help="How many poses to measure.",
+    ),
+    click.option(
+        "--criterion",
+        type=click.Choice(["tool", "determinant"]),
+        default="tool",
+        show_default=True,
+        help="What is to be best: tool, the mean uncertainty at the tool over the workspace; or "
+        "determinant, the volume of the ellipsoid of the unknowns.",
+    ),
+    click.option(
+        "--compare",
+        "others",
+        metavar="WHAT",
+        multiple=True,
+        help="Say how many readings of this instrument do what those of the first do.",
+    ),
+    click.option(
+        "--identify",
+        metavar="PATTERN",
+        multiple=True,
+        help="Find these parameters only, such as strut.*.length; with a half band of their own: "
+        '"strut.*.length=0.5 mm". Without it all that have a tolerance.',
+    ),
+    click.option(
+        "--as-filed",
+        is_flag=True,
+        help="Measure in the condition of the machine file, warm and loaded as it says, instead of "
+        "at reference temperature with nothing on the tool.",
+    ),
+    click.option(
+        "--program",
+        metavar="FILE",
+        type=_FILE,
+        help="Also write a measuring program (G-code) that dwells at every pose.",
+    ),
+    click.option(
+        "--template",
+        metavar="FILE.csv",
+        type=_FILE,
+        help="Also write a file of measurements with all but the readings filled in.",
+    ),
+    click.option(
+        "--dwell", metavar="TIME", default="2 s", show_default=True, help="Rest at every pose."
+    ),
+    click.option(
+        "--feed",
+        metavar="SPEED",
+        default="1000 mm/min",
+        show_default=True,
+        help="Speed between poses.",
+    ),
+    seed_option,
+    set_option,
+    format_option,
+    output_option,
+)
+def command(
+    instruments: tuple[str, ...],
+    count: int,
+    criterion: str,
+    others: tuple[str, ...],
+    identify: tuple[str, ...],
+    as_filed: bool,
+    program: Path | None,
+    template: Path | None,
+    dwell: str,
+    feed: str,
+    seed: int,
+    **options: Any,
+) -> int:
+    """Choose the poses to measure for a calibration.
+
+    Takes those poses of the workspace, in reach and away from singularities, that leave the
+    calibrated machine's tool known best, and says what each further pose buys. Tolerances count as
+    what is known before.
+    """
+    from truepose.calibration.planning.comparison import compare_instruments
+    from truepose.calibration.planning.plan import plan
+    from truepose.calibration.planning.program import program as program_text
+    from truepose.calibration.planning.program import template as template_text
+    from truepose.cli import _work
+    from truepose.cli._progress import progress
+    from truepose.output import require_writable
+    from truepose.report import planning
+    from truepose.report.result import Result
+
+    request = Request(**options)
+    machine = _work.read_machine(request)
+    for path, endings in ((program, None), (template, [".csv"])):
+        if path is not None:
+            require_writable(path, endings or [path.suffix.lower()], [request.machine_file])
+    seconds, speed = _seconds(machine, dwell), _speed(machine, feed)
+    chosen = _instruments(machine, instruments)
+    compared = [_instruments(machine, (each,)) for each in others]
+    with progress("plan", "starts") as report:
+        found = plan(
+            machine,
+            chosen,
+            count,
+            criterion="tool" if criterion == "tool" else "determinant",
+            condition=machine.condition if as_filed else None,
+            identify=identify,
+            seed=seed,
+            progress=report,
+        )
+    text = None
+    if program is not None:
+        text = program_text(
+            machine, found.poses, instruments=found.instruments, dwell=seconds, feed=speed
+        )
+    form = template_text(machine, found.poses, found.instruments) if template is not None else None
+    _work.deliver(request, Result("plan", machine, found.dataset), planning.tables(found))
+    if request.format == "table":
+        for sentence in planning.sentences(found):
+            click.echo(sentence)
+    for other in compared:
+        with progress("comparison", "instruments") as report:
+            comparison = compare_instruments(
+                machine,
+                [chosen[0], other[0]],
+                count,
+                condition=machine.condition if as_filed else None,
+                identify=identify,
+                seed=seed,
+                progress=report,
+            )
+        for sentence in planning.compared(comparison):
+            # Beside data for programs a sentence goes where people look.
+            click.echo(sentence, err=request.format != "table")
+    _write(program, text)
+    _write(template, form)
+    return 0
+
+
+def _instruments(machine: Machine, texts: tuple[str, ...]) -> tuple[Instrument, ...]:
+    from truepose.calibration.planning.instruments import distinct, instruments_named
+    from truepose.errors import RequestError
+
+    found: list[Instrument] = []
+    problems: list[Problem] = []
+    for text in texts:
+        try:
+            found += instruments_named(machine, text)
+        except RequestError as failure:
+            problems += failure.problems
+    if problems:
+        raise RequestError(*problems)
+    return distinct(machine, tuple(found))
+
+
+def _write(path: Path | None, text: str | None) -> None:
+    from truepose.cli._work import note_written
+    from truepose.output import replacing
+
+    if path is None or text is None:
+        return
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+    note_written(path)
+
+
+def _seconds(machine: Machine, text: str) -> float:
+    return _quantity(machine, "--dwell", text, "time", "a time above zero, such as 2 s")
+
+
+def _speed(machine: Machine, text: str) -> float:
+    """M/s of a length a minute or a second; a bare number is in the file's lengths a minute."""
+    expected = 'a speed above zero, such as "1000 mm/min"'
+    length, slash, per = text.partition("/")
+    if slash and per.strip() not in _PER:
+        raise _refusal("--feed", text, expected)
+    amount = _quantity(machine, "--feed", length, "length", expected)
+    return amount / _PER[per.strip() if slash else "min"]
+
+
+def _quantity(machine: Machine, option: str, text: str, dimension: str, expected: str) -> float:
+    from truepose.errors import ReadingError
+    from truepose.machine.units import UnitSystem
+
+    try:
+        value = UnitSystem(machine.file_units).read(text.strip(), dimension)
+    except ReadingError as failure:
+        raise _refusal(option, failure.found or text, expected) from None
+    if value <= 0.0:
+        raise _refusal(option, text, expected)
+    return value
+
+
+def _refusal(option: str, found: str, expected: str) -> Exception:
+    from truepose.errors import Problem, RequestError
+
+    return RequestError(
+        Problem("plan-option", f"{option} cannot be read", found=found, expected=expected)
+    )

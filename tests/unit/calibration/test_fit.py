@@ -1,0 +1,253 @@
+"""The fit: unknowns, warm and loaded rows, properties, outliers, gauge, and what is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import truepose as tp
+from build_machine import machine_files
+from machine_texts import PLANAR, edited, load_text
+from made_measurements import made_measurements, poses_within, reference_condition
+from truepose.calibration.identification.fit import Fit, fit
+from truepose.calibration.identification.problem import Problem
+from truepose.calibration.identification.robust import outliers
+from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
+from truepose.calibration.measurements import Measurements
+from truepose.errors import RequestError
+from truepose.machine import Condition, Machine
+
+FILES = {path.stem: path for path in machine_files()}
+CROSSED = tp.load(FILES["planar_crossed"])
+
+
+def codes(refused: pytest.ExceptionInfo[RequestError]) -> list[str]:
+    return [problem.code for problem in refused.value.problems]
+
+
+def tracked(machine: Machine, rows: int = 20, **others: object) -> Measurements:
+    """Positions in the base frame of the machine as filed, to 10 um."""
+    poses = poses_within(machine, rows, seed=3)
+    return made_measurements(machine, "position", poses, values="nominal", **others)  # type: ignore[arg-type]
+
+
+def read_of(
+    machine: Machine, data: Measurements, unknowns: Unknowns, truth: np.ndarray, seed: int | None
+) -> Measurements:
+    """What the machine with `truth` shows, with noise where there is a seed."""
+    read = Problem(machine, data, unknowns).predict(truth)
+    if seed is not None:
+        read += data.uncertainty * np.random.default_rng(seed).standard_normal(read.size)
+    return data.with_values(read)
+
+
+def fitted(machine: Machine, data: Measurements, *identify: str, **how: bool) -> Fit:
+    return fit(machine, data, unknowns_of(machine, data, identify), **how)
+
+
+def test_unknowns_are_the_variables_of_the_tolerances() -> None:
+    unknowns = unknowns_of(CROSSED, tracked(CROSSED))
+    assert len(set(unknowns.names)) == unknowns.count
+    for number, name in enumerate(unknowns.names):
+        moved = [
+            CROSSED.parameters[at] for at in unknowns.columns[unknowns.effects[:, number] != 0]
+        ]
+        assert name in moved or len(moved) > 1
+        assert np.abs(unknowns.effects[:, number]).max() == 1.0
+    assert np.isfinite(unknowns.prior_covariance).all()
+
+
+def test_patterns_choose_unknowns_and_may_bring_a_band() -> None:
+    data = tracked(CROSSED)
+    lengths = unknowns_of(CROSSED, data, ["strut.*.length=0.3 mm"])
+    assert set(lengths.names) == {f"strut.{strut.name}.length" for strut in CROSSED.struts}
+    np.testing.assert_allclose(lengths.half, 0.3e-3)
+    np.testing.assert_allclose(np.diagonal(lengths.prior_covariance), 0.3e-3**2 / 3.0)
+    scale = unknowns_of(CROSSED, data, [f"{CROSSED.drives[0].part}.scale"])
+    assert np.isinf(scale.prior_covariance[0, 0])  # without a tolerance: from the data alone
+
+
+@pytest.mark.parametrize(
+    ("identify", "code"),
+    [
+        ("strut.1.lenght", "unknown-parameter"),
+        ("strut.*.length=3 kN", "bad-band"),
+        ("strut.*.length=-1 mm", "bad-band"),
+        ("strut.*.length=wide", "bad-band"),
+    ],
+)
+def test_what_cannot_be_identified_is_refused(identify: str, code: str) -> None:
+    with pytest.raises(RequestError) as refused:
+        unknowns_of(CROSSED, tracked(CROSSED), [identify])
+    assert codes(refused) == [code]
+
+
+def test_a_machine_without_tolerances_has_nothing_to_identify() -> None:
+    bare = dataclasses.replace(CROSSED, sources=())
+    with pytest.raises(RequestError) as refused:
+        unknowns_of(bare, tracked(bare))
+    assert codes(refused) == ["no-unknowns"]
+
+
+def test_a_group_whose_middles_go_their_own_way_is_refused(tmp_path: Path) -> None:
+    group = (
+        '[tolerance]\n"drive.d1.origin.x" = { band = [-0.1, 0.3], group = "rails" }\n'
+        '"drive.d2.origin.x" = { band = [-0.3, 0.1], group = "rails" }\n[condition]'
+    )
+    machine = load_text(tmp_path, edited(PLANAR, ("[condition]", group)))
+    with pytest.raises(RequestError) as refused:
+        unknowns_of(machine, tracked(machine))
+    assert codes(refused) == ["bad-prior"]
+    together = load_text(
+        tmp_path, edited(PLANAR, ("[condition]", group.replace("[-0.3, 0.1]", "[-0.1, 0.3]")))
+    )
+    unknowns = unknowns_of(together, tracked(together))
+    rails = unknowns.names.index("rails")
+    np.testing.assert_allclose(unknowns.effects[:, rails].sum(), 2.0)
+    np.testing.assert_allclose(unknowns.prior_mean[rails], 0.1e-3)
+
+
+def test_too_few_readings_say_how_many_more() -> None:
+    data = tracked(CROSSED, rows=2)
+    with pytest.raises(RequestError) as refused:
+        fitted(CROSSED, data, use_prior=False)
+    (problem,) = refused.value.problems
+    assert problem.code == "too-few-measurements"
+    assert problem.found == "2 rows with 4 readings"
+    assert problem.expected is not None
+    assert problem.expected.startswith("2 more readings: 1 more rows")
+
+
+def test_readings_of_no_such_machine_are_refused() -> None:
+    data = tracked(CROSSED)
+    far = data.with_values(data.value + 3.0 * np.sign(data.value))
+    with pytest.raises(RequestError) as refused:
+        fitted(CROSSED, far, use_prior=False, robust=False)
+    assert codes(refused) == ["no-fit"]
+
+
+def test_warm_and_loaded_rows_give_the_cold_and_free_machine() -> None:
+    """Each row at a temperature and a load of its own: the same parameters as cold and free."""
+    machine = tp.load(FILES["hexapod"])
+    cold = reference_condition(machine)
+    conditions = tuple(
+        dataclasses.replace(
+            cold,
+            part_temperatures={"strut.2": 293.15 + row},
+            default_temperature=293.15 + 0.3 * row,
+            force=(10.0 * row, -40.0, 200.0),
+        )
+        for row in range(20)
+    )
+    data = tracked(machine, condition=conditions)
+    unknowns = unknowns_of(machine, data)
+    truth = 0.5 * unknowns.half * np.random.default_rng(2).uniform(-1.0, 1.0, unknowns.count)
+    read = read_of(machine, data, unknowns, truth, None)
+    plain = tracked(machine)
+    shown = Problem(machine, plain, unknowns).predict(truth)
+    assert np.abs(read.value - shown).max() > 20e-6  # heat and load do show
+    warm = fit(machine, read, unknowns, robust=False)
+    free = fit(machine, plain.with_values(shown), unknowns, robust=False)
+    np.testing.assert_allclose(warm.values, free.values, atol=0.05 * free.deviations.max())
+    assert np.abs(warm.residual).max() < 0.5
+    # As if they were cold, the same readings give another machine.
+    wrong = fit(machine, plain.with_values(read.value), unknowns, robust=False)
+    assert np.abs(wrong.residual).max() > 3.0
+
+
+def test_expansion_and_compliance_are_found() -> None:
+    machine = tp.load(FILES["hexapod"])
+    cold = reference_condition(machine)
+    random = np.random.default_rng(4)
+    conditions = tuple(
+        dataclasses.replace(
+            cold,
+            part_temperatures={
+                strut.part: 293.15 + random.uniform(0.0, 20.0) for strut in machine.struts
+            },
+            force=tuple(random.uniform(-800.0, 800.0, 3).tolist()),
+        )
+        for _ in range(40)
+    )
+    data = tracked(machine, rows=40, condition=conditions)
+    identify = ("strut.*.expansion", "strut.*.compliance")
+    unknowns = unknowns_of(machine, data, identify)
+    assert unknowns.units == ("1/K",) * 6 + ("1",) * 6 or set(unknowns.units) == {"1/K", "1"}
+    truth = np.array([2e-6 if unit == "1/K" else 0.2 for unit in unknowns.units])
+    truth *= random.uniform(-1.0, 1.0, truth.size)
+    exact = fit(machine, read_of(machine, data, unknowns, truth, None), unknowns, robust=False)
+    np.testing.assert_allclose(exact.values, truth, atol=1e-9 * np.abs(truth).max(), rtol=1e-6)
+    noisy = fit(machine, read_of(machine, data, unknowns, truth, 5), unknowns)
+    assert (np.abs(noisy.values - truth) < 5.0 * noisy.deviations).all()
+    assert (noisy.deviations[np.array(unknowns.units) == "1/K"] < 1e-6).all()
+
+
+def test_an_outlier_is_named_and_moves_nothing_much() -> None:
+    data = tracked(CROSSED, rows=30)
+    unknowns = unknowns_of(CROSSED, data)
+    truth = 0.5 * unknowns.half * np.random.default_rng(1).uniform(-1.0, 1.0, unknowns.count)
+    good = read_of(CROSSED, data, unknowns, truth, 7)
+    values = good.value.copy()
+    values[17] += 0.5e-3  # fifty standard uncertainties
+    bad = good.with_values(values)
+    (found,) = outliers(CROSSED, fit(CROSSED, bad, unknowns))[:1]
+    assert (found.row, found.instrument) == (int(bad.row[17]), "made")
+    assert abs(found.sigmas) > 40.0
+    assert "sigma off" in found.sentence
+    clean, robust = fit(CROSSED, good, unknowns), fit(CROSSED, bad, unknowns)
+    plain = fit(CROSSED, bad, unknowns, robust=False)
+    moved = np.abs((robust.values - clean.values) / clean.deviations).max()
+    assert moved < 1.0
+    assert moved < 0.2 * np.abs((plain.values - clean.values) / clean.deviations).max()
+    assert outliers(CROSSED, clean) == ()
+
+
+def test_what_is_not_determined_stays_as_filed() -> None:
+    """An offset and a length that no pose tells apart: only what is seen of them moves."""
+    machine = tp.load(FILES["linapod"])
+    data = made_measurements(machine, "pose", poses_within(machine, 25, seed=1), values="nominal")
+    identify = [f"{machine.drives[0].part}.{name}=0.1 mm" for name in ("offset", "origin.z")]
+    identify += [f"{machine.drives[0].part}.origin.{axis}=0.1 mm" for axis in "xy"]
+    unknowns = unknowns_of(machine, data, identify)
+    free = fit(machine, data, unknowns, use_prior=False)
+    assert len(free.null_space) == 1
+    assert np.isinf(free.deviations).any()
+    direction = free.null_space[0] * free.scale
+    np.testing.assert_allclose(free.problem.jacobian(free.values) @ direction, 0.0, atol=1e-9)
+    np.testing.assert_allclose(free.null_space @ (free.values / free.scale), 0.0, atol=1e-6)
+
+
+def test_the_two_signs_of_a_ball_bars_plane_are_both_tried() -> None:
+    """Poses in a plane see a centre over it or under it alike: the better one is kept."""
+    machine = tp.load(FILES["hexaglide"])
+    low = poses_within(machine, 24, seed=6)
+    low[:, 2] = low[0, 2]
+    for height in (-0.2, 0.2):
+        frame = (0.05, -0.1, float(low[0, 2] + height))
+        data = made_measurements(machine, "distance", low, frame="unknown")
+        (instrument,) = data.instruments
+        placed_at = dataclasses.replace(instrument.frame, origin=frame)
+        known = dataclasses.replace(
+            data, instruments=(dataclasses.replace(instrument, frame=placed_at),)
+        )
+        unknowns = unknowns_of(machine, data)
+        read = Problem(machine, known, unknowns).predict(np.zeros(unknowns.count))
+        found = fit(machine, data.with_values(read), unknowns)
+        assert np.abs(found.before).max() < 1e-3
+
+
+def test_a_condition_that_asks_for_what_the_machine_does_not_say_is_refused() -> None:
+    text = FILES["planar_crossed"].read_text(encoding="utf-8")
+    assert "expansion" in text or "material" in text
+    silent = dataclasses.replace(
+        CROSSED, struts=tuple(dataclasses.replace(s, expansion=None) for s in CROSSED.struts)
+    )
+    warm = dataclasses.replace(reference_condition(CROSSED), default_temperature=300.0)
+    data = tracked(CROSSED, condition=warm)
+    with pytest.raises(tp.errors.TrueposeError) as refused:
+        fitted(silent, data)
+    assert {problem.code for problem in refused.value.problems} == {"no-expansion"}
+    assert isinstance(warm, Condition)

@@ -68,6 +68,20 @@ class Calibration:
         names = [self.machine.parameters[column] for column in unknowns.columns]
         return self.machine.replace(dict(zip(names, nominal.tolist(), strict=True)))
 
+    def save(
+        self,
+        path: str | Path,
+        *,
+        original: str | Path,
+        date: str,
+        as_shifts: bool = False,
+        force: bool = False,
+    ) -> Machine:
+        """Write the calibrated machine file; see `truepose.calibration.result.save.save`."""
+        from truepose.calibration.result.save import save
+
+        return save(self, path, original=original, date=date, as_shifts=as_shifts, force=force)
+
     @property
     def dataset(self) -> xr.Dataset:
         """Everything as data; `docs/calibration.md` has the schema."""

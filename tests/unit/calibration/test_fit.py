@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,9 @@ from truepose.calibration.identification.fit import Fit, fit
 from truepose.calibration.identification.problem import Problem
 from truepose.calibration.identification.robust import outliers
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
+from truepose.calibration.instruments import Frame
 from truepose.calibration.measurements import Measurements
+from truepose.calibration.measurements.arrays import joined
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
 
@@ -251,3 +254,40 @@ def test_a_condition_that_asks_for_what_the_machine_does_not_say_is_refused() ->
         fitted(silent, data)
     assert {problem.code for problem in refused.value.problems} == {"no-expansion"}
     assert isinstance(warm, Condition)
+
+
+def test_several_instruments_are_fitted_together() -> None:
+    """A tracker somewhere, a ball bar with a wrong length, a camera: each says what it can."""
+    machine = tp.load(FILES["hexaglide"])
+    poses = poses_within(machine, 24, seed=8)
+    turned = Frame(
+        (1.5, -2.0, 0.4),
+        (math.cos(1.3), 0.0, 0.6 * math.sin(1.3), 0.8 * math.sin(1.3)),
+        (True,) * 6,
+    )
+    data = joined(
+        made_measurements(machine, "position", poses, name="tracker", frame="unknown"),
+        made_measurements(machine, "distance", poses, name="bar", bias_unknown=True),
+        made_measurements(machine, "strut-direction", poses[:6], name="camera", frame="unknown"),
+    )
+    # Where the tracker and the camera really are nobody tells the fit.
+    instruments = tuple(
+        dataclasses.replace(each, frame=dataclasses.replace(turned, unknown=each.frame.unknown))
+        if each.name != "bar"
+        else each
+        for each in data.instruments
+    )
+    really = dataclasses.replace(data, instruments=instruments)
+    unknowns = unknowns_of(machine, data)
+    assert {"tracker.frame.rx", "bar.bias.distance", "camera.frame.rz"} <= set(unknowns.names)
+    truth = np.zeros(unknowns.count)
+    truth[: unknowns.n_machine] = 0.5 * np.sqrt(
+        np.diagonal(unknowns.prior_covariance)[: unknowns.n_machine]
+    )
+    truth[unknowns.names.index("bar.bias.distance")] = 35e-6
+    read = data.with_values(Problem(machine, really, unknowns).predict(truth))
+    found = fit(machine, read, unknowns, robust=False)
+    assert np.abs(found.residual).max() < 0.2  # nothing but the pull of the tolerances
+    assert abs(found.values[unknowns.names.index("bar.bias.distance")] - 35e-6) < 5e-6
+    tracker = found.measurements.instruments[0].frame
+    assert np.linalg.norm(np.subtract(tracker.origin, turned.origin)) < 1e-3

@@ -177,8 +177,8 @@ def _told(view: View, code: str, mends: list[Mend]) -> Suspicion:
     return Suspicion(
         code,
         f"{view.instrument.name}: it looks as if {first.words}{either}: as given the readings are "
-        f"{view.amount(before, unit_of)} (rms) from where the nominal machine would be, so "
-        f"{view.amount(after, unit_of)}",
+        f"{view.amount(before, unit_of)} (rms) from where the nominal machine would be, "
+        f"with that mended {view.amount(after, unit_of)}",
         view.instrument.name,
         first.where,
         first.rows,

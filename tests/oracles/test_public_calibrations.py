@@ -286,7 +286,7 @@ def rod_found(machine: Machine, data: Measurements) -> tuple[float, float]:
     assert unknowns.count == REPRAP["published"]["factors"]
     found = fit(machine, data, unknowns, use_prior=False, robust=False)
     at = unknowns.names.index("rod length")
-    return ROD + float(found.values[at]) / MM, float(found.deviations[at]) / MM
+    return ROD + float(found.values[at]) / MM, float(found.deviations[at]) / found.birge / MM
 
 
 def test_reprap_unguarded_fit_lets_the_rods_go(tmp_path: Path) -> None:

@@ -11,20 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.calibration.gate.verdict import MARGIN, Gate, HeldOut, judge
-from truepose.calibration.identification.fit import Fit, fit
+from truepose.calibration.identification.considered import considered, with_considered
+from truepose.calibration.identification.fit import Fit, fit, placed
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
     candidates,
     tool_effects,
     workspace_poses,
 )
-from truepose.calibration.identification.unknowns import unknowns_of
+from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.calibration.identification.validate import Validation, validate
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.reading import read_measurements
 from truepose.calibration.suspicions import Suspicion, suspicions
-from truepose.errors import RequestError
+from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.sources._base import Flags, Floats
 
@@ -118,9 +119,11 @@ def calibrate(
     `TrueposeError` where a row's temperatures or loads ask for what the machine does not say.
     """
     whole = data if isinstance(data, Measurements) else read_measurements(data, machine)
-    suspected = suspicions(machine, whole)
+    if whole.held_out.all():
+        raise _nothing_to_fit(whole)
     table, joints, placements = workspace_poses(machine, poses)
     unknowns = unknowns_of(machine, whole, identify)
+    suspected = _suspected(machine, whole, unknowns)
     used = whole.select(~whole.held_out) if whole.held_out.any() else whole
     try:
         fitted = fit(machine, used, unknowns, use_prior=use_prior, robust=robust)
@@ -129,17 +132,48 @@ def calibrate(
     checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
     gate = _judged(machine, fitted, checked, effects, placements[usable, :3], margin)
+    rest = considered(machine, fitted, identify, joints[usable], placements[usable])
+    gate = with_considered(gate, rest, (machine.accuracy.target, machine.accuracy.angle_target))
     return Calibration(
         machine,
         whole,
         fitted,
         gate,
-        outliers(machine, fitted),
+        outliers(machine, fitted, whole, checked),
         suspected,
         checked,
         table,
         usable,
         seed,
+    )
+
+
+def _suspected(machine: Machine, whole: Measurements, unknowns: Unknowns) -> tuple[Suspicion, ...]:
+    """What is suspected, with unknown frames first set where they fit best.
+
+    A blunder may lead them astray: what then stays unexplained is looked at with the frames as
+    declared too.
+    """
+    try:
+        standing = placed(machine, whole, unknowns)[0].measurements
+    except RequestError:
+        return suspicions(machine, whole)
+    found = suspicions(machine, standing)
+    if standing.instruments == whole.instruments or all(each.code != "far-off" for each in found):
+        return found
+    declared = suspicions(machine, whole)
+    return found if any(each.code == "far-off" for each in declared) else declared
+
+
+def _nothing_to_fit(whole: Measurements) -> RequestError:
+    return RequestError(
+        Problem(
+            "too-few-measurements",
+            "every row is kept from the fit",
+            whole.file or None,
+            found=f"{whole.n_row} rows to check with, none to fit",
+            expected="rows to fit, and some to check with",
+        )
     )
 
 
@@ -174,17 +208,22 @@ def _judged(
         weights=fitted.weights,
         by=phrases(machine, fitted.measurements),
         nominal=_nominal(machine, fitted),
-        held_out=_held_out(checked),
+        held_out=_held_out(fitted, checked),
         target=(accuracy.target, accuracy.angle_target),
         candidates=candidates(machine, fitted),
         margin=margin,
+        noise=(fitted.noise, fitted.freedom),
     )
 
 
-def _held_out(checked: Validation | None) -> tuple[HeldOut, ...]:
+def _held_out(fitted: Fit, checked: Validation | None) -> tuple[HeldOut, ...]:
     if checked is None or not checked.used.any():
         return ()
-    return (HeldOut(checked.rms_before, checked.rms_after),)
+    # Without tolerances nothing else shows that a fit promises too little to be of use.
+    unknowns = fitted.unknowns
+    compared = bool(unknowns.has_prior[: unknowns.n_machine].all())
+    consistent = compared and checked.consistent
+    return (HeldOut(checked.rms_before, checked.rms_after, consistent=consistent),)
 
 
 def phrases(machine: Machine, measurements: Measurements) -> list[str]:

@@ -21,6 +21,7 @@ from truepose.cli._options import (
 if TYPE_CHECKING:
     from truepose.calibration.calibrate import Calibration
     from truepose.machine import Machine
+    from truepose.report.result import Result
 
 _FILE = click.Path(path_type=Path)
 
@@ -114,9 +115,12 @@ def command(**options: Any) -> int:
     """
     asked = _Asked(options)
     asked.check()
+    from dataclasses import replace
+
     from truepose.calibration.calibrate import calibrate
     from truepose.cli import _work
     from truepose.cli._progress import waiting
+    from truepose.errors import TrueposeError
     from truepose.output import require_writable
     from truepose.report.result import Result
 
@@ -142,17 +146,21 @@ def command(**options: Any) -> int:
             margin=options["margin"],
         )
         dataset = found.dataset
+    result = Result("calibrate", machine, dataset)
+    failure = None
+    try:
+        _write_files(asked, found, result)
+    except TrueposeError as error:  # the answer is printed all the same
+        failure = error
     shown = []
     if request.format == "table":
         from truepose.report.calibration import tables
 
         click.echo(_folded(dataset.attrs["answer"]) + "\n")
         shown = tables(dataset)
-    _work.deliver(request, Result("calibrate", machine, dataset), shown)
-    if asked.page is not None:
-        _write_page(request, machine, dataset, asked.page)
-    if asked.machine_output is not None:
-        _write_machine(asked, found)
+    _work.deliver(replace(request, output=None), result, shown)
+    if failure is not None:
+        raise failure
     return 0 if found.accepted or options["force"] else 1
 
 
@@ -194,8 +202,23 @@ def _folded(text: str) -> str:
     return textwrap.fill(text, 100)
 
 
+def _write_files(asked: _Asked, found: Calibration, result: Result) -> None:
+    """All files that are asked for, before anything is printed: a reader may stop reading."""
+    from truepose.cli._work import note_written
+    from truepose.report import formats
+
+    if asked.request.output is not None:
+        formats.write(result, asked.request.output)
+        note_written(asked.request.output)
+    if asked.page is not None:
+        _write_page(asked.request, result.machine, result.dataset, asked.page)
+    if asked.machine_output is not None:
+        _write_machine(asked, found)
+
+
 def _write_machine(asked: _Asked, found: Calibration) -> None:
     """The calibrated file, unless the answer is no and nobody forces it."""
+    from truepose.calibration.dataset import verdict_of
     from truepose.calibration.result.save import save
     from truepose.cli._work import note_written
 
@@ -208,7 +231,7 @@ def _write_machine(asked: _Asked, found: Calibration) -> None:
             err=True,
         )
         return
-    save(
+    written = save(
         found,
         asked.machine_output,
         original=asked.request.machine_file,
@@ -217,6 +240,10 @@ def _write_machine(asked: _Asked, found: Calibration) -> None:
         force=asked.force,
     )
     note_written(asked.machine_output)
+    said = () if written.calibration is None else written.calibration.warning
+    for each in said:
+        if each != verdict_of(found):  # that is printed as the answer
+            click.echo(f"Warning, inside the file too: {each}.", err=True)
     if not found.accepted:
         click.echo("The answer is NO: the file was forced, and says so inside.", err=True)
 

@@ -26,8 +26,9 @@ def command(old_file: Path, new_file: Path, **options: Any) -> int:
 
     Is it still the same? Exit code 0: it did not change beyond what both files say of their
     uncertainty. Exit code 1: it did. Compares parameter by parameter, all parameters together, and
-    where the tool goes. Two calibrations of an unchanged machine are told apart by chance in 5 % of
-    cases.
+    where the tool goes. Two calibrations of an unchanged machine are told apart by chance in at
+    most 5 % of cases, and in far fewer where both rest on the same tolerances: then small changes
+    are missed.
     """
     import truepose
     from truepose.calibration.result.compare import compare

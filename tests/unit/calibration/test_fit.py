@@ -202,9 +202,11 @@ def test_an_outlier_is_named_and_moves_nothing_much() -> None:
     assert "sigma off" in found.sentence
     clean, robust = fit(CROSSED, good, unknowns), fit(CROSSED, bad, unknowns)
     plain = fit(CROSSED, bad, unknowns, robust=False)
-    moved = np.abs((robust.values - clean.values) / clean.deviations).max()
-    assert moved < 1.0
-    assert moved < 0.2 * np.abs((plain.values - clean.values) / clean.deviations).max()
+    assert np.abs((robust.values - clean.values) / clean.deviations).max() < 0.5
+    # Counted in full it makes all other readings suspect as well.
+    assert robust.birge < 1.3
+    assert plain.birge > 4.0
+    np.testing.assert_allclose(robust.deviations, clean.deviations, rtol=0.2)
     assert outliers(CROSSED, clean) == ()
 
 
@@ -291,3 +293,46 @@ def test_several_instruments_are_fitted_together() -> None:
     assert abs(found.values[unknowns.names.index("bar.bias.distance")] - 35e-6) < 5e-6
     tracker = found.measurements.instruments[0].frame
     assert np.linalg.norm(np.subtract(tracker.origin, turned.origin)) < 1e-3
+
+
+def test_noise_larger_than_stated_is_found_and_believed() -> None:
+    """Of 30 machines read with five times the stated noise the errors are as large as stated."""
+    data = tracked(CROSSED, rows=25)
+    unknowns = unknowns_of(CROSSED, data)
+    random = np.random.default_rng(11)
+    known = np.diagonal(np.sqrt(unknowns.prior_covariance))
+    quotients, noise = [], []
+    for seed in range(30):
+        truth = known * random.standard_normal(unknowns.count)
+        read = read_of(CROSSED, data, unknowns, truth, None)
+        wide = 5.0 * data.uncertainty * np.random.default_rng(seed).standard_normal(len(read.value))
+        found = fit(CROSSED, read.with_values(read.value + wide), unknowns)
+        quotients.append((found.values - truth) / found.deviations)
+        noise.append(found.noise)
+    assert abs(np.mean(noise) - 5.0) < 0.3
+    assert abs(np.sqrt(np.mean(np.square(quotients))) - 1.0) < 0.15
+
+
+def test_what_is_seen_too_little_to_be_followed_counts_as_undetermined() -> None:
+    """A target on a platform that hardly tilts: held where it starts, and said to be open."""
+    machine = tp.load(FILES["linear_delta"])
+    data = tracked(machine, rows=30, frame="unknown", target_unknown=True)
+    unknowns = unknowns_of(machine, data)
+    truth = np.zeros(unknowns.count)
+    known = unknowns.has_prior
+    truth[known] = 0.5 * np.sqrt(np.diagonal(unknowns.prior_covariance)[known])
+    found = fit(machine, read_of(machine, data, unknowns, truth, 3), unknowns)
+    at = [number for number, name in enumerate(unknowns.names) if ".target." in name]
+    assert np.isinf(found.deviations[at]).any()
+    assert np.abs(found.values[at]).max() < 1e-3
+
+
+def test_variables_that_are_one_have_a_prior_all_the_same(tmp_path: Path) -> None:
+    tolerance = (
+        '[tolerance]\n"drive.d1.origin.x" = 0.1\n"drive.d2.origin.x" = 0.1\n'
+        '[[correlation]]\nbetween = ["drive.*.origin.x"]\ncoefficient = 1.0\n[condition]'
+    )
+    machine = load_text(tmp_path, edited(PLANAR, ("[condition]", tolerance)))
+    found = fitted(machine, tracked(machine))
+    rails = [number for number, name in enumerate(found.unknowns.names) if "origin" in name]
+    assert abs(found.values[rails[0]] - found.values[rails[1]]) < 1e-9

@@ -115,6 +115,7 @@ class Case:
         measured: tuple[float | None, float | None],
         target: tuple[float | None, float | None],
         margin: float,
+        noise: tuple[float, float] | None = None,
     ) -> Case:
         """Raises `ValueError` for arrays whose shapes do not fit."""
         n, n_machine = len(unknowns.names), unknowns.n_machine
@@ -132,8 +133,10 @@ class Case:
                 raise ValueError(f"{name}: not finite")
         rows = weighted(jacobian, weights)
         held = prior_rows(unknowns.prior_covariance) if use_prior else np.zeros((0, n))
-        degrees = float(weights.sum()) - fitted(rows, held)
-        rms = normalised_rms(residual, weights, degrees)
+        if noise is None:
+            degrees = float(np.count_nonzero(weights)) - fitted(rows, held)
+            noise = (normalised_rms(residual, weights, degrees), degrees)
+        rms, degrees = noise
         birge = max(1.0, rms) if np.isfinite(rms) else 1.0
         triangle = np.linalg.qr(rows / birge, mode="r") if rows.shape[0] > n else rows / birge
         return cls(

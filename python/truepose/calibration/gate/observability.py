@@ -268,10 +268,10 @@ def fitted(rows: Floats, held: Floats) -> float:
 
 
 def normalised_rms(residual: Floats, weights: Floats, degrees: float) -> float:
-    """Root mean square of normalised residuals over their degrees of freedom; NaN with none."""
+    """Root mean square of weighted residuals over their degrees of freedom; NaN with none."""
     if degrees < 0.5:
         return float("nan")
-    return float(np.sqrt(np.sum(weights * residual**2) / degrees))
+    return float(np.sqrt(np.sum((weights * residual) ** 2) / degrees))
 
 
 def _lengths(matrix: Floats) -> Floats:

@@ -14,9 +14,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.calibration.identification.frames import with_frames_found
+from truepose.calibration.identification.frames import (
+    FAR,
+    TURNED,
+    rebased,
+    turned_further,
+    with_frames_found,
+)
 from truepose.calibration.identification.problem import Prior, Problem
-from truepose.calibration.identification.robust import LOSS_ROUNDS, weights_of
+from truepose.calibration.identification.robust import LOSS_ROUNDS, noise_of, weights_of
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.measurements import Measurements
 from truepose.errors import Problem as Refused
@@ -68,13 +74,24 @@ class Fit:
     """(n,) the machine as filed, 0, and where the instruments then are."""
     problem: Problem
     evaluations: int = 0
+    noise: float = float("nan")
+    """Residuals in stated uncertainties, robust, over their freedom; NaN where there is none."""
 
     @property
     def standardised(self) -> Floats:
         """(m,) residuals in units of their own standard deviation after the fit."""
         left = np.maximum(1.0 - self.leverage, 1e-12)
-        standardised: Floats = self.residual / np.sqrt(left)
+        standardised: Floats = self.residual / (self.birge * np.sqrt(left))
         return standardised
+
+    @property
+    def birge(self) -> float:
+        """By what the stated uncertainties were multiplied, for fit and covariance: 1 or more.
+
+        Where residuals are larger than they should be, readings weigh less against what was known
+        beforehand (R. T. Birge, Phys. Rev. 40 (1932) 207-227).
+        """
+        return max(1.0, self.noise) if np.isfinite(self.noise) else 1.0
 
     @property
     def freedom(self) -> float:
@@ -99,8 +116,17 @@ class Equations:
     """(n, n): rows are right singular vectors, in the order of `singular`."""
 
     @classmethod
-    def of(cls, jacobian: Floats, prior: Prior, unknowns: Unknowns) -> Equations:
-        """Scaled by the tolerances' standard deviations, else by their columns."""
+    def of(
+        cls,
+        jacobian: Floats,
+        prior: Prior,
+        unknowns: Unknowns,
+        left_out: Floats | None = None,
+    ) -> Equations:
+        """Scaled by the tolerances' standard deviations, else by their columns.
+
+        Along `left_out` (k, n), in the unknowns' own units, nothing counts as determined.
+        """
         equations = np.vstack([jacobian, prior.rows])
         norms = np.linalg.norm(equations, axis=0)
         # A column of rounding is none: scaled by its length it would seem well determined.
@@ -111,7 +137,11 @@ class Equations:
         scale = np.where(norms > 0.0, 1.0 / np.where(norms > 0.0, norms, 1.0), 1.0)
         scale[known] = np.sqrt(variances[known])
         count = unknowns.count
-        factor = np.linalg.qr(equations * scale, mode="r")
+        scaled = equations * scale
+        if left_out is not None and len(left_out):
+            basis = np.linalg.qr((left_out / scale).T)[0].T
+            scaled = scaled - scaled @ basis.T @ basis
+        factor = np.linalg.qr(scaled, mode="r")
         _, found, directions = np.linalg.svd(factor, full_matrices=True)
         singular = np.zeros(count)
         singular[: found.size] = found
@@ -178,29 +208,43 @@ def fit(
     prior = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
     prior = Prior(prior.rows, unknowns.prior_mean)
     values = unknowns.prior_mean if start is None else start
-    equations = Equations.of(whitened(problem, values), prior, unknowns)
-    weights = np.ones(measurements.n_observation)
-    evaluations = 0
-    for _ in range(LOSS_ROUNDS if robust else 1):
+    slope = whitened(problem, values)
+    equations = Equations.of(slope, prior, unknowns)
+    weights, scale, noise = np.ones(measurements.n_observation), 1.0, float("nan")
+    factor = weights
+    evaluations, same = 0, True
+    freed, left_out = np.empty((0, unknowns.count)), None
+    for _ in range(LOSS_ROUNDS):
         held = prior.with_rows(equations.holding())
-        solved = problem.solve(prior=held, weights=weights, start=values)
+        solved = problem.solve(prior=held, weights=weights / scale**2, start=values)
         evaluations += solved.evaluations[0]
         # Readings that fit to the last digit leave nothing that a step could be judged by.
         exact = solved.cost[0] < EXACT**2 * measurements.n_observation
-        if solved.ending[0] not in SETTLED and not exact:
+        settled = solved.ending[0] in SETTLED or exact
+        usable = settled and np.isfinite(problem.jacobian(solved.values[0])).all()
+        if not (usable or same) and left_out is None:
+            # What the first solution begins to see is seen too little to be followed.
+            left_out = freed
+            equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
+            continue
+        if not settled:
             raise _no_fit(problem, f"it ended as {solved.ending[0]}", np.empty(0, np.intp))
         values = solved.values[0]
         residual = problem.residual(values)
-        if not robust:
+        slope = whitened(problem, values)
+        freed = equations.null_space * equations.scale
+        factor = np.sqrt(weights) / scale
+        equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
+        covariance = equations.covariance
+        leverage = np.einsum("ij,jk,ik->i", slope, covariance, slope) * factor**2
+        noise = noise_of(weights * residual, float(np.sum(1.0 - leverage)))
+        larger = max(1.0, noise) if np.isfinite(noise) else 1.0
+        changed = weights_of(residual / larger) if robust else weights
+        # What nothing saw at the start may be seen where the machine really is.
+        same = len(equations.null_space) == len(freed)
+        if same and abs(larger / scale - 1.0) < 1e-3 and np.abs(changed - weights).max() < 1e-3:
             break
-        changed = weights_of(residual)
-        if np.abs(changed - weights).max() < 1e-4:
-            break
-        weights = changed
-    slope = whitened(problem, values)
-    equations = Equations.of(np.sqrt(weights)[:, np.newaxis] * slope, prior, unknowns)
-    covariance = equations.covariance
-    leverage = weights * np.einsum("ij,jk,ik->i", slope, covariance, slope)
+        weights, scale = changed, larger
     return Fit(
         unknowns,
         problem.measurements,
@@ -217,6 +261,7 @@ def fit(
         as_filed,
         problem,
         evaluations,
+        noise,
     )
 
 
@@ -225,31 +270,65 @@ def placed(
 ) -> tuple[Problem, Floats]:
     """The problem, its instruments where the machine as filed has them, and values (n,) of that.
 
-    Of several starts of the frames the one that fits best is taken.
+    Of several starts of the frames the one that fits best is taken, one that settles before one
+    that does not; frames that then still are far from fitting are turned further.
+
+    Raises `RequestError` (no-fit) where from no start the readings can be followed.
     """
-    best: tuple[float, Problem, Floats] | None = None
-    for each in with_frames_found(machine, measurements):
-        problem = Problem(machine, each, unknowns)
-        values = np.zeros(unknowns.count)
-        values[unknowns.n_machine :] = _instruments(machine, each, unknowns)
-        cost = float(np.sum(problem.residual(values) ** 2))
-        if best is None or cost < best[0]:
-            best = (cost, problem, values)
-    assert best is not None
-    return best[1], best[2]
+    best: tuple[bool, float, Problem, Floats] | None = None
+    refused: RequestError | None = None
+    of = measurements.instrument[measurements.row]
+    for number in [None, *unknowns.frames]:
+        if number is None:
+            starts = with_frames_found(machine, measurements)
+        elif best is None:
+            starts = turned_further(machine, measurements, number)
+        else:
+            # Each instrument on its own: on a machine as filed none depends on another.
+            residual = best[2].residual(best[3])[of == number]
+            near = not best[0] and float(np.sum(residual**2)) <= FAR**2 * residual.size
+            starts = [] if near else turned_further(machine, best[2].measurements, number)
+        for each in starts:
+            try:
+                found = _instruments(machine, each, unknowns.of_instruments)
+            except RequestError as failure:
+                refused = failure
+                continue
+            if best is None or found[:2] < best[:2]:
+                best = found
+    if best is None:
+        assert refused is not None
+        raise refused
+    alone, values = best[2].unknowns, best[3]
+    standing = best[2].measurements
+    turns = [at for own in alone.frames.values() for at in own[3:6] if at is not None]
+    if np.abs(values[turns]).max(initial=0.0) > TURNED:
+        standing = rebased(standing, alone, values)
+        values = _instruments(machine, standing, alone)[3]
+    machine_too = np.concatenate([np.zeros(unknowns.n_machine), values])
+    return Problem(machine, standing, unknowns), machine_too
 
 
-def _instruments(machine: Machine, measurements: Measurements, unknowns: Unknowns) -> Floats:
-    """Values of the instruments' unknowns that fit the machine as filed."""
-    alone = unknowns.of_instruments
-    start = np.zeros(alone.count)
-    if not alone.count:
-        return start
+def _instruments(
+    machine: Machine, measurements: Measurements, alone: Unknowns
+) -> tuple[bool, float, Problem, Floats]:
+    """(whether unsettled, cost, problem, values) of the instruments' unknowns alone.
+
+    They fit the machine as filed; an infinite cost where a reading is not finite.
+    """
     problem = Problem(machine, measurements, alone)
-    none = Prior.none(alone.count)
-    held = none.with_rows(Equations.of(whitened(problem, start), none, alone).holding())
-    values: Floats = problem.solve(prior=held, start=start).values[0]
-    return values
+    values = np.zeros(alone.count)
+    unsettled = False
+    if alone.count:
+        none = Prior.none(alone.count)
+        held = none.with_rows(Equations.of(whitened(problem, values), none, alone).holding())
+        solved = problem.solve(prior=held, start=values)
+        values = solved.values[0]
+        unsettled = solved.ending[0] not in SETTLED
+    cost = float(np.sum(problem.residual(values) ** 2))
+    if not np.isfinite(cost):
+        return True, np.inf, problem, values
+    return unsettled and cost > EXACT**2 * measurements.n_observation, cost, problem, values
 
 
 def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bool) -> None:

@@ -2,16 +2,19 @@
 
 The search for an unknown frame is not linear in its rotation, so it starts from the rigid motion
 that fits the nominal points best (B. K. P. Horn, Closed-form solution of absolute orientation using
-unit quaternions, J. Opt. Soc. Am. A 4 (1987) 629-642), and from trilateration for distances.
+unit quaternions, J. Opt. Soc. Am. A 4 (1987) 629-642), and from trilateration for distances. Where
+there is no closed form it starts from the declared frame, and from that turned about.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 
-from truepose.calibration.instruments._base import Frame, Instrument
+from truepose.calibration.identification.unknowns import Unknowns
+from truepose.calibration.instruments._base import Frame
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Machine
@@ -21,18 +24,92 @@ from truepose.sources._block import rotations_of
 _NUMBER = {name: number for number, name in enumerate(OBSERVABLES)}
 _ORIGIN, _ROTATION = slice(0, 3), slice(3, 6)
 
+FAR = 10.0
+"""Root mean square of an instrument's residuals, in uncertainties, from which its frame is sought
+further; a machine within wide tolerances may be so far off too, and then nothing is lost."""
+
+TURNED = 0.5
+"""rad of a rotation unknown from which the frame is set down where it was found: half a turn of one
+is infinite."""
+
+_ALONG = 1.0 - 1e-6
+"""Cosine from which two axes are one."""
+
 
 def with_frames_found(machine: Machine, measurements: Measurements) -> list[Measurements]:
     """The measurements with unknown frames set to where the nominal machine says they are.
 
-    Usually one; where distances leave two sides of a plane open, one for each. Frames that are
-    known in part, or of which too little was measured, start where they are declared.
+    Usually one; where distances leave two sides of a plane open, one for each. Frames that no
+    closed form finds start where they are declared; see `turned_further`.
     """
     found = [measurements]
     for number, instrument in enumerate(measurements.instruments):
-        starts = _starts(machine, measurements, number, instrument)
+        starts = _closed_forms(machine, measurements, number) or [instrument.frame]
         found = [_replaced(each, number, start) for each in found for start in starts]
     return found
+
+
+def turned_further(machine: Machine, measurements: Measurements, number: int) -> list[Measurements]:
+    """The measurements with one frame turned about what is unknown of its rotation; further starts.
+
+    About one axis by eighths of a turn, about two by thirds of a half turn in eight directions,
+    about three by the rotations of a cube; its origin where the readings then put it. None where
+    nothing of the rotation is unknown, or a closed form finds it.
+    """
+    frame = measurements.instruments[number].frame
+    axes = np.flatnonzero(frame.unknown[_ROTATION])
+    if not axes.size or _closed_forms(machine, measurements, number):
+        return []
+    points, _ = _looked_at(measurements, number)
+    read = _table(measurements, number)
+    rotation = rotation_matrix(frame.rotation)
+    return [
+        _replaced(measurements, number, _with_origin(frame, turn @ rotation, points, read))
+        for turn in _turns(axes)
+    ]
+
+
+def rebased(measurements: Measurements, unknowns: Unknowns, values: Floats) -> Measurements:
+    """The measurements with unknown frames moved by the values (n,) that were found for them."""
+    for number, own in unknowns.frames.items():
+        moved = np.array([0.0 if at is None else values[at] for at in own[:6]])
+        frame = measurements.instruments[number].frame
+        # The kernel's rotation unknowns: the quaternion (1, turn / 2), not of length 1.
+        turn = np.concatenate([[1.0], 0.5 * moved[_ROTATION]])
+        w, x, y, z = (turn / np.linalg.norm(turn)).tolist()
+        frame = dataclasses.replace(
+            frame,
+            origin=tuple((np.array(frame.origin) + moved[_ORIGIN]).tolist()),
+            rotation=quaternion_of(rotation_matrix((w, x, y, z)) @ rotation_matrix(frame.rotation)),
+        )
+        measurements = _replaced(measurements, number, frame)
+    return measurements
+
+
+def _turns(axes: np.ndarray) -> list[Floats]:
+    """Rotations (3, 3) about the base axes of these numbers, none of them the identity."""
+    if axes.size == 3:
+        found: list[Floats] = []
+        for order in itertools.permutations(range(3)):
+            for signs in itertools.product((1.0, -1.0), repeat=3):
+                cube = np.eye(3)[list(order)] * np.array(signs)
+                if np.linalg.det(cube) > 0.0 and np.trace(cube) < 2.5:
+                    found.append(cube)
+        return found
+    if axes.size == 1:
+        return [_turn(np.eye(3)[axes[0]], eighth * np.pi / 4.0) for eighth in range(1, 8)]
+    first, second = np.eye(3)[axes]
+    return [
+        _turn(np.cos(way) * first + np.sin(way) * second, angle)
+        for angle in (np.pi / 3.0, np.pi / 1.5, np.pi)
+        for way in np.arange(8) * np.pi / 4.0
+    ]
+
+
+def _turn(axis: Floats, angle: float) -> Floats:
+    """(3, 3) about a unit axis (3,) by an angle, rad."""
+    x, y, z = (np.sin(0.5 * angle) * axis).tolist()
+    return rotation_matrix((float(np.cos(0.5 * angle)), x, y, z))
 
 
 def _replaced(measurements: Measurements, number: int, frame: Frame) -> Measurements:
@@ -41,26 +118,62 @@ def _replaced(measurements: Measurements, number: int, frame: Frame) -> Measurem
     return dataclasses.replace(measurements, instruments=tuple(instruments))
 
 
-def _starts(
-    machine: Machine, measurements: Measurements, number: int, instrument: Instrument
-) -> list[Frame]:
-    frame = instrument.frame
+def _looked_at(measurements: Measurements, number: int) -> tuple[Floats, Floats]:
+    """Target points (n, 3) in the base frame and rotations (n, 3, 3) of an instrument's rows."""
+    rows = np.flatnonzero(measurements.instrument == number)
+    rotations = rotations_of(measurements.placements[rows])
+    arm = rotations @ np.array(measurements.instruments[number].target)
+    return measurements.placements[rows, :3] + arm, rotations
+
+
+def _closed_forms(machine: Machine, measurements: Measurements, number: int) -> list[Frame]:
+    """Frames that fit the nominal machine best; empty where no closed form finds them."""
+    frame = measurements.instruments[number].frame
     unknown = np.array(frame.unknown)
     if not unknown.any():
         return [frame]
     read = _table(measurements, number)
-    rows = np.flatnonzero(measurements.instrument == number)
-    rotations = rotations_of(measurements.placements[rows])
-    points = measurements.placements[rows, :3] + rotations @ np.array(instrument.target)
+    points, rotations = _looked_at(measurements, number)
     if "distance" in read and unknown[_ORIGIN].any():
         return _by_distances(frame, points, read["distance"])
-    if all(axis in read for axis in "xyz"):
-        whole = np.asarray(np.isfinite([read[axis] for axis in "xyz"]).all(axis=0))
-        seen = np.stack([read[axis] for axis in "xyz"], axis=1)[whole]
-        return [_by_points(frame, points[whole], seen, rotations[whole], read, whole)]
+    if not unknown[_ROTATION].any():
+        return [_with_origin(frame, rotation_matrix(frame.rotation), points, read)]
     if any(f"direction.{axis}" in read for axis in "xyz"):
-        return [_by_directions(machine, measurements, number, frame)]
-    return [frame]
+        product = _of_directions(machine, measurements, number)
+    elif all(angle in read for angle in "abc"):
+        product = _of_angles(rotations, read)
+    else:
+        product = _of_points(frame, points, read)
+    rotation = None if product is None else _rotation_by(frame, product)
+    return [] if rotation is None else [_with_origin(frame, rotation, points, read)]
+
+
+def _rotation_by(frame: Frame, product: Floats) -> Floats | None:
+    """(3, 3) R with the largest trace(R^T product) that what is unknown of the frame allows."""
+    axes = np.flatnonzero(frame.unknown[_ROTATION])
+    if axes.size == 3:
+        return nearest_rotation(product)
+    if axes.size != 1:
+        return None
+    rotation = rotation_matrix(frame.rotation)
+    i, j = (axes[0] + 1) % 3, (axes[0] + 2) % 3
+    turned = product @ rotation.T
+    angle = np.arctan2(turned[j, i] - turned[i, j], turned[i, i] + turned[j, j])
+    return _turn(np.eye(3)[axes[0]], float(angle)) @ rotation
+
+
+def _with_origin(frame: Frame, rotation: Floats, points: Floats, read: dict[str, Floats]) -> Frame:
+    """The frame so turned, its origin where the coordinates read of points (n, 3) put it."""
+    origin = np.array(frame.origin)
+    free = np.array(frame.unknown[_ORIGIN])
+    axes = [at for at, axis in enumerate("xyz") if axis in read]
+    if axes and free.any():
+        seen = (points - origin) @ rotation
+        away = [np.nanmean(seen[:, at] - read["xyz"[at]]) for at in axes]
+        origin[free] += np.linalg.lstsq(rotation.T[axes][:, free], np.array(away), rcond=1e-6)[0]
+    return dataclasses.replace(
+        frame, origin=tuple(origin.tolist()), rotation=quaternion_of(rotation)
+    )
 
 
 def _table(measurements: Measurements, number: int) -> dict[str, Floats]:
@@ -77,30 +190,38 @@ def _table(measurements: Measurements, number: int) -> dict[str, Floats]:
     return table
 
 
-def _by_points(
-    frame: Frame,
-    points: Floats,
-    seen: Floats,
-    rotations: Floats,
-    read: dict[str, Floats],
-    whole: np.ndarray,
-) -> Frame:
-    """Points (n, 3) in the base frame, read as `seen` (n, 3) in the instrument's."""
-    rotation = rotation_matrix(frame.rotation)
-    if all(frame.unknown[_ROTATION]):
-        if all(angle in read for angle in "abc"):
-            angles = np.stack([read[angle] for angle in "abc"], axis=1)[whole]
-            measured = euler_matrices(angles)
-            rotation = nearest_rotation(np.einsum("nij,nkj->ik", rotations, measured))
-        elif _spread_out(seen):
-            left, right = points - points.mean(axis=0), seen - seen.mean(axis=0)
-            rotation = nearest_rotation(left.T @ right)
-    origin = np.array(frame.origin)
-    free = np.array(frame.unknown[_ORIGIN])
-    origin[free] = (points - seen @ rotation.T).mean(axis=0)[free]
-    return dataclasses.replace(
-        frame, origin=tuple(origin.tolist()), rotation=quaternion_of(rotation)
-    )
+def _of_points(frame: Frame, points: Floats, read: dict[str, Floats]) -> Floats | None:
+    """(3, 3) sum over points of (in the base frame) (as read)^T, both from their means.
+
+    None where they do not fix the rotation. About one axis alone what is read across it does.
+    """
+    axes = [at for at, axis in enumerate("xyz") if axis in read]
+    unread = [at for at in range(3) if at not in axes]
+    about = np.flatnonzero(frame.unknown[_ROTATION])
+    if unread:
+        across = about.size == 1 and len(unread) == 1
+        along = across and abs(rotation_matrix(frame.rotation)[about[0], unread[0]])
+        if not along > _ALONG:
+            return None
+    seen = np.zeros_like(points)
+    for at in axes:
+        seen[:, at] = read["xyz"[at]]
+    whole = np.isfinite(seen).all(axis=1)
+    points, seen = points[whole], seen[whole]
+    if len(points) < 2 or (about.size > 1 and not _spread_out(seen)):
+        return None
+    product: Floats = (points - points.mean(axis=0)).T @ (seen - seen.mean(axis=0))
+    return product if product.any() else None
+
+
+def _of_angles(rotations: Floats, read: dict[str, Floats]) -> Floats | None:
+    """(3, 3) sum of the platform's rotations (n, 3, 3), each with its reading taken back."""
+    angles = np.stack([read[angle] for angle in "abc"], axis=1)
+    whole = np.isfinite(angles).all(axis=1)
+    if not whole.any():
+        return None
+    product: Floats = np.einsum("nij,nkj->ik", rotations[whole], euler_matrices(angles[whole]))
+    return product
 
 
 def _spread_out(points: Floats) -> bool:
@@ -144,10 +265,8 @@ def _by_distances(frame: Frame, points: Floats, distances: Floats) -> list[Frame
     return frames
 
 
-def _by_directions(
-    machine: Machine, measurements: Measurements, number: int, frame: Frame
-) -> Frame:
-    """A camera's rotation, from the directions that nominal struts have."""
+def _of_directions(machine: Machine, measurements: Measurements, number: int) -> Floats | None:
+    """(3, 3) sum of the directions that nominal struts have times those that a camera read."""
     mine = np.flatnonzero(measurements.instrument[measurements.row] == number)
     centres = machine.kernel.joint_centres(measurements.joints, measurements.placements)
     along = centres[:, :, 1] - centres[:, :, 0]
@@ -164,9 +283,7 @@ def _by_directions(
         if len(seen) == 3:
             product += np.outer(along[row, strut], [seen[0], seen[1], seen[2]])
             count += 1
-    if count < 2 or not all(frame.unknown[_ROTATION]):
-        return frame
-    return dataclasses.replace(frame, rotation=quaternion_of(nearest_rotation(product)))
+    return product if count > 1 else None
 
 
 def nearest_rotation(product: Floats) -> Floats:

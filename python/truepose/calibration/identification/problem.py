@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from truepose import _kernel
 from truepose.budget.exact import Moved, together
+from truepose.calibration.gate.observability import prior_rows
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
@@ -48,12 +49,8 @@ class Prior:
 
     @classmethod
     def of(cls, unknowns: Unknowns) -> Prior:
-        """The unknowns' own: rows are the inverse of the covariance's triangular factor."""
-        known = unknowns.has_prior
-        factor = np.linalg.cholesky(unknowns.prior_covariance[np.ix_(known, known)])
-        rows = np.zeros((int(known.sum()), unknowns.count))
-        rows[:, known] = np.linalg.inv(factor)
-        return cls(rows, unknowns.prior_mean)
+        """The unknowns' own."""
+        return cls(prior_rows(unknowns.prior_covariance), unknowns.prior_mean)
 
     def with_rows(self, rows: Floats) -> Prior:
         """Further rows, about the same mean."""

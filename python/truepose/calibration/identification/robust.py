@@ -18,6 +18,8 @@ from truepose.sources._base import Floats
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.fit import Fit
+    from truepose.calibration.identification.validate import Validation
+    from truepose.calibration.measurements import Measurements
     from truepose.machine import Machine
 
 HUBER = 3.0
@@ -25,6 +27,9 @@ HUBER = 3.0
 
 OUTLIER = 4.5
 """Standard deviations from which a reading is named: by chance one in 150,000."""
+
+LEAST_FREEDOM = 0.5
+"""Of readings less what they determine: below it nothing checks the stated noise."""
 
 LOSS_ROUNDS = 50
 """Most rounds of weights; five or so do."""
@@ -37,11 +42,23 @@ def weights_of(residual: Floats) -> Floats:
     return weights
 
 
+def noise_of(residual: Floats, freedom: float) -> float:
+    """Scale of residuals (m,), in which those beyond `HUBER` count as that; NaN without freedom.
+
+    `residual`: multiplied by its weights. Huber's proposal 2: one reading, however wrong, adds no
+    more than `HUBER` squared (P. J. Huber, Robust Statistics (1981), 6.4).
+    """
+    if freedom < LEAST_FREEDOM:
+        return float("nan")
+    return float(np.sqrt(np.sum(residual**2) / freedom))
+
+
 @dataclass(frozen=True)
 class Outlier:
     """A reading that does not fit: `row` counts from 0, `line` is the file's (0: none).
 
-    `sigmas`: its residual in standard deviations, with its sign.
+    `sigmas`: its residual in standard deviations, with its sign. `held_out`: of a row that was kept
+    from the fit, whose prediction adds to them.
     """
 
     row: int
@@ -49,19 +66,35 @@ class Outlier:
     instrument: str
     what: str
     sigmas: float
+    held_out: bool = False
 
     @property
     def sentence(self) -> str:
         """For people."""
         where = f"line {self.line}" if self.line else f"row {self.row}"
-        return f"{where}: {self.what} of {self.instrument} is {abs(self.sigmas):.3g} sigma off"
+        kept = ", in a row kept from the fit" if self.held_out else ""
+        size = f"{abs(self.sigmas):.3g} sigma off"
+        return f"{where}: {self.what} of {self.instrument} is {size}{kept}"
 
 
-def outliers(machine: Machine, fit: Fit) -> tuple[Outlier, ...]:
-    """Readings that are `OUTLIER` standard deviations or more off, the worst first."""
-    data = fit.measurements
+def outliers(
+    machine: Machine,
+    fit: Fit,
+    whole: Measurements | None = None,
+    checked: Validation | None = None,
+) -> tuple[Outlier, ...]:
+    """Readings that are `OUTLIER` standard deviations or more off, the worst first.
+
+    `whole`: all measurements, in which rows are counted; of those kept from the fit, `checked` says
+    how far they are off.
+    """
+    data = fit.measurements if whole is None else whole
     # A reading that the fit gives up counts by its distance from what the others say.
-    size = fit.standardised
+    kept = data.held_out[data.row] if whole is not None else np.zeros(data.n_observation, np.bool_)
+    size = np.full(data.n_observation, np.nan)
+    size[~kept] = fit.standardised
+    if checked is not None:
+        size[kept] = checked.standardised[kept]
     found = []
     for at in np.flatnonzero(np.abs(size) >= OUTLIER).tolist():
         row = int(data.row[at])
@@ -69,5 +102,6 @@ def outliers(machine: Machine, fit: Fit) -> tuple[Outlier, ...]:
         if what in OF_STRUTS:
             what = f"strut.{machine.struts[int(data.strut[at])].name}.{what}"
         name = data.instruments[int(data.instrument[row])].name
-        found.append(Outlier(row, int(data.lines[row]), name, what, float(size[at])))
+        line, sigmas = int(data.lines[row]), float(size[at])
+        found.append(Outlier(row, line, name, what, sigmas, bool(kept[at])))
     return tuple(sorted(found, key=lambda each: -abs(each.sigmas)))

@@ -3,6 +3,9 @@
 Every fold fits the others' rows, instruments' frames and all, and then says what the left-out rows
 should have read; so does the machine as its file has it, with the same frames' freedom. A fit that
 only follows its own noise shows here.
+
+A reading that the other rows cannot foretell is not predicted: where they leave the frame, target
+or constant of its instrument open. Of the others the fit says how uncertain its prediction is.
 """
 
 from __future__ import annotations
@@ -19,7 +22,7 @@ from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import UNITS
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.sources._base import Flags, Floats
+from truepose.sources._base import Flags, Floats, Indices
 
 FEW = 0.1
 """Share of the readings up to which those that do not fit are left out of what is counted."""
@@ -27,14 +30,24 @@ FEW = 0.1
 LEAST_ROWS = 4
 """Fewer rows are not divided."""
 
+CONSISTENT = 1.5
+"""Up to this times what the fit promises for them, rows that were not used agree with it."""
+
+OPEN = 1e-6
+"""Share of an open direction, or of a reading's slope along it, that is not rounding."""
+
+STATED, FOLDS = "stated set", "folds"
+
 
 @dataclass(frozen=True, eq=False)
 class Validation:
     """Residuals of rows that were not used for the fit that predicts them.
 
     `kind`: "folds" or "stated set"; `folds` how many. `used` (m,): which observations were
-    predicted. `before`, `after` (m,): (predicted - measured) over the uncertainty, NaN where not;
-    of the machine as filed and of the calibrated one.
+    predicted and count. `before`, `after` (m,): (predicted - measured) over the uncertainty, NaN
+    where not predicted; of the machine as filed and of the calibrated one. `promised` (m,):
+    variance of the prediction by the calibrated one, over the uncertainty squared. `noise`: by what
+    the fit multiplied the stated uncertainties, 1 or more.
     """
 
     kind: str
@@ -44,6 +57,19 @@ class Validation:
     after: Floats
     uncertainty: Floats
     units: tuple[str, ...]
+    promised: Floats
+    noise: float = 1.0
+
+    @property
+    def standardised(self) -> Floats:
+        """(m,) `after` over what the fit promises for it, noise and prediction; NaN where not."""
+        found: Floats = self.after / np.sqrt(self.noise**2 + self.promised)
+        return found
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the errors that are left are no larger than the fit itself promises."""
+        return _rms(self.standardised[self.used]) <= CONSISTENT
 
     @property
     def rms_before(self) -> float:
@@ -66,10 +92,16 @@ def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
 
 
-def fold_numbers(count: int, folds: int, seed: int) -> np.ndarray:
-    """(count,) which fold each row is in: shuffled, as equal as can be."""
-    numbers = np.arange(count) % folds
-    return np.random.default_rng(seed).permutation(numbers)
+def fold_numbers(instrument: Indices, folds: int, seed: int) -> Indices:
+    """(n_row,) which fold each row is in: shuffled, as equal as can be, of each instrument too.
+
+    `instrument` (n_row,): which one measured the row.
+    """
+    count = len(instrument)
+    shuffled = np.random.default_rng(seed).permutation(np.arange(count))
+    numbers = np.empty(count, np.intp)
+    numbers[np.lexsort((shuffled, instrument))] = np.arange(count) % folds
+    return numbers
 
 
 def validate(
@@ -84,45 +116,87 @@ def validate(
     """Predict rows that were not used.
 
     `whole`: all measurements; where some are `held_out`, these are predicted by `fitted`, which did
-    not use them, else every fold by the others. None where there are too few rows, or where what is
-    left without a fold does not determine the unknowns.
+    not use them, else every fold by the others, as where they are of instruments that may stand
+    anywhere and so cannot be predicted. None where there are too few rows, or where what is
+    left for the fit determines none of the readings.
     """
-    units = tuple(UNITS[what] for what in whole.observable.tolist())
-    before, after = np.full((2, whole.n_observation), np.nan)
+    found = np.full((3, whole.n_observation), np.nan)
+    fitting = ~whole.held_out
     if whole.held_out.any():
-        used = whole.held_out[whole.row]
-        both = _predicted(machine, whole.select(whole.held_out), fitted)
-        before[used], after[used] = both
-        return Validation("stated set", 1, used, before, after, whole.uncertainty, units)
-    count = min(folds, whole.n_row)
-    if whole.n_row < LEAST_ROWS or count < 2:
+        kept = whole.select(whole.held_out)
+        found[:, whole.held_out[whole.row]] = _predicted(machine, kept, fitted)
+        checked = _counted(STATED, 1, whole, found, fitted)
+        if checked is not None:
+            return checked
+    rows = int(fitting.sum())
+    count = min(folds, rows)
+    if rows < LEAST_ROWS or count < 2:
         return None
-    numbers = fold_numbers(whole.n_row, count, seed)
+    numbers = np.full(whole.n_row, -1)
+    numbers[fitting] = fold_numbers(whole.instrument[fitting], count, seed)
     for number in range(count):
         left_out = numbers == number
         try:
             others = fit(
                 machine,
-                whole.select(~left_out),
+                whole.select(fitting & ~left_out),
                 fitted.unknowns,
                 use_prior=fitted.use_prior,
                 robust=robust,
             )
-            both = _predicted(machine, whole.select(left_out), others)
-        except RequestError:
-            return None
-        at = left_out[whole.row]
-        before[at], after[at] = both
+        except RequestError:  # what is left does not say enough: the others still do
+            continue
+        found[:, left_out[whole.row]] = _predicted(machine, whole.select(left_out), others)
+    return _counted(FOLDS, count, whole, found, fitted)
+
+
+def _counted(
+    kind: str, folds: int, whole: Measurements, found: Floats, fitted: Fit
+) -> Validation | None:
+    """Of (3, m) residuals before and after and promised variances; None where all are NaN."""
+    units = tuple(UNITS[what] for what in whole.observable.tolist())
+    used: Flags = np.asarray(np.isfinite(found).all(axis=0))
+    if not used.any():
+        return None
+    before, after, promised = found
+    checked = Validation(
+        kind, folds, used, before, after, whole.uncertainty, units, promised, fitted.birge
+    )
     # Readings that do not fit, where they are few, would be all that the root mean square shows.
-    odd = np.abs(fitted.standardised) >= OUTLIER
-    odd = odd if odd.mean() <= FEW else np.zeros_like(odd)
-    used = np.isfinite(after) & ~odd
-    return Validation("folds", count, used, before, after, whole.uncertainty, units)
+    sizes = checked.standardised
+    if kind == FOLDS:
+        sizes[~whole.held_out[whole.row]] = fitted.standardised
+    odd: Flags = used & (np.abs(sizes) >= OUTLIER)
+    few = odd.sum() <= FEW * used.sum()
+    return dataclasses.replace(checked, used=used & ~odd) if few else checked
 
 
-def _predicted(machine: Machine, rows: Measurements, fitted: Fit) -> tuple[Floats, Floats]:
-    """Residuals of rows that `fitted` did not see: of the machine as filed, and calibrated."""
+def _predicted(machine: Machine, rows: Measurements, fitted: Fit) -> Floats:
+    """(3, m) of rows that `fitted` did not see, NaN where it leaves open what they read.
+
+    Residuals of the machine as filed and calibrated, and the variance of the latter's prediction.
+    """
     # The instruments stand where the fit's own rows put them: its values are relative to that.
     standing = dataclasses.replace(rows, instruments=fitted.measurements.instruments)
     problem = Problem(machine, standing, fitted.unknowns)
-    return problem.residual(fitted.as_filed), problem.residual(fitted.values)
+    slope = problem.jacobian(fitted.values) / rows.uncertainty[:, np.newaxis]
+    promised = np.einsum("ij,jk,ik->i", slope, fitted.covariance, slope)
+    found = np.stack([problem.residual(fitted.as_filed), problem.residual(fitted.values), promised])
+    found[:, _left_open(rows, fitted, slope)] = np.nan
+    return found
+
+
+def _left_open(rows: Measurements, fitted: Fit, slope: Floats) -> Flags:
+    """(m,) which readings change with what the fit leaves open of their own instrument."""
+    unknowns = fitted.unknowns
+    turning = slope * fitted.scale
+    along = np.abs(turning @ fitted.null_space.T).max(axis=1, initial=0.0)
+    changing = along > OPEN * np.linalg.norm(turning, axis=1)
+    open_: Flags = np.asarray((np.abs(fitted.null_space) > OPEN).any(axis=0))
+    mine = np.zeros(len(rows.instruments), np.bool_)
+    for instrument, own in unknowns.frames.items():
+        mine[instrument] = any(number is not None and open_[number] for number in own)
+    for (instrument, _, _), number in unknowns.biases.items():
+        mine[instrument] |= open_[number]
+    flags: Flags = changing & mine[rows.instrument[rows.row]]
+    return flags

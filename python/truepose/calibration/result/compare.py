@@ -1,16 +1,17 @@
 """Whether a machine changed between two machine files of it, such as two dated calibrations.
 
 Parameter by parameter and at the tool, with what both files say of their uncertainty: the bands of
-their tolerances. The two are taken to be independent. Where they share prior knowledge or
-measurements that is on the safe side: a change is then called certain too seldom, not too often.
+their tolerances. The two are taken to be independent. Where both rest on the same tolerances, or
+share measurements, their difference is less uncertain than that: of machines that did not change
+far fewer than `ALPHA` are then said to have changed, and small changes are missed.
 
     difference = new - old,    covariance = covariance of old + covariance of new
 
-Two tests are made, each with half of the probability `ALPHA` that a machine which did not change
-is said to have changed: every parameter by itself (its share of the probability by Bonferroni), and
-all together by difference^T covariance^-1 difference, a chi-square, which also sees what shows only
-in how parameters differ with each other. What is not determined has a wide band, and decides
-nothing.
+Two tests are made, each with half of the probability, at most `ALPHA`, that a machine which did
+not change is said to have changed: every parameter by itself (its share of the probability by
+Bonferroni), and all together by difference^T covariance^-1 difference, a chi-square, which also
+sees what shows only in how parameters differ with each other. What is not determined has a wide
+band, and decides nothing.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from truepose.sources._base import Floats
 from truepose.sources.quantiles import normal_quantile
 
 ALPHA = 0.05
-"""Probability that a machine that did not change is said to have changed."""
+"""Probability that a machine that did not change is said to have changed, at most."""
 
 _ROUNDING = 1e-12
 """Of the number of parameters: an eigenvalue so small, of a correlation matrix, is zero."""
@@ -351,7 +352,6 @@ def _provenance(which: str, machine: Machine) -> dict[str, str]:
 
 def verdict(found: xr.Dataset) -> str:
     """One sentence on what `compare` found, for people."""
-    tool = _at_tool(found)
     if not found.attrs["changed"]:
         normalised = np.abs(found["normalised_difference"].values)
         largest = int(normalised.argmax())
@@ -360,8 +360,9 @@ def verdict(found: xr.Dataset) -> str:
         name = str(found["parameter"].values[largest])
         return (
             f"No change beyond uncertainty: {name} differs most, by {normalised[largest]:.2g} "
-            f"standard uncertainties; {tool}."
+            f"standard uncertainties; {_allowed(found)}."
         )
+    tool = _at_tool(found)
     each = found["parameter_changed"].values
     if not each.any():
         return (
@@ -393,15 +394,26 @@ def _amount(name: str, value: float, deviation: float, unit: str) -> str:
     return f"{name} by {1e6 * value:.4g} {shown} ({sign} {2e6 * deviation:.2g})"
 
 
+def _allowed(found: xr.Dataset) -> str:
+    """What the difference would do to the tool, where it is no sign of a change."""
+    likely = float(found.attrs["chi_square_probability"])
+    return (
+        f"taken as they are the two files differ at the tool by up to {_largest(found)}, and what "
+        "both files say of their uncertainty allows it: without a change all parameters together "
+        f"differ so much in {100.0 * likely:.3g} % of cases"
+    )
+
+
 def _at_tool(found: xr.Dataset) -> str:
-    quantity = str(found["quantity"].values[0])
+    verb = "moves" if found["quantity"].values[0] == "position" else "turns"
+    return f"the tool {verb} by up to {_largest(found)}"
+
+
+def _largest(found: xr.Dataset) -> str:
+    """What the difference does to the tool at the worst pose: a size, (its uncertainty, k = 2)."""
+    shown = _SHOWN[_QUANTITIES[str(found["quantity"].values[0])]]
     sizes = found["moved"].values[:, 0]
     at = int(sizes.argmax())
-    shown = _SHOWN[_QUANTITIES[quantity]]
     deviation = float(found["moved_uncertainty"].values[at, 0])
-    verb = "moves" if quantity == "position" else "turns"
     sign = "\N{PLUS-MINUS SIGN}"
-    return (
-        f"the tool {verb} by up to {1e6 * sizes[at]:.4g} {shown} "
-        f"({sign} {2e6 * deviation:.2g}, k = 2)"
-    )
+    return f"{1e6 * sizes[at]:.4g} {shown} ({sign} {2e6 * deviation:.2g}, k = 2)"

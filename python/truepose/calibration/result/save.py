@@ -8,6 +8,10 @@ import numpy as np
 
 from truepose.calibration.calibrate import Calibration
 from truepose.calibration.dataset import covariance_of, determined_covariance, verdict_of
+from truepose.calibration.gate import words
+from truepose.calibration.gate.at_tool import Tool
+from truepose.calibration.gate.observability import prior_root, prior_rows
+from truepose.calibration.identification.tool_effects import tool_effects, workspace_poses
 from truepose.calibration.result.file import DEFAULT_COVERAGE, Provenance, write_calibrated
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
@@ -29,7 +33,8 @@ def save(
     `original`: the file that was calibrated; `date`: the caller's, written as it is. `as_shifts`:
     nominal values stay, what was found becomes the middle of their bands. `force`: write it though
     the answer is no, with the verdict as a warning inside. `coverage`: half bands in standard
-    deviations.
+    deviations. A property that was found (an expansion, a compliance) is written without its
+    uncertainty, for which a machine file has no place: a warning inside says so.
 
     Raises `RequestError` (calibration-refused, and what `write_calibrated` raises).
     """
@@ -58,17 +63,21 @@ def save(
         if checked is None or not np.isfinite(checked.rms_after)
         else checked.rms_after,
     )
+    covariance = _covariance(calibration)
     return write_calibrated(
         path,
         calibration.machine,
         fit.unknowns,
         fit.values,
-        _covariance(calibration),
+        covariance,
         provenance,
         original=original,
         coverage=coverage,
         as_shifts=as_shifts,
-        warnings=() if calibration.accepted else (said,),
+        warnings=(
+            *(() if calibration.accepted else (said,)),
+            *_of_properties(calibration, covariance),
+        ),
     )
 
 
@@ -86,12 +95,47 @@ def _covariance(calibration: Calibration) -> Floats:
     members = np.flatnonzero((np.abs(fit.null_space[:, :n]) > 1e-6).any(axis=0))
     if np.isfinite(stated).all() or not np.isin(members, known).all():
         return stated
-    information = np.zeros((n, n))
-    prior = fit.unknowns.prior_covariance[np.ix_(known, known)]
-    information[np.ix_(known, known)] = np.linalg.inv(prior)
+    rows = prior_rows(fit.unknowns.prior_covariance[:n, :n])
+    information = rows.T @ rows
     left = np.linalg.pinv(open_ @ information @ open_.T, hermitian=True)
     covariance: Floats = determined_covariance(calibration) + open_.T @ left @ open_
     return covariance
+
+
+def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
+    """What is lost where properties are written without their uncertainty, with both numbers.
+
+    `covariance` (n_machine, n_machine) of what was found.
+    """
+    unknowns, machine = calibration.fit.unknowns, calibration.machine
+    if not unknowns.properties or not np.isfinite(covariance).all():
+        return []
+    _, joints, placements = workspace_poses(machine, calibration.poses)
+    effects, _ = tool_effects(machine, unknowns, calibration.fit.values, joints, placements)
+    stated = effects.copy()
+    stated[:, :, list(unknowns.properties)] = 0.0
+    root, none = prior_root(covariance), np.zeros((0, unknowns.n_machine))
+    components = calibration.gate.after.components
+    whole, known = (
+        Tool.of(each, components, None).uncertainty(root, none) for each in (effects, stated)
+    )
+    names = words.listed(
+        words.collapsed(
+            [unknowns.labels[at] for at in unknowns.properties],
+            unknowns.labels[: unknowns.n_machine],
+        )
+    )
+    unit, with_them, without = "m", whole.position_max, known.position_max
+    what = "position"
+    if not with_them:
+        unit, with_them, without = "rad", whole.rotation_max, known.rotation_max
+        what = "rotation"
+    return [
+        f"the uncertainty of what was found of {names} is not in this file, which has no place for "
+        f"it: by the rest of what was found the tool's {what} at the worst pose is known to "
+        f"{words.quantity(without, unit)}, with it, at this file's temperatures and loads, to "
+        f"{words.quantity(with_them, unit)}"
+    ]
 
 
 __all__ = ["save"]

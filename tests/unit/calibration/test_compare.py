@@ -82,6 +82,19 @@ def test_unchanged_machines_are_told_apart_by_chance_only(tmp_path: Path, name: 
     assert np.nanstd(at_tool) == pytest.approx(1.0, abs=0.3)
 
 
+def test_no_change_says_why_the_tool_may_be_elsewhere(tmp_path: Path) -> None:
+    path = MACHINES / "linear_delta.toml"
+    machine = load(path, registry=REGISTRY)
+    deviations = of_bands(machine)[1]
+    found = calibrated(tmp_path, path, 0.5 * deviations, np.diag((0.5 * deviations) ** 2))
+    attrs = compare(machine, found, machine.poses()[:5]).attrs
+    assert attrs["changed"] == 0
+    said = attrs["verdict"]
+    assert "the two files differ at the tool by up to" in said
+    assert "what both files say of their uncertainty allows it" in said
+    assert "moves" not in said
+
+
 @pytest.mark.parametrize("as_shifts", [False, True], ids=["values", "shifts"])
 def test_a_change_is_found_where_it_is(tmp_path: Path, as_shifts: bool) -> None:
     path = MACHINES / "linear_delta.toml"

@@ -30,13 +30,13 @@ def machine(name: str) -> Machine:
     return tp.load(MACHINES / f"{name}.toml")
 
 
-def standing(name: str, kind: str, degrees: float, **others: object) -> Measurements:
+def standing(of: str, kind: str, degrees: float, **others: object) -> Measurements:
     """Readings of the machine as filed from a frame that is far off what is declared.
 
     It is off and turned in what the kind says is unknown of it.
     """
-    poses = poses_within(machine(name), 24, seed=3)
-    made = made_measurements(machine(name), kind, poses, frame="unknown", **others)  # type: ignore[arg-type]
+    poses = poses_within(machine(of), 24, seed=3)
+    made = made_measurements(machine(of), kind, poses, frame="unknown", **others)  # type: ignore[arg-type]
     (instrument,) = made.instruments
     unknown = np.array(instrument.frame.unknown)
     axis = np.where(unknown[3:], [0.3, 1.0, 0.2], 0.0)
@@ -46,7 +46,7 @@ def standing(name: str, kind: str, degrees: float, **others: object) -> Measurem
     off = np.where(unknown[:3], FAR_OFF, 0.0)
     true = Frame(tuple(off.tolist()), (float(np.cos(half)), x, y, z))
     there = dataclasses.replace(made, instruments=(dataclasses.replace(instrument, frame=true),))
-    return made.with_values(nominal_values(machine(name), there))
+    return made.with_values(nominal_values(machine(of), there))
 
 
 def left(name: str, data: Measurements) -> float:
@@ -77,7 +77,7 @@ def test_two_turned_sensors_are_both_found() -> None:
         standing("hexapod", "joint-angle", degrees, name=name, struts=struts)
         for name, degrees, struts in (("left", 170.0, [0, 1, 2]), ("right", 150.0, [3, 4, 5]))
     ]
-    assert left("hexapod", joined(data)) < 1e-3
+    assert left("hexapod", joined(*data)) < 1e-3
 
 
 def test_a_frame_with_a_closed_form_is_not_turned_further() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -262,3 +263,44 @@ def test_readings_that_no_machine_gives(capsys: Capture, tmp_path: Path) -> None
     wild = changed(tmp_path / "wild.csv", POSITIONS, ("105.6088, 0.3352", "-9e5, 9e5"))
     done = calibrate(capsys, wild, "--no-prior", "--no-robust")
     assert (done.code, done.codes) == (2, ["no-fit"])
+
+
+def test_files_are_written_before_anything_is_printed(
+    capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(text: object) -> None:
+        raise RuntimeError
+
+    monkeypatch.setattr("truepose.report.calibration.tables", stopped)
+    paths = [tmp_path / name for name in ("machine.toml", "result.json")]
+    asked = ("--machine-output", paths[0], "--date", "2026-01-31", "--output", paths[1])
+    with suppress(RuntimeError, SystemExit):
+        calibrate(capsys, POSITIONS, *asked)
+    assert all(path.exists() for path in paths)
+
+
+def test_a_file_without_what_was_found_of_a_property_says_so(
+    capsys: Capture, tmp_path: Path
+) -> None:
+    machine = tmp_path / "calibrated.toml"
+    asked = ("--machine-output", machine, "--date", "2026-01-31", "--force")
+    named = ("--identify", "strut.*.length", "--identify", "strut.a.expansion=1e-6 1/K")
+    done = calibrate(capsys, POSITIONS, *named, *asked)
+    assert "Warning, inside the file too: the uncertainty of what was found of" in done.err
+    written = tp.load(machine)
+    assert written.calibration is not None
+    (said,) = [each for each in written.calibration.warning if "expansion" in each]
+    assert said in " ".join(done.err.split())
+
+
+def test_tolerances_that_are_wholly_correlated_can_be_written(
+    capsys: Capture, tmp_path: Path
+) -> None:
+    text = MACHINE.read_text("utf-8")
+    linked = '\n[[correlation]]\nbetween = ["tower a sideways", "tower b sideways"]\n'
+    machine, output = tmp_path / "machine.toml", tmp_path / "calibrated.toml"
+    machine.write_text(f"{text}{linked}coefficient = 1.0\n", "utf-8")
+    asked = ("--machine-output", output, "--date", "2026-01-31", "--force", "--no-prior")
+    done = call(capsys, "calibrate", machine, HEIGHTS, *asked)
+    assert done.code == 0, done.err
+    assert tp.load(output).calibration is not None

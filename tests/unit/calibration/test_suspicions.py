@@ -248,7 +248,7 @@ def test_warm_and_loaded_machines_arouse_no_suspicion(name: str) -> None:
         unknowns = unknowns_of(m, made)
         spread = np.sqrt(np.diagonal(unknowns.prior_covariance))
         values = unknowns.prior_mean + spread * np.random.default_rng(2).uniform(-1, 1, spread.size)
-        shows = Problem.of(m, made, unknowns).predict(values)
+        shows = Problem(m, made, unknowns).predict(values)
         assert suspicions(m, with_noise(made, shows, 2)) == (), kind
 
 

@@ -15,4 +15,4 @@ pub mod trust_region;
 pub use design::{Design, Observation, Prepared, Table, Term};
 pub use evaluation::Evaluation;
 pub use observation::{Instrument, OWN, Observable};
-pub use solve::{Found, Prior, Readings, fit, fit_many};
+pub use solve::{Found, Prior, Readings, fit_many};

@@ -138,20 +138,8 @@ impl Problem for Fit<'_> {
     }
 }
 
-/// Fits the unknowns to readings, from `start`.
-pub fn fit(
-    prepared: &Prepared,
-    readings: Readings<'_>,
-    prior: &Prior,
-    start: &[f64],
-    options: &Options,
-) -> Found {
-    let information = information(prior, prepared.design.unknowns);
-    one(prepared, readings, prior, &information, start, options)
-}
-
-/// The same for many sets of readings of one design, shared out to the threads; `measured` has one row of
-/// readings a set.
+/// Fits the unknowns to each of many sets of readings of one design, from `start`, the sets shared out to the
+/// threads; `measured` has one row of readings a set.
 pub fn fit_many(
     prepared: &Prepared,
     measured: &[f64],

@@ -48,11 +48,6 @@ class AtTool:
         """Root mean square over the poses, m."""
         return _rms(self.position)
 
-    @property
-    def rotation_rms(self) -> float:
-        """Root mean square over the poses, rad."""
-        return _rms(self.rotation)
-
 
 @dataclass(frozen=True, eq=False)
 class Sorted:

@@ -180,7 +180,10 @@ def whitened(problem: Problem, values: Floats) -> Floats:
 
     Raises `RequestError` (no-fit) where a pose of the machine with these values cannot be solved.
     """
-    jacobian = problem.jacobian(values)
+    return _whitened(problem, values, problem.jacobian(values))
+
+
+def _whitened(problem: Problem, values: Floats, jacobian: Floats) -> Floats:
     if not np.isfinite(jacobian).all():
         status = problem.status(values)
         rows = np.flatnonzero(status)
@@ -196,7 +199,6 @@ def fit(
     *,
     use_prior: bool = True,
     robust: bool = True,
-    start: Floats | None = None,
 ) -> Fit:
     """Fit the unknowns to all rows of the measurements.
 
@@ -205,9 +207,9 @@ def fit(
     """
     require_enough(measurements, unknowns, use_prior)
     problem, as_filed = placed(machine, measurements, unknowns)
-    prior = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
-    prior = Prior(prior.rows, unknowns.prior_mean)
-    values = unknowns.prior_mean if start is None else start
+    known = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
+    prior = Prior(known.rows, unknowns.prior_mean)  # without tolerances, where the gauge holds
+    values = unknowns.prior_mean
     slope = whitened(problem, values)
     equations = Equations.of(slope, prior, unknowns)
     weights, scale, noise = np.ones(measurements.n_observation), 1.0, float("nan")
@@ -221,7 +223,8 @@ def fit(
         # Readings that fit to the last digit leave nothing that a step could be judged by.
         exact = solved.cost[0] < EXACT**2 * measurements.n_observation
         settled = solved.ending[0] in SETTLED or exact
-        usable = settled and np.isfinite(problem.jacobian(solved.values[0])).all()
+        jacobian = problem.jacobian(solved.values[0])
+        usable = settled and np.isfinite(jacobian).all()
         if not (usable or same) and left_out is None:
             # What the first solution begins to see is seen too little to be followed.
             left_out = freed
@@ -231,7 +234,7 @@ def fit(
             raise _no_fit(problem, f"it ended as {solved.ending[0]}", np.empty(0, np.intp))
         values = solved.values[0]
         residual = problem.residual(values)
-        slope = whitened(problem, values)
+        slope = _whitened(problem, values, jacobian)
         freed = equations.null_space * equations.scale
         factor = np.sqrt(weights) / scale
         equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)

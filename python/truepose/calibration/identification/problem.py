@@ -18,7 +18,6 @@ from truepose.calibration.gate.observability import prior_rows
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
-from truepose.errors import TrueposeError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, acting
 from truepose.sources._base import Floats, Indices
@@ -78,11 +77,6 @@ class Problem:
         """Raises `TrueposeError` where a row's condition asks for what the machine does not say."""
         self.machine, self.measurements, self.unknowns = machine, measurements, unknowns
         self._kernel = _kernel.Identification(machine.kernel, self._description())
-
-    @classmethod
-    def of(cls, machine: Machine, measurements: Measurements, unknowns: Unknowns) -> Problem:
-        """The same as the constructor."""
-        return cls(machine, measurements, unknowns)
 
     def predict(self, values: ArrayLike) -> Floats:
         """(n_observation,) what would be read, SI; NaN where a pose cannot be solved."""
@@ -270,4 +264,4 @@ def _shifts(
     return together(parts)
 
 
-__all__ = ["Prior", "Problem", "Solved", "TrueposeError", "row_shifts"]
+__all__ = ["Prior", "Problem", "Solved", "row_shifts"]

@@ -19,7 +19,6 @@ from truepose.calibration.identification.fit import Fit, fit
 from truepose.calibration.identification.problem import Problem
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import UNITS
 from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.sources._base import Flags, Floats, Indices
@@ -55,8 +54,6 @@ class Validation:
     used: Flags
     before: Floats
     after: Floats
-    uncertainty: Floats
-    units: tuple[str, ...]
     promised: Floats
     noise: float = 1.0
 
@@ -80,12 +77,6 @@ class Validation:
     def rms_after(self) -> float:
         """Root mean square over the uncertainty: about 1 where the noise is as stated."""
         return _rms(self.after[self.used])
-
-    def rms_in(self, unit: str) -> tuple[float, float]:
-        """(before, after) root mean squares of readings of one SI unit; NaN without any."""
-        mine = self.used & (np.array(self.units) == unit)
-        sigma = self.uncertainty[mine]
-        return _rms(self.before[mine] * sigma), _rms(self.after[mine] * sigma)
 
 
 def _rms(values: Floats) -> float:
@@ -154,14 +145,11 @@ def _counted(
     kind: str, folds: int, whole: Measurements, found: Floats, fitted: Fit
 ) -> Validation | None:
     """Of (3, m) residuals before and after and promised variances; None where all are NaN."""
-    units = tuple(UNITS[what] for what in whole.observable.tolist())
     used: Flags = np.asarray(np.isfinite(found).all(axis=0))
     if not used.any():
         return None
     before, after, promised = found
-    checked = Validation(
-        kind, folds, used, before, after, whole.uncertainty, units, promised, fitted.birge
-    )
+    checked = Validation(kind, folds, used, before, after, promised, fitted.birge)
     # Readings that do not fit, where they are few, would be all that the root mean square shows.
     sizes = checked.standardised
     if kind == FOLDS:

@@ -17,7 +17,13 @@ from truepose import _kernel
 from truepose.budget.poses import faults_text
 from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
-from truepose.calibration.measurements.form import Flags, Floats, Indices, Measurements
+from truepose.calibration.measurements.form import (
+    Flags,
+    Floats,
+    Indices,
+    Measurements,
+    cold_and_free,
+)
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Condition, Machine
 from truepose.machine.condition import DEFAULT_PART
@@ -246,18 +252,7 @@ def _within_travel(machine: Machine, rows: Rows, good: Flags, report: Report) ->
 
 def _conditions(machine: Machine, rows: Rows, report: Report) -> tuple[Condition, ...]:
     """(n_row,) the condition of each row; equal ones are the same object."""
-    given = machine.condition
-    cold = dataclasses.replace(
-        given,
-        default_temperature=given.reference_temperature,
-        part_temperatures={},
-        gradients={},
-        temperature_log=None,
-        time=None,
-        force=(0.0, 0.0, 0.0),
-        moment=(0.0, 0.0, 0.0),
-        envelope=None,
-    )
+    cold = cold_and_free(machine.condition)
     for part, values in rows.temperatures.items():
         column = f"temperature.{part}"
         for row in np.flatnonzero((values <= 0.0) & ~rows.spoilt(column)).tolist():
@@ -281,7 +276,7 @@ def _conditions(machine: Machine, rows: Rows, report: Report) -> tuple[Condition
             for name, value in zip(names, values_of_row, strict=True)
             if math.isfinite(value) and (value > 0.0 if name not in WRENCH else value != 0.0)
         }
-        if told.get(DEFAULT_PART) == given.reference_temperature:
+        if told.get(DEFAULT_PART) == cold.reference_temperature:
             del told[DEFAULT_PART]  # as where a row says nothing
         key = tuple(told.items())
         if key not in known:

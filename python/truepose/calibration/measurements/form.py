@@ -23,6 +23,21 @@ Indices = NDArray[np.intp]
 Flags = NDArray[np.bool_]
 
 
+def cold_and_free(condition: Condition) -> Condition:
+    """The condition of a row that says nothing: at reference throughout, nothing on the tool."""
+    return dataclasses.replace(
+        condition,
+        default_temperature=condition.reference_temperature,
+        part_temperatures={},
+        gradients={},
+        temperature_log=None,
+        time=None,
+        force=(0.0, 0.0, 0.0),
+        moment=(0.0, 0.0, 0.0),
+        envelope=None,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Measurements:
     """What instruments read of a machine; SI, radians and kelvin.

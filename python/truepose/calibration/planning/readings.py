@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +11,7 @@ from truepose.calibration.identification.problem import Problem as Fitted
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.instruments import REGISTRY, Instrument
 from truepose.calibration.instruments._base import moved
-from truepose.calibration.measurements import Measurements
+from truepose.calibration.measurements.form import Measurements, cold_and_free
 from truepose.calibration.observables import OBSERVABLES, OF_STRUTS
 from truepose.calibration.planning.poses import Placed
 from truepose.errors import Problem, RequestError
@@ -102,7 +101,7 @@ def planned(
     n_pose, n_instrument = len(placed), len(instruments)
     own = np.repeat(np.arange(n_instrument), sizes)
     table = np.tile(one, (n_pose, 1))
-    state = reference_condition(machine) if condition is None else condition
+    state = cold_and_free(machine.condition) if condition is None else condition
     machine.check_condition(state)
     return Measurements(
         instruments=tuple(instruments),
@@ -124,25 +123,9 @@ def whitened(
     machine: Machine, measurements: Measurements, unknowns: Unknowns, n_pose: int
 ) -> Floats:
     """(n_pose, k, n) d(read)/d(unknown) over the standard uncertainty; NaN where unsolved."""
-    problem = Fitted.of(machine, measurements, unknowns)
+    problem = Fitted(machine, measurements, unknowns)
     rows = problem.jacobian(unknowns.prior_mean) / measurements.uncertainty[:, np.newaxis]
     return np.asarray(rows.reshape(n_pose, -1, rows.shape[1]), np.float64)
-
-
-def reference_condition(machine: Machine) -> Condition:
-    """The machine's condition at reference temperature throughout, with nothing on the tool."""
-    given = machine.condition
-    return dataclasses.replace(
-        given,
-        default_temperature=given.reference_temperature,
-        part_temperatures={},
-        gradients={},
-        temperature_log=None,
-        time=None,
-        force=(0.0, 0.0, 0.0),
-        moment=(0.0, 0.0, 0.0),
-        envelope=None,
-    )
 
 
 def _columns(machine: Machine, instrument: Instrument) -> list[tuple[int, int, float]]:

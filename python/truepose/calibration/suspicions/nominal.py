@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from truepose.calibration.identification.frames import rotation_matrix
 from truepose.calibration.instruments._base import Frame, Instrument
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
@@ -66,8 +67,8 @@ class Setup:
     def stated(cls, instrument: Instrument) -> Setup:
         """As the measurements declare it; where something is unknown, where its search starts."""
         frame: Frame = instrument.frame
-        quaternion = np.array([[0.0, 0.0, 0.0, *frame.rotation]])
-        return cls(np.array(frame.origin), rotations_of(quaternion)[0], np.array(instrument.target))
+        rotation = rotation_matrix(frame.rotation)
+        return cls(np.array(frame.origin), rotation, np.array(instrument.target))
 
 
 def read(

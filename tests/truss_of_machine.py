@@ -97,15 +97,16 @@ class Truss:
         end = self.reference.platform_joint(row, self.point, self.rotation)
         length = float(np.linalg.norm(end - start))
         along = (end - start) / length
-        # In line, one after the other: the strut, its joints, a telescopic drive.
-        in_line = [strut.axial_stiffness(length), *(joint.stiffness for joint in strut.joints)]
+        # In line, one after the other: what the base end carries, the strut, the platform joint.
+        below = [strut.base_joint.stiffness]
         drive = self.drive_of(strut)
         joint = foot = self.foot(strut, start)
         if drive is not None and drive.kind == "telescopic":
-            in_line.append(drive.held_stiffness)
+            below.append(drive.held_stiffness)
             joint = self.grown(joint, start, self.measured(drive) * along)
-        stiffness, *others = (spring for spring in in_line if spring is not None)
-        for spring in others:
+        stiffness = strut.axial_stiffness(length)
+        assert stiffness is not None, "a strut is an elastic member here"
+        for spring in filter(None, below):
             joint = deck.shifted(start, [(deck.spring(spring), along)], joint)
         platform = deck.node(end)
         shift = self.growth(self.machine.platform, row["platform"])
@@ -113,9 +114,12 @@ class Truss:
             centre = self.reference.platform_point(row["platform"], self.point, self.rotation)
             shift += self.strain(self.machine.platform) * self.rotation.T @ (end - centre)
         grown = self.grown(platform, end, self.rotation @ shift)
-        # An element's weight is half at each end; what a centre elsewhere adds is a load there. All
-        # of it is a load where springs stand between the strut and the joint that bears its share.
-        even = min(strut.centre_of_mass, 1.0 - strut.centre_of_mass) if joint == foot else 0.0
+        if strut.platform_joint.stiffness is not None:
+            spring = deck.spring(strut.platform_joint.stiffness)
+            grown = deck.shifted(end, [(spring, along)], grown)
+        # An element's weight is half at each end; what a centre elsewhere adds is a load there. The
+        # springs of joints and drive stand between these ends and what carries the strut.
+        even = min(strut.centre_of_mass, 1.0 - strut.centre_of_mass)
         deck.truss(
             joint,
             grown,
@@ -124,7 +128,7 @@ class Truss:
             expansion=strut.expansion or 0.0,
         )
         deck.load(grown, (strut.centre_of_mass - even) * strut.mass * self.weight)
-        deck.load(foot, (1.0 - strut.centre_of_mass - even) * strut.mass * self.weight)
+        deck.load(joint, (1.0 - strut.centre_of_mass - even) * strut.mass * self.weight)
         if drive is not None:
             # A carriage weighs on the joints that it carries, in equal parts.
             carried = sum(other.drive == drive.name for other in self.machine.struts)

@@ -207,7 +207,7 @@ def _evaluate(
             values["strain"][:, at, closures] = rest.strain[:, closures]
     shifts = [(each.parameters, each.shift) for each in deviations]
     wrench = block.tool_wrench + block.own_wrench
-    rest = _settle(block, together([*shifts, *_weight_at_bases(block)]), gaps, wrench)
+    rest = _settle(block, together([*shifts, *_own_weight(block)]), gaps, wrench)
     values["overall_force"] = rest.force
     values["overall_absorbed"] = rest.absorbed
     values["overall_strain"] = rest.strain
@@ -249,15 +249,18 @@ def _settle(block: Block, moved: Moved, gaps: Floats, wrench: Floats) -> _Rest:
     return _Rest(force, absorbed, strained, status)
 
 
-def _weight_at_bases(block: Block) -> list[Moved]:
-    """What gives way under the weight that acts at the struts' bases, not on the platform."""
+def _own_weight(block: Block) -> list[Moved]:
+    """What gives way under weight that does not act on the platform: at the bases, along struts."""
+    uneven = block.uneven_stretch
+    lengths = block.machine.kernel.length_parameters
+    moved: list[Moved] = [] if uneven is None else [(lengths, uneven)]
     if block.base_forces is None:
-        return []
+        return moved
     columns, compliance = block.compliances
     forces = block.base_forces.reshape(len(block.base_forces), -1)
     kernel = block.machine.kernel
     loads = kernel.base_loads_at(block.joints, block.placements, forces, columns)
-    return [(columns, loads * compliance)]
+    return [*moved, (columns, loads * compliance)]
 
 
 def _misfit(machine: Machine, deviation: Deviation) -> Floats:

@@ -3,6 +3,9 @@
 One rule: what is in series on one parameter adds up. Strut and both joints are on the strut's
 length; screw, nut and bearing on the drive's offset (a telescopic drive's offset is its strut's
 length, so all of them); carriage or frame on the base joint's x, y and z.
+
+A strut that weighs is not loaded alike at its two ends; what gives way at an end says
+`end_compliances`.
 """
 
 from __future__ import annotations
@@ -50,6 +53,27 @@ def compliances(
         column = names[name]
         by_column[column] = by_column.get(column, np.zeros(n_pose)) + compliance
     return np.array(list(by_column), np.intp), np.stack(list(by_column.values()), axis=1)
+
+
+def end_compliances(
+    kernel: _kernel.Machine, drives: Sequence[Drive], struts: Sequence[Strut]
+) -> Floats:
+    """(n_strut, 2) m/N of what gives way along each strut at its base and at its platform end.
+
+    Its joints and, at the base end, the drive of a telescopic strut: shares of what `compliances`
+    adds up on the strut's length.
+    """
+    ends = np.zeros((len(struts), 2))
+    offsets = {drive.name: f"{drive.part}.offset" for drive in drives}
+    held = {drive.name: drive.held_stiffness for drive in drives}
+    for at, (strut, column) in enumerate(zip(struts, kernel.length_parameters, strict=True)):
+        for end, joint in enumerate(strut.joints):
+            ends[at, end] = 0.0 if joint.stiffness is None else 1.0 / joint.stiffness
+        stiffness = held.get(strut.drive or "")
+        # The offset of a telescopic drive, and of no other, is its strut's length.
+        if stiffness is not None and offsets[str(strut.drive)] == kernel.parameters[column]:
+            ends[at, 0] += 1.0 / stiffness
+    return ends
 
 
 def known(drives: Sequence[Drive], struts: Sequence[Strut]) -> NDArray[np.bool_]:

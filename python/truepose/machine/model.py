@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from truepose import _kernel
 from truepose.errors import PoseError, Problem, RequestError
-from truepose.machine.compliances import compliances, known
+from truepose.machine.compliances import compliances, end_compliances, known
 from truepose.machine.condition import DEFAULT_PART, Condition
 from truepose.machine.parts_of_machine import BODIES, Body, Drive, Guide, Strut, Vector
 from truepose.machine.suggestion import did_you_mean, one_of
@@ -213,6 +213,14 @@ class Machine:
         """
         given = np.atleast_2d(np.asarray(lengths, np.float64))
         return compliances(self.kernel, self.drives, self.struts, given)
+
+    @property
+    def end_compliances(self) -> Floats:
+        """(n_strut, 2) m/N of what gives way along each strut at its base and platform end.
+
+        Its joints and a telescopic drive, which stands at the base end: shares of `compliances`.
+        """
+        return end_compliances(self.kernel, self.drives, self.struts)
 
     @overload
     def stiffness(self, poses: ArrayLike, *, status: Literal[False] = False) -> Floats: ...

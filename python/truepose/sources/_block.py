@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -135,14 +136,65 @@ class Block:
 
     @property
     def tension(self) -> Floats:
-        """(n, n_strut) strut force under everything that acts, N, tension positive."""
+        """(n, n_strut) strut force under everything that acts, N, tension positive.
+
+        Of a strut that weighs the mean along it: see `end_forces`.
+        """
         return self.balance[0]
+
+    @cached_property
+    def over_tension(self) -> Floats:
+        """(n, n_strut, 2) N by which the force at a strut's base and platform end exceeds the mean.
+
+        The tension is found with the weight at the joint centres, the share c at the platform. Of
+        what is along the strut the platform joint hands that share on to the strut, and the base
+        joint holds all: c less, and 1 - c more, than the tension (docs/sources/loads.md).
+        """
+        masses = np.array([strut.mass for strut in self.machine.struts])
+        centres = np.array([strut.centre_of_mass for strut in self.machine.struts])
+        along = masses * (self.directions @ self.weight)
+        return np.stack([(1.0 - centres) * along, -centres * along], axis=2)
+
+    @property
+    def end_forces(self) -> Floats:
+        """(n, n_strut, 2) axial force at each strut's base and platform end, N, tension positive.
+
+        Under everything that acts: what its base joint, and its platform joint, carry along it.
+        """
+        forces: Floats = self.tension[:, :, np.newaxis] + self.over_tension
+        return forces
+
+    @cached_property
+    def uneven_stretch(self) -> Floats | None:
+        """(n, n_strut) m by which each limb gives way more than under its mean tension.
+
+        None where no strut weighs, or nothing gives way at an end.
+        """
+        ends = self.machine.end_compliances
+        if not (ends.any() and any(strut.mass > 0.0 for strut in self.machine.struts)):
+            return None
+        return np.asarray((self.over_tension * ends).sum(axis=2))
+
+    def drive_loads(self, drives: Sequence[int]) -> Floats:
+        """(n, k) what these drives carry under everything that acts, N, of a crank N m.
+
+        It drives their offset up. A telescopic drive stands at the base end of its strut.
+        """
+        names = self.machine.parameters
+        columns = [names.index(f"{self.machine.drives[each].part}.offset") for each in drives]
+        loads = self.loads(np.array(columns, np.intp), "all")
+        of_strut = {int(c): k for k, c in enumerate(self.machine.kernel.length_parameters)}
+        for at, column in enumerate(columns):
+            if column in of_strut:
+                loads[:, at] += self.over_tension[:, of_strut[column], 0]
+        return loads
 
     @cached_property
     def forces(self) -> Floats:
         """(n, n_closure) force of every closure under everything that acts, N.
 
-        A strut's is its tension; a universal guide's its moment over the characteristic length.
+        A strut's is its tension, the mean along it; a universal guide's its moment over the
+        characteristic length.
         """
         kernel = self.machine.kernel
         if len(kernel.closures) == self.tension.shape[1]:

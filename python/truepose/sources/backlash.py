@@ -4,8 +4,8 @@
     shift = -sign(travel) * play / 2           below it, on a path: the carriage lags behind
     half  = play / 2                           else
 
-The load is that of all that acts, on the drive's offset, by virtual work.
-`docs/sources/backlash.md` has the reference.
+The load is that of all that acts, on the drive's offset, by virtual work; of a telescopic drive the
+force at the base end of its strut. `docs/sources/backlash.md` has the reference.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Backlash:
             machine.characteristic_length if drive.coordinate == "angle" else 1.0
             for drive in drives
         ]
-        loads = block.loads(columns, "all")
+        loads = block.drive_loads(self.joints)
         side, free = pressed(block, columns, loads, self.thresholds, lever)
         if block.travel is not None:
             side = np.where(free, -np.sign(block.travel[:, self.joints]), side)

@@ -3,9 +3,10 @@
     reach = clearance / 2                                       spherical, universal
     reach = (clearance * |u across| + axial_clearance * |u along|) / 2       revolute
 
-with u the strut's direction, across and along the joint's axis. Each joint of a strut in tension
-lets it grow by its reach, in compression it shrinks by it; a strut that carries no more than the
-threshold has a half band of the reach. `docs/sources/clearance.md` has the reference.
+with u the strut's direction, across and along the joint's axis. Each joint that is pulled along its
+strut lets that grow by its reach, pressed it lets it shrink; one that carries no more than the
+threshold has a half band of the reach. A strut that weighs may pull one joint and press the
+other. `docs/sources/clearance.md` has the reference.
 """
 
 from __future__ import annotations
@@ -94,7 +95,8 @@ class Clearance:
         for column, joint in enumerate(self.joints):
             reach[:, column] = _reach(machine, block, joint)
         columns = machine.kernel.length_parameters[struts]
-        side, _ = pressed(block, columns, block.tension[:, struts], self.threshold)
+        forces = block.end_forces[:, struts, [joint.end for joint in self.joints]]
+        side, _ = pressed(block, columns, forces, self.threshold)
         return Deviation.of(columns, side * reach, np.where(side == 0.0, reach, 0.0))
 
 

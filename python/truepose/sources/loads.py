@@ -5,6 +5,9 @@ on the tool does:
 
     shift = load on the parameter * compliance of the parameter
 
+A strut's weight loads its ends unlike its middle, so that its joints (and the drive of a telescopic
+strut) give way otherwise than under the mean tension, which is the load on its length.
+
 A force on the tool of known size F but unknown direction is a band: along each of three orthogonal
 directions d (two, in a plane) a common variable of its own moves all parameters together by
 
@@ -85,6 +88,9 @@ class Loads:
             raise TrueposeError(*problems)
         columns, compliance = block.compliances
         shift = block.loads(columns, "own") * compliance
+        if block.uneven_stretch is not None:
+            # The struts' lengths are the first columns.
+            shift[:, : len(machine.struts)] += block.uneven_stretch
         if condition.envelope is None:
             return Deviation.of(columns, shift)
         return _with_envelope(block, condition.envelope, shift)

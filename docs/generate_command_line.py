@@ -38,7 +38,9 @@ own. `.nc` files are the Dataset as it is, in SI.
 
 A file is written under a temporary name beside its place and then renamed, so it is whole or it
 is not there. Progress, with the rate and the time left at that rate, shows on stderr, on a
-terminal, when the work takes more than two seconds.
+terminal, when the work takes more than two seconds. What to know before the numbers are used
+(`guide-taken-rigid`: [machines.md](machines.md#what-a-description-leaves-out)) is on stderr too,
+once, as `warning[CODE]: ...`, and in `json`.
 
 `montecarlo`, `bounds` and `shares` answer how sure an error is: [how_sure.md](how_sure.md) says
 which of their numbers to quote to whom.

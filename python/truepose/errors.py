@@ -104,6 +104,7 @@ CATALOGUE: dict[str, str] = {
     "bad-setting": "a --set, or a TRUEPOSE_ variable, that is not what it can be",
     "unknown-parameter": "a parameter that the machine does not have",
     "no-stiffness": "a stiffness is wanted of a strut that gives none",
+    "guide-taken-rigid": "a warning: guides carry load, and how they bend is not in the results",
     "bad-condition": "a condition of values that cannot be",
     "no-source": "the file gives no error source to evaluate",
     "correlation-out-of-reach": "a correlation that two distributions of these shapes cannot have",

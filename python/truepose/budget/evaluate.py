@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,6 +20,7 @@ from truepose.budget.dataset import (
     label,
     sizes,
 )
+from truepose.budget.guide_loads import GuideLoads
 from truepose.budget.poses import (
     OK,
     Progress,
@@ -123,7 +125,8 @@ def budget(
     errors are actual minus commanded, base frame (Gojtan & Hess-Coelho 2005, equations 3-9).
 
     Raises `RequestError`: bad-poses, no-workspace, no-source, no-pose-left; `TrueposeError` where
-    the condition asks for what the machine does not say (no-stiffness, no-expansion).
+    the condition asks for what the machine does not say (no-stiffness, no-expansion). What it warns
+    of (guide-taken-rigid) is in the attribute `warnings`.
     """
     given = machine.condition if condition is None else condition
     table = requested_poses(machine, poses)
@@ -136,6 +139,7 @@ def budget(
         for name in _HIGHEST
     }
     statistics = comparison.NormStatistics(len(sources), kinds)
+    guides = GuideLoads(machine)
     distributions: list[dict[str, None]] = [{} for _ in sources]
 
     walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
@@ -151,6 +155,7 @@ def budget(
             for name, running in highest.items():
                 running.add(values[_HIGHEST[name]][usable])
             statistics.add(values["worst"][usable])
+            guides.add(block, usable)
     if rows.count == 0:
         raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
 
@@ -175,9 +180,11 @@ def budget(
             "quantity", [QUANTITY_UNITS[kind] for kind in kinds], "unit of the quantity"
         ),
     }
-    return assemble(
+    dataset = assemble(
         machine, given, SCHEMA, rows, table, walk.left_out, over_all=over_all, coords=coords
     )
+    dataset.attrs["warnings"] = json.dumps(guides.warnings())
+    return dataset
 
 
 def required_sources(machine: Machine, condition: Condition) -> tuple[Source, ...]:

@@ -25,7 +25,7 @@ from truepose.output import require_writable
 from truepose.report import formats
 from truepose.report.display import nearest_middle, pose_text, where_highest
 from truepose.report.result import Result
-from truepose.report.study import Study
+from truepose.report.study import Study, warnings_of
 from truepose.report.tables import Table
 
 if TYPE_CHECKING:
@@ -62,10 +62,12 @@ def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMAT
 
 
 def evaluate(request: Request, machine: Machine) -> xr.Dataset:
-    """The error budget over the file's workspace."""
+    """The error budget over the file's workspace; what it warns of goes to stderr."""
     with progress("error budget") as report:
         found = truepose.budget(machine, progress=report)
     refuse_left_out_of(request, machine, found)
+    for warning in warnings_of(found):
+        click.echo(f"warning[{warning['code']}]: {warning['sentence']}", err=True)
     return found
 
 

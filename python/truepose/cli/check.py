@@ -41,6 +41,7 @@ def command(**options: Any) -> int:
     from truepose.output import replacing
     from truepose.report import accuracy, inputs
     from truepose.report.reach import reach
+    from truepose.report.study import warnings_of
 
     request = Request(**options)
     machine = _work.read_machine(request, [".json", ".csv"])
@@ -48,20 +49,23 @@ def command(**options: Any) -> int:
     out = ~found.usable
     _work.refuse_left_out(request, machine, out.nonzero()[0], found.poses[out], found.status[out])
     answers: tuple[Answer, ...] = ()
+    warnings: list[dict[str, str]] = []
     # Without a source the file may still be asked about its workspace, unless it asks for more.
     asked = machine.accuracy.target is not None or machine.accuracy.angle_target is not None
     if asked or any(inputs.acting(machine)):
-        answers = accuracy.answers(_work.study_of(request, machine))
+        study = _work.study_of(request, machine)
+        answers, warnings = accuracy.answers(study), warnings_of(study.budget)
     if request.format == "table":
         from truepose.cli._show import show_tables
 
         show_tables(_tables(machine, found, answers))
     else:
-        click.echo(_text(request.format, machine, found, answers))
+        click.echo(_text(request.format, machine, found, answers, warnings))
     if request.output is not None:
         form = request.output.suffix.lower().removeprefix(".")
         with replacing(request.output) as temporary:
-            temporary.write_text(_text(form, machine, found, answers) + "\n", encoding="utf-8")
+            text = _text(form, machine, found, answers, warnings)
+            temporary.write_text(text + "\n", encoding="utf-8")
         _work.note_written(request.output)
     return int(accuracy.met(answers, accuracy.BEFORE) is False)
 
@@ -81,7 +85,13 @@ def _tables(machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> list
     return [*shown, tables.answers(answers)] if answers else shown
 
 
-def _text(form: str, machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> str:
+def _text(
+    form: str,
+    machine: Machine,
+    found: Reach,
+    answers: tuple[Answer, ...],
+    warnings: list[dict[str, str]],
+) -> str:
     """The answers as JSON, or as CSV one row an answer. File units, named."""
     import csv
     import io
@@ -113,6 +123,7 @@ def _text(form: str, machine: Machine, found: Reach, answers: tuple[Answer, ...]
             "sources": inputs.source_data(machine),
             "workspace": reach.as_data(machine, found),
             "answers": rows,
+            "warnings": warnings,
         },
         indent=1,
         ensure_ascii=False,

@@ -19,10 +19,10 @@ from truepose.report.study import Study
 LIMITS = (
     "These results hold for the sources found in the machine file and for the poses evaluated, "
     "nothing else. Sources that the file does not name (backlash, joint clearance, wear, control "
-    "and measuring errors, bending of frame and platform) are not in them. Highest values add the "
-    "bands linearly and, with the exact simulation at both edges, are not a guaranteed enclosure; "
-    "where a guaranteed bound is given it says so, and holds at the poses that it names. "
-    "Loads and temperatures act on the nominal machine at the commanded pose."
+    "and measuring errors, bending of frame, platform and guides) are not in them. Highest values "
+    "add the bands linearly and, with the exact simulation at both edges, are not a guaranteed "
+    "enclosure; where a guaranteed bound is given it says so, and holds at the poses that it "
+    "names. Loads and temperatures act on the nominal machine at the commanded pose."
 )
 FIGURE_SETTINGS = {"displaylogo": False, "responsive": True, "displayModeBar": "hover"}
 
@@ -62,6 +62,7 @@ def render(study: Study, machine_text: str = "") -> str:
         if study.calibration is None
         else calibration.of_page(study.calibration),
         results=results,
+        warnings=tables.warnings(study),
         inputs=[
             table(study.machine)
             for table in (inputs.machine, inputs.condition, inputs.sources, inputs.deviations)

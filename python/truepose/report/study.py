@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,6 +19,12 @@ if TYPE_CHECKING:
     from truepose.machine import Machine
 
 Array = NDArray[np.float64]
+
+
+def warnings_of(dataset: xr.Dataset) -> list[dict[str, str]]:
+    """What a result warns of: `code` and `sentence` of each, without its full stop."""
+    found: list[dict[str, str]] = json.loads(dataset.attrs.get("warnings") or "[]")
+    return found
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from truepose.report.display import (
     pose_text,
     where_highest,
 )
-from truepose.report.study import Study
+from truepose.report.study import Study, warnings_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -274,6 +274,13 @@ def answers(found: Sequence[Answer]) -> Table:
         "compensation with the second-order term of its law); the exact error at an edge where "
         "that is larger.",
     )
+
+
+def warnings(study: Study) -> Table | None:
+    """What the budget warns of; None where nothing."""
+    sentences = [warning["sentence"] for warning in warnings_of(study.budget)]
+    rows = [(f"{text[:1].upper()}{text[1:]}.",) for text in sentences]
+    return Table("warnings", "Warnings", ("",), tuple(rows)) if rows else None
 
 
 def poses_left_out(study: Study) -> Table | None:

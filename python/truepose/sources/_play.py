@@ -21,13 +21,13 @@ def pressed(
     Loads and threshold in N, or N m of a parameter that is an angle, whose `lever` (k,) is the
     machine's size, m; 1 otherwise.
     """
-    least = np.maximum(threshold, NO_LOAD * _acting(block) * np.asarray(lever, np.float64))
+    least = np.maximum(threshold, NO_LOAD * all_that_acts(block) * np.asarray(lever, np.float64))
     unknown = _of_any_direction(block, columns)
     side = np.where(np.abs(loads) - unknown > least, np.sign(loads), 0.0)
     return side, np.abs(loads) + unknown <= least
 
 
-def _acting(block: Block) -> Floats:
+def all_that_acts(block: Block) -> Floats:
     """(n or 1, 1) N: the size of all that acts, moments by the machine's size."""
     wrench = np.abs(block.tool_wrench) + np.abs(block.own_wrench)
     size = block.machine.characteristic_length

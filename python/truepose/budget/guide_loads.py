@@ -1,0 +1,81 @@
+"""What the guides carry over a run: they give way nowhere in the results, which has to be said."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truepose.machine import Guide, Machine
+from truepose.sources import Block
+from truepose.sources._base import Flags, Floats
+from truepose.sources._play import NO_LOAD, all_that_acts
+
+CODE = "guide-taken-rigid"
+
+
+class GuideLoads:
+    """The largest load on each guide over poses: a force, N, or a universal guide's moment, N m."""
+
+    def __init__(self, machine: Machine) -> None:
+        first = len(machine.struts)
+        owners = [name.partition(".")[0] for name in machine.closures[first:]]
+        self._guides = machine.guides
+        self._closures = [
+            [first + at for at, owner in enumerate(owners) if owner == guide.name]
+            for guide in machine.guides
+        ]
+        # A universal guide's closure is a length: what turns it, times the machine's size.
+        self._lever = [
+            machine.characteristic_length if _is_turned(guide) else 1.0 for guide in machine.guides
+        ]
+        self._highest = np.zeros(len(machine.guides))
+        self._acting = 0.0
+
+    def add(self, block: Block, usable: Flags) -> None:
+        """The poses of a block where `usable` (n,)."""
+        if not (self._guides and usable.any()):
+            return
+        known, unknown = block.forces, _of_any_direction(block)
+        for at, closures in enumerate(self._closures):
+            load = np.linalg.norm(known[:, closures], axis=1)
+            if unknown is not None:
+                # The largest over all directions of a force: the matrix's largest singular value.
+                load = load + np.linalg.norm(unknown[:, closures], 2, axis=(1, 2))
+            highest = float(load[usable].max()) * self._lever[at]
+            self._highest[at] = max(self._highest[at], highest)
+        self._acting = max(self._acting, float(all_that_acts(block).max()))
+
+    def warnings(self) -> list[dict[str, str]]:
+        """One warning, its code and sentence, where a guide carries anything; else none."""
+        loaded = [
+            f"{guide.name} carries up to {load:.4g} {'N m' if _is_turned(guide) else 'N'}"
+            for guide, load, lever in zip(self._guides, self._highest, self._lever, strict=True)
+            if load > NO_LOAD * self._acting * lever
+        ]
+        if not loaded:
+            return []
+        sentence = (
+            f"guides are taken as rigid: {', '.join(loaded)}; "
+            "how far the limbs that they stand for bend is in no result"
+        )
+        return [{"code": CODE, "sentence": sentence}]
+
+
+def _is_turned(guide: Guide) -> bool:
+    """Whether what the guide carries is a moment."""
+    return guide.kind == "universal"
+
+
+def _of_any_direction(block: Block) -> Floats | None:
+    """(n, n_closure, n_direction) N of every closure under the force of unknown direction."""
+    envelope = block.condition.envelope
+    if envelope is None:
+        return None
+    poses = block.requested[block.indices]
+    forces = []
+    for direction in envelope.directions:
+        wrench = np.array([[*(envelope.force * direction), 0.0, 0.0, 0.0]])
+        forces.append(block.machine.kernel.forces(poses, wrench, status=True)[0])
+    return np.stack(forces, axis=2)
+
+
+__all__ = ["CODE", "GuideLoads"]

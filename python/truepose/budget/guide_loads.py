@@ -55,7 +55,7 @@ class GuideLoads:
             return []
         sentence = (
             f"guides are taken as rigid: {', '.join(loaded)}; "
-            "how far the limbs that they stand for bend is in no result"
+            "the bending of the limbs that they stand for is in no result"
         )
         return [{"code": CODE, "sentence": sentence}]
 

@@ -231,7 +231,7 @@ class Deviation:
         their shift. Members of a group go to the ends of their common variable, so that one with a
         negative sign moves the other way: other corners of the band cannot happen.
         """
-        t = np.array([each.ends[side > 0.0] for each in self.distribution], np.float64)
+        t = abs(side) * np.array([each.ends[side > 0.0] for each in self.distribution], np.float64)
         return self.shift + np.where(self.edge, self.signed_half * t, 0.0)
 
 

@@ -14,6 +14,8 @@ from benchmarks.rows import Row
 from benchmarks.timing import best_seconds
 from truepose.budget.comparison import quantities
 from truepose.budget.vertices import worst_vertices
+from truepose.sources import UNIFORM
+from truepose.sources.domain import Domain
 
 BAND = 1e-4  # m, of every parameter of the hexapod, to either side
 ROUNDS = 7
@@ -71,7 +73,8 @@ def _at_home() -> list[Row]:
 
     kinds = quantities(machine.components)
     nothing = np.zeros((1, len(machine.components)))
-    found = worst_vertices(exact, nothing, BAND * slopes, list(kinds.values()))
+    domain = Domain.of([UNIFORM] * columns.size)
+    found = worst_vertices(exact, nothing, BAND * slopes, domain, list(kinds.values()))
     if found.status.any():
         raise RuntimeError("the hexapod does not close at one of the corners")
     reached = found.most[0]

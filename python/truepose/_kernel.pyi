@@ -176,12 +176,14 @@ class Machine:
         parameters: ArrayLike,
         variables: Sequence[int],
         swing: ArrayLike,
+        directions: Sequence[Sequence[int]] = ...,
     ) -> tuple[list[list[float]], list[list[float]], list[list[float]], list[str]]:
         """(lower, upper (n, n_component), magnitudes (n, n_quantity), status (n,)), proven bounds.
 
         Over every variable in [-1, 1]: parameters `shifted` (k0,) are deviated by `shift`
         (n or 1, k0), and column c moves `parameters[c]` by `swing` (n or 1, k) times variable
-        `variables[c]`. Status: proven, near_singular, box_too_wide.
+        `variables[c]`; the variables of one of `directions` are together a unit vector. Status:
+        proven, near_singular, box_too_wide.
         """
 
     def bounds_over(
@@ -336,7 +338,8 @@ class Variables:
     `sigmas` (half band in standard deviations), `stream` and `number` (its identity: whatever else
     varies, its samples are the same), `dof`, `values` and `probabilities` where the kind has them.
     The variables `members` are correlated: `factor` (k x k, row after row) times independent normal
-    numbers, then taken to their distributions.
+    numbers, then taken to their distributions. Those of one of `directions` are together a unit
+    vector, as likely in any direction.
     """
 
     def __new__(
@@ -344,6 +347,7 @@ class Variables:
         variables: Sequence[Mapping[str, object]],
         members: Sequence[int] = ...,
         factor: Sequence[float] = ...,
+        directions: Sequence[Sequence[int]] = ...,
     ) -> Variables: ...
     def draw(self, seed: int, first: int, count: int) -> _Floats:
         """(count, n_variable) the samples from number `first` on."""

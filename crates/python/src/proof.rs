@@ -33,8 +33,10 @@ impl Machine {
     /// magnitudes (n, n_quantity), status (n,) of "proven", "near_singular", "box_too_wide").
     ///
     /// `shifted` (k0,) parameters and their `shift` (n or 1, k0); `parameters`, `variables` (k,) of the
-    /// columns and their `swing` (n or 1, k), the variables in [-1, 1].
+    /// columns and their `swing` (n or 1, k), the variables in [-1, 1]; `directions`: variables that are
+    /// together a unit vector.
     #[allow(clippy::too_many_arguments)] // Python's signature
+    #[pyo3(signature = (joints, placements, shifted, shift, parameters, variables, swing, directions=vec![]))]
     fn bounds_at<'py>(
         &self,
         py: Python<'py>,
@@ -45,6 +47,7 @@ impl Machine {
         parameters: &Bound<'py, PyAny>,
         variables: Vec<usize>,
         swing: &Bound<'py, PyAny>,
+        directions: Vec<Vec<usize>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let shifted = self.columns(shifted)?;
         let parameters = self.columns(parameters)?;
@@ -62,6 +65,9 @@ impl Machine {
         let swings = swing.rows(0, swing.count != count || count == 1);
         let places = placements.data();
         let number = variables.iter().map(|&variable| variable + 1).max().unwrap_or(0);
+        if directions.iter().flatten().any(|&member| member >= number) {
+            return Err(PyValueError::new_err("a direction of variables that are not there"));
+        }
         let mut found: Vec<Result<PoseBound, Unproven>> = vec![Err(Unproven::TooWide); count];
         py.detach(|| {
             share_out(&mut found, count, 1, |poses, found| {
@@ -71,6 +77,7 @@ impl Machine {
                         variables: variables.clone(),
                         swing: swings.row(i).to_vec(),
                         count: number,
+                        directions: directions.clone(),
                     };
                     let extent = Extent::new(
                         machine,
@@ -144,7 +151,8 @@ impl Machine {
             return Err(PyValueError::new_err("the arguments do not fit the machine"));
         }
         let number = variables.iter().map(|&variable| variable + 1).max().unwrap_or(0);
-        let deviating = Deviating { parameters, variables, swing, count: number };
+        let deviating =
+            Deviating { parameters, variables, swing, count: number, directions: vec![] };
         let region = Region {
             machine,
             sides,

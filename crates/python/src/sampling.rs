@@ -51,7 +51,7 @@ fn variable(entry: &Bound<'_, PyDict>) -> PyResult<Variable> {
     Ok(Variable { shape, stream: required(entry, "stream")?, number: required(entry, "number")? })
 }
 
-/// Independent or correlated variables, each of a distribution.
+/// Independent or correlated variables, each of a distribution, and components of directions.
 #[pyclass(frozen, module = "truepose._kernel")]
 pub struct Variables {
     inner: sampling::Variables,
@@ -60,19 +60,23 @@ pub struct Variables {
 #[pymethods]
 impl Variables {
     #[new]
-    #[pyo3(signature = (variables, members=vec![], factor=vec![]))]
+    #[pyo3(signature = (variables, members=vec![], factor=vec![], directions=vec![]))]
     fn new(
         variables: Vec<Bound<'_, PyDict>>,
         members: Vec<usize>,
         factor: Vec<f64>,
+        directions: Vec<Vec<usize>>,
     ) -> PyResult<Self> {
         let count = variables.len();
         if factor.len() != members.len() * members.len() || members.iter().any(|&m| m >= count) {
             return Err(PyValueError::new_err("members and factor do not fit the variables"));
         }
+        if directions.iter().flatten().any(|&m| m >= count || members.contains(&m)) {
+            return Err(PyValueError::new_err("the directions do not fit the variables"));
+        }
         let variables = variables.iter().map(variable).collect::<PyResult<Vec<_>>>()?;
         let copula = (!members.is_empty()).then_some(Copula { members, factor });
-        Ok(Variables { inner: sampling::Variables::new(variables, copula) })
+        Ok(Variables { inner: sampling::Variables::new(variables, copula, directions) })
     }
 
     /// (count, n_variable) the samples from number `first` on.

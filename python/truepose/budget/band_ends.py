@@ -45,13 +45,13 @@ class Ends:
         return {"truncate": "none" if self.sigmas is None else self.sigmas}
 
     def narrowed(self, machine: Machine, moves: Spread) -> Spread:
-        """The spread with every variable in [-1, 1]: what has no ends is cut.
+        """The spread with every single variable in [-1, 1]: what has no ends is cut.
 
         Raises `RequestError` (no-finite-band) where something has no ends and is not to be cut.
         """
         endless = [at for at, each in enumerate(moves.distributions) if not each.bounded]
         if not endless:
-            return moves
+            return moves.centred()
         if self.sigmas is None:
             named = ", ".join(
                 f"{moves.names[at]} ({moves.distributions[at]})" for at in endless[:NAMED]
@@ -71,4 +71,5 @@ class Ends:
         factor = np.ones(len(moves.names))
         for at in endless:
             factor[at] = self.sigmas / moves.distributions[at].sigmas
-        return dataclasses.replace(moves, swing=moves.swing * factor[moves.variables])
+        cut = dataclasses.replace(moves, swing=moves.swing * factor[moves.variables])
+        return cut.centred()

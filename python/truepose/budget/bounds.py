@@ -3,7 +3,8 @@
 The variables of all sources are taken anywhere in their bands, in any combination. Interval Newton
 on the closures proves that every such machine has exactly one pose near the commanded one and
 encloses it, rounding included (`crates/kernel/src/proof`). What is reached stands beside it: the
-exact error at the worst vertices that were found.
+exact error at the worst vertices that were found. A force of unknown direction is taken on its
+sphere: along an error the most that it can do is the length of its three effects.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from truepose.budget.over_region import bounds_over_region, no_proof, required_g
 from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, requested_poses
 from truepose.budget.spread import Spread, spread
 from truepose.budget.vertices import worst_vertices
-from truepose.budget.worst import linear_half, worst
+from truepose.budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block
@@ -144,7 +145,7 @@ def _bounded(
     """Every variable over the poses of a block, and which of them are usable."""
     value, effects = order
     kinds = list(quantities(machine.components).values())
-    found = worst_vertices(Mover(machine, block, moves), value, effects, kinds)
+    found = worst_vertices(Mover(machine, block, moves), value, effects, moves.domain, kinds)
     m = len(machine.components)
     shifted, shift = moves.shift
     lower, upper, magnitude, status = machine.kernel.bounds_at(
@@ -155,6 +156,7 @@ def _bounded(
         moves.columns,
         moves.variables.tolist(),
         np.ascontiguousarray(moves.swing),
+        [members.tolist() for members in moves.directions],
     )
     values = {
         "lower": np.asarray(lower),
@@ -164,6 +166,6 @@ def _bounded(
         "reached_lower": -found.most[:, m : 2 * m],
         "reached_upper": found.most[:, :m],
         "reached_magnitude": found.most[:, 2 * m :],
-        "linear": worst(value, linear_half(effects)),
+        "linear": worst(value, moves.domain.reach(effects)),
     }
     return values, walk.keep(block.indices, found.status)

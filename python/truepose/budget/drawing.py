@@ -19,6 +19,7 @@ import numpy as np
 
 from truepose.budget.copula import NORMAL, Copula
 from truepose.sources._base import Distribution, Flags, Floats, Indices
+from truepose.sources.domain import unit
 
 STUDENT = "student-t"
 
@@ -40,14 +41,18 @@ class Drawing:
         numbers: Indices,
         names: Sequence[str],
         seed: int,
+        directions: Sequence[Indices] = (),
     ) -> None:
         """`streams`, `numbers` (n_variable,): what each variable is, for its random numbers.
+
+        `directions`: numbers of the variables that are together a unit vector.
 
         Raises `RequestError` (correlation-out-of-reach).
         """
         self.distributions = tuple(distributions)
         self.sigmas: Floats = np.array([each.sigmas for each in distributions], np.float64)
         self.copula = Copula.of(distributions, correlation, names)
+        self.directions = tuple(directions)
         self._seed = seed
         self._identity = [
             int(stream) * _STREAM + int(number)
@@ -65,6 +70,15 @@ class Drawing:
         single = np.ones(len(self.distributions), np.bool_)
         single[self.linked] = False
         return single
+
+    @cached_property
+    def by_itself(self) -> list[Indices]:
+        """Numbers of the variables of each cause: a direction's together, all others alone."""
+        alone = np.ones(len(self.distributions), np.bool_)
+        for members in self.directions:
+            alone[members] = False
+        causes = [*np.flatnonzero(alone)[:, np.newaxis], *self.directions]
+        return sorted(causes, key=lambda members: int(members[0]))
 
     @cached_property
     def covariance(self) -> Floats:
@@ -97,11 +111,14 @@ class Points:
         """(count, n_variable) as `next`, but with unit normals for correlated ones."""
         drawing = self._drawing
         found = np.empty((count, len(self._generators)))
+        of_normals = set(drawing.linked.tolist()).union(*map(np.ndarray.tolist, drawing.directions))
         for column, numbers in enumerate(self._generators):
-            if drawing.single[column]:
-                found[:, column] = _unit(numbers, drawing.distributions[column], count)
-            else:
+            if column in of_normals:
                 found[:, column] = numbers.standard_normal(count)
+            else:
+                found[:, column] = _unit(numbers, drawing.distributions[column], count)
+        for members in drawing.directions:
+            found[:, members] = unit(found[:, members]) * drawing.sigmas[members]
         return found
 
     def next(self, count: int) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
@@ -13,6 +13,7 @@ import numpy as np
 from truepose.budget.copula import Copula
 from truepose.errors import Problem, RequestError
 from truepose.sources._base import Distribution, Floats, Indices
+from truepose.sources.domain import unit
 from truepose.sources.quantiles import normal_quantile
 
 if TYPE_CHECKING:
@@ -49,6 +50,11 @@ class Variables(Protocol):
         ...
 
     @property
+    def directions(self) -> Sequence[Indices]:
+        """Numbers of the variables that are together a unit vector."""
+        ...
+
+    @property
     def streams(self) -> Indices:
         """(n_variable,) what each belongs to, for random numbers."""
         ...
@@ -82,6 +88,7 @@ class Random:
 
         self.seed = seed
         self.distributions = of.distributions
+        self.directions = of.directions
         self.copula = Copula.of(of.distributions, of.correlation, of.names)
         linked = self.copula.linked.tolist()
         # The kernel has no quantile function of Student's distribution.
@@ -97,7 +104,12 @@ class Random:
                 described[k] |= {"kind": "normal", "sigmas": 1.0}
             linked = []
         factor = self.copula.factor if linked else np.empty((0, 0))
-        self.variables = _kernel.Variables(described, linked, factor.ravel().tolist())
+        self.variables = _kernel.Variables(
+            described,
+            linked,
+            factor.ravel().tolist(),
+            [members.tolist() for members in of.directions],
+        )
 
     def given(self, first: int, count: int) -> Floats | None:
         """None, but where a correlated variable is of Student's distribution."""
@@ -160,6 +172,8 @@ class _Sobol:
         if copula.linked.size:
             normals = normal_quantile(u[:, copula.linked]) @ copula.factor.T
             self._rows[:, copula.linked] = copula.variables(normals)
+        for members in random.directions:
+            self._rows[:, members] = unit(normal_quantile(u[:, members]))
 
     def given(self, first: int, count: int) -> Floats:
         """(count, n_variable)."""

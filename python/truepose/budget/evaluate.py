@@ -222,11 +222,11 @@ def _evaluate(
     statuses: list[np.ndarray] = []
     for at, deviation in enumerate(deviations):
         edges = exact.source_edges(machine, block, deviation)
-        half, spread, status = _band(machine, block, deviation)
+        reach, spread, status = _band(machine, block, deviation)
         values["error"][:, at] = edges.error
         values["error_lower"][:, at] = edges.lower
         values["error_upper"][:, at] = edges.upper
-        values["worst"][:, at] = worst.worst(edges.error, half)
+        values["worst"][:, at] = worst.worst(edges.error, reach)
         values["uncertainty"][:, at] = spread
         percent.percent(edges.lower, per_error, out=values["percent_lower"][:, at])
         percent.percent(edges.upper, per_error, out=values["percent_upper"][:, at])
@@ -252,11 +252,14 @@ def _evaluate(
 
 def _band(
     machine: Machine, block: Block, deviation: Deviation
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Half width and standard uncertainty (n, n_component) of a source, and a status (n,)."""
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
+    """How far a source reaches down and up, its standard uncertainty, (n, n_component), a status.
+
+    The status (n,) is the kernel's.
+    """
     n_pose = block.indices.size
-    half = np.zeros((n_pose, len(machine.components)))
-    spread = np.zeros_like(half)
+    down = np.zeros((n_pose, len(machine.components)))
+    up, spread = np.zeros_like(down), np.zeros_like(down)
     status = np.full(n_pose, OK, np.uint8)
     if deviation.banded.size:
         for start in range(0, n_pose, FEW):
@@ -267,11 +270,11 @@ def _band(
             # Sizes first, then their squares, in the one place; what is correlated keeps its signs.
             correlation = deviation.banded_correlation
             scratch = effects if correlation is None else None
-            half[poses] = worst.linear_half(effects, scratch=scratch)
+            down[poses], up[poses] = deviation.domain.reach(effects, scratch)
             spread[poses] = propagation.standard_uncertainty(
                 effects, sigmas, scratch=effects, correlation=correlation
             )
-    return half, spread, status
+    return (down, up), spread, status
 
 
 __all__ = ["SCHEMA", "budget", "required_sources"]

@@ -54,15 +54,16 @@ class Linear:
 class Model(Protocol):
     """Outputs, of which there are m, as a function of n_variable variables t.
 
-    `names`, `sources`, `distributions`, `correlation`, `streams` and `numbers` of the variables are
-    those of `Spread`; `dofs` (n_variable,): degrees of freedom of the estimates of their standard
-    uncertainties. `outputs` and `output_units` (m).
+    `names`, `sources`, `distributions`, `correlation`, `directions`, `streams` and `numbers` of the
+    variables are those of `Spread`; `dofs` (n_variable,): degrees of freedom of Student variables
+    and of estimated standard uncertainties, else inf. `outputs` and `output_units` (m).
     """
 
     names: tuple[str, ...]
     sources: tuple[str, ...]
     distributions: tuple[Distribution, ...]
     correlation: Floats | None
+    directions: tuple[Indices, ...]
     streams: Indices
     numbers: Indices
     dofs: Floats
@@ -88,7 +89,8 @@ class MachineModel:
         self.names, self.sources = moves.names, moves.sources
         self.distributions, self.correlation = moves.distributions, moves.correlation
         self.streams, self.numbers = moves.streams, moves.numbers
-        self.dofs: Floats = np.full(len(moves.names), np.inf)
+        self.directions = moves.directions
+        self.dofs: Floats = np.array([each.dof or np.inf for each in moves.distributions])
         self.outputs: tuple[str, ...] = machine.components
         self.output_units = tuple(component_units(machine))
 
@@ -155,9 +157,12 @@ class FunctionModel:
         each = tuple(self.inputs.values())
         self.distributions = tuple(one.distribution for one in each)
         self.correlation = correlation_matrix(self.names, correlation)
+        self.directions: tuple[Indices, ...] = ()
         self.streams: Indices = np.zeros(len(each), np.intp)
         self.numbers: Indices = np.arange(len(each), dtype=np.intp)
-        self.dofs: Floats = np.array([one.dof for one in each], np.float64)
+        self.dofs: Floats = np.array(
+            [min(one.dof, one.distribution.dof or np.inf) for one in each], np.float64
+        )
         self._centre = np.array([one.centre for one in each], np.float64)
         self._half = np.array([one.half for one in each], np.float64)
         self.outputs, self._value = self._probe()

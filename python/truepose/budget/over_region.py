@@ -24,7 +24,7 @@ from truepose.budget.dataset import Schema, Variable, region_dataset
 from truepose.budget.evaluate import required_sources
 from truepose.budget.length_law import law_of_length
 from truepose.budget.poses import Progress, Walk, faults_text, pose_in_words
-from truepose.budget.spread import spread
+from truepose.budget.spread import Spread, spread
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.machine.suggestion import did_you_mean, one_of
@@ -115,7 +115,9 @@ def bounds_over_region(
     for source in sources:
         of = _known(machine, condition, source, block)
         (yielding if getattr(source, "over_region", None) == "wrench" else shifts).extend(of)
-    moves = ends.narrowed(machine, spread(machine, block, sources))
+    every = spread(machine, block, sources)
+    moves = ends.narrowed(machine, every)
+    shifts.extend(_middles(every))
     found = machine.kernel.bounds_over(
         sides,
         shifts,
@@ -158,6 +160,13 @@ def bounds_over_region(
     return result.assign_attrs(
         ends.attrs | {"gap": gap, "gap_reached": float(found["gap"]), "region": str(asked)}
     )
+
+
+def _middles(moves: Spread) -> list[Affine]:
+    """By how much the middles of bands lie off their shifts, of listed values of no symmetry."""
+    offsets = moves.swing[0] * moves.domain.middle[moves.variables]
+    columns = zip(moves.columns.tolist(), offsets.tolist(), strict=True)
+    return [(column, (value, value), 0.0, 0) for column, value in columns if value != 0.0]
 
 
 def _finite(values: Sequence[float]) -> Floats:
@@ -242,6 +251,8 @@ def _known(machine: Machine, condition: Condition, source: Source, block: Block)
     """
     deviation = source.deviation(machine, condition, block)
     how = getattr(source, "over_region", None)
+    if deviation.domain.directions:
+        raise _unknown(machine, source, "what a force of unknown direction does is not enclosed")
     if _varies(deviation.half) or _varies(deviation.signed_half):
         raise _unknown(machine, source, "its band differs from pose to pose")
     if how == "wrench":

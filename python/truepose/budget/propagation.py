@@ -42,11 +42,19 @@ def standard_uncertainty(
 
 @dataclass(frozen=True)
 class Combined:
-    """Standard uncertainty (n, m), covariance (n, m, m) and effective degrees of freedom (n, m)."""
+    """The law of propagation, per output.
+
+    `standard_uncertainty` (n, m), `covariance` (n, m, m); `dof` (n, m): effective degrees of
+    freedom, NaN where there is no such number. `scale` and `scale_dof` (n, m): the interval is
+    Student's quantile for `scale_dof` times `scale`, the standard uncertainty but for Student's
+    variables, which enter with their scale.
+    """
 
     standard_uncertainty: Floats
     covariance: Floats
     dof: Floats
+    scale: Floats
+    scale_dof: Floats
 
 
 def combine(
@@ -54,27 +62,41 @@ def combine(
     sigmas: Floats,
     correlation: Floats | None = None,
     dofs: Floats | None = None,
+    scales: Floats | None = None,
 ) -> Combined:
     """The law of propagation for effects (n, m, v), of variables with `dofs` (v,), default inf.
 
     u[c, d] = sum over i, j of a[c, i] r[i, j] a[d, j] with a = effect / sigmas (GUM 5.2.2, H.2.3),
-    and u[c]^4 / dof[c] = sum of u_i[c]^4 / dof_i (G.2b). Variables that are correlated enter the
-    latter as one, with the fewest degrees of freedom among them, which is on the safe side: the
-    formula is for independent ones (G.4.1).
+    and s[c]^4 / dof[c] = sum of s_i[c]^4 / dof_i (G.2b), with s_i = `scales` (v,) u_i: the formula
+    is for what a readings' standard deviation estimates, which is the scale of a Student variable
+    and not its standard deviation (G.3.2). It is for independent variables (G.4.1). Where some of
+    finite degrees are correlated there are no effective ones, and the interval takes them as one
+    variable with the fewest degrees among them, which it is where they are wholly correlated.
     """
     each = effects / sigmas
     weighed = each if correlation is None else each @ correlation
     covariance = weighed @ each.transpose(0, 2, 1)
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
     variance = np.maximum(np.einsum("ncc->nc", covariance), 0.0)
+    size = np.sqrt(variance)
     dof = np.full(variance.shape, math.inf)
-    if dofs is not None and np.isfinite(dofs).any():
-        sets = _correlated_sets(len(dofs), correlation)
-        member = (sets[:, np.newaxis] == np.unique(sets)).astype(np.float64)
-        fewest = np.array([dofs[column > 0.0].min() for column in member.T])
-        fourth = np.square((weighed * each) @ member) @ (1.0 / fewest)
-        np.divide(np.square(variance), fourth, out=dof, where=fourth > 0.0)
-    return Combined(np.sqrt(variance), covariance, dof)
+    if dofs is None or not np.isfinite(dofs).any():
+        return Combined(size, covariance, dof, size, dof)
+    if scales is not None:
+        each = each * scales
+        weighed = each if correlation is None else each @ correlation
+    square = np.maximum((weighed * each).sum(axis=2), 0.0)
+    sets = _correlated_sets(len(dofs), correlation)
+    member = (sets[:, np.newaxis] == np.unique(sets)).astype(np.float64)
+    fewest = np.array([dofs[column > 0.0].min() for column in member.T])
+    fourth = np.square((weighed * each) @ member) @ (1.0 / fewest)
+    scale_dof = dof.copy()
+    np.divide(np.square(square), fourth, out=scale_dof, where=fourth > 0.0)
+    correlated = (member.sum(axis=0) > 1.0) & np.isfinite(fewest)
+    undefined = (np.abs(each) @ member)[..., correlated].any(axis=2)
+    return Combined(
+        size, covariance, np.where(undefined, np.nan, scale_dof), np.sqrt(square), scale_dof
+    )
 
 
 def _correlated_sets(count: int, correlation: Floats | None) -> Indices:

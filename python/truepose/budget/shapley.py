@@ -53,7 +53,7 @@ ORDERS = 1 << 12
 
 @dataclass(frozen=True)
 class ShapleyShares:
-    """Shares (n_variable, m) of the outputs' variance.
+    """Shares (n_cause, m) of the outputs' variance, in the order of `Drawing.by_itself`.
 
     `failed`: walks left out, since the model could not be evaluated somewhere on them; `points`:
     evaluations made.
@@ -74,22 +74,24 @@ def shares(
     confidence: float,
     floor: Floats,
 ) -> ShapleyShares:
-    """Shapley shares of every variable, from `samples` walks.
+    """Shapley shares of every cause, from `samples` walks.
 
     `slopes` (n_variable, m): a linear function of the coordinates close to the outputs. `floor`
     (m,): standard deviation that is no more than rounding; the shares of an output below are NaN.
     """
-    n_variable, n_output = slopes.shape
-    sums = Sums(seed, n_output)
+    causes = drawing.by_itself
+    sums = Sums(seed, slopes.shape[1])
     failed = points = 0
     for order, values, linear, good in _walks(evaluate, drawing, slopes, samples, seed):
-        points += good.size * (1 + n_variable)
+        points += good.size * (1 + len(causes))
         failed += int(good.size - good.sum())
         taken = _taken(values) - _taken(linear)
-        by_variable = np.empty_like(taken)
-        np.put_along_axis(by_variable, order[:, :, np.newaxis], taken, axis=1)
-        sums.add(by_variable[good])
-    found = sums.means() + linear_shares(drawing, slopes, seed)
+        by_cause = np.empty_like(taken)
+        np.put_along_axis(by_cause, order[:, :, np.newaxis], taken, axis=1)
+        sums.add(by_cause[good])
+    linear_parts = linear_shares(drawing, slopes, seed)
+    # The components of a direction are not correlated, so that their linear parts add up.
+    found = sums.means() + np.stack([linear_parts[members].sum(axis=0) for members in causes])
     # Of its own sum, so that the shares add up to one.
     variance = found.sum(axis=1)
     defined = (np.sqrt(np.maximum(variance[0], 0.0)) > floor) & (sums.count >= LEAST)
@@ -194,45 +196,48 @@ def _taken(values: Floats) -> Floats:
 def _walks(
     evaluate: Evaluate, drawing: Drawing, slopes: Floats, samples: int, seed: int
 ) -> Iterator[tuple[Indices, Floats, Floats, Flags]]:
-    """In parts: orders (n, d), f and linear function (n, d + 1, m) on the way, good walks (n,)."""
-    n_variable = len(slopes)
+    """In parts: orders (n, d), f and linear function (n, d + 1, m) on the way, good walks (n,).
+
+    d causes, which become known one after the other.
+    """
+    n_cause, n_variable = len(drawing.by_itself), len(slopes)
     bases, others = drawing.points(WALK_BASE), drawing.points(WALK_OTHER)
     numbers = generator(seed, 0, ORDER)
-    for count in parts(samples, n_variable + 1):
-        order = _orders(numbers, count, n_variable)
+    for count in parts(samples, n_cause + 1):
+        order = _orders(numbers, count, n_cause)
         coordinates = _coordinates(
             drawing, order, bases.independent(count), others.independent(count)
         )
         flat = coordinates.reshape(-1, n_variable)
         values, good = evaluate(drawing.variables(flat))
         values = np.where(good[:, np.newaxis], values, 0.0)
-        shape = (n_variable + 1, count, slopes.shape[1])
+        shape = (n_cause + 1, count, slopes.shape[1])
         yield (
             order,
             values.reshape(shape).swapaxes(0, 1),
             (flat @ slopes).reshape(shape).swapaxes(0, 1),
-            np.asarray(good.reshape(n_variable + 1, count).all(axis=0)),
+            np.asarray(good.reshape(n_cause + 1, count).all(axis=0)),
         )
 
 
 def _coordinates(drawing: Drawing, order: Indices, base: Floats, other: Floats) -> Floats:
-    """(d + 1, n, d) coordinates along the walks of `order` (n, d), all of `base` at their start.
+    """(d + 1, n, v) coordinates along the walks of `order` (n, d), all of `base` at their start.
 
-    `base`, `other` (n, d): independent ones; those of linked variables become the components of e.
+    `base`, `other` (n, v): independent ones; those of linked variables become the components of e.
     """
-    count, n_variable = order.shape
+    n_cause = order.shape[1]
     linked = drawing.linked
-    rows = np.arange(count)
-    steps = np.empty((n_variable + 1, count, n_variable))
+    cause_of = np.empty(base.shape[1], np.intp)
+    for cause, members in enumerate(drawing.by_itself):
+        cause_of[members] = cause
+    steps = np.empty((n_cause + 1, *base.shape))
     steps[0] = base
-    for step in range(n_variable):
-        steps[step + 1] = steps[step]
-        chosen = order[:, step]
-        steps[step + 1, rows, chosen] = other[rows, chosen]
+    for step in range(n_cause):
+        steps[step + 1] = np.where(cause_of == order[:, [step]], other, steps[step])
     if linked.size:
         # Place of each linked variable among them, the last of the walk first: what changes first
         # is drawn given all others, so its component of e comes last.
-        place = np.argsort(order, axis=1)[:, linked]
+        place = np.argsort(order, axis=1)[:, cause_of[linked]]
         reverse = np.argsort(-place, axis=1)
         lower = factors(drawing.copula.latent, reverse)
         moved = np.take_along_axis(steps[:, :, linked], reverse[np.newaxis], axis=2)

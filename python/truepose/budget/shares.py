@@ -201,7 +201,10 @@ class _Plan:
 
 @dataclass(frozen=True)
 class _Variables:
-    """What acts: names and sources of n_variable variables, and how to draw them."""
+    """What acts: names and sources of the causes, and how to draw them.
+
+    A cause is what varies by itself (`Drawing.by_itself`): a variable, or a direction.
+    """
 
     names: tuple[str, ...]
     sources: tuple[str, ...]
@@ -211,13 +214,25 @@ class _Variables:
     @classmethod
     def of(cls, model: Model, seed: int) -> _Variables:
         drawing = Drawing(
-            model.distributions, model.correlation, model.streams, model.numbers, model.names, seed
+            model.distributions,
+            model.correlation,
+            model.streams,
+            model.numbers,
+            model.names,
+            seed,
+            model.directions,
         )
-        return cls(model.names, model.sources, model.correlation, drawing)
+        first = [int(members[0]) for members in drawing.by_itself]
+        return cls(
+            tuple(model.names[at] for at in first),
+            tuple(model.sources[at] for at in first),
+            model.correlation,
+            drawing,
+        )
 
     @property
     def sets(self) -> dict[str, Indices]:
-        """Numbers of the variables of each source."""
+        """Numbers of the causes of each source."""
         of = np.array(self.sources)
         return {name: np.flatnonzero(of == name) for name in dict.fromkeys(self.sources)}
 
@@ -227,9 +242,10 @@ def _at_one_pose(
 ) -> dict[str, np.ndarray]:
     """Every variable of the schemas that there is, without its dim pose."""
     drawing = variables.drawing
-    count = len(variables.names)
-    of_sources = variables.sets
-    sets = [*np.arange(count)[:, np.newaxis], *of_sources.values()]
+    causes, of_sources = drawing.by_itself, variables.sets
+    count = len(causes)
+    together = [np.concatenate([causes[at] for at in of]) for of in of_sources.values()]
+    sets = [*causes, *together]
     each = (model.linear().effects / drawing.sigmas).T
     found = sobol.indices(
         model.evaluate,
@@ -241,7 +257,7 @@ def _at_one_pose(
         confidence=plan.confidence,
         floor=floor,
     )
-    linear = _linear(each, variables.correlation, floor)
+    linear = _linear(each, variables.correlation, causes, floor)
     values: dict[str, Any] = {
         "linear": linear,
         "source_linear": np.array([linear[members].sum(axis=0) for members in of_sources.values()]),
@@ -270,9 +286,12 @@ def _at_one_pose(
     return values
 
 
-def _linear(each: Floats, correlation: Floats | None, floor: Floats) -> Floats:
-    """(n_variable, m) shares of the linear variance, from standard uncertainties of either sign."""
-    parts: Floats = each * (each if correlation is None else correlation @ each)
+def _linear(
+    each: Floats, correlation: Floats | None, causes: Sequence[Indices], floor: Floats
+) -> Floats:
+    """(n_cause, m) shares of the linear variance, from standard uncertainties of either sign."""
+    of_variables: Floats = each * (each if correlation is None else correlation @ each)
+    parts: Floats = np.stack([of_variables[members].sum(axis=0) for members in causes])
     whole = parts.sum(axis=0)
     varies = np.sqrt(np.maximum(whole, 0.0)) > floor
     np.divide(parts, whole, out=parts, where=varies)

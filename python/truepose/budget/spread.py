@@ -1,6 +1,6 @@
 """Spread: what all sources leave unknown at the poses of a block, as one set of variables.
 
-    deviation of the parameters = shift + sum over columns of swing t[variable],   t in [-1, 1]
+    deviation of the parameters = shift + sum over columns of swing t[variable],   t in the domain
 
 Each source brings its variables; which there are, their names and their numbers for drawing them
 are worked out here once, for everything that combines them.
@@ -20,6 +20,10 @@ from truepose.budget.exact import Moved, together
 from truepose.machine import Machine
 from truepose.sources import REGISTRY, Block, Deviation, Source
 from truepose.sources._base import Distribution, Flags, Floats, Indices
+from truepose.sources.domain import Domain
+
+ROUNDING = 1e-14
+"""By which a band is made wider where its middle and its half are rounded, so that none is lost."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +34,8 @@ class Spread:
     `columns` (k,): kernel parameter of each column that has a band; one may repeat.
     `variables` (k,): which variable moves the column; `swing` (n or 1, k): its deviation, m, rad
     or 1, where that variable is +1.
-    `distributions`, `names` (unique) and `sources` of the n_variable variables.
+    `distributions`, `names` (unique) and `sources` of the n_variable variables, and the `domain`
+    that they lie in.
     `streams`, `numbers` (n_variable,): identity for random numbers, whatever else acts: the place
     of the source in the registry, and the variable's number in that source's deviation.
     `correlation` (n_variable, n_variable): Pearson's; None where all are independent.
@@ -46,6 +51,30 @@ class Spread:
     streams: Indices
     numbers: Indices
     correlation: Floats | None
+    domain: Domain
+
+    @property
+    def directions(self) -> tuple[Indices, ...]:
+        """Numbers of the variables that are together a unit vector."""
+        return self.domain.directions
+
+    def centred(self) -> Spread:
+        """The same deviations with every single variable in [-1, 1], a band about its middle.
+
+        For what needs a box about the shift; the distributions are no longer those of the
+        variables.
+        """
+        if self.domain.symmetric:
+            return self
+        middle, half = self.domain.middle[self.variables], self.domain.half[self.variables]
+        half = half * (1.0 + ROUNDING)
+        ones = np.ones(len(self.names))
+        return dataclasses.replace(
+            self,
+            shift=together([self.shift, (self.columns, self.swing * middle)]),
+            swing=self.swing * half,
+            domain=Domain(-ones, ones, self.directions),
+        )
 
     def at(self, pose: int) -> Spread:
         """The same at one pose of the block."""
@@ -115,6 +144,14 @@ def spread(machine: Machine, block: Block, sources: Sequence[Source]) -> Spread:
         streams=np.repeat([part.stream for part in parts], counts).astype(np.intp),
         numbers=np.concatenate([empty, *(part.numbers for part in parts)]),
         correlation=_correlation(parts, first),
+        domain=Domain.of(
+            [each for part in parts for each in part.distributions],
+            [
+                members + at
+                for part, at in zip(parts, first[:-1], strict=True)
+                for members in part.deviation.domain.directions
+            ],
+        ),
     )
 
 
@@ -135,14 +172,15 @@ class _Part:
 
 def _part(machine: Machine, source: Source, position: int, deviation: Deviation) -> _Part:
     banded = deviation.banded
-    numbers, variables = np.unique(deviation.variables[banded], return_inverse=True)
+    numbers, variables = deviation.banded_variables
     columns = deviation.parameters[banded]
     first = [int(banded[np.flatnonzero(variables == at)[0]]) for at in range(numbers.size)]
     names = []
     for at, column in enumerate(first):
         moved = [machine.parameters[each] for each in columns[variables == at]]
         group = deviation.group_names.get(int(deviation.groups[column]))
-        if len(moved) == 1:
+        direction = any(at in members for members in deviation.domain.directions)
+        if len(moved) == 1 and not direction:
             names.append(moved[0])
         else:
             names.append(group or f"{source.name}: {moved[0]} and others")
@@ -154,9 +192,9 @@ def _part(machine: Machine, source: Source, position: int, deviation: Deviation)
         stream=kinds.index(kind) if kind in kinds else len(kinds) + position,
         deviation=deviation,
         columns=columns,
-        variables=np.asarray(variables, np.intp),
+        variables=variables,
         swing=deviation.signed_half[:, banded],
-        numbers=np.asarray(numbers, np.intp),
+        numbers=numbers,
         names=tuple(names),
         distributions=tuple(deviation.distribution[column] for column in first),
     )

@@ -227,17 +227,21 @@ def _corners(block: Block, deviation: Deviation, drawn: Floats) -> _Corners:
     if not banded.size:
         return _Corners([deviation.shift], force, own, status)
     effects, variable = worst.by_variable(deviation, slopes[:, :, banded])
-    width = np.abs(effects).sum(axis=2)
+    down, up = deviation.domain.reach(effects)
     # A band alone pulls and pushes alike: then the corner that pulls.
-    side = np.where(force < -FITS * width, -1.0, 1.0)
+    side = np.where(force + 0.5 * (up - down) < -FITS * 0.5 * (up + down), -1.0, 1.0)
+    width = np.where(side < 0.0, down, up)
     known = np.abs(effects) > FITS * width[:, :, np.newaxis]
-    toward = side[:, :, np.newaxis] * np.where(known, np.sign(effects), 0.0)
+    along = deviation.domain.most_along(side[:, :, np.newaxis] * effects)
+    toward = np.where(known, along, 0.0)
     corners = []
     for closure in range(force.shape[1]):
         corner = np.repeat(deviation.shift, len(toward) // len(deviation.shift), axis=0)
         corner[:, banded] += deviation.signed_half[:, banded] * toward[:, closure][:, variable]
         corners.append(corner)
-    return _Corners(corners, force + side * width, np.abs(own) + width, status)
+    return _Corners(
+        corners, force + side * width, np.maximum(np.abs(own - down), np.abs(own + up)), status
+    )
 
 
 def _settle(block: Block, moved: Moved, gaps: Floats, wrench: Floats) -> _Rest:

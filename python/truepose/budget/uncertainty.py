@@ -3,7 +3,9 @@
     lower, upper = value -+ k u
 
 u by the law of propagation (`truepose.budget.propagation`), k of Student's distribution for the
-effective degrees of freedom. Whether the interval may be used is for the comparison with sampling
+effective degrees of freedom; a Student variable enters k with its scale, u with its standard
+deviation, so that k of it alone is its own. Correlated inputs of finite degrees of freedom have no
+effective ones (NaN). Whether the interval may be used is for the comparison with sampling
 to say (JCGM 101:2008, clause 8; `truepose.budget.validity`).
 """
 
@@ -52,7 +54,9 @@ _EACH = ("pose", "component")
 SCHEMA: Schema = {
     "value": Variable(_EACH, "component", "error from all sources at their shifts, exact"),
     "standard_uncertainty": Variable(_EACH, "component", "standard uncertainty, first order"),
-    "effective_dof": Variable(_EACH, "1", "effective degrees of freedom, by Welch-Satterthwaite"),
+    "effective_dof": Variable(
+        _EACH, "1", "effective degrees of freedom, by Welch-Satterthwaite; none of correlated ones"
+    ),
     "coverage_factor": Variable(_EACH, "1", "half coverage interval in standard uncertainties"),
     "lower": Variable(_EACH, "component", "lower end of the coverage interval"),
     "upper": Variable(_EACH, "component", "upper end of the coverage interval"),
@@ -113,10 +117,15 @@ class _Variables:
     names: Sequence[str]
     distributions: Sequence[Distribution]
     correlation: Floats | None
-    dofs: Floats | None
+    dofs: Floats
     outputs: Sequence[str]
     units: Sequence[str]
     rounding: Floats
+
+    @property
+    def scales(self) -> Floats:
+        """(v,) scale of a Student variable in its standard deviation, else 1."""
+        return np.array([each.scale for each in self.distributions], np.float64)
 
     @property
     def sigmas(self) -> Floats:
@@ -223,7 +232,7 @@ def _of_machine(
             moves.names,
             moves.distributions,
             moves.correlation,
-            None,
+            np.array([each.dof or np.inf for each in moves.distributions]),
             machine.components,
             units,
             ROUNDING * scale,
@@ -288,9 +297,12 @@ def _answer(
     value: Floats, effects: Floats, variables: _Variables, asked: _Asked
 ) -> dict[str, np.ndarray]:
     """Every variable of `SCHEMA` for n poses, from `value` (n, m) and `effects` (n, m, v)."""
-    law = combine(effects, variables.sigmas, variables.correlation, variables.dofs)
-    factor = coverage_factor(law.dof, asked.probability)
-    half = factor * law.standard_uncertainty
+    law = combine(
+        effects, variables.sigmas, variables.correlation, variables.dofs, variables.scales
+    )
+    factor = coverage_factor(law.scale_dof, asked.probability)
+    half = factor * law.scale
+    np.divide(half, law.standard_uncertainty, out=factor, where=law.standard_uncertainty > 0.0)
     return {
         "value": value,
         "standard_uncertainty": law.standard_uncertainty,

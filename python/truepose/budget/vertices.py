@@ -1,22 +1,25 @@
 """The exact worst case: the corner of the box of variables where something is largest.
 
-Every variable lies in [-1, 1]. What is sought at the corners is each component of the error, both
-ways, and the size (norm) of each quantity. Few variables: every corner is evaluated. Many: a
+Every variable lies between its ends. What is sought at the corners is each component of the error,
+both ways, and the size (norm) of each quantity. Few variables: every corner is evaluated. Many: a
 directed search, which starts where the linear worst case lies and takes what single variables, and
 all patterns of the weakest ones, still gain; where it ends far from the linear worst case it also
-starts elsewhere. It proves nothing: a guaranteed bound does.
+starts elsewhere. A direction that is not known has a sphere for its corners: it is turned to where
+a linear function through points about it is largest, again and again. It proves nothing: a
+guaranteed bound does.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from truepose.budget.poses import OK
 from truepose.sources._base import Flags, Floats, Indices
+from truepose.sources.domain import Domain, unit
 
 EVERY_VERTEX = 12
 """Variables up to which every corner of their box is evaluated: 4096 of them."""
@@ -44,6 +47,12 @@ GAIN = 1e-12
 
 AT_ONCE = 1 << 16
 """Corners evaluated at once."""
+
+ALIKE = 3
+"""Decimals to which the variables of two starts agree that are one."""
+
+TURN = 0.3
+"""Angle, rad, by which a direction is turned to see where it should go."""
 
 Evaluate = Callable[[Indices, Floats], tuple[Floats, np.ndarray]]
 """Outputs (s, m) and kernel status (s,) of poses (s,) of a block where the variables are (s, v)."""
@@ -95,30 +104,35 @@ class Found:
 
 
 def worst_vertices(
-    evaluate: Evaluate, centre: Floats, effects: Floats, quantities: Sequence[Indices] = ()
+    evaluate: Evaluate,
+    centre: Floats,
+    effects: Floats,
+    domain: Domain,
+    quantities: Sequence[Indices] = (),
 ) -> Found:
     """The exact worst case of n poses.
 
     `centre` (n, m): exact outputs where every variable is 0; `effects` (n, m, v): first-order
-    change where each is +1, from which the search sets out; `quantities`: outputs of each norm.
+    change where each is +1, from which the search sets out; `domain`: where the variables can lie;
+    `quantities`: outputs of each norm.
     """
     targets = Targets(centre.shape[1], quantities)
     n_pose, _, n_variable = effects.shape
     found = Found(targets.of(centre), np.zeros(n_pose, np.intp), np.full(n_pose, OK, np.uint8))
     if n_variable == 0:
         return found
-    if n_variable <= EVERY_VERTEX:
-        _every(evaluate, targets, found, corners(n_variable))
+    if n_variable <= EVERY_VERTEX and not domain.directions:
+        _every(evaluate, targets, found, at_ends(domain, corners(n_variable)))
         return found
     found.search = "directed"
     step = max(1, AT_ONCE // (targets.count * len(directions(3))))
     for start in range(0, n_pose, step):
         poses = np.arange(start, min(start + step, n_pose))
-        rows, wanted, t, linear = _starts(targets, centre[poses], effects[poses])
-        _climb(evaluate, targets, found, poses[rows], wanted, t)
+        rows, wanted, t, linear = _starts(targets, centre[poses], effects[poses], domain)
+        _climb(evaluate, targets, domain, found, poses[rows], wanted, t)
         short = np.abs(found.most[poses] - linear) > BENT * np.abs(linear)
-        rows, wanted, t = _elsewhere(short, n_variable)
-        _climb(evaluate, targets, found, poses[rows], wanted, t)
+        rows, wanted, t = _elsewhere(short, domain)
+        _climb(evaluate, targets, domain, found, poses[rows], wanted, t)
     return found
 
 
@@ -126,6 +140,11 @@ def corners(n_variable: int) -> Floats:
     """(2^n_variable, n_variable) every corner of the box, of -1 and +1."""
     bits = np.arange(2**n_variable)[:, np.newaxis] >> np.arange(n_variable)
     return np.where(bits & 1, -1.0, 1.0)
+
+
+def at_ends(domain: Domain, t: Floats) -> Floats:
+    """(..., v) corners `t`, of -1 and +1, at the ends that the variables have."""
+    return np.where(t < 0.0, domain.lower, domain.upper)
 
 
 def _every(evaluate: Evaluate, targets: Targets, found: Found, t: Floats) -> None:
@@ -145,21 +164,21 @@ def _first_bad(status: np.ndarray, rows: int) -> np.ndarray:
 
 
 def _starts(
-    targets: Targets, centre: Floats, effects: Floats
+    targets: Targets, centre: Floats, effects: Floats, domain: Domain
 ) -> tuple[Indices, Indices, Floats, Floats]:
     """Where searches start: pose (r,), target (r,) and corner (r, v) of each.
 
     And the worst case (n, 2 m + q) of the linear model.
     """
     n_pose, n_output, n_variable = effects.shape
-    signs = np.where(effects >= 0.0, 1.0, -1.0)
-    t = [np.concatenate([signs, -signs], axis=1).reshape(-1, n_variable)]
+    ends = [domain.most_along(effects), domain.most_along(-effects)]
+    t = [np.concatenate(ends, axis=1).reshape(-1, n_variable)]
     rows = [np.repeat(np.arange(n_pose), 2 * n_output)]
     wanted = [np.tile(np.arange(2 * n_output), n_pose)]
-    half = np.abs(effects).sum(axis=2)
-    linear = [centre + half, half - centre]
+    down, up = domain.reach(effects)
+    linear = [centre + up, down - centre]
     for number, columns in enumerate(targets.quantities):
-        norms, patterns = linear_norms(centre[:, columns], effects[:, columns])
+        norms, patterns = linear_norms(centre[:, columns], effects[:, columns], domain)
         linear.append(norms.max(axis=1, keepdims=True))
         for pose in range(n_pose):
             chosen = _distinct(norms[pose], patterns[pose])
@@ -174,10 +193,13 @@ def _starts(
     )
 
 
-def _elsewhere(short: Flags, n_variable: int) -> tuple[Indices, Indices, Floats]:
+def _elsewhere(short: Flags, domain: Domain) -> tuple[Indices, Indices, Floats]:
     """Starts as in `_starts` for the poses and targets where `short` (n, 2 m + q)."""
+    n_variable = domain.lower.size
     random = np.random.default_rng(n_variable)
-    few = np.where(random.integers(0, 2, (ELSEWHERE, n_variable)), 1.0, -1.0)
+    few = at_ends(domain, np.where(random.integers(0, 2, (ELSEWHERE, n_variable)), 1.0, -1.0))
+    for members in domain.directions:
+        few[:, members] = unit(random.standard_normal((ELSEWHERE, members.size)))
     rows, wanted = np.nonzero(short)
     return (
         np.repeat(rows, ELSEWHERE),
@@ -190,18 +212,18 @@ def _distinct(norms: Floats, patterns: Floats) -> Indices:
     """Up to `STARTS` patterns (d, v) that differ, of the largest `norms` (d,)."""
     chosen: dict[bytes, int] = {}
     for at in np.argsort(-norms, kind="stable"):
-        chosen.setdefault((patterns[at] > 0.0).tobytes(), int(at))
+        chosen.setdefault(np.round(patterns[at], ALIKE).tobytes(), int(at))
         if len(chosen) == STARTS:
             break
     return np.array(list(chosen.values()), np.intp)
 
 
-def linear_norms(centre: Floats, effects: Floats) -> tuple[Floats, Floats]:
+def linear_norms(centre: Floats, effects: Floats, domain: Domain) -> tuple[Floats, Floats]:
     """Corners where the norm of the linear model is largest, as far as directions find them.
 
-    The linear model maps the box to a zonotope; its point furthest along a direction u is the
-    corner of signs sign(u . effects). From each direction on to that of the point found, the norm
-    never falls, and it comes to rest where it is largest nearby.
+    The linear model maps the box to a zonotope (with directions, a sum of one and of ellipsoids);
+    its point furthest along u is that of the corner along u . effects. From each direction on to
+    that of the point found, the norm never falls, and it comes to rest where it is largest nearby.
 
     `centre` (n, k), `effects` (n, k, v) -> norms (n, d) and corners (n, d, v).
     """
@@ -209,7 +231,7 @@ def linear_norms(centre: Floats, effects: Floats) -> tuple[Floats, Floats]:
     norms = np.full(along.shape[:2], -1.0)
     t = np.ones((*along.shape[:2], effects.shape[2]))
     for _ in range(SETTLED):
-        further = np.where(along @ effects >= 0.0, 1.0, -1.0)
+        further = domain.most_along(along @ effects)
         points = centre[:, np.newaxis] + further @ effects.transpose(0, 2, 1)
         reached = np.sqrt(np.square(points).sum(axis=2))
         better = reached > norms * (1.0 + GAIN)
@@ -240,6 +262,7 @@ def directions(n: int) -> Floats:
 def _climb(
     evaluate: Evaluate,
     targets: Targets,
+    domain: Domain,
     found: Found,
     poses: Indices,
     wanted: Indices,
@@ -249,7 +272,7 @@ def _climb(
     step = max(1, AT_ONCE // max(t.shape[1], 2**WEAKEST))
     for start in range(0, len(t), step):
         rows = slice(start, start + step)
-        _climb_some(_Tried(evaluate, targets, found, poses[rows], wanted[rows]), t[rows])
+        _climb_some(_Tried(evaluate, targets, domain, found, poses[rows], wanted[rows]), t[rows])
 
 
 def _climb_some(tried: _Tried, t: Floats) -> None:
@@ -259,18 +282,68 @@ def _climb_some(tried: _Tried, t: Floats) -> None:
         tried, t, score = tried.only(fine), t[fine], score[fine]
         if not t.size:
             return
-        gains = tried.scores(_flips(t)) - score[:, np.newaxis]
+        t, score = _turned(tried, t, score)
+        single = np.flatnonzero(tried.domain.single)
+        if not single.size:
+            return
+        gains = tried.scores(_flips(t, tried.domain)) - score[:, np.newaxis]
         improving = gains > GAIN * np.abs(score[:, np.newaxis])
         # All that gain by themselves at once, or the best alone where that gives more.
-        together = np.where(improving, -t, t)
-        alone = t.copy()
-        alone[np.arange(len(t)), np.argmax(gains, axis=1)] *= -1.0
+        other, rows = _other_end(t, tried.domain), np.arange(len(t))
+        together, alone = t.copy(), t.copy()
+        together[:, single] = np.where(improving, other[:, single], t[:, single])
+        best = single[np.argmax(gains, axis=1)]
+        alone[rows, best] = other[rows, best]
         better, reached = _best(tried, np.stack([together, alone], axis=1))
-        rest = ~improving.any(axis=1)
+        rest: Flags = np.asarray(~improving.any(axis=1))
         if rest.any():
-            better[rest], reached[rest] = _best(tried.only(rest), _patterns(t[rest], gains[rest]))
+            patterns = _patterns(t[rest], gains[rest], tried.domain)
+            better[rest], reached[rest] = _best(tried.only(rest), patterns)
         gained = reached > score + GAIN * np.abs(score)
         tried, t, score = tried.only(gained), better[gained], reached[gained]
+
+
+def _turned(tried: _Tried, t: Floats, score: Floats) -> tuple[Floats, Floats]:
+    """Corners `t` (r, v) and their scores (r,) with every direction turned to where it gains.
+
+    A function that is linear in the direction d has, along each tangent a, f(d cos T + a sin T)
+    and f(d cos T - a sin T) from which its gradient follows; d turns to it. What is not quite
+    linear takes several turns, and comes to rest where one no longer gains.
+    """
+    for members in tried.domain.directions:
+        going: Flags = np.ones(len(t), np.bool_)
+        for _ in range(SETTLED):
+            rows = np.flatnonzero(going)
+            if not rows.size:
+                break
+            now, some = t[rows], tried.only(np.asarray(going))
+            aside = _tangents(now[:, members])
+            tried_t = np.repeat(now[:, np.newaxis], 2 * aside.shape[1], axis=1)
+            ahead = math.cos(TURN) * now[:, np.newaxis, members]
+            tried_t[:, ::2, members] = ahead + math.sin(TURN) * aside
+            tried_t[:, 1::2, members] = ahead - math.sin(TURN) * aside
+            around = some.scores(tried_t)
+            up, down = around[:, ::2], around[:, 1::2]
+            slopes = (up - down) / (2.0 * math.sin(TURN))
+            level = 2.0 * score[rows, np.newaxis] - up - down
+            along = level.mean(axis=1) / (2.0 * (1.0 - math.cos(TURN)))
+            to = along[:, np.newaxis] * now[:, members]
+            to = to + (slopes[:, :, np.newaxis] * aside).sum(axis=1)
+            now[:, members] = unit(np.where(np.isfinite(to), to, now[:, members]))
+            reached = some.scores(now[:, np.newaxis])[:, 0]
+            gained = reached > score[rows] + GAIN * np.abs(score[rows])
+            going[rows[~gained]] = False
+            t[rows[gained]], score[rows[gained]] = now[gained], reached[gained]
+    return t, score
+
+
+def _tangents(directions: Floats) -> Floats:
+    """(r, d - 1, d) unit vectors across unit vectors (r, d), d of 2 or 3, and each other."""
+    if directions.shape[1] == 2:
+        return np.stack([-directions[:, 1], directions[:, 0]], axis=1)[:, np.newaxis]
+    least = np.eye(3)[np.argmin(np.abs(directions), axis=1)]
+    first = unit(np.cross(directions, least))
+    return np.stack([first, np.cross(directions, first)], axis=1)
 
 
 @dataclass(frozen=True)
@@ -279,13 +352,14 @@ class _Tried:
 
     evaluate: Evaluate
     targets: Targets
+    domain: Domain
     found: Found
     poses: Indices
     wanted: Indices
 
     def only(self, rows: Flags) -> _Tried:
         """Some of the searches."""
-        return _Tried(self.evaluate, self.targets, self.found, self.poses[rows], self.wanted[rows])
+        return replace(self, poses=self.poses[rows], wanted=self.wanted[rows])
 
     def scores(self, t: Floats) -> Floats:
         """(r, p) what the wanted target is at the corners `t` (r, p, v); -inf where it fails."""
@@ -305,18 +379,31 @@ def _best(tried: _Tried, t: Floats) -> tuple[Floats, Floats]:
     return t[rows, best], scores[rows, best]
 
 
-def _flips(t: Floats) -> Floats:
-    """(r, v, v) the corners beside `t` (r, v): in each another variable at its other end."""
-    n_variable = t.shape[1]
-    beside: Floats = t[:, np.newaxis, :] * (1.0 - 2.0 * np.eye(n_variable))
+def _other_end(t: Floats, domain: Domain) -> Floats:
+    """(r, v) each variable of `t` (r, v) at its other end."""
+    other: Floats = np.where(t == domain.lower, domain.upper, domain.lower)
+    return other
+
+
+def _flips(t: Floats, domain: Domain) -> Floats:
+    """(r, s, v) the corners beside `t` (r, v): in each another single variable at its other end."""
+    single = np.flatnonzero(domain.single)
+    beside = np.repeat(t[:, np.newaxis], single.size, axis=1)
+    beside[:, np.arange(single.size), single] = _other_end(t, domain)[:, single]
     return beside
 
 
-def _patterns(t: Floats, gains: Floats) -> Floats:
-    """(r, 2^w, v) corners `t` (r, v) with every pattern of the w variables of least effect."""
-    weakest = np.argsort(np.abs(gains), axis=1)[:, :WEAKEST]
+def _patterns(t: Floats, gains: Floats, domain: Domain) -> Floats:
+    """(r, 2^w, v) corners `t` (r, v) with every pattern of the w single ones of least effect."""
+    single = np.flatnonzero(domain.single)
+    weakest = single[np.argsort(np.abs(gains), axis=1)[:, :WEAKEST]]
     patterns = corners(weakest.shape[1])
     tried = np.repeat(t[:, np.newaxis, :], len(patterns), axis=1)
     for at in range(weakest.shape[1]):
-        tried[np.arange(len(t)), :, weakest[:, at]] = patterns[:, at]
+        ends = np.where(patterns[:, at] < 0.0, *_ends_of(domain, weakest[:, at, np.newaxis]))
+        tried[np.arange(len(t)), :, weakest[:, at]] = ends
     return tried
+
+
+def _ends_of(domain: Domain, variables: Indices) -> tuple[Floats, Floats]:
+    return domain.lower[variables], domain.upper[variables]

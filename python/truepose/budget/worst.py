@@ -1,9 +1,11 @@
 """Worst: the most that the unknown part of a deviation can do, to first order.
 
-    half[c] = sum over variables of | sum over the variable's columns of sensitivity[c, k] half[k] |
+    reach[c] = most of sum over variables of effect[c, v] t[v],    t where the variables can lie
+    effect[c, v] = sum over the variable's columns of sensitivity[c, k] half[k]
 
-A variable is one column, or a correlation group whose members move together with their signs;
-every variable lies in [-1, 1], so the sum of absolute values is reached at a corner of the box.
+A variable is one column, or a correlation group whose members move together with their signs. Where
+every variable lies in [-1, 1] the reach is the sum of the effects' sizes, down as up; listed values
+that are not symmetric and directions that are not known are `truepose.sources.domain`'s.
 """
 
 from __future__ import annotations
@@ -54,25 +56,16 @@ def by_variable(
     if banded.size < half.shape[1]:
         half = half[:, banded]
     effects: Floats = np.multiply(slopes, half[:, np.newaxis], out=slopes)
-    numbers, variable = np.unique(deviation.variables[banded], return_inverse=True)
+    numbers, variable = deviation.banded_variables
     if numbers.size < banded.size:
         member = np.zeros((banded.size, numbers.size))
         member[np.arange(banded.size), variable] = 1.0
         effects = effects @ member
-    return effects, np.asarray(variable, np.intp)
+    return effects, variable
 
 
-def linear_half(effects: Floats, scratch: Floats | None = None) -> Floats:
-    """(n, n_component) half width of the first-order error: every variable at its worst.
-
-    `scratch`: where what is on the way may go, such as `effects` itself.
-    """
-    # A product with ones, which is several times as quick as a sum along a short axis.
-    width: Floats = np.abs(effects, out=scratch) @ np.ones(effects.shape[-1])
-    return width
-
-
-def worst(error: Floats, half: Floats) -> Floats:
-    """(n, n_component) the most a source alone can do: |error at its shift| + half width."""
-    most: Floats = np.abs(error) + half
+def worst(error: Floats, reach: tuple[Floats, Floats]) -> Floats:
+    """(n, n_component) the largest |error|, from that at the shift and its reach down and up."""
+    down, up = reach
+    most: Floats = np.maximum(np.abs(error - down), np.abs(error + up))
     return most

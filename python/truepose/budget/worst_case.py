@@ -1,11 +1,13 @@
 """Worst case: the most that everything together can do, to first order and exactly.
 
-    linear[c] = |error at the shifts| + sum over variables of |effect[c]|
-    exact[c] = the largest |error| at a corner of the box in which the variables lie
+    linear[c] = largest |error at the shifts + sum over variables of effect[c] t|
+    exact[c] = the largest |error| at a corner of what the variables lie in
 
 Both are of all sources together. The linear one is quick and may fall short of the truth, since the
 error bends; the exact one is a corner that the machine can be at. Neither is a proof: `bounds` is.
-A correlation does not narrow the worst case: every corner of the box is taken to happen.
+A variable lies in [-1, 1], or as far either way as its listed values do; the components of a
+direction that is not known lie on their sphere together, and every point of it is a corner. A
+correlation does not narrow the worst case: every corner is taken to happen.
 """
 
 from __future__ import annotations
@@ -35,11 +37,12 @@ from truepose.budget.model import FunctionModel
 from truepose.budget.poses import OK, Progress, Walk, is_path, no_pose_left, requested_poses
 from truepose.budget.spread import spread
 from truepose.budget.vertices import Found, linear_norms, worst_vertices
-from truepose.budget.worst import linear_half, worst
+from truepose.budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Distribution
 from truepose.sources._base import Floats, Indices
+from truepose.sources.domain import Domain
 
 _EACH = ("pose", "component")
 _SIZE = ("pose", "quantity")
@@ -124,10 +127,11 @@ def _of_machine(
             _only(usable, Mover(machine, block, moves)),
             value[usable],
             effects[usable],
+            moves.domain,
             list(kinds.values()),
         )
         block = block.select(usable)
-        values = _values(found, value[usable], effects[usable], list(kinds.values()))
+        values = _values(found, value[usable], effects[usable], moves.domain, list(kinds.values()))
         rows.append(block, values, walk.keep(block.indices, found.status))
         _collect(endless, moves.names, moves.distributions)
     if rows.count == 0:
@@ -160,30 +164,36 @@ def _only(
 
 
 def _values(
-    found: Found, value: Floats, effects: Floats, quantities: Sequence[Indices]
+    found: Found,
+    value: Floats,
+    effects: Floats,
+    domain: Domain,
+    quantities: Sequence[Indices],
 ) -> dict[str, np.ndarray]:
     """Every variable over n poses, from exact values (n, m) and effects (n, m, v) at the shifts."""
     n_pose, n_output, _ = effects.shape
     upper, lower = found.most[:, :n_output], -found.most[:, n_output : 2 * n_output]
     return {
-        "linear": worst(value, linear_half(effects)),
+        "linear": worst(value, domain.reach(effects)),
         "exact": np.maximum(np.abs(lower), np.abs(upper)),
         "exact_lower": lower,
         "exact_upper": upper,
-        "magnitude_linear": _linear_magnitudes(value, effects, quantities),
+        "magnitude_linear": _linear_magnitudes(value, effects, domain, quantities),
         "magnitude_exact": found.most[:, 2 * n_output :],
         "search": np.full(n_pose, found.search, object),
         "vertices": found.evaluated,
     }
 
 
-def _linear_magnitudes(value: Floats, effects: Floats, quantities: Sequence[Indices]) -> Floats:
+def _linear_magnitudes(
+    value: Floats, effects: Floats, domain: Domain, quantities: Sequence[Indices]
+) -> Floats:
     """(n, q) largest norm of each quantity at a corner of the linear model."""
     magnitudes = np.zeros((len(value), len(quantities)))
     for start in range(0, len(value), POSES):
         poses = slice(start, start + POSES)
         for number, columns in enumerate(quantities):
-            norms, _ = linear_norms(value[poses][:, columns], effects[poses][:, columns])
+            norms, _ = linear_norms(value[poses][:, columns], effects[poses][:, columns], domain)
             magnitudes[poses, number] = norms.max(axis=1)
     return magnitudes
 
@@ -211,7 +221,8 @@ def _of_function(function: Callable[..., Any], inputs: Any) -> xr.Dataset:
         outputs, fine = model.evaluate(t)
         return outputs, np.where(fine, OK, OK + 1).astype(np.uint8)
 
-    found = worst_vertices(evaluate, law.value[np.newaxis], law.effects[np.newaxis])
+    domain = Domain.of(model.distributions)
+    found = worst_vertices(evaluate, law.value[np.newaxis], law.effects[np.newaxis], domain)
     if found.status[0] != OK:
         raise RequestError(
             Problem(
@@ -222,7 +233,7 @@ def _of_function(function: Callable[..., Any], inputs: Any) -> xr.Dataset:
                 hint="narrow the bands, or keep them off where the function is not defined",
             )
         )
-    values = _values(found, law.value[np.newaxis], law.effects[np.newaxis], [])
+    values = _values(found, law.value[np.newaxis], law.effects[np.newaxis], domain, [])
     schema = {
         name: Variable(each.dims[1:], each.units, each.long_name, each.dtype)
         for name, each in SCHEMA.items()

@@ -32,7 +32,7 @@ SCHEMA: Schema = {
     "residual_middle": Variable(
         _ALL, "component", "error of the corrected command, every source at its shift"
     ),
-    "bound": Variable(_ALL, "component", "linear, group-aware half band over all sources"),
+    "bound": Variable(_ALL, "component", "linear, group-aware reach of the bands of all sources"),
     "second_order": Variable(
         _ALL, "component", "what the residual may exceed the bound by, of second order"
     ),
@@ -96,13 +96,14 @@ def _correct(
 
     # Rounding of the inverse is no deviation: where nothing is known, nothing is corrected.
     centre = Step(*shift, joints - block.joints, middle)
-    bound = np.zeros_like(middle)
+    down, up = np.zeros_like(middle), np.zeros_like(middle)
     band: list[Step] = []
     for deviation in deviations:
         if not deviation.banded.size:
             continue
         effects, _, status = worst.variable_effects(machine, block, deviation)
-        bound += worst.linear_half(effects)
+        for reach, of_source in zip((down, up), deviation.domain.reach(effects), strict=True):
+            reach += of_source
         band += second_order.steps(deviation, effects)
         statuses.append(status)
     values = {
@@ -111,7 +112,7 @@ def _correct(
         "residual_lower": low,
         "residual_upper": high,
         "residual_middle": middle,
-        "bound": bound,
+        "bound": np.maximum(down, up),
         "second_order": second_order.bound(block, centre, band),
     }
     return values, statuses

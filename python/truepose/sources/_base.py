@@ -26,6 +26,7 @@ from truepose.sources.distributions import (
     Distribution,
     normal,
 )
+from truepose.sources.domain import Domain
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -51,7 +52,8 @@ class Deviation:
     `shift` (n or 1, k): the known centre, which can be compensated.
     `half` (n or 1, k), at least 0: the half band about the shift, which remains.
     `groups` (k,): columns of one non-negative id share one variable t in [-1, 1] and deviate by
-    `shift + sign * half * t`; `OWN_GROUP` columns each have a variable of their own.
+    `shift + sign * half * t`; `OWN_GROUP` columns each have a variable of their own. Of listed
+    values that are not symmetric t ends where they do (`Distribution.ends`).
     `sign` (n or 1, k): signed coefficient (+1 or -1) in the common variable; of no effect in an
     own group.
     `distribution`: of each column's variable; one for all, or k of them, equal within a group.
@@ -60,6 +62,8 @@ class Deviation:
     `correlation` (n_variable, n_variable), of the numbers in `variables`: Pearson's coefficients
     of the variables t; None where all are independent.
     `group_names`: what a group is called, where it has a name.
+    `directions`: groups whose two or three variables are together a unit vector, as the components
+    of a direction that is not known are.
 
     Raises `ValueError` where shapes or values contradict this.
     """
@@ -73,6 +77,7 @@ class Deviation:
     distribution: tuple[Distribution, ...] = field(default=())
     correlation: Floats | None = None
     group_names: Mapping[int, str] = field(default_factory=dict)
+    directions: tuple[tuple[int, ...], ...] = ()
 
     @classmethod
     def of(
@@ -87,6 +92,7 @@ class Deviation:
         distribution: Distribution | Sequence[Distribution] = UNIFORM,
         correlation: ArrayLike | None = None,
         group_names: Mapping[int, str] | None = None,
+        directions: Sequence[Sequence[int]] = (),
     ) -> Self:
         """A deviation from plain values: a number or a (k,) array stands for every pose."""
         columns = np.atleast_1d(np.asarray(parameters, np.intp))
@@ -102,6 +108,7 @@ class Deviation:
             tuple(each),
             None if correlation is None else np.array(correlation, np.float64),
             dict(group_names or {}),
+            tuple(tuple(groups) for groups in directions),
         )
 
     def __post_init__(self) -> None:
@@ -125,7 +132,18 @@ class Deviation:
         for group, each in zip(self.groups.tolist(), self.distribution, strict=True):
             if group != OWN_GROUP and shared.setdefault(group, each) != each:
                 raise ValueError(f"group {group} has one variable but two distributions")
+        self._check_directions(shared)
         self._check_correlation()
+
+    def _check_directions(self, shared: Mapping[int, Distribution]) -> None:
+        """A component of a direction that is as likely anywhere (Archimedes): each is so spread."""
+        listed = [group for groups in self.directions for group in groups]
+        if len(set(listed)) < len(listed):
+            raise ValueError("a group is a component of two directions")
+        for groups in self.directions:
+            spread = {2: ARCSINE, 3: UNIFORM}.get(len(groups))
+            if any(shared.get(group) != spread for group in groups):
+                raise ValueError(f"the groups {groups} are no components of a direction")
 
     def _check_correlation(self) -> None:
         given = self.correlation
@@ -160,26 +178,61 @@ class Deviation:
 
     @cached_property
     def banded(self) -> Indices:
-        """Columns whose band is not empty at some pose."""
-        return np.flatnonzero((self.half > 0.0).any(axis=0))
+        """Columns whose band is not empty at some pose; of a direction all, or none."""
+        wide: Flags = np.asarray((self.half > 0.0).any(axis=0))
+        for groups in self.directions:
+            members = np.isin(self.groups, groups)
+            wide[members] = wide[members].any()
+        return np.flatnonzero(wide)
+
+    @cached_property
+    def banded_variables(self) -> tuple[Indices, Indices]:
+        """Numbers (v,) of the variables that have a band, ascending.
+
+        And which of these moves each banded column (n_banded,).
+        """
+        numbers, place = np.unique(self.variables[self.banded], return_inverse=True)
+        return np.asarray(numbers, np.intp), np.asarray(place, np.intp)
+
+    @cached_property
+    def domain(self) -> Domain:
+        """Where the variables that have a band, ascending, can lie."""
+        place = self.banded_variables[1]
+        first = self.banded[np.unique(place, return_index=True)[1]]
+        directions = []
+        for groups in self.directions:
+            # In the order of the groups, which is that of the direction's axes.
+            members = [np.flatnonzero(self.groups[first] == group) for group in groups]
+            if all(member.size for member in members):
+                directions.append(np.concatenate(members))
+        return Domain.of([self.distribution[column] for column in first], directions)
+
+    @cached_property
+    def ends(self) -> tuple[Floats, Floats]:
+        """(n or 1, k) lowest and highest deviation of each column, about the shift."""
+        t = np.array([each.ends for each in self.distribution], np.float64).reshape(-1, 2)
+        one, other = self.signed_half * t[:, 0], self.signed_half * t[:, 1]
+        return np.minimum(one, other), np.maximum(one, other)
 
     @cached_property
     def banded_correlation(self) -> Floats | None:
         """The correlation of the variables that have a band, ascending; None: all independent."""
         if self.correlation is None:
             return None
-        numbers = np.unique(self.variables[self.banded])
+        numbers, _ = self.banded_variables
         found: Floats = self.correlation[np.ix_(numbers, numbers)]
         return None if np.array_equal(found, np.eye(numbers.size)) else found
 
     def at_edge(self, side: float) -> Floats:
         """(n or 1, k) deviations with lengths and offsets at an end of their bands.
 
-        `side` -1 is `shift - half`, +1 is `shift + half`; all other columns stay at their shift.
-        Members of a group go to the ends of their common variable, so that one with a negative
-        sign moves the other way: other corners of the band cannot happen.
+        `side` -1 is the lower end of their variables, +1 the upper one (`shift - half` and
+        `shift + half`, but for listed values that are not symmetric); all other columns stay at
+        their shift. Members of a group go to the ends of their common variable, so that one with a
+        negative sign moves the other way: other corners of the band cannot happen.
         """
-        return self.shift + side * np.where(self.edge, self.signed_half, 0.0)
+        t = abs(side) * np.array([each.ends[side > 0.0] for each in self.distribution], np.float64)
+        return self.shift + np.where(self.edge, self.signed_half * t, 0.0)
 
 
 def _table(values: ArrayLike, count: int) -> Floats:

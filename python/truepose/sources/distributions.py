@@ -2,7 +2,9 @@
 
 A column deviates by `shift + swing * t`. The variable is standardised: its mean is 0, and its
 standard deviation 1 / sigmas, so that the half band is |swing|. Bounded distributions have t in
-[-1, 1]. GUM (JCGM 100:2008) 4.3.5, 4.3.7, 4.3.9; JCGM 101:2008, 6.4.
+[-1, 1], and reach both ends, but for listed values that lie further to one side of their mean than
+to the other: those end where the values do. GUM (JCGM 100:2008) 4.3.5, 4.3.7, 4.3.9; JCGM 101:2008,
+6.4.
 """
 
 from __future__ import annotations
@@ -56,9 +58,19 @@ class Distribution:
         return self.name
 
     @property
+    def scale(self) -> float:
+        """Scale of Student's distribution in its standard deviation; 1 of every other."""
+        return 1.0 if self.dof is None else math.sqrt((self.dof - 2.0) / self.dof)
+
+    @property
     def bounded(self) -> bool:
         """Whether t lies in [-1, 1]; a normal or Student one reaches beyond any band."""
         return self.name not in (_NORMAL, _STUDENT)
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Lowest and highest t; of one that reaches beyond any band, those of its band."""
+        return (self.values[0], self.values[-1]) if len(self.values) > 1 else (-1.0, 1.0)
 
     @property
     def stepped(self) -> bool:
@@ -84,8 +96,7 @@ class Distribution:
             return normal_quantile(probability) / self.sigmas
         if self.name == _STUDENT:
             assert self.dof is not None
-            spread = math.sqrt(self.dof / (self.dof - 2.0))
-            return student_quantile(probability, self.dof) / (spread * self.sigmas)
+            return student_quantile(probability, self.dof) * (self.scale / self.sigmas)
         if self.stepped:
             values, up_to = self.steps
             # u in [up_to before, up_to): a variable drawn from [0, 1) has the exact share of each.

@@ -9,9 +9,11 @@ A strut's weight loads its ends unlike its middle, so that its joints (and the d
 strut) give way otherwise than under the mean tension, which is the load on its length.
 
 A force on the tool of known size F but unknown direction is a band: along each of three orthogonal
-directions d (two, in a plane) a common variable of its own moves all parameters together by
+axes d (two, in a plane) a common variable moves all parameters together by
 
     sign * half = load on the parameter under F d * compliance of the parameter
+
+and the variables of the axes are together a unit vector, the direction.
 
 `docs/sources/loads.md` says what this covers.
 """
@@ -33,6 +35,9 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from truepose.machine import Condition, Envelope, FileParts, Machine
+
+UNKNOWN_DIRECTION = "force of unknown direction"
+"""What varies with the direction of the envelope's force."""
 
 _CAUSE = "weight, inertia or a force of any direction acts on the machine"
 
@@ -97,13 +102,13 @@ class Loads:
 
 
 def _with_envelope(block: Block, envelope: Envelope, shift: np.ndarray) -> Deviation:
-    """The shift, and for each direction one group of columns whose variable is its component."""
+    """The shift, and for each axis a group of columns moved by the direction's component."""
     columns, compliance = block.compliances
     shifts, halves, signs = [shift], [np.zeros_like(shift)], [np.ones_like(shift)]
     groups = [np.full(columns.size, OWN_GROUP)]
-    directions = envelope.directions
-    for group, direction in enumerate(directions):
-        wrench = np.array([[*(envelope.force * direction), 0.0, 0.0, 0.0]])
+    axes = envelope.directions
+    for group, axis in enumerate(axes):
+        wrench = np.array([[*(envelope.force * axis), 0.0, 0.0, 0.0]])
         moved = np.broadcast_to(block.loads_of(wrench, columns) * compliance, compliance.shape)
         shifts.append(np.zeros_like(moved))
         halves.append(np.abs(moved))
@@ -118,7 +123,9 @@ def _with_envelope(block: Block, envelope: Envelope, shift: np.ndarray) -> Devia
         groups=np.concatenate(groups),
         sign=np.concatenate([np.broadcast_to(each, compliance.shape) for each in signs], axis=1),
         edge=False,
-        distribution=UNIFORM if len(directions) == 3 else ARCSINE,
+        distribution=UNIFORM if len(axes) == 3 else ARCSINE,
+        group_names=dict.fromkeys(range(len(axes)), UNKNOWN_DIRECTION),
+        directions=[range(len(axes))],
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -65,15 +67,35 @@ def test_effective_degrees_of_freedom_by_welch_and_satterthwaite() -> None:
     )[1]
 
 
-def test_correlated_variables_enter_as_one_of_the_fewest() -> None:
+def test_correlated_variables_of_finite_degrees_have_no_effective_ones() -> None:
     matrix = np.eye(4)
     matrix[0, 1] = matrix[1, 0] = 0.5
     matrix[1, 2] = matrix[2, 1] = 0.5
     effects, dofs = np.array([[[1.0, 2.0, 1.0, 3.0]]]), np.array([20.0, 8.0, 30.0, 5.0])
     found = combine(effects, np.ones(4), matrix, dofs)
+    assert np.isnan(found.dof[0, 0])
+    # The interval takes them as one variable of the fewest degrees among them.
     together = 1.0 + 4.0 + 1.0 + 2.0 * 0.5 * (2.0 + 2.0)
     expected = (together + 9.0) ** 2 / (together**2 / 8.0 + 81.0 / 5.0)
+    assert found.scale_dof[0, 0] == pytest.approx(expected)
+    # An output that none of them moves has its own, and so have correlated ones known outright.
+    alone = combine(effects * [0.0, 0.0, 0.0, 1.0], np.ones(4), matrix, dofs)
+    assert alone.dof[0, 0] == pytest.approx(5.0)
+    known = combine(effects, np.ones(4), matrix, np.array([np.inf, np.inf, np.inf, 5.0]))
+    assert known.dof[0, 0] == pytest.approx((together + 9.0) ** 2 / (81.0 / 5.0))
+
+
+def test_student_variables_enter_the_degrees_of_freedom_by_their_scale() -> None:
+    # Two of standard deviation 3 and 4, of 5 and 12 degrees, beside one known outright.
+    scales = np.array([math.sqrt(3.0 / 5.0), math.sqrt(10.0 / 12.0), 1.0])
+    effects, dofs = np.array([[[3.0, 4.0, 2.0]]]), np.array([5.0, 12.0, np.inf])
+    found = combine(effects, np.ones(3), None, dofs, scales)
+    assert found.standard_uncertainty[0, 0] == pytest.approx(math.sqrt(29.0))
+    squares = [9.0 * 3.0 / 5.0, 16.0 * 10.0 / 12.0, 4.0]
+    assert found.scale[0, 0] == pytest.approx(math.sqrt(sum(squares)))
+    expected = sum(squares) ** 2 / (squares[0] ** 2 / 5.0 + squares[1] ** 2 / 12.0)
     assert found.dof[0, 0] == pytest.approx(expected)
+    assert found.scale_dof[0, 0] == found.dof[0, 0]
 
 
 @pytest.mark.parametrize("probability", [0.5, 0.6827, 0.95, 0.99, 0.9999])

@@ -54,6 +54,7 @@ class Described:
     distributions: tuple[Distribution, ...]
     correlation: Array | None = None
     stream: int = 3
+    directions: tuple[NDArray[np.intp], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -122,6 +123,28 @@ def test_far_tails_of_a_normal_variable() -> None:
         expected = scipy.stats.norm.sf(z) * t.size
         for count in ((t > z).sum(), (t < -z).sum()):
             assert abs(count - expected) < FAR * np.sqrt(expected)
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_direction_is_as_likely_anywhere(dimensions: int) -> None:
+    # Numbers that begin in the middle of a counter's words, beside two that are by themselves.
+    component = UNIFORM if dimensions == 3 else ARCSINE
+    members = np.arange(2, 2 + dimensions)
+    kinds = (UNIFORM, normal(3.0), *[component] * dimensions)
+    rows = Random(Described(kinds, directions=(members,)), SEED).rows(0, DRAWN)
+    direction = rows[:, members]
+    assert np.allclose(np.linalg.norm(direction, axis=1), 1.0, rtol=1e-14)
+    # Whatever the axis, a component has the distribution of its axis (Kolmogorov's statistic).
+    random = np.random.default_rng(3)
+    for _ in range(4):
+        axis = random.standard_normal(dimensions)
+        along = np.sort(direction @ axis / np.linalg.norm(axis))
+        share = 0.5 * (1.0 + along) if dimensions == 3 else 1.0 - np.arccos(along) / np.pi
+        assert np.abs(share - (np.arange(DRAWN) + 0.5) / DRAWN).max() < 2.0 / np.sqrt(DRAWN)
+    # What stands beside it is drawn as it is without it.
+    alone = Random(Described(kinds[:2]), SEED).rows(0, DRAWN)
+    assert np.array_equal(rows[:, :2], alone)
+    assert abs(np.corrcoef(rows[:, 1], direction[:, 0])[0, 1]) < 5.0 / np.sqrt(DRAWN)
 
 
 def test_variables_are_independent() -> None:

@@ -9,6 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from truepose.budget import vertices
+from truepose.sources import UNIFORM
+from truepose.sources.domain import Domain
 
 Array = NDArray[np.float64]
 POSITION = [np.arange(3)]
@@ -37,6 +39,10 @@ class Bowl:
     def effects(self) -> Array:
         return self.factor[:, np.newaxis, np.newaxis] * self.slopes
 
+    @property
+    def domain(self) -> Domain:
+        return Domain.of([UNIFORM] * self.slopes.shape[1])
+
     def worst(self) -> Array:
         every = vertices.corners(self.slopes.shape[1])
         outputs, _ = self(np.zeros(len(every), np.intp), every)
@@ -54,7 +60,7 @@ def test_corners_are_all_there_once() -> None:
 
 def test_few_variables_are_looked_at_at_every_corner() -> None:
     bowl = Bowl(1, vertices.EVERY_VERTEX, bend=3.0, poses=3)
-    found = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, POSITION)
+    found = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
     assert found.search == "every vertex"
     assert found.evaluated.tolist() == [2**vertices.EVERY_VERTEX] * 3
     assert bowl.asked == 3 * 2**vertices.EVERY_VERTEX
@@ -65,7 +71,7 @@ def test_few_variables_are_looked_at_at_every_corner() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_directed_search_finds_the_worst_of_what_bends_little(bend: float, seed: int) -> None:
     bowl = Bowl(seed, vertices.EVERY_VERTEX + 2, bend, poses=2)
-    found = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, POSITION)
+    found = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
     assert found.search == "directed"
     assert bowl.asked == found.evaluated.sum()
     assert np.allclose(found.most, bowl.worst(), rtol=1e-12)
@@ -74,7 +80,7 @@ def test_a_directed_search_finds_the_worst_of_what_bends_little(bend: float, see
 @pytest.mark.parametrize("seed", range(5))
 def test_a_directed_search_of_what_bends_much_comes_close_and_never_beyond(seed: int) -> None:
     bowl = Bowl(seed, vertices.EVERY_VERTEX + 1, bend=1.0)
-    found = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, POSITION)
+    found = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
     reached = found.most / bowl.worst()
     assert reached.max() <= 1.0 + 1e-12
     assert reached.min() > 0.97
@@ -83,14 +89,14 @@ def test_a_directed_search_of_what_bends_much_comes_close_and_never_beyond(seed:
 def test_where_the_effects_are_nothing_the_search_starts_elsewhere() -> None:
     bowl = Bowl(7, vertices.EVERY_VERTEX + 1, bend=1.0)
     bowl.slopes[:] = 0.0
-    found = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, POSITION)
+    found = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
     assert (found.most / bowl.worst()).min() > 0.97
 
 
 def test_the_same_search_finds_the_same() -> None:
     first, second = (Bowl(3, 15, 1.0) for _ in range(2))
     found = [
-        vertices.worst_vertices(bowl, bowl.centre, bowl.effects, POSITION)
+        vertices.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
         for bowl in (first, second)
     ]
     assert np.array_equal(found[0].most, found[1].most)
@@ -100,17 +106,19 @@ def test_the_same_search_finds_the_same() -> None:
 def test_poses_in_parts_find_what_they_find_together(monkeypatch: pytest.MonkeyPatch) -> None:
     for variables in (4, 14):
         bowl = Bowl(5, variables, 0.3, poses=7)
-        whole = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, POSITION)
+        whole = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
         with monkeypatch.context() as context:
             context.setattr(vertices, "AT_ONCE", 100)
-            parts = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, POSITION)
+            parts = vertices.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
         assert np.array_equal(parts.most, whole.most)
         assert np.array_equal(parts.evaluated, whole.evaluated)
 
 
 def test_no_variable_leaves_the_centre() -> None:
     centre = np.array([[1.0, -2.0, 2.0]])
-    found = vertices.worst_vertices(Bowl(1, 0, 0.0), centre, np.empty((1, 3, 0)), POSITION)
+    found = vertices.worst_vertices(
+        Bowl(1, 0, 0.0), centre, np.empty((1, 3, 0)), Domain.of([]), POSITION
+    )
     assert found.most.tolist() == [[1.0, -2.0, 2.0, -1.0, 2.0, -2.0, 3.0]]
     assert found.evaluated.tolist() == [0]
 
@@ -124,7 +132,7 @@ def test_a_corner_that_fails_says_which_pose_it_fails_at(variables: int) -> None
         bad = (poses == 1) & (t[:, 0] > 0.0)
         return np.where(bad[:, np.newaxis], np.nan, outputs), np.where(bad, 4, 0).astype(np.uint8)
 
-    found = vertices.worst_vertices(failing, bowl.centre, bowl.effects, POSITION)
+    found = vertices.worst_vertices(failing, bowl.centre, bowl.effects, bowl.domain, POSITION)
     assert found.status.tolist() == [0, 4, 0]
     worst = bowl.worst()
     assert np.allclose(found.most[[0, 2]], worst[[0, 2]], rtol=1e-12)
@@ -153,7 +161,7 @@ def test_the_linear_norm_is_the_largest_at_any_corner_in_space(flat: float) -> N
     random = np.random.default_rng(12)
     effects = random.normal(size=(6, 3, 30)) * np.array([1.0, 1.0, flat])[:, np.newaxis]
     centre = random.normal(size=(6, 3))
-    norms, corners = vertices.linear_norms(centre, effects)
+    norms, corners = vertices.linear_norms(centre, effects, Domain.of([UNIFORM] * effects.shape[2]))
     expected = [facets_norm(*each) for each in zip(centre, effects, strict=True)]
     assert np.allclose(norms.max(axis=1), expected, rtol=1e-12)
     points = centre[:, np.newaxis] + corners @ effects.transpose(0, 2, 1)
@@ -164,7 +172,7 @@ def test_the_linear_norm_is_the_largest_at_any_corner_in_space(flat: float) -> N
 def test_the_linear_norm_is_the_largest_over_all_corners(dimensions: int) -> None:
     random = np.random.default_rng(3)
     effects, centre = random.normal(size=(8, dimensions, 9)), random.normal(size=(8, dimensions))
-    norms, _ = vertices.linear_norms(centre, effects)
+    norms, _ = vertices.linear_norms(centre, effects, Domain.of([UNIFORM] * effects.shape[2]))
     points = centre[:, np.newaxis] + vertices.corners(9) @ effects.transpose(0, 2, 1)
     assert np.allclose(norms.max(axis=1), np.linalg.norm(points, axis=2).max(axis=1), rtol=1e-13)
 

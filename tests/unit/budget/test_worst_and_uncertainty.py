@@ -53,7 +53,8 @@ def test_worst_is_the_most_over_all_corners_of_the_variables() -> None:
     deviation = grouped()
     effects, _, _ = worst.variable_effects(MACHINE, BLOCK, deviation)
     assert effects.shape == (5, 3, 4)  # groups 0 and 3, columns 1 and 4; column 6 has no band
-    half = worst.linear_half(effects)
+    down, up = deviation.domain.reach(effects)
+    assert np.array_equal(down, up)
     highest = np.zeros((5, 3))
     signed = np.where(
         deviation.groups == OWN_GROUP, deviation.half, deviation.sign * deviation.half
@@ -67,15 +68,15 @@ def test_worst_is_the_most_over_all_corners_of_the_variables() -> None:
         ]
         moved = np.einsum("nck,nk->nc", SENSITIVITY[:, :, deviation.parameters], signed * t)
         highest = np.maximum(highest, np.abs(moved))
-    assert np.allclose(half, highest, rtol=1e-13)
+    assert np.allclose(up, highest, rtol=1e-13)
     error = RANDOM.normal(size=(5, 3))
-    assert np.allclose(worst.worst(error, half), np.abs(error) + highest, rtol=1e-13)
+    assert np.allclose(worst.worst(error, (down, up)), np.abs(error) + highest, rtol=1e-13)
 
 
 def test_a_group_that_cancels_does_no_harm() -> None:
     deviation = Deviation.of([2, 2], half=0.3, groups=0, sign=[1.0, -1.0])
     effects, sigmas, _ = worst.variable_effects(MACHINE, BLOCK, deviation)
-    assert np.abs(worst.linear_half(effects)).max() < 1e-16
+    assert np.abs(deviation.domain.support(effects)).max() < 1e-16
     assert np.abs(propagation.standard_uncertainty(effects, sigmas)).max() < 1e-16
 
 

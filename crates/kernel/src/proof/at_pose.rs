@@ -12,7 +12,7 @@ use super::{Deviating, Unproven, point};
 use crate::kinematics::{Sample, forward, limbs};
 use crate::linear::SIX;
 use crate::machine::Machine;
-use crate::scalar::Interval;
+use crate::scalar::{Interval, Scalar};
 use crate::spatial::{Pose, Quaternion, Vector, relative_quaternion, rotation_matrix};
 use crate::status::Status;
 
@@ -181,15 +181,22 @@ impl<'a> Extent<'a> {
     pub fn most(&self, direction: &[f64; SIX], first: &Enclosed) -> f64 {
         let whole = Interval::symmetric(1.0);
         let mut variables = vec![whole; self.deviating.count];
+        let mut in_direction = vec![false; self.deviating.count];
+        for &member in self.deviating.directions.iter().flatten() {
+            in_direction[member] = true;
+        }
         let mut own: Option<Enclosed> = None;
         let mut best = f64::INFINITY;
         for _ in 0..ROUNDS {
             let enclosed = own.as_ref().unwrap_or(first);
             let mut bound = along(direction, &enclosed.middle);
             let mut fixed = false;
-            let mut free = false;
+            let mut free = !self.deviating.directions.is_empty();
             let before = variables.clone();
             for (variable, slope) in enclosed.slopes.iter().enumerate() {
+                if in_direction[variable] {
+                    continue;
+                }
                 let slope = along(direction, slope);
                 let middle = point(before[variable].midpoint());
                 bound = bound + slope * (before[variable] - middle);
@@ -203,6 +210,14 @@ impl<'a> Extent<'a> {
                 } else {
                     free = true;
                 }
+            }
+            // Of a unit vector t, slopes . t is at most the length of the slopes (Cauchy and Schwarz).
+            for members in &self.deviating.directions {
+                let squares = members
+                    .iter()
+                    .map(|&member| along(direction, &enclosed.slopes[member]).square())
+                    .fold(point(0.0), |sum, square| sum + square);
+                bound = bound + squares.sqrt();
             }
             best = best.min(bound.upper);
             if !fixed {

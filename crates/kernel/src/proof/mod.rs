@@ -21,7 +21,8 @@ pub use over_region::{Region, RegionBound, bound_over_region, can_be_enclosed};
 use crate::scalar::Interval;
 
 /// What the variables of a box of deviations move: column c moves `parameters[c]` by `swing[c]` times
-/// variable `variables[c]`, which lies in [-1, 1].
+/// variable `variables[c]`, which lies in [-1, 1]; the variables of one of `directions` lie on the unit
+/// circle or sphere together.
 #[derive(Clone, Debug, Default)]
 pub struct Deviating {
     /// Which parameter.
@@ -32,6 +33,8 @@ pub struct Deviating {
     pub swing: Vec<f64>,
     /// How many variables.
     pub count: usize,
+    /// Variables that are together a unit vector.
+    pub directions: Vec<Vec<usize>>,
 }
 
 /// Why nothing was proven.

@@ -209,7 +209,7 @@ impl Region<'_> {
         for &(index, shift) in &shifts {
             p[index] = p[index] + shift;
         }
-        let Deviating { parameters, variables, swing, count } = self.deviating;
+        let Deviating { parameters, variables, swing, count, .. } = self.deviating;
         for (&parameter, &swing) in parameters.iter().zip(swing) {
             p[parameter] = p[parameter] + Interval::symmetric(swing);
         }
@@ -361,7 +361,7 @@ impl Region<'_> {
     /// joints move, and because the displacement and the known deviations change a little.
     pub fn rates(&self, command: &Command, over: &Over) -> Result<Vec<Rates>, Unproven> {
         let machine = self.machine;
-        let Deviating { parameters, variables, swing, count } = self.deviating;
+        let Deviating { parameters, variables, swing, count, .. } = self.deviating;
         let changes = self.changes(command, over)?;
         let mut result = Vec::with_capacity(changes.len());
         for (freedom, change) in changes.iter().enumerate() {

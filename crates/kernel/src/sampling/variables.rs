@@ -75,6 +75,8 @@ impl Shape {
 const NORMAL: u64 = 5;
 /// Of the normal numbers that correlated variables are made of: they share words with no other kind.
 const CORRELATED: u64 = 8;
+/// Likewise of those that directions are made of.
+const DIRECTION: u64 = 9;
 /// Normal numbers from the two words of one counter.
 const NORMALS: u64 = 4;
 
@@ -118,18 +120,31 @@ pub struct Variables {
     variables: Vec<Variable>,
     draws: Vec<Draw>,
     copula: Option<Copula>,
+    directions: Vec<Vec<usize>>,
+    /// Whether a variable is made of a standard normal number.
+    of_normals: Vec<bool>,
 }
 
 impl Variables {
-    /// The variables, some of which may correlate.
-    pub fn new(variables: Vec<Variable>, copula: Option<Copula>) -> Self {
+    /// The variables, some of which may correlate; those of one of `directions` are together a unit vector,
+    /// as likely in any direction.
+    pub fn new(
+        variables: Vec<Variable>,
+        copula: Option<Copula>,
+        directions: Vec<Vec<usize>>,
+    ) -> Self {
+        let mut code_of_normals = vec![None; variables.len()];
+        for &member in copula.iter().flat_map(|copula| &copula.members) {
+            code_of_normals[member] = Some(CORRELATED);
+        }
+        for &member in directions.iter().flatten() {
+            code_of_normals[member] = Some(DIRECTION);
+        }
         let mut draws: Vec<Draw> = Vec::new();
         for (index, variable) in variables.iter().enumerate() {
-            let normal = copula.as_ref().is_some_and(|copula| copula.members.contains(&index));
-            let (code, sharing) = if normal {
-                (CORRELATED, NORMALS)
-            } else {
-                (variable.shape.code(), variable.shape.sharing())
+            let (code, sharing) = match code_of_normals[index] {
+                Some(code) => (code, NORMALS),
+                None => (variable.shape.code(), variable.shape.sharing()),
             };
             let slot = (variable.number % sharing) as usize;
             let (stream, counter) = (variable.stream, (code << 48) | (variable.number / sharing));
@@ -144,7 +159,8 @@ impl Variables {
                 }
             }
         }
-        Variables { variables, draws, copula }
+        let of_normals = code_of_normals.iter().map(Option::is_some).collect();
+        Variables { variables, draws, copula, directions, of_normals }
     }
 
     /// How many.
@@ -158,11 +174,10 @@ impl Variables {
         let mut made = [[0.0; GROUP]; NORMALS as usize];
         for draw in &self.draws {
             let Some(index) = draw.slots.iter().flatten().copied().next() else { continue };
-            let correlates =
-                self.copula.as_ref().is_some_and(|copula| copula.members.contains(&index));
+            let normal = self.of_normals[index];
             let shape = &self.variables[index].shape;
             let scales = draw.slots.map(|slot| match slot {
-                Some(index) if !correlates => match self.variables[index].shape {
+                Some(index) if !normal => match self.variables[index].shape {
                     Shape::Normal(sigma) => sigma,
                     _ => 1.0,
                 },
@@ -171,7 +186,7 @@ impl Variables {
             for at in (0..SEGMENT).step_by(GROUP) {
                 let counter = first.wrapping_add(at as u64);
                 let words = threefry([seed, draw.stream], counter, draw.counter);
-                if correlates {
+                if normal {
                     normal_quad(&words, &mut made);
                 } else {
                     fill::<S>(shape, &words, &mut made);
@@ -188,6 +203,9 @@ impl Variables {
         }
         if let Some(copula) = &self.copula {
             self.correlate(copula, into);
+        }
+        for members in &self.directions {
+            direct(members, into);
         }
     }
 
@@ -227,6 +245,21 @@ impl Variables {
                     }
                 };
             }
+        }
+    }
+}
+
+/// Independent standard normal numbers of the members to a unit vector: their density is round (Muller, "A
+/// note on a method for generating points uniformly on n-dimensional spheres", Comm. ACM 2 (1959)).
+fn direct(members: &[usize], into: &mut [f64]) {
+    for sample in 0..SEGMENT {
+        let squares: f64 =
+            members.iter().map(|&member| into[member * SEGMENT + sample].powi(2)).sum();
+        let length = squares.sqrt();
+        for (place, &member) in members.iter().enumerate() {
+            let value = &mut into[member * SEGMENT + sample];
+            // All of them zero happens once in 2^96 draws: then the first axis.
+            *value = if length > 0.0 { *value / length } else { f64::from(place == 0) };
         }
     }
 }

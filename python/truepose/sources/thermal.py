@@ -6,9 +6,9 @@
     frame, platform, tool, carriages
                     u = expansion * [rise r + (g . r) r - |r|^2 g / 2]
 
-with L the strut's length at the pose and r the arm from a body's anchor. A slider's guideway goes
-with the frame where its screw or scale is held. The temperatures are
-known: there is no band. `docs/sources/thermal.md` has the derivation and the references.
+with L the strut's length at the pose and r the arm from a body's anchor. A slider goes with the
+frame where its screw or scale is held. The temperatures are known: there is no band.
+`docs/sources/thermal.md` has the derivation and the references.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ class _Moved:
                 self._shift(f"{guide.part}.origin", frame.displacement(origin))
         if frame.gradient.any():
             for index, drive in enumerate(self.machine.drives):
-                if drive in held:
+                if drive.name in names:
                     self._on_bent_frame(frame, index, drive)
 
     def _held_at(self, drive: Drive) -> Floats:

@@ -7,6 +7,7 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import truepose as tp
@@ -123,9 +124,18 @@ def test_the_command_line_says_so_once(tmp_path: Path, capsys: pytest.CaptureFix
         assert "ot included" not in call(capsys, command, machine).out, command
 
 
-def test_the_delta_of_an_enclosure_is_not_called_negligible(tmp_path: Path) -> None:
-    """An aluminium frame at 45 degC: what was 1.26 um because nobody said it had a frame."""
-    machine = tp.load(MACHINES / "linear_delta.toml")
-    assert machine.condition.default_temperature == pytest.approx(318.15)
-    found = tp.budget(machine, machine.poses()[::5])
-    assert str(found.verdict.sel(source="thermal").values) != "negligible"
+def test_a_warm_frame_spreads_the_towers_of_a_delta() -> None:
+    """In its enclosure at 45 degC the rods alone do 1 to 2 um; the frame does 70."""
+    rigid = ["each.drive.expansion", "each.drive.carriage.expansion", "platform.expansion"]
+    machine = tp.load(MACHINES / "linear_delta.toml", [f"{key}=0 1/K" for key in rigid])
+    found = tp.budget(machine, [[0.0, 0.0, 0.1]]).error.sel(source="thermal").values[0]
+    # Aluminium about the bed's middle, rods of carbon fibre: by Pythagoras, sizes of the file.
+    tower, effector, rod = 0.20475, 0.03, 0.333
+    before = np.sqrt(rod**2 - (tower - effector) ** 2)
+    wide, short = tower * (1 + 23e-6 * 25) - effector, rod * (1 - 0.2e-6 * 25)
+    rise = before - np.sqrt(short**2 - wide**2)
+    assert rise == pytest.approx(74.5e-6, abs=0.5e-6)
+    # Its towers and rods are told to 0.1 um, and differ by as much.
+    assert np.allclose(found, [0, 0, rise, 0, 0, 0], rtol=0, atol=1e-9)
+    whole = tp.budget(machine, machine.poses()[::5])
+    assert str(whole.verdict.sel(source="thermal").values) != "negligible"

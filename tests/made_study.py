@@ -224,6 +224,7 @@ def _study(machine: Any, poses: Array) -> Study:
         "poses_used": n_pose,
         "poses_left_out": 1,
         "settings": "",
+        "not_included": "",
     }
     budget = _dataset(data, coords, attrs)
     remaining: dict[str, tuple[tuple[str, ...], Any, str]] = {

@@ -67,7 +67,11 @@ class Truss:
     def measured(self, drive: Drive) -> float:
         """m by which a screw or scale, growing from where it is fixed, takes what it moves."""
         number = self.reference.index[drive.name]
-        travelled = self.joints[number] - drive.fixed_at
+        row = self.reference.drives[number]
+        fixed = drive.fixed_at
+        if fixed is None:  # where a telescopic strut would have no length
+            fixed = -row.get("offset", 0.0) / row.get("scale", 1.0)
+        travelled = self.joints[number] - fixed
         return float(self.strain(drive) * self.reference.drives[number].get("scale", 1) * travelled)
 
     def growth(self, body: Body, at: ArrayLike) -> Vector:
@@ -152,8 +156,12 @@ class Truss:
             row = self.reference.drives[number]
             axis, on_frame = unit(row["axis"]), np.array(row.get("origin", np.zeros(3)), float)
             if drive.kind == "slider":
+                # The frame has the bearing of the screw, the screw the carriage, that the joint.
                 way = axis
-                grown = self.measured(drive) * axis
+                held = row.get("scale", 1.0) * drive.fixed_at + row.get("offset", 0.0)
+                on_frame = on_frame + held * axis
+                on_carriage = self.reference.struts[self.machine.struts.index(strut)]["base"]
+                grown = self.measured(drive) * axis + self.growth(drive.carriage, on_carriage)
             else:
                 way = np.cross(axis, at - on_frame)
                 angle = row.get("scale", 1.0) * self.joints[number] + row.get("offset", 0.0)

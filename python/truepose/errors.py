@@ -50,6 +50,7 @@ CATALOGUE: dict[str, str] = {
     "unknown-drive": "a strut names a drive that is not there",
     "unused-drive": "a drive that carries no strut",
     "unwanted-length": "a length for a strut whose length is its drive's coordinate",
+    "unwanted-carriage": "a carriage of a drive that moves none",
     "closure-count": "too few or too many closures for the platform's freedoms",
     "drive-count": "not as many drives as commanded freedoms",
     "unknown-freedom": "a freedom that the platform does not have, or that is not commanded",
@@ -88,7 +89,7 @@ CATALOGUE: dict[str, str] = {
     "correlation-pattern": "a pattern where a matrix of correlations needs names in their order",
     "correlation-twice": "two variables given two correlations, or one with itself",
     "correlation-not-semidefinite": "correlations that cannot all hold at once",
-    "no-expansion": "a temperature is given for a strut that gives no expansion",
+    "no-expansion": "a temperature is given for a part that gives no expansion",
     "tolerance-reversed": "a tolerance whose upper limit is below its lower one",
     # the workspace
     "grid-count": "a grid count that is not a whole number of one or more",

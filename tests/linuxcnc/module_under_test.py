@@ -76,8 +76,12 @@ class Rig:
         turning = [drive.coordinate == "angle" for drive in self.machine.drives]
         self.joint_units = np.where(turning, DEGREE, 1e-3)
         self.parts = {
-            f"truepose.{family}-{number}-temperature": row.part
-            for family, rows in (("strut", self.machine.struts), ("drive", self.machine.drives))
+            f"truepose.{family}-{number}-temperature": f"{family}.{row.name}"
+            for family, rows in (
+                ("strut", self.machine.struts),
+                ("drive", self.machine.drives),
+                ("carriage", self.machine.drives),
+            )
             for number, row in enumerate(rows)
             if self._has(f"truepose.{family}-{number}-temperature")
         }

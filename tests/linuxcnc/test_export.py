@@ -230,15 +230,26 @@ def test_the_licence() -> None:
     assert 'MODULE_LICENSE("GPL");' in c
 
 
-def test_pins_by_part() -> None:
+@pytest.mark.parametrize(
+    ("name", "families"),
+    [
+        ("hexapod_all_sources", ["strut-[0-5]", "drive-[135]", "frame", "platform"]),
+        ("linear_delta", ["strut-[0-5]", "drive-[0-2]", "carriage-[0-2]", "frame", "platform"]),
+    ],
+)
+def test_pins_by_part(name: str, families: list[str]) -> None:
     """Drives and bodies have a temperature where it counts; parts go by number, not by name."""
-    machine = tp.load(MACHINES / "hexapod_all_sources.toml")
-    files = files_of(machine)
+    files = files_of(tp.load(MACHINES / f"{name}.toml"))
     pins = re.findall(r"=> (truepose\.\S+-temperature)", files["hal"])
-    assert len(pins) == len(set(pins)) > 6
-    assert all(
-        re.fullmatch(r"truepose\.((strut|drive)-\d+|frame|platform|tool)-.*", p) for p in pins
-    )
+    assert len(pins) == len(set(pins))
+    for family in families:
+        found = [p for p in pins if re.fullmatch(rf"truepose\.{family}-temperature", p)]
+        several = re.search(r"\[(.*)\]", family)
+        listed = {"0-5": 6, "0-2": 3, "135": 3}
+        assert len(found) == (listed[several[1]] if several else 1), family
+        pins = [p for p in pins if p not in found]
+    assert not pins
+    pins = re.findall(r"=> (truepose\.\S+-temperature)", files["hal"])
     listed = re.search(r"TEMPERATURE_NAME\[.*?\] = \{(.*?)\}", files["c"])
     assert listed
     assert [f"truepose.{name}-temperature" for name in re.findall(r'"(.*?)"', listed[1])] == pins

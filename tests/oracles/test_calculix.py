@@ -62,6 +62,9 @@ def equipped(machine: Machine, random: np.random.Generator) -> Machine:
             # A file gives a telescopic strut one of the two expansions; here both add up.
             expansion=random.uniform(5e-6, 2e-5),
             fixed_at=random.uniform(*drive.travel),
+            carriage=None
+            if drive.carriage is None
+            else dataclasses.replace(drive.carriage, expansion=random.uniform(5e-6, 2e-5)),
         )
         for drive in machine.drives
     ]

@@ -18,7 +18,7 @@ from truepose.budget.comparison import quantities
 from truepose.budget.percent import POSITIONS
 from truepose.budget.poses import LeftOut
 from truepose.machine import Condition, Machine
-from truepose.sources import Block
+from truepose.sources import Block, not_included_text
 from truepose.sources._base import Flags, Floats, Indices
 
 if TYPE_CHECKING:
@@ -301,7 +301,10 @@ def _left_out_coords(machine: Machine, poses: Floats, left_out: LeftOut) -> dict
 
 
 def provenance(machine: Machine, condition: Condition) -> dict[str, str | int | float]:
-    """Version, machine file with its hash, changes to it and condition: what every result says."""
+    """Version, machine file with its hash, changes to it, condition and what is left out of it.
+
+    What every result says.
+    """
     attrs: dict[str, str | int | float] = {
         "truepose_version": version("truepose"),
         "machine": machine.name,
@@ -311,6 +314,7 @@ def provenance(machine: Machine, condition: Condition) -> dict[str, str | int | 
         "settings": "; ".join(f"{key}={value}" for key, value in machine.settings.items()),
         "replaced": "; ".join(f"{key}={value!r}" for key, value in machine.replaced.items()),
         "condition": json.dumps(_condition(condition)),
+        "not_included": not_included_text(machine, condition),
         "seed": "none",
     }
     if machine.accuracy.target is not None:

@@ -72,13 +72,15 @@ def command(**options: Any) -> int:
 
 def _tables(machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> list[Table]:
     from truepose.report import calibrated_files, inputs, reach, tables
+    from truepose.sources import not_included_text
 
+    left_out = not_included_text(machine, machine.condition)
     made = calibrated_files.calibration(machine)
     shown = [
         inputs.machine(machine),
         *([] if made is None else [made]),
         inputs.condition(machine),
-        inputs.sources(machine),
+        tables.with_not_included(inputs.sources(machine), left_out),
         inputs.deviations(machine),
         reach.table(machine, found),
     ]
@@ -99,6 +101,7 @@ def _text(
 
     from truepose.report import inputs, reach
     from truepose.report.result import in_file_units, pose_si
+    from truepose.sources import NO_MATERIAL, not_included, not_included_text
 
     rows = [answer.as_data(machine) for answer in answers]
     if form == "csv":
@@ -107,11 +110,13 @@ def _text(
             f"pose_{name} [{in_file_units(machine, 0.0, pose_si(name))[1]}]"
             for name in machine.commanded
         ]
-        columns = ["quantity", "state", "highest", "asked", "units", "met", "pose"]
+        columns = ["quantity", "state", "highest", "asked", "units", "met", "not_included", "pose"]
+        left_out = not_included_text(machine, machine.condition)
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow([*columns, *where])
         for row in rows:
-            writer.writerow([*(row[column] for column in columns), *row["at"].values()])
+            told = row | {"not_included": left_out}
+            writer.writerow([*(told[column] for column in columns), *row["at"].values()])
         return buffer.getvalue().rstrip("\n")
     return json.dumps(
         {
@@ -121,6 +126,10 @@ def _text(
             if machine.calibration is None
             else machine.calibration.model_dump(),
             "sources": inputs.source_data(machine),
+            "not_included": [
+                {"part": part, "why": NO_MATERIAL}
+                for part in not_included(machine, machine.condition)
+            ],
             "workspace": reach.as_data(machine, found),
             "answers": rows,
             "warnings": warnings,

@@ -15,8 +15,16 @@ from truepose.machine.cutting import cutting_force, kienzle_force
 from truepose.machine.elements import drive_kinds
 from truepose.machine.file_table import FileTable
 from truepose.machine.materials import MATERIALS
-from truepose.machine.parts_of_machine import Body, Drive, Guide, Joint, Strut, Vector
-from truepose.machine.tables.body import FrameTable, PlatformTable, ToolTable
+from truepose.machine.parts_of_machine import (
+    Body,
+    Drive,
+    Guide,
+    Joint,
+    Strut,
+    Vector,
+    carriage_part,
+)
+from truepose.machine.tables.body import CarriageTable, FrameTable, PlatformTable, ToolTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.drive import DriveTable
 from truepose.machine.tables.force import AccelerationTable, ForceTable, MomentTable
@@ -49,10 +57,15 @@ def drives(validated: Validated) -> tuple[Drive, ...]:
                 fixed_at=fields.pop("fixed_at"),
                 stiffness=fields.pop("stiffness"),
                 mass=common.mass,
+                carriage=_carriage(common) if kind.has_carriage else None,
                 fields=fields,
             )
         )
     return tuple(found)
+
+
+def _carriage(row: DriveTable) -> Body:
+    return _body(carriage_part(row.name), row.carriage or CarriageTable())
 
 
 def guides(validated: Validated) -> tuple[Guide, ...]:
@@ -117,12 +130,13 @@ def bodies(validated: Validated) -> tuple[Body, Body, Body]:
 
 def _body(
     part: str,
-    table: PlatformTable | FrameTable | ToolTable,
+    table: PlatformTable | FrameTable | ToolTable | CarriageTable,
     mass: float = 0.0,
     centre_of_mass: Vector = _NOTHING,
 ) -> Body:
     expansion = _expansion(table.material, table.expansion)
-    return Body(part, mass, centre_of_mass, table.material, expansion, table.anchor)
+    anchor = _NOTHING if isinstance(table, CarriageTable) else table.anchor
+    return Body(part, mass, centre_of_mass, table.material, expansion, anchor)
 
 
 def mounting(validated: Validated) -> Vector:

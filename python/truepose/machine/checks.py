@@ -6,7 +6,7 @@ Each check looks at as little as it needs, so that it also runs on a file that h
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from truepose.errors import Problem
@@ -15,7 +15,7 @@ from truepose.machine.condition import DEFAULT_PART
 from truepose.machine.dimensions import FREEDOMS
 from truepose.machine.document import ARRAY_TABLES, Document, Key, named_rows
 from truepose.machine.elements import drive_kinds, guide_kinds
-from truepose.machine.parts_of_machine import BODIES
+from truepose.machine.parts_of_machine import BODIES, carriage_part, is_body
 from truepose.machine.suggestion import counted, did_you_mean, one_of
 from truepose.machine.tables.accuracy import AccuracyTable
 from truepose.machine.tables.condition import ConditionTable
@@ -184,6 +184,28 @@ def _telescopic_travel(document: Document, validated: Validated) -> Iterator[Pro
                 expected="lengths above zero",
                 hint="offset is the strut's length where the coordinate is 0",
             )
+
+
+def _has_carriage(row: Mapping[str, Any]) -> bool:
+    """Whether a drive, as the file writes it, is of a kind that moves a carriage."""
+    kind = row.get("kind")
+    return isinstance(kind, str) and kind in drive_kinds() and drive_kinds()[kind].has_carriage
+
+
+def _carriages(document: Document, validated: Validated) -> Iterator[Problem]:
+    """What a carriage is made of is said of a drive that has one."""
+    for index, row in enumerate(_rows(document, "drive")):
+        if "carriage" not in row or row.get("kind") not in drive_kinds() or _has_carriage(row):
+            continue
+        yield document.problem(
+            "unwanted-carriage",
+            f"a {row['kind']} drive moves no carriage",
+            ("drive", index, "carriage"),
+            found=f'carriage, and kind = "{row["kind"]}"',
+            expected="no carriage",
+            hint="the expansion of a crank is that of its arm, that of a telescopic strut the "
+            "strut's",
+        )
 
 
 def _guide_closures(document: Document) -> int:
@@ -357,6 +379,11 @@ def _parts_with_temperatures(document: Document, validated: Validated) -> Iterat
         for table in ("drive", "strut")
         for _, name in named_rows(document.data, table)
     ]
+    rows += [
+        carriage_part(row["name"])
+        for row in _rows(document, "drive")
+        if isinstance(row.get("name"), str) and _has_carriage(row)
+    ]
     growing = [*rows, *(body for body in BODIES if body != "tool")]
     for key, given, known in (
         ("temperature", condition.temperature, [DEFAULT_PART, *rows, *BODIES]),
@@ -382,15 +409,15 @@ def _gradients(document: Document, validated: Validated) -> Iterator[Problem]:
     for part in (condition.gradient or ()) if condition is not None else ():
         key = document.key(f"condition.gradient.{part}")
         value = document.value(key)
-        if isinstance(value, list) != (part in BODIES):
+        if isinstance(value, list) != is_body(part):
             yield document.problem(
                 "wrong-type",
                 f"{part} has a gradient along each of its axes"
-                if part in BODIES
+                if is_body(part)
                 else f"{part} has one gradient, along itself",
                 key,
                 found=shown_value(value),
-                expected="[x, y, z]" if part in BODIES else "one temperature gradient",
+                expected="[x, y, z]" if is_body(part) else "one temperature gradient",
             )
 
 
@@ -430,6 +457,7 @@ _CHECKS: tuple[Check, ...] = (
     _strut_lengths,
     _rings,
     _telescopic_travel,
+    _carriages,
     _counts,
     _workspace_freedoms,
     _grid_size,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truepose.errors import Problem, RequestError
-from truepose.machine.parts_of_machine import BODIES, Vector
+from truepose.machine.parts_of_machine import Vector, is_body
 
 if TYPE_CHECKING:
     from truepose.machine.temperature_log import TemperatureLog
@@ -75,9 +75,10 @@ class Condition:
     """Temperatures in K; force (N) and moment (N m) on the tool at the tool point, base axes.
 
     `gradients`: K/m by part; along a strut from base to platform, or along a drive's coordinate
-    from where its scale is fixed, the first component counts; of frame and platform it is a vector
-    in their axes. `temperature_log`: measured temperatures over time of the parts that it names, if
-    `part_temperatures` does not, at `time` (s; None: its last) where a run is not over time itself.
+    from where its scale is fixed, the first component counts; of frame, platform and carriages it
+    is a vector in their axes. `temperature_log`: measured temperatures over time of the parts that
+    it names, if `part_temperatures` does not, at `time` (s; None: its last) where a run is not over
+    time itself.
     `gravity` (m/s^2) acts on every mass, `acceleration` (m/s^2, base axes) is that of the platform.
     """
 
@@ -188,9 +189,9 @@ class Condition:
         `temperature`: K, one number for all parts (in place of a log, too), or
         `{"default": ..., "strut.1": ...}`, where parts that are not named stay as they are.
         A default takes the place of the log's. `gradient`: K/m of parts, one number along a strut
-        or drive, three of frame and platform. `envelope`: a force of any direction, N; 0 takes it
-        away. Raises `RequestError` (bad-condition) for a value that is not finite or of the wrong
-        size. Parts that a machine does not have are refused where it is known: by
+        or drive, three of frame, platform and carriages. `envelope`: a force of any direction, N;
+        0 takes it away. Raises `RequestError` (bad-condition) for a value that is not finite or of
+        the wrong size. Parts that a machine does not have are refused where it is known: by
         `truepose.budget`, `truepose.compensate` and `Machine.with_condition`.
         """
         changes: dict[str, object] = {}
@@ -242,7 +243,7 @@ class Condition:
 
 def _along(part: str, value: float | Sequence[float]) -> Vector:
     if isinstance(value, (int, float)):
-        if part in BODIES:
+        if is_body(part):
             raise _bad(f"gradient.{part}", str(value), "three numbers, along its axes, K/m")
         return (float(value), 0.0, 0.0)
     return _vector(f"gradient.{part}", value)

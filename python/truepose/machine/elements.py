@@ -48,6 +48,11 @@ class DriveKind(ElementKind):
     sets_length: bool
     """Whether the joint coordinate is the strut's length, which the file then does not give."""
 
+    @property
+    def has_carriage(self) -> bool:
+        """Whether it moves a carriage: neither the strut itself, nor an arm."""
+        return self.coordinate == "length" and not self.sets_length
+
 
 @dataclass(frozen=True)
 class GuideKind(ElementKind):
@@ -96,6 +101,15 @@ def _fields(entry: dict[str, Any], coordinate: str) -> dict[str, Any]:
     return fields
 
 
+def _fixed_at(one: Any, sets_length: bool) -> Any:
+    """Where what the position is measured by is held; of a strut's own scale, at its base joint."""
+    what = "Joint coordinate at which screw, rack or scale is fixed."
+    if sets_length:
+        default = " Default: that at which the strut's length is 0, so that all of it grows."
+        return (one | None, Field(None, description=what + default))
+    return (one, Field(0.0, description=what))
+
+
 @cache
 def drive_kinds() -> dict[str, DriveKind]:
     """Every kind of drive, by the word that a file writes for it."""
@@ -108,10 +122,7 @@ def drive_kinds() -> dict[str, DriveKind]:
             Annotated[tuple[one, one], list_of(2), WrapValidator(_ascending)],
             Field(description="First and last value of the joint coordinate."),
         )
-        fields["fixed_at"] = (
-            one,
-            Field(0.0, description="Joint coordinate at which screw, rack or scale is fixed."),
-        )
+        fields["fixed_at"] = _fixed_at(one, bool(entry["sets_length"]))
         fields["stiffness"] = (
             (SeriesTorsionalStiffness if coordinate == "angle" else SeriesStiffness) | None,
             Field(

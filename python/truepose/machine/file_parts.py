@@ -61,6 +61,7 @@ class FileParts:
         self.drives = drives
         self.struts = struts
         self.platform, self.frame, self.tool = bodies
+        self.carriages = tuple(drive.carriage for drive in drives if drive.carriage is not None)
         self.guides = guides
         self.condition = condition
         self.problems: list[Problem] = []

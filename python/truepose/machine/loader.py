@@ -158,7 +158,9 @@ def _condition(
     found = built_parts.condition(table)
     if table is None or table.temperature_log is None:
         return found
-    parts = [*(drive.part for drive in drives), *(strut.part for strut in struts), *BODIES]
+    carriages = [drive.carriage.part for drive in drives if drive.carriage is not None]
+    rows = [*(drive.part for drive in drives), *(strut.part for strut in struts)]
+    parts = [*rows, *carriages, *BODIES]
     log = read_temperature_log(
         data_files, table.temperature_log, parts, table.time, found.part_temperatures
     )

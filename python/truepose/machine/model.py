@@ -177,8 +177,23 @@ class Machine:
     @property
     def parts(self) -> tuple[str, ...]:
         """Paths of the parts that may have a temperature of their own: `strut.1`, `frame`, ..."""
-        rows: tuple[Drive | Strut | Guide, ...] = (*self.drives, *self.struts, *self.guides)
+        rows: tuple[Drive | Strut | Guide | Body, ...] = (
+            *self.drives,
+            *self.struts,
+            *self.guides,
+            *self.carriages,
+        )
         return (*(row.part for row in rows), *BODIES)
+
+    @property
+    def carriages(self) -> tuple[Body, ...]:
+        """The bodies that the drives move, those that have one."""
+        return tuple(drive.carriage for drive in self.drives if drive.carriage is not None)
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """All of them: platform, frame, tool and carriages."""
+        return (self.platform, self.frame, self.tool, *self.carriages)
 
     @property
     def down(self) -> Floats:

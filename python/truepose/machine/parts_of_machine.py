@@ -13,6 +13,19 @@ Fields = Mapping[str, float | tuple[float, ...]]
 BODIES = ("platform", "frame", "tool")
 """Parts that every machine has once."""
 
+_CARRIAGE = "carriage."
+"""How the path of a carriage begins: `carriage.d1` is that of drive d1."""
+
+
+def carriage_part(drive: str) -> str:
+    """Path of the carriage of a drive, by the drive's name."""
+    return f"{_CARRIAGE}{drive}"
+
+
+def is_body(part: str) -> bool:
+    """Whether a part, by its path, extends along three axes: one of `BODIES`, or a carriage."""
+    return part in BODIES or part.startswith(_CARRIAGE)
+
 
 def in_series(*stiffnesses: float | None) -> float | None:
     """Stiffness of springs in series; a spring that is None, or infinite, is rigid.
@@ -70,8 +83,10 @@ class Drive(_WithFields):
     `feedback`: the position is measured at the `motor`, so that screw, backlash and lead come
     between it and the carriage, or `direct` on the carriage. `expansion` (1/K) is that of what the
     position is measured by (screw, rack or scale), which is fixed at the joint coordinate
-    `fixed_at`. `stiffness`: N/m, or N m/rad of a crank, of all that the file names, in series;
-    None: rigid. `mass` (kg) is the carriage's.
+    `fixed_at`; None: that at which a telescopic strut would have no length. `stiffness`: N/m, or
+    N m/rad of a crank, of all that the file names, in series; None: rigid. `mass` (kg) is that of
+    the `carriage`, the body between the drive's point and the struts' base joints; None where the
+    drive moves none.
     """
 
     name: str
@@ -84,9 +99,10 @@ class Drive(_WithFields):
     feedback: str = "motor"
     material: str | None = None
     expansion: float | None = None
-    fixed_at: float = 0.0
+    fixed_at: float | None = 0.0
     stiffness: float | None = None
     mass: float = 0.0
+    carriage: Body | None = None
 
     @property
     def part(self) -> str:
@@ -157,11 +173,11 @@ class Strut:
 
 @dataclass(frozen=True)
 class Body:
-    """A body that the machine has once: the platform with the spindle, the frame, the tool.
+    """The platform with the spindle, the frame, the tool, or a drive's carriage.
 
     `mass` in kg, `centre_of_mass` in platform axes, m. `expansion` in 1/K, None where the file says
-    nothing; it grows about `anchor` (m; base axes of the frame, else platform axes), and a tool
-    from its anchor to the tool point.
+    nothing; it grows about `anchor` (m; base axes of the frame, platform axes of platform and tool,
+    of a carriage its point that the drive moves), and a tool from its anchor to the tool point.
     """
 
     part: str

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from truepose.machine.parts_of_machine import BODIES
+from truepose.machine.parts_of_machine import is_body
 from truepose.report.display import MICRO, MILLI, MISSING, nearest_middle, number, pose_text
 from truepose.report.result import in_file_units
 from truepose.report.tables import Table
@@ -82,7 +82,7 @@ def _log(it: Condition) -> list[tuple[str, str]]:
 
 
 def _gradient(part: str, value: tuple[float, float, float]) -> str:
-    if part in BODIES:
+    if is_body(part):
         return _vector(value, "K/m")
     return f"{value[0]:.6g} K/m along it".replace("-", "\N{MINUS SIGN}")
 

@@ -6,7 +6,7 @@ Lengths of errors in µm, angles in µrad, percentages of the commanded coordina
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,6 +50,14 @@ class Table:
     note: str = ""
 
 
+def with_not_included(table: Table, parts: str) -> Table:
+    """The table, whose note also names what is not in the results, where anything is not.
+
+    `parts`: as the attribute `not_included` of a result has them, `frame (no material)`.
+    """
+    return replace(table, note=f"{table.note} Not included: {parts}.") if parts else table
+
+
 def ranking(study: Study) -> Table:
     """The sources by rank: what each alone can do at most, its share and the verdict."""
     order = study.by_rank
@@ -66,7 +74,7 @@ def ranking(study: Study) -> Table:
         columns += [column(study.values(kind)[order, part] * MICRO) for kind in ("highest", "rms")]
     header.append("share, %")
     columns.append(column(study.values("share")[order] * 100, 1))
-    return Table(
+    table = Table(
         "ranking",
         "The sources compared",
         tuple(header),
@@ -74,6 +82,7 @@ def ranking(study: Study) -> Table:
         words=2,
         note="Highest: the most this source alone can do at its worst pose.",
     )
+    return with_not_included(table, str(study.budget.attrs["not_included"]))
 
 
 def highest_absolute(study: Study) -> Table:

@@ -20,6 +20,7 @@ from truepose.sources._base import (
     normal,
 )
 from truepose.sources._block import Block
+from truepose.sources._expansion import NO_MATERIAL, not_included, not_included_text
 from truepose.sources.actuator import Actuator
 from truepose.sources.backlash import Backlash
 from truepose.sources.clearance import Clearance
@@ -58,6 +59,7 @@ def acting(machine: Machine, condition: Condition | None = None) -> tuple[Source
 
 __all__ = [
     "ARCSINE",
+    "NO_MATERIAL",
     "OWN_GROUP",
     "REGISTRY",
     "TRIANGULAR",
@@ -76,5 +78,7 @@ __all__ = [
     "discrete",
     "empirical",
     "normal",
+    "not_included",
+    "not_included_text",
     "student_t",
 ]

@@ -63,10 +63,10 @@ class ActuatorTable(FileTable):
         None,
         description="True travel per nominal travel, less one, such as `20 um / 300 mm`.",
     )
-    zero_at: Coordinate | None = Field(
-        None,
-        description="Joint coordinate at which `lead_error` has no effect. "
-        "Default: the drive's `fixed_at`.",
+    zero_at: Coordinate = Field(
+        0.0,
+        description="Joint coordinate at which `lead_error` has no effect: where the axis is "
+        "homed.",
     )
     periodic: PeriodicTable | None = Field(
         None, description="An error that repeats, such as with every turn of the screw."
@@ -188,7 +188,7 @@ def _actuation(parts: FileParts, joint: int, drive: Drive, row: ActuatorTable) -
         drive.part,
         joint,
         row.lead_error,
-        drive.fixed_at if row.zero_at is None else row.zero_at,
+        row.zero_at,
         row.periodic,
         found,
     )

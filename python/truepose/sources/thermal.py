@@ -1,43 +1,43 @@
 """Thermal expansion of every part: what is warmer than the reference is longer.
 
     strut           length     expansion * (rise * L + gradient * L^2 / 2)
-    screw, scale    scale and offset, so that the point `fixed_at` stays
+    screw, scale    scale and offset, so that the point `fixed_at` stays on what holds it
     crank's arm     the base joints that it carries, about its axis
-    frame, platform, tool      u = expansion * [rise r + (g . r) r - |r|^2 g / 2]
+    frame, platform, tool, carriages
+                    u = expansion * [rise r + (g . r) r - |r|^2 g / 2]
 
-with L the strut's length at the pose and r the arm from a body's anchor. The temperatures are
-known: there is no band. `docs/sources/thermal.md` has the derivation and the references.
+with L the strut's length at the pose and r the arm from a body's anchor. A slider goes with the
+frame where its screw or scale is held. The temperatures are known: there is no band.
+`docs/sources/thermal.md` has the derivation and the references.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
-from truepose.errors import Problem, TrueposeError
-from truepose.machine.parts_of_machine import BODIES, Body, Drive, Strut
+from truepose.errors import TrueposeError
+from truepose.machine.parts_of_machine import Body, Drive, Strut
 from truepose.sources._base import Deviation, refuse
 from truepose.sources._block import Block, Floats
+from truepose.sources._expansion import ASKED_BY, located, silent, twice
 from truepose.sources._growth import Growth, along_line
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from truepose import _kernel
     from truepose.machine import Condition, FileParts, Machine
-
-_ASKED_BY = ("condition.temperature", "condition.gradient", "condition.temperature_log")
 
 
 @dataclass(frozen=True)
 class Thermal:
-    """Expansion of struts, drives, frame, platform and tool, each at its own temperature."""
+    """Expansion of struts, drives and all bodies, each at its own temperature."""
 
     name: ClassVar[str] = "thermal"
-    doc: ClassVar[str] = "thermal expansion of struts, drives, frame, platform and tool"
+    doc: ClassVar[str] = "thermal expansion of struts, drives, carriages, frame, platform and tool"
     tables: ClassVar[Mapping[str, type[BaseModel]]] = {}
     sets_overall_edges: ClassVar[bool] = False
     over_region: ClassVar[str] = "lengths"
@@ -48,14 +48,14 @@ class Thermal:
     @classmethod
     def build(cls, parts: FileParts) -> Self | None:
         """Always there, for a condition given later may have temperatures that the file has not."""
-        bodies = (parts.platform, parts.frame, parts.tool)
-        for problem in _silent(parts.condition, parts.drives, parts.struts, bodies):
-            refuse(parts, _located(parts, problem))
-        for problem in _twice(parts.kernel, parts.drives, parts.struts):
+        bodies = (parts.platform, parts.frame, parts.tool, *parts.carriages)
+        for problem in silent(parts.condition, parts.drives, parts.struts, bodies):
+            refuse(parts, located(parts, problem))
+        for problem in twice(parts.kernel, parts.drives, parts.struts):
             refuse(parts, problem)
         every: tuple[Drive | Strut | Body, ...] = (*parts.drives, *parts.struts, *bodies)
         known = any(part.expansion is not None for part in every)
-        return cls(requested=known and any(map(parts.says, _ASKED_BY)))
+        return cls(requested=known and any(map(parts.says, ASKED_BY)))
 
     def acts(self, condition: Condition) -> bool:
         """Where the file asks for it, and in any condition that leaves the reference."""
@@ -74,14 +74,14 @@ class Thermal:
         parts whose temperature the condition names, whose expansion the machine does not say; all
         of them at once.
         """
-        bodies = (machine.platform, machine.frame, machine.tool)
-        silent = list(_silent(condition, machine.drives, machine.struts, bodies))
-        if silent:
-            raise TrueposeError(*silent)
+        unsaid = list(silent(condition, machine.drives, machine.struts, machine.bodies))
+        if unsaid:
+            raise TrueposeError(*unsaid)
         moved = _Moved(machine, condition, block)
         moved.struts()
         for index, drive in enumerate(machine.drives):
             moved.drive(index, drive)
+            moved.carriage(drive)
         moved.frame()
         moved.platform_and_tool()
         return moved.deviation()
@@ -131,43 +131,64 @@ class _Moved:
             for strut in self._carried(drive):
                 self._shift(f"{strut.part}.base", arm.displacement(self._point(strut, "base")))
             return
-        scale = float(self._nominal[self._at[f"{drive.part}.scale"]])
+        scale, _ = self._driven(drive)
+        fixed_at = self._fixed_at(drive)
         strain = np.atleast_2d(scale * expansion * rise)
         self._add(self._at[f"{drive.part}.scale"], strain)
-        fixed = -strain * drive.fixed_at
+        fixed = -strain * fixed_at
         if gradient:
-            way = self.block.joints[:, [index]] - drive.fixed_at
+            way = self.block.joints[:, [index]] - fixed_at
             fixed = fixed + scale * along_line(expansion, 0.0, gradient, way)
         if fixed.any():
             self._add(self._at[f"{drive.part}.offset"], fixed)
 
+    def carriage(self, drive: Drive) -> None:
+        """The base joints that a carriage carries, about the point that the drive moves."""
+        growth = None if drive.carriage is None else self._growth(drive.carriage)
+        if growth is not None and growth.any:
+            for strut in self._carried(drive):
+                self._shift(f"{strut.part}.base", growth.displacement(self._point(strut, "base")))
+
     def frame(self) -> None:
-        """Where struts stand on the frame, where drives and guides have their origin on it."""
+        """Where struts stand on the frame, where drives and guides are held by it."""
         frame = self._growth(self.machine.frame)
         if not frame.any:
             return
         # A list, for the order of the columns is that of the results.
-        origins = [drive.part for drive in self.machine.drives if self._has_origin(drive)]
+        held = [drive for drive in self.machine.drives if self._has_origin(drive)]
+        names = [drive.name for drive in held]
         for strut in self.machine.struts:
-            if strut.drive is None or f"drive.{strut.drive}" not in origins:
+            if strut.drive not in names:
                 self._shift(f"{strut.part}.base", frame.displacement(self._point(strut, "base")))
-        for part in (*origins, *(guide.part for guide in self.machine.guides)):
-            if f"{part}.origin.x" in self._at:
-                self._shift(f"{part}.origin", frame.displacement(self._nominal_of(part, "origin")))
+        for drive in held:
+            self._shift(f"{drive.part}.origin", frame.displacement(self._held_at(drive)))
+        for guide in self.machine.guides:
+            if f"{guide.part}.origin.x" in self._at:
+                origin = self._nominal_of(guide.part, "origin")
+                self._shift(f"{guide.part}.origin", frame.displacement(origin))
         if frame.gradient.any():
             for index, drive in enumerate(self.machine.drives):
-                if drive.part in origins:
+                if drive.name in names:
                     self._on_bent_frame(frame, index, drive)
+
+    def _held_at(self, drive: Drive) -> Floats:
+        """(3,) where the frame holds a drive: a crank's pivot; where a screw or scale is fixed."""
+        origin = self._nominal_of(drive.part, "origin")
+        if drive.coordinate == "angle":
+            return origin
+        scale, offset = self._driven(drive)
+        return origin + (scale * self._fixed_at(drive) + offset) * np.array(drive.fields["axis"])
 
     def _on_bent_frame(self, frame: Growth, index: int, drive: Drive) -> None:
         """A temperature gradient bends the frame: what moves along it, or turns on it, leans.
 
-        A carriage follows its guideway across the axis (along it, its own scale decides) and turns
-        with it; an arm turns with its bearing. Both move the base joints that they carry.
+        A carriage follows its guideway across the axis (along it, its own scale decides, from where
+        that is held) and turns with it; an arm turns with its bearing. Both move the base joints
+        that they carry.
         """
         origin = self._nominal_of(drive.part, "origin")
         axis = np.asarray(drive.fields["axis"], np.float64)
-        scale, offset = (self._nominal[self._at[f"{drive.part}.{key}"]] for key in _DRIVEN)
+        scale, offset = self._driven(drive)
         way = scale * self.block.joints[:, [index]] + offset
         for strut in self._carried(drive):
             base = self._point(strut, "base")
@@ -176,7 +197,7 @@ class _Moved:
                 self._shift(f"{strut.part}.base", _turned(leaning, axis, -way))
                 continue
             carriage = origin + way * axis
-            bending = frame.displacement(carriage) - frame.displacement(origin)
+            bending = frame.displacement(carriage) - frame.displacement(self._held_at(drive))
             bending -= (bending @ axis)[:, np.newaxis] * axis
             turning = np.cross(frame.turn(carriage), base)
             self._shift(f"{strut.part}.base", bending + turning)
@@ -216,6 +237,18 @@ class _Moved:
             np.array(body.anchor),
         )
 
+    def _fixed_at(self, drive: Drive) -> float:
+        """The joint coordinate, m or rad, at which what the position is measured by is held."""
+        if drive.fixed_at is not None:
+            return drive.fixed_at
+        scale, offset = self._driven(drive)
+        return -offset / scale
+
+    def _driven(self, drive: Drive) -> tuple[float, float]:
+        """Scale and offset: where the coordinate q is, the drive is scale q + offset, m or rad."""
+        scale, offset = (float(self._nominal[self._at[f"{drive.part}.{key}"]]) for key in _DRIVEN)
+        return scale, offset
+
     def _carried(self, drive: Drive) -> Iterator[Strut]:
         return (strut for strut in self.machine.struts if strut.drive == drive.name)
 
@@ -251,79 +284,6 @@ def _turned(vectors: Floats, axis: Floats, angle: Floats) -> Floats:
     along = (given @ axis)[:, np.newaxis] * axis
     across = given - along
     return np.asarray(along + np.cos(angle) * across + np.sin(angle) * np.cross(axis, given))
-
-
-def _silent(
-    condition: Condition,
-    drives: Iterable[Drive],
-    struts: Iterable[Strut],
-    bodies: Iterable[Body],
-) -> Iterator[Problem]:
-    """Parts off the reference of which nobody says how they expand.
-
-    Every strut, and of the others those whose temperature the condition names: that a machine is
-    warm does not yet say that its frame is to be looked at.
-    """
-    for strut in struts:
-        if strut.expansion is None and _is_off(condition, strut.part):
-            yield _no_expansion(strut.part, f"strut {strut.name}", "strut")
-    named = condition.named_parts
-    for drive in drives:
-        if drive.expansion is None and drive.part in named and _is_off(condition, drive.part):
-            measured = "the arm of " if drive.coordinate == "angle" else "what measures "
-            yield _no_expansion(drive.part, f"{measured}drive {drive.name}", "screw, scale or arm")
-    for body in bodies:
-        if body.expansion is None and body.part in named and _is_off(condition, body.part):
-            yield _no_expansion(body.part, f"the {body.part}", body.part)
-
-
-def _located(parts: FileParts, problem: Problem) -> Problem:
-    """A part that the file does not describe is wrong where the condition names it."""
-    part = str(problem.path)
-    named = (f"condition.temperature.{part}", f"condition.gradient.{part}", _ASKED_BY[2])
-    found = next((path for path in (part, *named) if parts.says(path)), part)
-    return replace(problem, path=found)
-
-
-def _is_off(condition: Condition, part: str) -> bool:
-    log = condition.temperature_log
-    rise: float | Floats = condition.temperature_rise(part)
-    if log is not None:
-        rise = condition.temperature_rise(part, log.times)
-    return bool(np.any(rise) or np.any(condition.gradient(part)))
-
-
-def _no_expansion(part: str, what: str, word: str) -> Problem:
-    return Problem(
-        code="no-expansion",
-        message=f"{what} is not at the reference temperature, but nothing says how much it expands",
-        path=part,
-        found="neither expansion nor material",
-        expected='expansion = "1.1e-5 1/K", or a material'
-        + (f", under [{part}]" if part in BODIES else ""),
-        hint=f'a {word} that does not expand has expansion = "0 1/K"',
-    )
-
-
-def _twice(
-    kernel: _kernel.Machine, drives: Iterable[Drive], struts: Iterable[Strut]
-) -> Iterator[Problem]:
-    """A telescopic strut whose length is measured by a scale grows by the scale or as a strut."""
-    carried = {strut.drive: strut for strut in struts}
-    for drive in drives:
-        strut = carried.get(drive.name)
-        sets_length = f"{drive.part}.origin.x" not in kernel.parameters
-        if strut is not None and sets_length and drive.expansion and strut.expansion:
-            yield Problem(
-                code="excluding-keys",
-                message=f"the length of strut {strut.name} would grow twice: with the strut, and "
-                f"with what measures drive {drive.name}",
-                path=f"{drive.part}.expansion",
-                found="an expansion of the drive and one of the strut",
-                expected="one of them",
-                hint='expansion = "0 1/K" for the strut, where a scale along it measures its '
-                "length; no expansion of the drive, where the strut itself is the measure",
-            )
 
 
 __all__ = ["Thermal"]

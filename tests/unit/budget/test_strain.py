@@ -251,8 +251,8 @@ def upright(tmp_path: Path, strut: str, *keys: str) -> Machine:
 def test_the_platforms_weight_is_in_the_overall_force(tmp_path: Path) -> None:
     upright(tmp_path, "")
     path = tmp_path / "machine.toml"
-    platform = '[platform]\nmass = "10 kg"\n\n[[drive]]'
-    path.write_text(path.read_text("utf-8").replace("[[drive]]", platform, 1), encoding="utf-8")
+    platform = '[platform]\nmass = "10 kg"\n'
+    path.write_text(path.read_text("utf-8").replace("[platform]\n", platform), encoding="utf-8")
     heavy = tp.load(path, [COLD])
     found = strain(heavy, POSES)
     reference = Reference(description_of(FILE))

@@ -60,9 +60,9 @@ def test_check_says_where_in_the_units_of_the_file(capsys: pytest.CaptureFixture
     machine = MACHINES / "hexapod.toml"  # in inches
     document = json.loads(call(capsys, "check", machine, "--format", "json").out)
     answer = document["answers"][0]
-    assert answer["at"] == {"x": 4.0, "y": 4.0, "z": 18.0, "a": -10.0, "b": -10.0, "c": 0.0}
+    assert answer["at"] == {"x": 4.0, "y": 4.0, "z": 22.0, "a": -10.0, "b": -10.0, "c": 0.0}
     pose = truepose.load(machine).poses()[answer["pose"]]
-    assert pose[:3] == pytest.approx([0.1016, 0.1016, 0.4572])
+    assert pose[:3] == pytest.approx([0.1016, 0.1016, 0.5588])
     header, first, *_ = call(capsys, "check", machine, "--format", "csv").out.splitlines()
     assert header.endswith(
         "pose_x [in],pose_y [in],pose_z [in],pose_a [deg],pose_b [deg],pose_c [deg]"

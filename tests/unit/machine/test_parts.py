@@ -65,7 +65,7 @@ def test_what_a_file_says_of_its_parts(tmp_path: Path) -> None:
     assert machine.tool.anchor == (0.0, 0.0, -0.005)
     assert machine.mounting == pytest.approx((math.pi, 0.0, 0.0))
     assert machine.parts == (
-        *("drive.d1", "drive.d2", "strut.1", "strut.2"),
+        *("drive.d1", "drive.d2", "strut.1", "strut.2", "carriage.d1", "carriage.d2"),
         *("platform", "frame", "tool"),
     )
     again = pickle.loads(pickle.dumps(machine))  # noqa: S301

@@ -174,6 +174,31 @@ def test_a_scale_along_a_telescopic_strut(tmp_path: Path) -> None:
     assert shifts["drive.d1.offset"] == pytest.approx(ALPHA * 10 * 0.05)
 
 
+def test_a_scale_along_a_telescopic_strut_has_all_of_its_length(tmp_path: Path) -> None:
+    """Three struts from a ring to one point, which rises as their lengths grow: by Pythagoras."""
+    rows = "".join(
+        f'[[drive]]\nname = "d{n}"\nkind = "telescopic"\noffset = 400\nscale = 1.1\n'
+        f'travel = [0, 800]\nexpansion = "{ALPHA} 1/K"\n'
+        f'[[strut]]\nname = "{n}"\ndrive = "d{n}"\nbase = [{x}, {y}, 0]\n'
+        f'platform = [0, 0, 0]\nexpansion = "0 1/K"\n'
+        for n, (x, y) in enumerate(((400, 0), (-240, 320), (-240, -320)), start=1)
+    )
+    head = (
+        'schema = 1\n[machine]\nname = "tripod"\ndof = ["x", "y", "z"]\n'
+        '[units]\nlength = "mm"\nangle = "deg"\n[workspace]\nposes = [[0, 0, 650]]\n'
+    )
+    machine = load_text(tmp_path, head + rows)
+    warm = machine.condition.replace(temperature=REFERENCE + 10)
+    found = tp.budget(machine, [[0, 0, 0.65]], warm).error.sel(source="thermal").values[0]
+    length = np.hypot(0.4, 0.65) * (1 + ALPHA * 10)
+    assert np.allclose(found, [0, 0, np.sqrt(length**2 - 0.4**2) - 0.65], rtol=0, atol=1e-14)
+    # Fixed where the file says so: at 100 mm of the coordinate, 510 mm up the strut.
+    at = load_text(tmp_path, head + rows.replace("scale = 1.1", "scale = 1.1\nfixed_at = 100"))
+    found = tp.budget(at, [[0, 0, 0.65]], warm).error.sel(source="thermal").values[0]
+    length = 0.51 + (np.hypot(0.4, 0.65) - 0.51) * (1 + ALPHA * 10)
+    assert np.allclose(found, [0, 0, np.sqrt(length**2 - 0.4**2) - 0.65], rtol=0, atol=1e-14)
+
+
 def test_a_telescopic_strut_does_not_grow_twice(tmp_path: Path) -> None:
     text = HEXAPOD.replace("platform = [", 'material = "steel"\nplatform = [')
     text = edited(text, ("offset = 600", "offset = 600\nexpansion = 1e-5"))
@@ -241,19 +266,23 @@ def warm_point(point: Floats, gradient: Floats) -> Floats:
     return np.asarray(0.5 * slope @ arm)
 
 
-def test_carriages_follow_a_bent_frame_across_their_guideways(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("fixed_at", "offset"), [(0, 0), (300, 40), (-200, 0)])
+def test_carriages_follow_a_bent_frame_across_their_guideways(
+    fixed_at: int, offset: int, tmp_path: Path
+) -> None:
+    """Along them they go where the bearing of the screw goes."""
     base = ("base = [0, 0, 0]", "base = [20, 30, -10]")
-    machine = planar(tmp_path, base, more=FRAME)
+    told = ("travel = [0, 900]", f"travel = [-100, 900]\nfixed_at = {fixed_at}\noffset = {offset}")
+    machine = planar(tmp_path, base, told, more=FRAME)
     gradient = np.array([3.0, 50.0, -20.0])
     condition = machine.condition.replace(gradient={"frame": gradient})
     poses = machine.poses()
     joints = machine.inverse(poses)
     shifts = deviations(machine, condition, poses)
     axis = np.array([0.0, 1.0, 0.0])
+    bearing = warm_point((fixed_at + offset) / 1e3 * axis, gradient)
     for row, q in enumerate(joints[:, 0]):
-        origin = of_point(shifts, "drive.d1.origin")[0]
-        assert np.allclose(origin, warm_point(np.zeros(3), gradient), rtol=1e-12)
-        carriage = np.array([0.0, q, 0.0])
+        carriage = (q + offset / 1e3) * axis
         # The carriage is a small rigid triad on the frame; its joint turns with it.
         step = 1e-6
         turned = [
@@ -263,10 +292,11 @@ def test_carriages_follow_a_bent_frame_across_their_guideways(tmp_path: Path) ->
         ]
         slope = np.stack(turned, axis=1)
         rotation = 0.5 * (slope - slope.T)
-        moved = warm_point(carriage, gradient) - origin
-        across = moved - (moved @ axis) * axis
-        expected = across + rotation @ np.array([0.02, 0.03, -0.01])
-        assert np.allclose(of_point(shifts, "strut.1.base")[row], expected, rtol=0, atol=1e-12)
+        moved = warm_point(carriage, gradient)
+        moved += ((bearing - moved) @ axis) * axis
+        expected = moved + rotation @ np.array([0.02, 0.03, -0.01])
+        found = of_point(shifts, "drive.d1.origin")[0] + of_point(shifts, "strut.1.base")[row]
+        assert np.allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_an_arm_turns_with_its_bearing_on_a_bent_frame() -> None:

@@ -162,7 +162,7 @@ def _probe(machine: Machine, condition: Condition) -> Block:
 
 def _expanding(machine: Machine) -> Iterator[str]:
     """Parts that grow with their temperature."""
-    bodies = (machine.frame, machine.platform, machine.tool)
+    bodies = (*machine.carriages, machine.frame, machine.platform, machine.tool)
     parts: tuple[Strut | Drive | Body, ...] = (*machine.struts, *machine.drives, *bodies)
     return (part.part for part in parts if part.expansion)
 

@@ -32,8 +32,6 @@ LONGEST_NAME = 40
 WRENCHES = ("force-x", "force-y", "force-z", "moment-x", "moment-y", "moment-z")
 """Pins, in the order of a wrench."""
 
-_FAMILIES = ("strut", "drive", "guide")
-
 
 @dataclass(frozen=True)
 class Description:
@@ -133,12 +131,17 @@ def _stem(machine: Machine) -> str:
 
 def _pin(machine: Machine, part: str) -> str:
     """A part by its number, since names may hold what HAL does not take."""
-    family, _, _ = part.partition(".")
-    if family not in _FAMILIES:
+    family, _, name = part.partition(".")
+    rows: dict[str, tuple[Strut | Drive | Guide, ...]] = {
+        "strut": machine.struts,
+        "drive": machine.drives,
+        "guide": machine.guides,
+        "carriage": machine.drives,
+    }
+    if family not in rows:
         return part
-    families: dict[str, tuple[Strut | Drive | Guide, ...]]
-    families = {"strut": machine.struts, "drive": machine.drives, "guide": machine.guides}
-    return f"{family}-{[row.part for row in families[family]].index(part)}"
+    # A carriage has the name of its drive, and its number.
+    return f"{family}-{[row.name for row in rows[family]].index(name)}"
 
 
 def _arms(machine: Machine) -> Floats:

@@ -1,4 +1,4 @@
-"""`[platform]`, `[frame]` and `[tool]`: the bodies that every machine has once."""
+"""`[platform]`, `[frame]`, `[tool]` and `[drive.carriage]`: the bodies of a machine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ class _Growing(FileTable):
         None, description="Gives `expansion` where it is not written."
     )
     expansion: Expansion | None = Field(
-        None, description="Coefficient of linear thermal expansion. Default: it does not grow."
+        None,
+        description="Coefficient of linear thermal expansion. Default: it does not grow, and where "
+        "it is off the reference temperature results say that it is not included.",
     )
 
 
@@ -41,3 +43,10 @@ class ToolTable(_Growing):
     """
 
     anchor: Point = Field(_ORIGIN, description="Where it is held, platform axes.")
+
+
+class CarriageTable(_Growing):
+    """The carriage of a slider, which carries the base joints of its struts.
+
+    It grows about the point that the drive moves, from which the struts' bases are measured.
+    """

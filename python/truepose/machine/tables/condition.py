@@ -83,7 +83,7 @@ class ConditionTable(FileTable):
         None,
         description='Temperature gradient of parts, `{ "strut.1" = "4 K/m" }`: one number '
         "along a strut from base to platform, or along a drive's coordinate from `fixed_at`; "
-        "three of frame and platform.",
+        "three of frame, platform and carriages.",
     )
     temperature_log: str | None = Field(
         None, description="CSV file of measured temperatures over time, relative to this file."

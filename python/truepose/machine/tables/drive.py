@@ -8,6 +8,7 @@ from pydantic import Field
 
 from truepose.machine.file_table import FileTable, PartName
 from truepose.machine.quantity import Expansion, Mass
+from truepose.machine.tables.body import CarriageTable
 from truepose.machine.tables.material import MaterialName
 
 
@@ -36,4 +37,9 @@ class DriveTable(FileTable):
     )
     mass: Mass = Field(
         0.0, description="Mass of the carriage, shared by the struts that it carries."
+    )
+    carriage: CarriageTable | None = Field(
+        None,
+        description="What the carriage of a slider is made of: it grows about the point that the "
+        "drive moves, and with it the base joints that it carries.",
     )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import truepose as tp
 from c_program import EXACT, FUSED, STRICT, Answers, compiled, compiler, driver
 from made_source import MadeSource, with_sources
+from sweeps import sweep, thinned
 from truepose import _kernel, controllers
 from truepose.budget.exact import together
 from truepose.budget.poses import Walk
@@ -33,6 +34,10 @@ POSES = 100_000
 Floats = NDArray[np.float64]
 
 exported = pytest.mark.parametrize("name", MACHINES)
+OF_EACH_KIND = {"planar_two_slider", "rotary_delta", "tricept", "overconstrained"}
+"""Sliders, cranks, guides, and more closures than freedoms: what the C is printed of differs."""
+
+in_part = pytest.mark.parametrize("name", thinned(MACHINES, OF_EACH_KIND))
 
 
 @cache
@@ -105,13 +110,21 @@ class Both:
 
 
 @exported
-@pytest.mark.parametrize(("flags", "close"), [(EXACT, 1e-12), (FUSED, 1e-11)])
+@pytest.mark.parametrize(
+    ("flags", "close", "count"),
+    [
+        (EXACT, 1e-12, POSES // 50),
+        pytest.param(EXACT, 1e-12, POSES, marks=sweep),
+        pytest.param(FUSED, 1e-11, POSES // 10, marks=sweep),
+    ],
+    ids=["exact", "exact-at-many", "fused"],
+)
 def test_c_is_the_kernel_hot_and_loaded(
-    name: str, flags: tuple[str, ...], close: float, builds: Path
+    name: str, flags: tuple[str, ...], close: float, count: int, builds: Path
 ) -> None:
-    both = Both(name, builds, flags, POSES if flags is EXACT else POSES // 10)
+    both = Both(name, builds, flags, count)
     c = both.c
-    assert len(both.nominal) > 0.5 * (POSES if flags is EXACT else POSES // 10)
+    assert len(both.nominal) > 0.5 * count
     assert (c.status == 0).all()
     size = np.abs(both.nominal).max()
     assert np.abs(c.nominal - both.nominal).max() <= close * size
@@ -179,12 +192,12 @@ def test_a_pose_that_cannot_be_used_has_the_kernels_status(name: str, builds: Pa
     assert len(set(names)) > 1
 
 
-@exported
+@in_part
 def test_arm_takes_it_without_a_warning(name: str, builds: Path) -> None:
     compiled(program(name), builds, ["-O1"], to="object", by="arm-linux-gnueabihf-gcc")
 
 
-@exported
+@in_part
 def test_sanitizers_find_nothing(name: str, tmp_path: Path) -> None:
     """Good poses, far ones, and numbers that are none, under address and undefined sanitizers."""
     c, machine = program(name), machine_of(name)
@@ -239,7 +252,11 @@ int main(void)
 
 @pytest.mark.parametrize("flags", [["-O0"], ["-O2"]])
 @pytest.mark.parametrize(
-    "name", ["planar_two_slider", "hexapod", "linear_delta", "tricept", "overconstrained"]
+    "name",
+    thinned(
+        ["planar_two_slider", "hexapod", "linear_delta", "tricept", "overconstrained"],
+        OF_EACH_KIND,
+    ),
 )
 @pytest.mark.parametrize("by", ["gcc", "arm-linux-gnueabihf-gcc"])
 def test_the_stack_stated_is_enough(name: str, flags: list[str], by: str, builds: Path) -> None:
@@ -357,7 +374,9 @@ def test_a_shift_out_of_proportion_to_the_heat_is_refused() -> None:
     assert problem.found == "the source bending is not in proportion to the temperature"
 
 
-@pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "hexaglide", "hexapod_telescope"])
+@pytest.mark.parametrize(
+    "name", thinned(["planar_two_slider", "hexapod", "hexaglide", "hexapod_telescope"])
+)
 def test_both_ways_to_compensated_joints_agree(name: str, builds: Path) -> None:
     """In one go, and with pivoting, which is for poses where the order of home does not serve."""
     c, machine = program(name), machine_of(name)

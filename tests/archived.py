@@ -12,8 +12,8 @@ import json
 import math
 import re
 import tomllib
-from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,24 +23,39 @@ import xarray as xr
 Cell = float | str
 Key = tuple[str, str]
 """A variable, and the error source that it is of or ""."""
-Cells = Mapping[Key, list[Cell]]
 
 RELATIVE = 1e-9
 """Of the largest number of a variable (and source): what two processors may differ by."""
 ROUNDING = 1e-9
-"""In the units of a file (mm, inch, degrees): a smaller number is of rounding."""
-ROUNDING_IN_SI = 1e-12
-"""The same in NetCDF."""
+"""A smaller number is of rounding: mm, inches, degrees, shares; in SI a thousandth of it, and of
+squares a thousandth again, a millionth in SI: of errors of a micrometre or a microradian."""
+
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 COMMENT = re.compile(r"#.*|;.*|\([^)]*\)")
-SENTENCES = {"doc", "long_name", "origin", "description", "sentence", "reasons", "version", "hash"}
+SENTENCES = {"doc", "origin", "description", "sentence", "reasons", "version", "hash"}
 
 
-def cells_of(path: Path) -> Cells:
+@dataclass
+class Column:
+    """The numbers and words of a variable, in their order, and below what a number is rounding."""
+
+    rounding: float
+    cells: list[Cell] = field(default_factory=list)
+
+    def same(self, other: Column | None) -> bool:
+        """Whether another has the same, within RELATIVE of this one's largest number."""
+        if other is None or len(self.cells) != len(other.cells):
+            return False
+        numbers = [abs(cell) for cell in self.cells if not isinstance(cell, str)]
+        slack = RELATIVE * max(filter(math.isfinite, numbers), default=0.0) + self.rounding
+        return all(_close(*pair, slack) for pair in zip(self.cells, other.cells, strict=True))
+
+
+def columns_of(path: Path) -> Mapping[Key, Column]:
     """What a file holds. Raises where it cannot be read."""
-    found: dict[Key, list[Cell]] = defaultdict(list)
-    for variable, source, cell in READERS.get(path.suffix, _text)(path):
-        found[variable, source].append(cell)
+    found: dict[Key, Column] = {}
+    for variable, source, rounding, cell in READERS.get(path.suffix, _text)(path):
+        found.setdefault((variable, source), Column(rounding)).cells.append(cell)
     return found
 
 
@@ -49,31 +64,14 @@ def differences(archived: Path, present: Path) -> list[Key]:
 
     What the present file has besides is no difference.
     """
-    before, now = cells_of(archived), cells_of(present)
-    floor = ROUNDING_IN_SI if archived.suffix == ".nc" else ROUNDING
-    if archived.suffix not in READERS:
-        floor = _last_digit(archived)
-    return [key for key, cells in before.items() if not _same(cells, now.get(key, []), floor)]
-
-
-def _last_digit(path: Path) -> float:
-    """One in the last of the decimals that a printed file has, mm or inch."""
-    decimals = [len(each) for each in re.findall(r"\.(\d+)", _code(path))]
-    return 1.01 * 10.0 ** -max(decimals, default=0)
-
-
-def _same(before: list[Cell], now: list[Cell], floor: float) -> bool:
-    if len(before) != len(now):
-        return False
-    sizes = [abs(cell) for cell in before if isinstance(cell, float) and math.isfinite(cell)]
-    slack = RELATIVE * max(sizes, default=0.0) + floor
-    return all(_close(old, new, slack) for old, new in zip(before, now, strict=True))
+    now = columns_of(present)
+    return [key for key, column in columns_of(archived).items() if not column.same(now.get(key))]
 
 
 def _close(old: Cell, new: Cell, slack: float) -> bool:
-    if isinstance(old, str) or isinstance(new, str) or not math.isfinite(old):
-        return old == new or (old != old and new != new)
-    return abs(old - new) <= slack
+    if isinstance(old, str) or isinstance(new, str):
+        return old == new
+    return old == new or (math.isnan(old) and math.isnan(new)) or abs(old - new) <= slack
 
 
 def _cell(value: Any) -> Cell:
@@ -82,7 +80,17 @@ def _cell(value: Any) -> Cell:
     return value if isinstance(value, str) else float(value)
 
 
-Rows = Iterator[tuple[str, str, Cell]]
+def _rounding(units: str, *, si: bool = False) -> float:
+    """Of a variable in `units`, such as `mm`, `m`, `in^2`, `m rad` or `1`."""
+    of_tool = bool(re.search(r"[a-z]", units))
+    square = bool(re.search(r"\^2|[a-z] [a-z]", units))
+    return (
+        ROUNDING * (1e-3 if si and of_tool else 1.0) * ((1e-6 if si else 1e-3) if square else 1.0)
+    )
+
+
+Rows = Iterator[tuple[str, str, float, Cell]]
+"""Variable, source, rounding, cell."""
 
 
 def _json(path: Path) -> Rows:
@@ -92,10 +100,10 @@ def _json(path: Path) -> Rows:
         yield from _tree(document, "", "")
         return
     sources = document["coordinates"].get("source", {}).get("values", [])
-    for part in ("coordinates", "variables"):
-        for name, entry in document[part].items():
-            values = np.array(entry["values"], object)
-            yield from _array(name, entry["dims"], values, sources)
+    for name, entry in [*document["coordinates"].items(), *document["variables"].items()]:
+        values, units = np.array(entry["values"], object), entry["units"]
+        units = units if isinstance(units, str) else next(iter(units.values()))
+        yield from _array(name, entry["dims"], values, sources, _rounding(str(units)))
     yield from _attributes(document["attributes"])
 
 
@@ -103,36 +111,41 @@ def _netcdf(path: Path) -> Rows:
     with xr.open_dataset(path, engine="h5netcdf") as data:
         sources = [str(name) for name in data["source"].values] if "source" in data.coords else []
         for name, array in data.variables.items():
-            yield from _array(str(name), array.dims, array.values.astype(object), sources)
+            rounding = _rounding(array.attrs.get("units", "m"), si=True)
+            values = array.values.astype(object)
+            yield from _array(str(name), array.dims, values, sources, rounding)
         yield from _attributes({str(name): value for name, value in data.attrs.items()})
 
 
-def _array(name: str, dims: Any, values: Any, sources: list[str]) -> Rows:
+def _array(
+    name: str, dims: Sequence[Any], values: Any, sources: Sequence[str], rounding: float
+) -> Rows:
     if "source" not in dims or not sources or name == "source":
         for value in np.ravel(values).tolist():
-            yield name, "", _cell(value)
+            yield name, "", rounding, _cell(value)
         return
-    axis = list(dims).index("source")
     for number, source in enumerate(sources):
-        for value in np.ravel(np.take(values, number, axis=axis)).tolist():
-            yield name, source, _cell(value)
+        of_source = np.take(values, number, axis=list(dims).index("source"))
+        for value in np.ravel(of_source).tolist():
+            yield name, source, rounding, _cell(value)
 
 
 def _attributes(attributes: Mapping[str, Any]) -> Rows:
     for name, value in attributes.items():
         if isinstance(value, bool | int | float | np.number):
-            yield f"attributes.{name}", "", float(value)
+            yield f"attributes.{name}", "", ROUNDING, float(value)
 
 
 def _csv(path: Path) -> Rows:
     with path.open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(line for line in file if not line.startswith("#")):
             for column, text in row.items():
+                rounding = _rounding(column.partition("[")[2])
                 try:
                     cell: Cell = float(text) if text else math.nan
                 except ValueError:
                     cell = text
-                yield column, row.get("source", "") or "", cell
+                yield column, row.get("source") or "", rounding, cell
 
 
 def _toml(path: Path) -> Rows:
@@ -150,22 +163,23 @@ def _tree(value: Any, place: str, source: str) -> Rows:
             name = str(number)
             if isinstance(item, Mapping):
                 name = str(item.get("name", item.get("parameter", number)))
-            of = name if place == "sources" else source
-            yield from _tree(item, place if place == "sources" else f"{place}.{name}", of)
+            if place == "sources":
+                yield from _tree(item, place, name)
+            else:
+                yield from _tree(item, f"{place}.{name}", source)
     elif isinstance(value, bool | int | float) or value is None:
-        yield place, source, _cell(value)
-
-
-def _code(path: Path) -> str:
-    return COMMENT.sub("", path.read_text(encoding="utf-8"))
+        yield place, source, ROUNDING, _cell(value)
 
 
 def _text(path: Path) -> Rows:
     """A program or a block of settings: numbers outside comments, by what stands before them."""
-    for line in _code(path).splitlines():
+    text = COMMENT.sub("", path.read_text(encoding="utf-8"))
+    decimals = max((len(each) for each in re.findall(r"\.(\d+)", text)), default=0)
+    last_digit = 1.01 * 10.0**-decimals
+    for line in text.splitlines():
         end = 0
         for number in NUMBER.finditer(line):
-            yield line[end : number.start()].strip() or "number", "", float(number[0])
+            yield line[end : number.start()].strip() or "number", "", last_digit, float(number[0])
             end = number.end()
 
 

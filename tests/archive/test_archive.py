@@ -21,7 +21,7 @@ from pathlib import Path
 import pytest
 
 import truepose as tp
-from archived import Key, cells_of, differences
+from archived import Key, columns_of, differences
 from sweeps import sweep, thinned
 from truepose.calibration import read_measurements
 from truepose.cli import run
@@ -126,7 +126,7 @@ def run_again(call: Call, folder: Path) -> Answer:
     differing = {}
     for name in call.outputs:
         archived, present = call.version / name, folder / name
-        everything = list(cells_of(archived))
+        everything = list(columns_of(archived))
         keys = differences(archived, present) if present.is_file() else everything
         if keys:
             differing[name] = keys

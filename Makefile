@@ -23,7 +23,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help
 help: ## say what can be made
-	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{ printf "%-18s %s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1|\2/p' Makefile | awk -F'|' '{ printf "%-21s %s\n", $$1, $$2 }'
 
 # ---- what users run ----
 
@@ -39,16 +39,22 @@ package: $(PACKAGE) ## build the kernel and install truepose into .venv
 # ---- what developers run, and the CI ----
 
 .PHONY: test
-test: test-rust test-python ## run all tests
+test: test-rust test-python ## run the tests, of each sweep a member or a few: minutes
+
+.PHONY: test-all
+test-all: test-rust test-python-all ## run every test there is, as the CI does
 
 .PHONY: test-rust
 test-rust: cargo $(MADE) ## run the kernel's tests
 	$(CARGO) test --workspace --release --locked
 
 .PHONY: test-python
-test-python: package tools ## run the package's tests
-# Matrices here are small: threads of their own only wait for each other on a loaded machine.
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest
+test-python: package tools ## run the package's tests, of each sweep a member or a few
+	$(PYTEST) -m "not sweep"
+
+.PHONY: test-python-all
+test-python-all: package tools ## run all of the package's tests
+	$(PYTEST)
 
 .PHONY: lint
 lint: lint-python lint-types lint-imports lint-rust ## check form, types and the direction of imports
@@ -105,6 +111,10 @@ distclean: clean ## remove the virtual environment too
 	rm -rf $(VENV)
 
 # ---- how it is made ----
+
+# A worker for each core, which therefore starts no threads of its own, neither the kernel's nor those
+# of linear algebra. What goes to which worker, and why, is in tests/conftest.py.
+PYTEST := TRUEPOSE_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=auto --dist=loadgroup
 
 # PyO3 looks at the same Python in every build, so that none of them undoes another's.
 CARGO := PYO3_PYTHON=$(abspath $(BIN)/python) cargo

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from built_once import built_once
 from system_package import missing
 from truepose.controllers.c import Program
 
@@ -68,16 +69,22 @@ def compiled(
     to: str = "shared",
     by: str = "gcc",
 ) -> Path:
-    """The program compiled with the strict flags and `flags`; `more` is C that comes after it."""
-    (folder / f"{program.prefix}.h").write_text(program.header)
-    source = folder / f"{program.prefix}.c"
-    source.write_text(program.source + more)
-    target = folder / f"{program.prefix}.{to}"
+    """The program compiled with the strict flags and `flags`; `more` is C that comes after it.
+
+    Once a run: `folder` is the fixture `builds`.
+    """
     kind = {"shared": ["-shared", "-fPIC"], "object": ["-c"]}[to]
-    command = [compiler(by), *STRICT, *flags, *kind, str(source), "-o", str(target), "-lm"]
-    done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=folder)
-    assert done.returncode == 0, done.stderr
-    return target
+    files = {f"{program.prefix}.h": program.header, f"{program.prefix}.c": program.source + more}
+    source, target = f"{program.prefix}.c", f"{program.prefix}.{to}"
+    command = [compiler(by), *STRICT, *flags, *kind, source, "-o", target, "-lm"]
+
+    def build(scratch: Path) -> None:
+        for name, text in files.items():
+            (scratch / name).write_text(text)
+        done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=scratch)
+        assert done.returncode == 0, done.stderr
+
+    return built_once(folder, [*command, *files.values()], build) / target
 
 
 @dataclass(frozen=True)

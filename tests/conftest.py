@@ -1,11 +1,14 @@
-"""The switch that refreshes golden files; without it nothing writes them."""
+"""What all tests share: golden files, one folder for what they compile, and how workers split."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from sweeps import COLLECTED, member_of
 
 GOLDEN = Path(__file__).parent / "golden"
 
@@ -16,6 +19,25 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="write the golden files of tests/golden anew; read the difference before you commit",
     )
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    config.stash[COLLECTED] = [member_of(item) for item in items]
+    if config.pluginmanager.hasplugin("xdist"):
+        # A file is one worker's, with what its tests share, unless it says otherwise.
+        for item in items:
+            if item.get_closest_marker("xdist_group") is None:
+                item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+
+
+@pytest.fixture(scope="session")
+def builds(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of this run, for all workers, in which compiled programs are kept."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "builds"
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 @pytest.fixture

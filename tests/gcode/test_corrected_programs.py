@@ -23,6 +23,7 @@ from scipy.spatial import cKDTree
 import truepose as tp
 from build_machine import MACHINES, machine_files
 from made_source import MadeSource, with_sources
+from sweeps import thinned
 from system_package import missing
 from truepose import _kernel
 from truepose.compensation.commands import actual_of_joints, actual_poses
@@ -230,7 +231,7 @@ def off_path(machine: Machine, tool: np.ndarray, program: Path9) -> np.ndarray:
 PARTS = {"planar_two_slider": PLANAR_PART, "hexapod": HEXAPOD_PART}
 
 
-@pytest.mark.parametrize("interpolation", ["pose", "either"])
+@pytest.mark.parametrize("interpolation", thinned(["pose", "either"], {"either"}))
 @pytest.mark.parametrize("name", PARTS)
 def test_the_actual_tool_follows_the_program(
     name: str, interpolation: str, read: Read, tmp_path: Path

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 import truepose as tp
 from build_machine import MACHINES
 from made_source import MadeSource, with_sources
+from sweeps import thinned
 from truepose._kernel import STATUS
 from truepose.compensation.commands import ActualMachine, actual_of_joints, actual_poses
 from truepose.controllers.gcode import division
@@ -145,7 +146,7 @@ def zigzag(machine: Machine, count: int, seed: int = 4) -> np.ndarray:
 NAMES = ["planar_two_slider", "hexapod", "linear_delta", "3rrr", "3prs", "hexaglide"]
 
 
-@pytest.mark.parametrize("interpolation", ["pose", "either"])
+@pytest.mark.parametrize("interpolation", thinned(["pose", "either"], {"either"}))
 @pytest.mark.parametrize("name", NAMES)
 def test_the_tool_stays_within_the_tolerance(name: str, interpolation: str) -> None:
     machine = hot(name)
@@ -160,7 +161,9 @@ def test_the_tool_stays_within_the_tolerance(name: str, interpolation: str) -> N
         assert by_joints.max() > TOLERANCE
 
 
-@pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "linear_delta"])
+@pytest.mark.parametrize(
+    "name", thinned(["planar_two_slider", "hexapod", "linear_delta"], {"hexapod"})
+)
 def test_arcs_and_helices_too(name: str) -> None:
     machine = hot(name)
     centre = points_of(machine, machine.poses().mean(axis=0))[0]

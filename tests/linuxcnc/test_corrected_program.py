@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 import truepose as tp
 from build_machine import MACHINES
+from sweeps import sweep
 from truepose import _kernel
 from truepose.compensation.commands import actual_of_joints
 from truepose.controllers.gcode._axes import Axes
@@ -69,7 +70,10 @@ def programmed(machine: Machine, program: Path) -> Floats:
     return axes.poses(np.concatenate(table))
 
 
-@pytest.mark.parametrize(("name", "part"), [("planar_two_slider", PLANAR), ("hexapod", HEXAPOD)])
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [pytest.param("planar_two_slider", PLANAR, marks=sweep), ("hexapod", HEXAPOD)],
+)
 def test_the_actual_tool_stays_as_near_as_stated(name: str, part: str, tmp_path: Path) -> None:
     required()
     machine = hot(name)

@@ -14,6 +14,7 @@ from module_under_test import exported
 import truepose as tp
 from command_line import MACHINES
 from machine_texts import PLANAR, edited, load_text
+from sweeps import thinned
 from truepose.compensation.commands import corrected_poses
 from truepose.controllers._export import options_of
 from truepose.controllers.linuxcnc import LinuxCNC
@@ -21,6 +22,7 @@ from truepose.errors import RequestError
 from truepose.machine import Machine
 
 EVERY = sorted(path.stem for path in MACHINES.glob("*.toml"))
+QUICK = {"planar_two_slider", "rotary_delta", "3prs", "hexapod", "overconstrained"}
 IN_MODULES = ("thermal", "elastic", "tolerance")
 ANGLES = ("a", "b", "c")
 
@@ -64,7 +66,7 @@ def changed(tmp_path: Path, *changes: tuple[str, str]) -> Machine:
     return load_text(tmp_path, edited(PLANAR, *changes))
 
 
-@pytest.mark.parametrize("stem", EVERY)
+@pytest.mark.parametrize("stem", thinned(EVERY, QUICK))
 def test_home_and_limits(stem: str) -> None:
     machine = tp.load(MACHINES / f"{stem}.toml")
     ini = sections(files_of(machine)["ini"])
@@ -91,7 +93,9 @@ def test_home_and_limits(stem: str) -> None:
     assert (commanded <= high).all()
 
 
-@pytest.mark.parametrize("stem", ["planar_two_slider", "rotary_delta", "hexapod", "3rrr"])
+@pytest.mark.parametrize(
+    "stem", thinned(["planar_two_slider", "rotary_delta", "hexapod", "3rrr"], QUICK)
+)
 def test_the_box_keeps_its_word(stem: str) -> None:
     """At poses that the export did not look at, and with every joint at the clamp."""
     machine = tp.load(MACHINES / f"{stem}.toml")

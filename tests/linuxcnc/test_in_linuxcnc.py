@@ -19,6 +19,7 @@ from real_linuxcnc import Run, Step, required, run
 
 import truepose as tp
 from command_line import MACHINES
+from sweeps import thinned
 from truepose.controllers._export import options_of
 from truepose.controllers.linuxcnc import LinuxCNC
 
@@ -243,7 +244,7 @@ class Study:
         return "".join(f"net {signal} {pin}\n" for pin, signal in (struts | others).items())
 
 
-@pytest.fixture(scope="module", params=CASES, ids=lambda case: case.stem)
+@pytest.fixture(scope="module", params=thinned(CASES), ids=lambda case: case.stem)
 def done(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> object:
     """The study and its run; three seconds of it are waiting for things to settle."""
     required()

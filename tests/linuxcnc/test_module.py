@@ -12,6 +12,7 @@ import pytest
 from module_under_test import DEGREE, Rig, clean
 
 from command_line import MACHINES
+from sweeps import thinned
 from truepose import _kernel
 
 EVERY = [
@@ -22,6 +23,8 @@ EVERY = [
 ]  # fmt: skip
 JOINT, WORLD = 1e-9, 1e-8
 """mm, degrees."""
+QUICK = {"planar_two_slider", "rotary_delta", "3prs", "hexapod"}
+"""Halcompile takes a second a machine: in the quick suite some of all kinds."""
 RATE = 1e-3
 """mm a cycle."""
 
@@ -64,7 +67,7 @@ def back_and_forth(made: Rig, poses: np.ndarray, joints: np.ndarray) -> None:
         assert not np.delete(back, made.columns).any()
 
 
-@pytest.mark.parametrize("stem", ["3prs", "tricept"])
+@pytest.mark.parametrize("stem", thinned(["3prs", "tricept"]))
 def test_a_strut_that_leans_too_far_has_no_inverse(stem: str) -> None:
     """LinuxCNC knows no such limit, so that joints beyond it must not be given."""
     made = rig(stem)
@@ -78,7 +81,7 @@ def test_a_strut_that_leans_too_far_has_no_inverse(stem: str) -> None:
         assert (made.inverse(pose) is not None) == (name in ("ok", "out_of_travel"))
 
 
-@pytest.mark.parametrize("stem", EVERY)
+@pytest.mark.parametrize("stem", thinned(EVERY, QUICK))
 def test_round_trip_of_the_nominal_machine(stem: str) -> None:
     made = rig(stem)
     assert made.module.kind == 4
@@ -89,7 +92,7 @@ def test_round_trip_of_the_nominal_machine(stem: str) -> None:
     assert made.get("forward-calls") == made.get("inverse-calls") == len(poses)
 
 
-@pytest.mark.parametrize("stem", EVERY)
+@pytest.mark.parametrize("stem", thinned(EVERY, QUICK))
 def test_round_trip_hot_and_loaded(stem: str) -> None:
     made = rig(stem)
     made.connect()
@@ -140,7 +143,7 @@ def test_pins_swept_one_by_one() -> None:
         made.update(2)
 
 
-@pytest.mark.parametrize("stem", [PLANAR, HEXAPOD, "linear_delta", "rotary_delta"])
+@pytest.mark.parametrize("stem", thinned([PLANAR, HEXAPOD, "linear_delta", "rotary_delta"], QUICK))
 def test_the_forward_solution_from_anywhere(stem: str) -> None:
     """Starts that are no poses of the machine, or no numbers, are as good as home."""
     made = rig(stem)
@@ -154,7 +157,9 @@ def test_the_forward_solution_from_anywhere(stem: str) -> None:
     assert made.get("failures") == 0
 
 
-@pytest.mark.parametrize("stem", [PLANAR, "3rrr", "rotary_delta", "tricept", HEXAPOD])
+@pytest.mark.parametrize(
+    "stem", thinned([PLANAR, "3rrr", "rotary_delta", "tricept", HEXAPOD], QUICK)
+)
 def test_what_cannot_be_solved_fails(stem: str) -> None:
     made = rig(stem)
     made.connect()

@@ -15,6 +15,7 @@ import pytest
 import truepose as tp
 from build_machine import machine_files
 from made_measurements import made_measurements, poses_within
+from sweeps import thinned
 from truepose.budget.exact import displacement
 from truepose.calibration.calibrate import Calibration, calibrate
 from truepose.calibration.identification.problem import Problem
@@ -62,7 +63,7 @@ def error_of(calibration: Calibration, truth: np.ndarray) -> np.ndarray:
     return error
 
 
-@pytest.mark.parametrize("name", ["planar_crossed", "hexapod", "hexaglide"])
+@pytest.mark.parametrize("name", thinned(["planar_crossed", "hexapod", "hexaglide"]))
 def test_the_budget_of_the_calibrated_file_is_what_the_tool_is_off(
     name: str, tmp_path: Path
 ) -> None:

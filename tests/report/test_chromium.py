@@ -19,6 +19,7 @@ import pytest
 import truepose
 from command_line import MACHINES
 from made_measurements import made_measurements, poses_within
+from sweeps import sweep, thinned
 from system_package import missing
 from truepose.calibration import write_measurements
 from truepose.cli import run
@@ -173,7 +174,7 @@ def measurements(beside: Path) -> Path:
     return file
 
 
-@pytest.fixture(scope="module", params=MACHINES_SHOWN)
+@pytest.fixture(scope="module", params=thinned(MACHINES_SHOWN, {MEASURED, OVERCONSTRAINED}))
 def report(
     request: pytest.FixtureRequest, browser: Any, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Visit]:
@@ -193,7 +194,15 @@ def report(
     seen.page.close()
 
 
-@pytest.mark.parametrize("name", FIGURE_NAMES)
+def pages_and_figures() -> Iterator[Any]:
+    """Every figure on every page; once each in the quick suite, where a machine has it."""
+    for machine in MACHINES_SHOWN:
+        for name in FIGURE_NAMES:
+            once = OVERCONSTRAINED if name in ONLY_OVERCONSTRAINED else MEASURED
+            yield pytest.param(machine, name, marks=() if machine == once else sweep)
+
+
+@pytest.mark.parametrize(("report", "name"), list(pages_and_figures()), indirect=["report"])
 def test_a_figure_is_not_blank(name: str, report: Visit) -> None:
     if name in report.absent:
         assert report.page.locator(f"#figure-{name}").count() == 0

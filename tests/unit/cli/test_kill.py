@@ -20,6 +20,7 @@ from typing import Any
 import pytest
 
 from command_line import PLANAR, call
+from sweeps import thinned
 
 FORMS = (".json", ".csv", ".nc")
 # Long enough that half of the text does not wait in a buffer of the file.
@@ -55,7 +56,7 @@ main()
 """
 
 
-@pytest.fixture(params=["a file", "no file"])
+@pytest.fixture(params=thinned(["a file", "no file"]))
 def there(request: pytest.FixtureRequest) -> bool:
     return bool(request.param == "a file")
 

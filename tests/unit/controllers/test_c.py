@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import truepose as tp
 from c_program import EXACT, FUSED, STRICT, Answers, compiled, compiler, driver
 from made_source import MadeSource, with_sources
+from sweeps import sweep, thinned
 from truepose import _kernel, controllers
 from truepose.budget.exact import together
 from truepose.budget.poses import Walk
@@ -33,6 +34,10 @@ POSES = 100_000
 Floats = NDArray[np.float64]
 
 exported = pytest.mark.parametrize("name", MACHINES)
+OF_EACH_KIND = {"planar_two_slider", "rotary_delta", "tricept", "overconstrained"}
+"""Sliders, cranks, guides, and more closures than freedoms: what the C is printed of differs."""
+
+in_part = pytest.mark.parametrize("name", thinned(MACHINES, OF_EACH_KIND))
 
 
 @cache
@@ -105,13 +110,21 @@ class Both:
 
 
 @exported
-@pytest.mark.parametrize(("flags", "close"), [(EXACT, 1e-12), (FUSED, 1e-11)])
+@pytest.mark.parametrize(
+    ("flags", "close", "count"),
+    [
+        (EXACT, 1e-12, POSES // 50),
+        pytest.param(EXACT, 1e-12, POSES, marks=sweep),
+        pytest.param(FUSED, 1e-11, POSES // 10, marks=sweep),
+    ],
+    ids=["exact", "exact-at-many", "fused"],
+)
 def test_c_is_the_kernel_hot_and_loaded(
-    name: str, flags: tuple[str, ...], close: float, tmp_path: Path
+    name: str, flags: tuple[str, ...], close: float, count: int, builds: Path
 ) -> None:
-    both = Both(name, tmp_path, flags, POSES if flags is EXACT else POSES // 10)
+    both = Both(name, builds, flags, count)
     c = both.c
-    assert len(both.nominal) > 0.5 * (POSES if flags is EXACT else POSES // 10)
+    assert len(both.nominal) > 0.5 * count
     assert (c.status == 0).all()
     size = np.abs(both.nominal).max()
     assert np.abs(c.nominal - both.nominal).max() <= close * size
@@ -131,7 +144,7 @@ def machine_size(name: str) -> float:
 
 
 @exported
-def test_forward_from_home_is_the_kernels(name: str, tmp_path: Path) -> None:
+def test_forward_from_home_is_the_kernels(name: str, builds: Path) -> None:
     machine, c = machine_of(name), program(name)
     table = random_poses(machine, 300)
     joints, status = machine.inverse(table, status=True)
@@ -140,7 +153,7 @@ def test_forward_from_home_is_the_kernels(name: str, tmp_path: Path) -> None:
     home = np.tile(np.array(machine.kernel.control["home"]), (len(table), 1))
     kelvin = np.full(max(len(c.temperature_parts), 1), 293.15)
     wanted = in_full(machine, table, machine.commanded)
-    found = driver(c, tmp_path, EXACT)(wanted, home, kelvin, np.zeros(6))
+    found = driver(c, builds, EXACT)(wanted, home, kelvin, np.zeros(6))
     assert (found.found == kernel_status).all()
     good = kernel_status == 0
     assert good.mean() > 0.9
@@ -162,7 +175,7 @@ IN_C = [
 
 
 @exported
-def test_a_pose_that_cannot_be_used_has_the_kernels_status(name: str, tmp_path: Path) -> None:
+def test_a_pose_that_cannot_be_used_has_the_kernels_status(name: str, builds: Path) -> None:
     """Poses of a box three times the workspace: many are out of travel, reach or joint limits."""
     machine, c = machine_of(name), program(name)
     table = random_poses(machine, 1000)
@@ -173,18 +186,18 @@ def test_a_pose_that_cannot_be_used_has_the_kernels_status(name: str, tmp_path: 
     wanted = in_full(machine, table, machine.commanded)
     # Without heat and load compensated joints are the nominal ones.
     nominal = program_of(machine, without=(*WITHOUT.get(name, ()), *ALWAYS.get(name, ())))
-    found = driver(nominal, tmp_path, EXACT)(wanted, wanted, kelvin, np.zeros(6)).status
+    found = driver(nominal, builds, EXACT)(wanted, wanted, kelvin, np.zeros(6)).status
     names = [_kernel.STATUS[code] for code in expected]
     assert [IN_C[code] for code in found] == names
     assert len(set(names)) > 1
 
 
-@exported
-def test_arm_takes_it_without_a_warning(name: str, tmp_path: Path) -> None:
-    compiled(program(name), tmp_path, ["-O1"], to="object", by="arm-linux-gnueabihf-gcc")
+@in_part
+def test_arm_takes_it_without_a_warning(name: str, builds: Path) -> None:
+    compiled(program(name), builds, ["-O1"], to="object", by="arm-linux-gnueabihf-gcc")
 
 
-@exported
+@in_part
 def test_sanitizers_find_nothing(name: str, tmp_path: Path) -> None:
     """Good poses, far ones, and numbers that are none, under address and undefined sanitizers."""
     c, machine = program(name), machine_of(name)
@@ -239,14 +252,18 @@ int main(void)
 
 @pytest.mark.parametrize("flags", [["-O0"], ["-O2"]])
 @pytest.mark.parametrize(
-    "name", ["planar_two_slider", "hexapod", "linear_delta", "tricept", "overconstrained"]
+    "name",
+    thinned(
+        ["planar_two_slider", "hexapod", "linear_delta", "tricept", "overconstrained"],
+        OF_EACH_KIND,
+    ),
 )
 @pytest.mark.parametrize("by", ["gcc", "arm-linux-gnueabihf-gcc"])
-def test_the_stack_stated_is_enough(name: str, flags: list[str], by: str, tmp_path: Path) -> None:
+def test_the_stack_stated_is_enough(name: str, flags: list[str], by: str, builds: Path) -> None:
     """All functions' frames together, which is more than any chain of calls can take."""
     c = program(name)
-    compiled(c, tmp_path, [*flags, "-fstack-usage"], to="object", by=by)
-    usage = next(tmp_path.glob("*.su")).read_text()
+    made = compiled(c, builds, [*flags, "-fstack-usage"], to="object", by=by)
+    usage = made.with_suffix(".su").read_text()
     frames = [line.split("\t") for line in usage.splitlines()]
     assert {kind for *_, kind in frames} <= {"static", "dynamic,bounded"}
     stated = re.search(r"(\d+) bytes of stack", c.header)
@@ -273,13 +290,13 @@ def test_a_tolerance_that_is_known_is_in_it() -> None:
 
 
 @exported
-def test_one_number_that_is_none_is_refused(name: str, tmp_path: Path) -> None:
+def test_one_number_that_is_none_is_refused(name: str, builds: Path) -> None:
     """At each place of temperatures, wrench and pose by itself, and of the joints."""
     c, machine = program(name), machine_of(name)
     pose = in_full(machine, random_poses(machine, 1), machine.commanded)
     good = np.full(max(len(c.temperature_parts), 1), 300.0), np.full(6, 10.0)
     home = np.array(machine.kernel.control["home"])[np.newaxis]
-    run = driver(c, tmp_path, EXACT)
+    run = driver(c, builds, EXACT)
     for bad in (np.nan, np.inf):
         for place in range(len(c.temperature_parts)):
             kelvin = good[0].copy()
@@ -357,19 +374,19 @@ def test_a_shift_out_of_proportion_to_the_heat_is_refused() -> None:
     assert problem.found == "the source bending is not in proportion to the temperature"
 
 
-@pytest.mark.parametrize("name", ["planar_two_slider", "hexapod", "hexaglide", "hexapod_telescope"])
-def test_both_ways_to_compensated_joints_agree(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "name", thinned(["planar_two_slider", "hexapod", "hexaglide", "hexapod_telescope"])
+)
+def test_both_ways_to_compensated_joints_agree(name: str, builds: Path) -> None:
     """In one go, and with pivoting, which is for poses where the order of home does not serve."""
     c, machine = program(name), machine_of(name)
     assert c.source.count("growth < 100.0") == 1
     pivoting = dataclasses.replace(c, source=c.source.replace("growth < 100.0", "growth < 0.0"))
     _, kelvin, wrench = hot_and_loaded(name)
     poses = in_full(machine, random_poses(machine, 500), machine.commanded)
-    found = []
-    for way, each in enumerate((c, pivoting)):
-        (folder := tmp_path / str(way)).mkdir()
-        found.append(driver(each, folder, EXACT)(poses, poses, kelvin, wrench))
-    straight, other = found
+    straight, other = (
+        driver(each, builds, EXACT)(poses, poses, kelvin, wrench) for each in (c, pivoting)
+    )
     assert (straight.status == other.status).all()
     assert (straight.status == 0).mean() > 0.5
     usable = straight.status == 0
@@ -397,14 +414,14 @@ def test_an_option_given_twice_is_refused() -> None:
     ("stem", "names"),
     [("math", ("1", "2")), ("a b-ü", ("a", "A")), ("x", ("ä", "ö")), ("trigraph", ("q??/", "2"))],
 )
-def test_odd_names_compile(stem: str, names: tuple[str, str], tmp_path: Path) -> None:
+def test_odd_names_compile(stem: str, names: tuple[str, str], tmp_path: Path, builds: Path) -> None:
     text = (MACHINE_FOLDER / "planar_two_slider.toml").read_text()
     for old, new in zip(("1", "2"), names, strict=True):
         text = text.replace(f'[[strut]]\nname = "{old}"', f'[[strut]]\nname = "{new}"')
     file = tmp_path / f"{stem}.toml"
     file.write_text(text.replace('name = "Planar two-slider PKM"', 'name = "what?? */ /* ??/"'))
     c = program_of(tp.load(file))
-    compiled(c, tmp_path, ["-O0", "-I."], to="object")
+    compiled(c, builds, ["-O0", "-I."], to="object")
     words = re.findall(r"define (\S+_TEMPERATURE_\S+) ", c.header)
     assert len(set(words)) == 2
 

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 import truepose as tp
 from build_machine import MACHINES
+from sweeps import thinned
 from truepose.compensation.commands import actual_poses, corrected_poses
 from truepose.controllers._export import Export, options_of
 from truepose.controllers.pose_map import PoseMap
@@ -114,7 +115,7 @@ def test_nodes_are_exact_and_both_formats_agree(name: str) -> None:
     assert np.nanmax(off) < 1e-10  # as far as they are written
 
 
-@pytest.mark.parametrize("name", ["planar_two_slider", "linear_delta", "hexapod"])
+@pytest.mark.parametrize("name", thinned(["planar_two_slider", "linear_delta", "hexapod"]))
 def test_the_interpolation_error_is_as_stated(name: str) -> None:
     machine = tp.load(MACHINES / f"{name}.toml")
     export = exported(machine)
@@ -139,7 +140,7 @@ def test_the_interpolation_error_is_as_stated(name: str) -> None:
     assert f"# {line.replace('µ', 'u')}\n" in text
 
 
-@pytest.mark.parametrize("name", ["planar_two_slider", "linear_delta", "hexapod"])
+@pytest.mark.parametrize("name", thinned(["planar_two_slider", "linear_delta", "hexapod"]))
 def test_added_to_the_command_it_takes_the_error_away(name: str) -> None:
     machine = tp.load(MACHINES / f"{name}.toml")
     document, axes, values = of_json(exported(machine))

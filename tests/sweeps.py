@@ -1,0 +1,51 @@
+"""What `make test` leaves to `make test-all`: all but some members of a sweep.
+
+A sweep is one test that is run many times, for machines, seeds, instruments or flags. Its members
+with the marker `sweep` run in `make test-all` only. Of a law (tests/laws) every machine file keeps
+a member in `make test`, which laws/test_quick_members.py checks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from typing import Any
+
+import pytest
+
+sweep = pytest.mark.sweep
+
+Member = tuple[str, str | None, bool]
+"""A test with its file, the member's id in brackets or None, and whether it is marked `sweep`."""
+
+COLLECTED = pytest.StashKey[list[Member]]()
+"""In pytest's `config`: all that was collected, before `-m` took any out."""
+
+
+def member_of(item: pytest.Item) -> Member:
+    test, _, rest = item.nodeid.partition("[")
+    return test, rest.removesuffix("]") or None, item.get_closest_marker("sweep") is not None
+
+
+def thinned(members: Iterable[Any], quick: Collection[Any] | None = None) -> list[Any]:
+    """Members for `parametrize` or a fixture's `params`, with those marked that are not `quick`.
+
+    Quick is the first one where `quick` is left out. A member may be a `pytest.param`, which is
+    never found in `quick`.
+    """
+    found: list[Any] = []
+    for number, member in enumerate(members):
+        if number == 0 if quick is None else member in quick:
+            found.append(member)
+        elif isinstance(member, type(pytest.param())):
+            found.append(member._replace(marks=[*member.marks, sweep]))
+        else:
+            found.append(pytest.param(member, marks=sweep))
+    return found
+
+
+def one_a_machine(cases: Sequence[tuple[str, ...]]) -> set[tuple[str, ...]]:
+    """Of cases (machine, ...) one for each machine, by turns another: each has been on some."""
+    by_machine: dict[str, list[tuple[str, ...]]] = {}
+    for case in cases:
+        by_machine.setdefault(case[0], []).append(case)
+    return {own[turn % len(own)] for turn, own in enumerate(by_machine.values())}

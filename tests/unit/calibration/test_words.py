@@ -34,7 +34,7 @@ JOINTS = tuple(f"base joint {axis} of strut {n}" for n in range(1, 7) for axis i
         (0.3e-9, "m", "0.00030 µm"),
         (0.2696, "m", "270 mm"),
         (np.radians(0.126), "rad", "0.13°"),
-        (80e-6, "rad", "80 µrad"),
+        (80e-6, "rad", "4.6 mdeg"),
         (-0.0185, "m", "−18 mm"),
         (0.0, "m", "0 µm"),
         (1.1e-5, "1/K", "1.1e−05 1/K"),

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from truepose.calibration.gate import words
+from truepose.machine.shown_units import shown_units
+from truepose.machine.units import FileUnit
 
 DELTA = (
     "delta radius",
@@ -52,6 +54,15 @@ def test_stated_sizes_have_no_zeros_at_their_end() -> None:
     assert words.stated(10e-3, "m") == "10 mm"
     assert words.stated(2e-6, "m") == "2 µm"
     assert words.stated(np.radians(0.2), "rad") == "0.2°"
+
+
+def test_quantities_of_a_machine_in_inches_and_radians() -> None:
+    units = shown_units({"length": FileUnit("in", 0.0254), "angle": FileUnit("rad")})
+    assert words.quantity(0.254e-3, "m", units=units) == "0.010 in"
+    assert words.quantity(25.4e-6, "m", units=units) == "1000 µin"
+    assert words.quantity(80e-6, "rad", units=units) == "80 µrad"
+    assert words.quantity(0.01, "rad", units=units) == "0.010 rad"
+    assert words.stated(0.0254e-3, "m", units) == "0.001 in"
 
 
 def test_ratios() -> None:

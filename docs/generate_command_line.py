@@ -22,19 +22,21 @@ computes everything from it.
 | exit code | meaning |
 |---|---|
 | 0 | done |
-| 1 | a question answered with no: `check`, `calibrate`, `compare`, any with `--require-accuracy` |
+| 1 | answered with no: `check`, `calibrate`, `compare`, `gcode`, any with `--require-accuracy` |
 | 2 | bad input; every problem is on stderr, with `--format json` on stdout too |
 | 130 | interrupted (Ctrl-C): no file was changed, but `montecarlo` gives the result so far |
 | 141 | the reader of the output went away |
 
-Tables show mm, µm and µrad. `json` and `csv` have full precision (digits that give the same double
-back) in the units that the machine file declares, and name the unit of every value; a missing
-number is `null` or an empty cell. The variables are those of [results.md](results.md). `json` has
-every variable; `csv` has one row for each pose and source and one for all sources together
-(`overall`); of shares one for each pose and parameter or source, of bounds over a region one for
-each component and magnitude, of a calibration one for each unknown. A pose that cannot be used is
-left out, counted, and listed with its status: in `json` under `left_out`, in `csv` as a row of its
-own. `.nc` files are the Dataset as it is, in SI.
+Tables speak the machine file's units, smaller ones for errors: mm and µm, or in and µin; degrees
+and mdeg, or rad and µrad ([results.md](results.md#units)). `json` and `csv` have full precision in
+the units that the machine file declares, and name the unit of every value: a number is within 1e-14
+of the result, and 125 where rounding made 124.99999999999999 of it; a missing number is `null` or
+an empty cell. The variables are those of [results.md](results.md). `json` has every variable; `csv`
+has one row for each pose and source and one for all sources together (`overall`); of shares one for
+each pose and parameter or source, of bounds over a region one for each component and magnitude, of
+a calibration one for each unknown. A pose that cannot be used is left out, counted, and listed with
+its status: in `json` under `left_out`, in `csv` as a row of its own. `.nc` files are the Dataset as
+it is, in SI.
 
 A file is written under a temporary name beside its place and then renamed, so it is whole or it
 is not there. Progress, with the rate and the time left at that rate, shows on stderr, on a

@@ -13,10 +13,15 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from truepose.machine.shown_units import Shown, ShownUnits
+from truepose.machine.workspace import Accuracy
 from truepose.report.study import Study
 
 Array = NDArray[np.float64]
 SOURCES = ("tolerance", "thermal", "elastic")
+MADE_UNITS = ShownUnits(small_angle=Shown("µrad", 1e6))
+"""Millimetres and degrees, and errors in millionths of SI, which the tests need not convert."""
+
 UNIT_OF = {"x": "m", "y": "m", "z": "m"}
 
 
@@ -112,7 +117,8 @@ def _machine(name: str, dof: str, kernel: Any, drives: list[Any], **others: Any)
             envelope=SimpleNamespace(force=300.0, normal=(0.0, 0.0, 1.0)),
             acceleration=(0.0, 2.0, 0.0),
         ),
-        accuracy=SimpleNamespace(target=5e-4, angle_target=None),
+        accuracy=Accuracy(5e-4, None, "0.5 mm"),
+        shown=MADE_UNITS,
         sources=tuple(
             SimpleNamespace(name=name, doc=f"made-up {name}", acts=lambda condition: False)
             for name in SOURCES

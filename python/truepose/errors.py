@@ -194,6 +194,7 @@ CATALOGUE: dict[str, str] = {
     "gcode-axis": "a move of an axis that the platform moves in but that cannot be commanded",
     "gcode-start": "the machine cannot be where the program is said to start",
     "gcode-proof": "a corrected program that, read back, does not keep its tolerance",
+    "gcode-no-better": "a corrected program that errs as much as the program did, or more",
     "bad-correction": "an option of a corrected program that is not what it can be",
 }
 """Every code with its meaning in one line. A `Problem` refuses a code that is not here."""

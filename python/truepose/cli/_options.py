@@ -50,8 +50,8 @@ format_option = click.option(
     show_default=True,
     callback=_note_format,
     is_eager=True,
-    help="What is printed: a table for people (mm, µm, µrad), or json or csv for programs "
-    "(full precision, in the units of the machine file).",
+    help="What is printed: a table for people (mm and µm, or in and µin, as the file has it), "
+    "or json or csv for programs (full precision, in the units of the machine file).",
 )
 
 

@@ -185,7 +185,7 @@ def refuse_left_out(
     problems = [
         Problem(
             "unusable-pose",
-            f"pose {number} cannot be used: {pose_text(pose, machine.commanded)}",
+            f"pose {number} cannot be used: {pose_text(pose, machine.commanded, machine.shown)}",
             file=machine.file,
             line=line,
             found=_why(machine, pose, str(status)),

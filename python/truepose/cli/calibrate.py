@@ -157,7 +157,7 @@ def command(**options: Any) -> int:
         from truepose.report.calibration import tables
 
         click.echo(_folded(dataset.attrs["answer"]) + "\n")
-        shown = tables(dataset)
+        shown = tables(dataset, result.machine.shown)
     _work.deliver(replace(request, output=None), result, shown)
     if failure is not None:
         raise failure

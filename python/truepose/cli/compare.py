@@ -45,7 +45,7 @@ def command(old_file: Path, new_file: Path, **options: Any) -> int:
         from truepose.cli._show import show_tables
         from truepose.report import calibrated_files
 
-        show_tables(calibrated_files.tables(result.dataset))
+        show_tables(calibrated_files.tables(result.dataset, old.shown))
         click.echo(result.dataset.attrs["verdict"])
     else:
         click.echo("".join(_text(result, form)), nl=False)

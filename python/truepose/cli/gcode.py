@@ -16,9 +16,8 @@ if TYPE_CHECKING:
 
     from truepose.controllers.gcode import Errors, Proof
     from truepose.machine import Machine
+    from truepose.machine.shown_units import Shown
     from truepose.report.tables import Table
-
-_MICRO = 1e6
 
 
 @click.command("gcode")
@@ -36,10 +35,9 @@ _MICRO = 1e6
     click.option(
         "--tolerance",
         metavar="LENGTH",
-        default="5 um",
-        show_default=True,
         help="How far the tool may be off the programmed path. An angle counts times the "
-        "characteristic length.",
+        "characteristic length. Default: a share of the error before, at most 5 um; the output "
+        "says what it is.",
     ),
     click.option(
         "--interpolation",
@@ -81,6 +79,11 @@ _MICRO = 1e6
         show_default=True,
         help="Decimals of mm and degrees; inches get one more.",
     ),
+    click.option(
+        "--force",
+        is_flag=True,
+        help="Write the program even if its error is no smaller than before.",
+    ),
     set_option,
     click.option(
         "--format",
@@ -90,8 +93,8 @@ _MICRO = 1e6
         show_default=True,
         callback=_note_format,
         is_eager=True,
-        help="What is printed: a table for people (µm, µrad), or json for programs (full "
-        "precision, m and rad).",
+        help="What is printed: a table for people (mm and µm, or in and µin, as the file has it), "
+        "or json for programs (full precision, m and rad).",
     ),
 )
 def command(
@@ -100,7 +103,7 @@ def command(
     output: Path,
     settings: tuple[str, ...],
     form: str,
-    tolerance: str,
+    tolerance: str | None,
     start: str | None,
     offsets: tuple[tuple[str, str], ...],
     block_delete: str | None,
@@ -111,39 +114,53 @@ def command(
     Every block is given the pose that takes the actual machine where the program asks for, and
     long moves and arcs are divided so that it also stays on the path between. The condition is
     the file's; --set changes it. What was written is read back, driven through the actual
-    machine, and compared with the program before and after.
+    machine, and compared with the program before and after. Exit code 1 where the error after is
+    no smaller than before; nothing is written then, but with --force.
 
     Bare numbers are in the units of the machine file.
     """
     import truepose
+    from truepose.cli._problems import show_problems
     from truepose.cli._progress import progress
-    from truepose.cli._show import show_tables
     from truepose.cli._work import note_written
-    from truepose.controllers.gcode import correct_program
+    from truepose.controllers.gcode import NoBetter, correct_program
     from truepose.output import require_writable
 
     require_writable(output, [output.suffix.lower()], [machine_file])
     machine = truepose.load(machine_file, settings=settings)
     read = _Reading(machine)
-    with progress("corrected program", "lines") as report:
-        proof = correct_program(
-            machine,
-            program,
-            output,
-            tolerance=read.length("--tolerance", tolerance),
-            start=read.position("--start", start or ""),
-            offsets={name: read.position("--offset", text) for name, text in offsets},
-            block_delete=None if block_delete is None else block_delete == "on",
-            progress=report,
-            **options,
-        )
-    if form == "json":
-        json.dump(_as_json(proof), sys.stdout, indent=1, ensure_ascii=False)
-        sys.stdout.write("\n")
-    else:
-        show_tables(_tables(machine, proof))
+    said = "" if tolerance is None else read.said(tolerance)
+    try:
+        with progress("corrected program", "lines") as report:
+            proof = correct_program(
+                machine,
+                program,
+                output,
+                tolerance=None if tolerance is None else read.length("--tolerance", tolerance),
+                start=read.position("--start", start or ""),
+                offsets={name: read.position("--offset", text) for name, text in offsets},
+                block_delete=None if block_delete is None else block_delete == "on",
+                progress=report,
+                **options,
+            )
+    except NoBetter as no:
+        _show(machine, no.proof, form, said, written=False)
+        show_problems(no, as_json=False)
+        return 1
+    _show(machine, proof, form, said, written=True)
     note_written(output)
     return 0
+
+
+def _show(machine: Machine, proof: Proof, form: str, said: str, *, written: bool) -> None:
+    """Print what was found, whether or not a program was written; `said`: the tolerance asked."""
+    from truepose.cli._show import show_tables
+
+    if form == "json":
+        json.dump(_as_json(proof, written=written), sys.stdout, indent=1, ensure_ascii=False)
+        sys.stdout.write("\n")
+    else:
+        show_tables(_tables(machine, proof, said))
 
 
 class _Reading:
@@ -157,6 +174,13 @@ class _Reading:
     def length(self, option: str, text: str) -> float:
         """M. Raises `RequestError` (bad-correction)."""
         return self._quantity(option, text, "length")
+
+    def said(self, text: str) -> str:
+        """A length as it was asked for, a bare number with the unit of the file."""
+        try:
+            return f"{float(text):.15g} {self._units.shown()['length'].label}"
+        except ValueError:
+            return text.strip()
 
     def position(self, option: str, text: str) -> dict[str, float]:
         """Coordinates by axis, m and rad, of "x=10,y=2 in". Raises `RequestError`."""
@@ -192,19 +216,17 @@ class _Reading:
         )
 
 
-def _tables(machine: Machine, proof: Proof) -> Iterable[Table]:
+def _tables(machine: Machine, proof: Proof, said: str) -> Iterable[Table]:
     """The proof for people; poses as the program has them."""
     import numpy as np
 
-    from truepose.controllers.gcode._axes import Axes
+    from truepose.controllers.gcode._axes import LINEAR, Axes
     from truepose.report.tables import Table
 
     axes = Axes(machine)
     rows = []
-    for kind, unit in (
-        ("position", "µm"),
-        ("orientation", "µrad"),
-    ):
+    for kind in ("position", "orientation"):
+        unit = machine.shown.error(kind)
         for when, errors in (("before", proof.before), ("after", proof.after)):
             worst, rms = getattr(errors, kind), getattr(errors, f"{kind}_rms")
             if worst is not None:
@@ -212,15 +234,17 @@ def _tables(machine: Machine, proof: Proof) -> Iterable[Table]:
                     (
                         kind,
                         when,
-                        _micro(worst.value),
-                        "" if rms is None else _micro(rms),
-                        unit,
+                        _scaled(worst.value, unit),
+                        "" if rms is None else _scaled(rms, unit),
+                        unit.label,
                         str(worst.line),
                         axes.in_words(np.array(worst.pose)),
                     )
                 )
     header = ("error of", "program", "maximum", "rms", "in", "at line", "at the pose")
-    start = " ".join(f"{axis}{value:.6g}" for axis, value in proof.start.items())
+    length = machine.shown.length
+    scale = {axis: 1e-3 * length.per_si if axis in LINEAR else 1.0 for axis in proof.start}
+    start = " ".join(f"{axis}{value * scale[axis]:.6g}" for axis, value in proof.start.items())
     between = {
         "pose": "a controller that solves its kinematics all along a block",
         "either": "controllers that drive the pose or the joints between two blocks",
@@ -228,8 +252,8 @@ def _tables(machine: Machine, proof: Proof) -> Iterable[Table]:
     note = (
         f"{proof.moves:,} moves, written as {proof.blocks:,} blocks; compared at {proof.points:,} "
         f"points with what was read back.\n"
-        f"Tolerance {_micro(proof.tolerance)} µm, for {between}. rms over the path of the feeds; "
-        "poses in mm and deg, machine coordinates.\n"
+        f"Tolerance {_tolerance(machine, proof, said)}, for {between}. rms over the path of "
+        f"the feeds; poses in {length.label} and deg, machine coordinates.\n"
         f"Taken to start at {start}"
         + (
             f"; the machine stands there uncorrected, so the path of the first block, in line "
@@ -241,12 +265,26 @@ def _tables(machine: Machine, proof: Proof) -> Iterable[Table]:
     yield Table("proof", "Error of the tool, before and after", header, tuple(rows), 2, note)
 
 
-def _micro(value: float) -> str:
-    scaled = value * _MICRO
+def _tolerance(machine: Machine, proof: Proof, said: str) -> str:
+    """The tolerance and, where nobody asked for it, why it is that."""
+    unit, allowed = machine.shown.small_length, proof.tolerance_from
+    text = f"{_scaled(proof.tolerance, unit)} {unit.label}"
+    before = "" if allowed.before is None else f"{_scaled(allowed.before, unit)} {unit.label}"
+    return {
+        "asked": said,
+        "error": f"{text}, {100.0 * proof.tolerance / (allowed.before or 1.0):.2g} % of the error "
+        f"before ({before})",
+        "most": f"{text}, the most that is taken by itself",
+        "digits": f"{text}, the least that --digits can hold",
+    }[allowed.reason]
+
+
+def _scaled(value: float, unit: Shown) -> str:
+    scaled = value * unit.per_si
     return f"{scaled:.4f}" if scaled < 1.0 else f"{scaled:.2f}"
 
 
-def _as_json(proof: Proof) -> Mapping[str, object]:
+def _as_json(proof: Proof, *, written: bool) -> Mapping[str, object]:
     """The proof for programs, m and rad; the start in the program's own mm and degrees."""
 
     def of(errors: Errors) -> dict[str, object]:
@@ -268,6 +306,7 @@ def _as_json(proof: Proof) -> Mapping[str, object]:
         "corrected_program": proof.target,
         "units": {"position": "m", "orientation": "rad", "start": "mm, deg"},
         "tolerance": proof.tolerance,
+        "tolerance_from": proof.tolerance_from.reason,
         "interpolation": proof.interpolation,
         "start": proof.start,
         "approach_line": proof.approach,
@@ -276,4 +315,6 @@ def _as_json(proof: Proof) -> Mapping[str, object]:
         "points": proof.points,
         "before": of(proof.before),
         "after": of(proof.after),
+        "improves": proof.improves,
+        "written": written,
     }

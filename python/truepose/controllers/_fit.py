@@ -148,11 +148,11 @@ class Fit:
             f"with the nominal machine's numbers: {_words(machine, self.before)}",
             f"over {poses} of the workspace, in this condition: {_condition(machine)}",
         ]
-        designed = _micro(machine, self.designed.position.highest)
-        if float(designed) > 0.0:
+        designed = _small(machine, self.designed.position.highest)
+        if float(designed.split()[0]) > 0.0:
             lines.append(
                 "this model does not hold the machine as designed: "
-                f"of that alone at most {designed} µm are left"
+                f"of that alone at most {designed} are left"
             )
         if self.n_left_out:
             left_out = counted(self.n_left_out, "pose")
@@ -165,8 +165,8 @@ class Fit:
         if self.after.parasitic is not None:
             lines.append(
                 "besides, the platform turns by up to "
-                f"{_micro_angle(self.after.parasitic.highest)} µrad "
-                f"(before: {_micro_angle(_highest(self.before.parasitic))} µrad) more than as "
+                f"{_small_angle(machine, self.after.parasitic.highest)} "
+                f"(before: {_small_angle(machine, _highest(self.before.parasitic))}) more than as "
                 "designed, which this controller cannot command"
             )
         lines += _scales(machine)
@@ -497,15 +497,15 @@ def _kept(model: SmallModel, jacobian: Floats) -> tuple[str, ...]:
 def _words(machine: Machine, error: Error) -> str:
     position = error.position
     text = (
-        f"at most {_micro(machine, position.highest)} µm "
-        f"(at {pose_in_words(machine, position.at)}), rms {_micro(machine, position.rms)} µm"
+        f"at most {_small(machine, position.highest)} "
+        f"(at {pose_in_words(machine, position.at)}), rms {_small(machine, position.rms)}"
     )
     if error.orientation is None:
         return text
     turned = error.orientation
     return (
-        f"{text}; at most {_micro_angle(turned.highest)} µrad "
-        f"(at {pose_in_words(machine, turned.at)}), rms {_micro_angle(turned.rms)} µrad"
+        f"{text}; at most {_small_angle(machine, turned.highest)} "
+        f"(at {pose_in_words(machine, turned.at)}), rms {_small_angle(machine, turned.rms)}"
     )
 
 
@@ -559,12 +559,16 @@ def _listed(names: Sequence[str]) -> str:
     return f"{len(names)} of the numbers ({', '.join(names[:MOST_NAMED])}, ...)"
 
 
-def _micro(machine: Machine, value: float) -> str:
-    return f"{value * 1e6:.{1 + more_decimals(machine.characteristic_length, SMALL)}f}"
+def _small(machine: Machine, value: float) -> str:
+    unit = machine.shown.small_length
+    places = 1 + more_decimals(machine.characteristic_length, SMALL)
+    return f"{value * unit.per_si:.{places}f} {unit.label}"
 
 
-def _micro_angle(value: float) -> str:
-    return f"{value * 1e6:.1f}"
+def _small_angle(machine: Machine, value: float) -> str:
+    unit = machine.shown.small_angle
+    places = 1 if unit.per_si >= 1e6 else 3
+    return f"{value * unit.per_si:.{places}f} {unit.label}"
 
 
 def _highest(extent: Extent | None) -> float:

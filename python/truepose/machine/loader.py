@@ -130,9 +130,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         settings=document.settings,
         condition=condition,
         workspace=workspace,
-        accuracy=Accuracy()
-        if accuracy is None
-        else Accuracy(accuracy.target, accuracy.angle_target),
+        accuracy=_accuracy(document, validated, accuracy),
         drives=drives,
         struts=struts,
         guides=guides,
@@ -144,6 +142,27 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         mounting=built_parts.mounting(validated),
         data_files=data_files.hashes,
         calibration=validated.table(CalibrationTable),
+    )
+
+
+def _accuracy(document: Document, validated: Validated, table: AccuracyTable | None) -> Accuracy:
+    """What is asked, and how it was said: a bare number with the file's unit."""
+    if table is None:
+        return Accuracy()
+    units = validated.units.shown()
+
+    def said(key: str, dimension: str) -> str:
+        given = document.value(("accuracy", key))
+        try:
+            return f"{float(given):.15g} {units[dimension].label}"
+        except (TypeError, ValueError):
+            return "" if given is None else str(given).strip()
+
+    return Accuracy(
+        table.target,
+        table.angle_target,
+        said("target", "length"),
+        said("angle_target", "angle"),
     )
 
 

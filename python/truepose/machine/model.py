@@ -16,6 +16,7 @@ from truepose.errors import PoseError, Problem, RequestError
 from truepose.machine.compliances import compliances, end_compliances, known
 from truepose.machine.condition import DEFAULT_PART, Condition
 from truepose.machine.parts_of_machine import BODIES, Body, Drive, Guide, Strut, Vector
+from truepose.machine.shown_units import ShownUnits, shown_units
 from truepose.machine.suggestion import did_you_mean, one_of
 from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.units import FileUnit
@@ -168,6 +169,11 @@ class Machine:
     def unit_labels(self) -> dict[str, str]:
         """The file's word for the unit of each dimension; the SI unit where it declares none."""
         return {name: unit.label for name, unit in self.file_units.items()}
+
+    @property
+    def shown(self) -> ShownUnits:
+        """The units in which people are answered, from those of the file."""
+        return shown_units(self.file_units)
 
     @property
     def stiffness_known(self) -> NDArray[np.bool_]:

@@ -36,6 +36,38 @@ class QuantityError(ReadingError):
     """A value that is not the quantity wanted."""
 
 
+FEW_DIGITS = 10
+"""Significant digits of a number that somebody may have written."""
+
+ROUNDED = 5e-15
+"""Relative difference below which a number is one of few digits: half of its 15th digit."""
+
+_EXACT_POWERS = 22
+"""Powers of ten up to this one are doubles, so that dividing by them rounds once."""
+
+
+def meant(values: ArrayLike, offset: float = 0.0) -> NDArray[np.float64]:
+    """Numbers, any shape, without the rounding of a computation: 125 for 124.99999999999999.
+
+    A number that differs relatively by at most `ROUNDED` from one of `FEW_DIGITS` significant
+    digits is that one; all others stay as they are to the last bit. Of a difference to an `offset`,
+    as on a scale of temperature, the rounding is that of the offset.
+    """
+    given = np.asarray(values, dtype=np.float64)
+    size = np.abs(given)
+    usual = np.isfinite(given) & (size > 1e-300) & (size < 1e300)
+    size = np.where(usual, size, 1.0)
+    places = FEW_DIGITS - 1 - np.floor(np.log10(size)).astype(np.int64)
+    usual &= np.abs(places) <= _EXACT_POWERS
+    power = 10.0 ** np.where(usual, np.abs(places), 0)
+    digits = np.rint(np.where(places >= 0, size * power, size / power))
+    few = np.copysign(np.where(places >= 0, digits / power, digits * power), given)
+    found: NDArray[np.float64] = np.where(
+        usual & (np.abs(few - given) <= ROUNDED * np.maximum(size, abs(offset))), few, given
+    )
+    return found
+
+
 @dataclass(frozen=True)
 class FileUnit:
     """A unit that a file declares: `SI = value * scale + offset`. `label` is the file's word."""
@@ -50,7 +82,11 @@ class FileUnit:
             return self._scaled(np.asarray(value, dtype=np.float64), self.scale) + self.offset
 
     def to_file(self, value: ArrayLike) -> NDArray[np.float64]:
-        """SI values, any shape -> this unit."""
+        """SI values, any shape -> this unit, rounded to what is meant (`meant`)."""
+        return meant(self.to_file_exactly(value), self.offset / self.scale)
+
+    def to_file_exactly(self, value: ArrayLike) -> NDArray[np.float64]:
+        """The same with the rounding of the computation in it."""
         return self._scaled(np.asarray(value, dtype=np.float64) - self.offset, 1.0 / self.scale)
 
     @staticmethod

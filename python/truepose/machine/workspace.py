@@ -121,7 +121,21 @@ def along(waypoints: Floats, counts: NDArray[np.intp]) -> Floats:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What is asked: largest position error in m, largest orientation error in rad; or None."""
+    """What is asked: largest position error in m, largest orientation error in rad; or None.
+
+    `target_text`, `angle_target_text`: as the file, or the user, says them, with their unit.
+    """
 
     target: float | None = None
     angle_target: float | None = None
+    target_text: str = ""
+    angle_target_text: str = ""
+
+    def said(self, quantity: str) -> str:
+        """What is asked of "position" or "orientation" as it was asked; empty where nothing is."""
+        of_position = quantity == "position"
+        asked = self.target if of_position else self.angle_target
+        if asked is None:
+            return ""
+        text = self.target_text if of_position else self.angle_target_text
+        return text or f"{asked:.6g} {'m' if of_position else 'rad'}"

@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from truepose.report.display import Array, pose_text, where_highest
+from truepose.report.display import Array, number, pose_text, where_highest
 from truepose.report.result import in_file_units, pose_in_file_units
 from truepose.report.study import Study
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
+    from truepose.machine.shown_units import Shown, ShownUnits
 
 BEFORE, AFTER = "before compensation", "after compensation"
 
@@ -20,7 +21,8 @@ BEFORE, AFTER = "before compensation", "after compensation"
 class Answer:
     """One quantity against what was asked of it, SI. `asked` is None where nothing is asked.
 
-    `number` is that of its worst pose in the poses asked for, `pose` has the pose by freedom.
+    `number` is that of its worst pose in the poses asked for, `pose` has the pose by freedom;
+    `units` are those for people, `asked_text` is what is asked as it was asked.
     """
 
     quantity: str
@@ -29,6 +31,8 @@ class Answer:
     asked: float | None
     number: int
     pose: Mapping[str, float]
+    units: ShownUnits
+    asked_text: str = ""
 
     def as_data(self, machine: Machine) -> dict[str, Any]:
         """The answer for programs, in the units of the machine's file."""
@@ -49,7 +53,7 @@ class Answer:
     @property
     def at(self) -> str:
         """The worst pose for people."""
-        return pose_text(list(self.pose.values()), list(self.pose))
+        return pose_text(list(self.pose.values()), list(self.pose), self.units)
 
     @property
     def met(self) -> bool | None:
@@ -57,9 +61,14 @@ class Answer:
         return None if self.asked is None else bool(self.highest <= self.asked)
 
     @property
-    def unit(self) -> str:
+    def amount(self) -> str:
+        """The highest for people, without its unit."""
+        return number(self.highest * self.unit.per_si, self.unit.decimals)
+
+    @property
+    def unit(self) -> Shown:
         """Unit in which people read the quantity."""
-        return "µm" if self.quantity == "position" else "µrad"
+        return self.units.error(self.quantity)
 
 
 def answers(study: Study) -> tuple[Answer, ...]:
@@ -85,7 +94,8 @@ def _answer(study: Study, quantity: str, state: str, size: Array, asked: float |
     worst = where_highest(size)
     number = int(study.numbers[worst])
     pose = dict(zip(study.machine.commanded, study.poses[worst].tolist(), strict=True))
-    return Answer(quantity, state, float(size[worst]), asked, number, pose)
+    said = study.machine.accuracy.said(quantity)
+    return Answer(quantity, state, float(size[worst]), asked, number, pose, study.units, said)
 
 
 def met(found: tuple[Answer, ...], state: str) -> bool | None:

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truepose.report.display import MILLI, MISSING, number, pose_text, where_highest
-from truepose.report.inputs import DEVIATION_UNIT, SHOWN_UNIT
+from truepose.report.display import MISSING, number, pose_text, where_highest
 from truepose.report.tables import MOST_LISTED, Table
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from truepose.machine import Machine
+    from truepose.machine.shown_units import ShownUnits
     from truepose.report.result import Result
 
 _COLUMNS = (
@@ -58,9 +58,9 @@ def calibration(machine: Machine) -> Table | None:
     )
 
 
-def tables(found: xr.Dataset) -> list[Table]:
+def tables(found: xr.Dataset, units: ShownUnits) -> list[Table]:
     """Where the two files come from, what differs of the parameters, and at the tool."""
-    return [_files(found), _parameters(found), _tool(found)]
+    return [_files(found), _parameters(found, units), _tool(found, units)]
 
 
 def _files(found: xr.Dataset) -> Table:
@@ -80,14 +80,14 @@ def _files(found: xr.Dataset) -> Table:
     return Table("files", "The two files", ("", "old", "new"), tuple(rows), words=3)
 
 
-def _parameters(found: xr.Dataset) -> Table:
+def _parameters(found: xr.Dataset, units: ShownUnits) -> Table:
     normalised = found["normalised_difference"].values
     order = np.argsort(-np.abs(normalised), kind="stable")
     order = order[normalised[order] != 0.0]
     rows = []
     for at in order[:MOST_LISTED]:
         unit = str(found["parameter_units"].values[at])
-        (factor, shown), (fine, fine_unit) = SHOWN_UNIT[unit], DEVIATION_UNIT[unit]
+        shown, fine = units.of(unit), units.small(unit)
         old, new, difference, _, _, deviation, ratio = (
             float(found[name].values[at]) for name in _COLUMNS
         )
@@ -95,10 +95,10 @@ def _parameters(found: xr.Dataset) -> Table:
             (
                 str(found["parameter"].values[at]),
                 "changed" if found["parameter_changed"].values[at] else "",
-                f"{number(old * factor, 6)} {shown}",
-                f"{number(new * factor, 6)} {shown}",
-                f"{number(difference * fine, 3)} {fine_unit}",
-                f"{number(deviation * fine, 3)} {fine_unit}",
+                f"{number(old * shown.per_si, 6)} {shown.label}",
+                f"{number(new * shown.per_si, 6)} {shown.label}",
+                f"{number(difference * fine.per_si, 3)} {fine.label}",
+                f"{number(deviation * fine.per_si, 3)} {fine.label}",
                 number(ratio, 2),
             )
         )
@@ -123,19 +123,20 @@ def _parameters(found: xr.Dataset) -> Table:
     )
 
 
-def _tool(found: xr.Dataset) -> Table:
+def _tool(found: xr.Dataset, units: ShownUnits) -> Table:
     commanded = [str(name)[5:] for name in found.coords if str(name).startswith("pose_")]
     rows = []
     for at, quantity in enumerate(found["quantity"].values):
         sizes = found["moved"].values[:, at]
         worst = where_highest(sizes)
-        unit, factor = ("µm", MILLI**2) if quantity == "position" else ("µrad", 1e6)
+        scale = units.error(str(quantity))
+        unit, factor = scale.label, scale.per_si
         pose = [float(found[f"pose_{name}"].values[worst]) for name in commanded]
         deviation = float(found["moved_uncertainty"].values[worst, at])
         rows.append(
             (
                 str(quantity),
-                pose_text(pose, commanded),
+                pose_text(pose, commanded, units),
                 f"{number(float(sizes[worst]) * factor, 3)} {unit}",
                 f"{_PLUS_MINUS}{number(2.0 * deviation * factor, 3)} {unit}",
                 f"{number(float(np.sqrt(np.mean(sizes**2))) * factor, 3)} {unit}",

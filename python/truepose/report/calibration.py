@@ -13,16 +13,14 @@ import numpy as np
 
 from truepose.calibration.gate.words import listed, quantity, sentence
 from truepose.calibration.identification.robust import OUTLIER
+from truepose.machine.shown_units import Shown, ShownUnits
 from truepose.report.display import (
-    MICRO,
     MISSING,
     Array,
     decimals_for,
-    error_unit,
     number,
     where_highest,
 )
-from truepose.report.inputs import SHOWN_UNIT
 from truepose.report.tables import MOST_LISTED, Table
 
 if TYPE_CHECKING:
@@ -44,35 +42,34 @@ _FLAGS = {
     "off tolerance": "the value is not within its tolerance",
     "mostly tolerance": "the measurements say less than half of the value",
 }
-_SIZES = {"m": (MICRO, "µm"), "rad": (MICRO, "µrad"), "1": (1.0, "")}
 
 
-def tables(found: xr.Dataset) -> list[Table]:
+def tables(found: xr.Dataset, units: ShownUnits) -> list[Table]:
     """All that there is to say, in the order of the terminal, where the last is seen first."""
     return _there(
         suspicions(found),
         outliers(found),
-        unknowns(found),
-        instruments(found),
+        unknowns(found, units),
+        instruments(found, units),
         undetermined(found),
-        residuals(found),
-        tool(found),
+        residuals(found, units),
+        tool(found, units),
         heed(found),
-        next_measurement(found),
+        next_measurement(found, units),
     )
 
 
-def of_page(found: xr.Dataset) -> list[Table]:
+def of_page(found: xr.Dataset, units: ShownUnits) -> list[Table]:
     """The same for the page, where the first are seen first."""
     return _there(
         suspicions(found),
         undetermined(found),
-        next_measurement(found),
+        next_measurement(found, units),
         heed(found),
-        tool(found),
-        residuals(found),
-        unknowns(found, bars=False),
-        instruments(found),
+        tool(found, units),
+        residuals(found, units),
+        unknowns(found, units, bars=False),
+        instruments(found, units),
         outliers(found),
     )
 
@@ -138,7 +135,7 @@ def outliers(found: xr.Dataset) -> Table | None:
     )
 
 
-def unknowns(found: xr.Dataset, *, bars: bool = True) -> Table:
+def unknowns(found: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> Table:
     """What was found of the machine, and how much of it the measurements say, with bars of text."""
     values = {
         name: found[name].values
@@ -157,11 +154,11 @@ def unknowns(found: xr.Dataset, *, bars: bool = True) -> Table:
             (
                 str(found["unknown_label"].values[at]),
                 _flag(found, at),
-                _value(float(values["nominal"][at]), unit),
-                _value(float(values["identified"][at]), unit),
-                signed(float(values["value"][at]), unit),
-                _uncertainty(float(values["prior_uncertainty"][at]), unit),
-                _uncertainty(float(values["standard_uncertainty"][at]), unit),
+                _value(float(values["nominal"][at]), unit, shown_in),
+                _value(float(values["identified"][at]), unit, shown_in),
+                signed(float(values["value"][at]), unit, shown_in),
+                _uncertainty(float(values["prior_uncertainty"][at]), unit, shown_in),
+                _uncertainty(float(values["standard_uncertainty"][at]), unit, shown_in),
                 f"{bar(share)} {100.0 * share:4.0f}" if bars else f"{100.0 * share:.0f}",
             )
         )
@@ -216,28 +213,28 @@ def bar(share: float) -> str:
     return "█" * filled + "░" * (BAR - filled)
 
 
-def _value(value: float, unit: str) -> str:
+def _value(value: float, unit: str, units: ShownUnits) -> str:
     if not math.isfinite(value):
         return MISSING
-    if unit not in SHOWN_UNIT:
+    if unit not in ("m", "rad", "1"):
         return quantity(value, unit, 4)
-    factor, name = SHOWN_UNIT[unit]
-    return f"{number(value * factor, 4)} {name}".rstrip()
+    shown = units.of(unit)
+    return f"{number(value * shown.per_si, 4)} {shown.label}".rstrip()
 
 
-def signed(value: float, unit: str) -> str:
+def signed(value: float, unit: str, units: ShownUnits) -> str:
     """A change with its sign: "+0.456 mm", "−12.0 µm"."""
     if not math.isfinite(value):
         return MISSING
-    text = quantity(value, unit, 3)
+    text = quantity(value, unit, 3, units)
     return text if value <= 0.0 else f"+{text}"
 
 
-def _uncertainty(value: float, unit: str) -> str:
-    return "open" if math.isinf(value) else quantity(value, unit)
+def _uncertainty(value: float, unit: str, units: ShownUnits) -> str:
+    return "open" if math.isinf(value) else quantity(value, unit, units=units)
 
 
-def instruments(found: xr.Dataset) -> Table | None:
+def instruments(found: xr.Dataset, units: ShownUnits) -> Table | None:
     """Where the instruments stand, their targets, what they add."""
     values = found["instrument_value"].values
     if not values.size:
@@ -245,10 +242,11 @@ def instruments(found: xr.Dataset) -> Table | None:
     rows = [
         (
             str(found["instrument_unknown_label"].values[at]),
-            signed(float(value), str(found["instrument_unknown_units"].values[at])),
+            signed(float(value), str(found["instrument_unknown_units"].values[at]), units),
             _uncertainty(
                 float(found["instrument_uncertainty"].values[at]),
                 str(found["instrument_unknown_units"].values[at]),
+                units,
             ),
         )
         for at, value in enumerate(values)
@@ -280,7 +278,7 @@ def undetermined(found: xr.Dataset) -> Table | None:
     )
 
 
-def residuals(found: xr.Dataset) -> Table:
+def residuals(found: xr.Dataset, shown_in: ShownUnits) -> Table:
     """Root mean squares of what was read less what was predicted, for each instrument and unit."""
     instrument = found["row_instrument"].values[found["observation_row"].values]
     units = found["observation_units"].values
@@ -290,7 +288,8 @@ def residuals(found: xr.Dataset) -> Table:
     rows = []
     for name, unit in dict.fromkeys(zip(instrument.tolist(), units.tolist(), strict=True)):
         mine = (instrument == name) & (units == unit)
-        factor, shown = _SIZES[unit]
+        scale = Shown("", 1.0) if unit == "1" else shown_in.small(unit)
+        factor, shown = scale.per_si, scale.label
         what = listed(list(dict.fromkeys(_plain(each) for each in names[mine].tolist())))
         mine &= ~named
         sizes = [
@@ -353,27 +352,27 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(there**2))) if there.size else float("nan")
 
 
-def tool(found: xr.Dataset) -> Table:
+def tool(found: xr.Dataset, units: ShownUnits) -> Table:
     """Standard uncertainty at the tool before and after, over the workspace."""
     rows = []
     names = [str(name) for name in found["quantity"].values]
     for at, name in enumerate(names):
-        unit = "µm" if name == "position" else "µrad"
+        unit = units.error(name)
         rows.append(
             (
-                f"{name}, {unit}",
+                f"{name}, {unit.label}",
                 *_of_tool(
-                    found["tool_size_before"].values[:, at], found["tool_size_after"].values[:, at]
+                    found["tool_size_before"].values[:, at] * unit.per_si,
+                    found["tool_size_after"].values[:, at] * unit.per_si,
                 ),
             )
         )
     for at, component in enumerate(found["component"].values):
-        rows.append(
-            (
-                f"{component}, {error_unit(str(component))}",
-                *_of_tool(found["tool_before"].values[:, at], found["tool_after"].values[:, at]),
-            )
+        unit = units.error(str(component))
+        before, after = (
+            found[f"tool_{when}"].values[:, at] * unit.per_si for when in ("before", "after")
         )
+        rows.append((f"{component}, {unit.label}", *_of_tool(before, after)))
     note = "Standard uncertainty of where the tool is, over the poses of the workspace."
     if found.attrs["relative"]:
         note += " Where the machine as a whole stands in the instrument's frame is not in it."
@@ -388,10 +387,10 @@ def tool(found: xr.Dataset) -> Table:
 
 def _of_tool(before: Array, after: Array) -> tuple[str, ...]:
     sizes = [_worst(before), _worst(after), _rms_or_open(before), _rms_or_open(after)]
-    places = decimals_for([each * MICRO for each in sizes if math.isfinite(each)], 4)
+    places = decimals_for([each for each in sizes if math.isfinite(each)], 4)
     ratio = sizes[1] / sizes[0] if sizes[0] > 0.0 and math.isfinite(sizes[1]) else float("nan")
     return (
-        *("open" if math.isinf(each) else number(each * MICRO, places) for each in sizes),
+        *("open" if math.isinf(each) else number(each, places) for each in sizes),
         number(ratio, 2),
     )
 
@@ -414,14 +413,14 @@ def heed(found: xr.Dataset) -> Table | None:
     return Table("heed", "To heed", ("",), tuple(rows)) if rows else None
 
 
-def next_measurement(found: xr.Dataset) -> Table | None:
+def next_measurement(found: xr.Dataset, units: ShownUnits) -> Table | None:
     """The cheapest measurement that would turn the verdict."""
     remedy = said(found, "remedy")
     if remedy is None:
         return None
     note = ""
     then = [
-        f"{what} known to {quantity(remedy[name], unit)}"
+        f"{what} known to {quantity(remedy[name], unit, units=units)}"
         for what, name, unit in (
             ("position", "position", "m"),
             ("orientation", "rotation", "rad"),

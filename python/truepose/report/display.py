@@ -1,4 +1,4 @@
-"""How numbers are shown to people: millimetres in, micrometres and microradians out."""
+"""How numbers are shown to people: in the units of `truepose.machine.shown_units`."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-MICRO = 1e6
-"""m -> µm and rad -> µrad."""
-MILLI = 1e3
-"""m -> mm."""
+from truepose.machine.shown_units import ShownUnits
+
 POSITION = ("x", "y", "z")
 MISSING = "–"
 ROUNDING = 1e-9
@@ -24,21 +22,9 @@ def is_position(component: str) -> bool:
     return component in POSITION
 
 
-def error_unit(component: str) -> str:
-    """Unit in which an error component is shown: "µm" or "µrad"."""
-    return "µm" if is_position(component) else "µrad"
-
-
-def pose_unit(coordinate: str) -> str:
-    """Unit in which a coordinate of a pose (x y z a b c) is shown: "mm" or "°"."""
-    return "mm" if is_position(coordinate) else "°"
-
-
-def shown_poses(poses: ArrayLike, coordinates: Sequence[str]) -> NDArray[np.float64]:
-    """Poses (n, n_coordinate) from m and rad to mm and degrees."""
-    per_unit = [MILLI if is_position(name) else 180.0 / np.pi for name in coordinates]
-    shown: Array = np.asarray(poses, dtype=np.float64) * np.array(per_unit)
-    return shown
+def is_length(name: str) -> bool:
+    """Whether a component of an error, or a magnitude, is a length."""
+    return is_position(name) or name == "position"
 
 
 def decimals_for(values: ArrayLike, significant: int = 5) -> int:
@@ -68,13 +54,12 @@ def column(values: ArrayLike, decimals: int | None = None) -> tuple[str, ...]:
     return tuple(number(float(value), places) for value in array)
 
 
-def pose_text(pose: ArrayLike, coordinates: Sequence[str]) -> str:
-    """One pose (n_coordinate,), m and rad, as people write it: "x 200, y 100 mm"."""
-    shown = shown_poses(pose, coordinates)
-    parts = [
-        f"{name} {value + 0.0:.6g} {pose_unit(name)}"  # -0 is 0
-        for name, value in zip(coordinates, shown, strict=True)
-    ]
+def pose_text(pose: ArrayLike, coordinates: Sequence[str], units: ShownUnits) -> str:
+    """One pose (n_coordinate,), m and rad, as people write it: "x 200 mm, y 100 mm"."""
+    parts = []
+    for name, value in zip(coordinates, np.asarray(pose, np.float64).tolist(), strict=True):
+        unit = units.pose(name)
+        parts.append(f"{name} {value * unit.per_si + 0.0:.6g} {unit.label}")  # -0 is 0
     return ", ".join(parts).replace("-", "\N{MINUS SIGN}")
 
 

@@ -1,7 +1,7 @@
 """Tables of how sure an error is: sampled, guaranteed, worst case, and whose share it is.
 
 Each is made from one Dataset of `truepose.monte_carlo`, `bounds`, `worst_case` or `shares`, as
-the functions return it. Lengths of errors in µm, angles in µrad.
+the functions return it. In the units for people (`truepose.machine.shown_units`).
 """
 
 from __future__ import annotations
@@ -15,24 +15,20 @@ import numpy as np
 from truepose.machine.suggestion import counted
 from truepose.report.blame import shares
 from truepose.report.display import (
-    MICRO,
     MISSING,
     Array,
     column,
     decimals_for,
-    error_unit,
     nearest_middle,
     pose_text,
     where_highest,
 )
 from truepose.report.reading import (
-    SIZE_UNIT,
     at_text,
     components,
     percent_text,
     poses_of,
     quantities,
-    unit_of,
     worst_pose,
 )
 from truepose.report.study import Study
@@ -114,6 +110,11 @@ def spread_over(poses: Array, axes: list[int]) -> list[int]:
     return sorted(chosen)
 
 
+def _named(machine: Machine, name: str) -> str:
+    """A component or quantity with its unit for people."""
+    return f"{name}, {machine.shown.error(name).label}"
+
+
 def sampled(machine: Machine, found: xr.Dataset) -> list[Table]:
     """What the samples say at the pose where the position is farthest off, and over all poses."""
     pose = worst_pose(found, "magnitude_upper")
@@ -129,7 +130,7 @@ def _sampled_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
     kinds = ("mean", "standard_deviation", *ends)
     values = np.stack([found[kind].values[pose] for kind in kinds], axis=-1)
     rows = [
-        (f"{name}, {error_unit(name)}", *column(row * MICRO))
+        (_named(machine, name), *column(row * machine.shown.error(name).per_si))
         for name, row in zip(names, values, strict=True)
     ]
     for at, name in enumerate(quantities(found)):
@@ -137,7 +138,8 @@ def _sampled_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
             found[f"magnitude_{kind}"].values[pose, at] for kind in ("mean", "upper", "maximum")
         )
         cells = [mean, np.nan, np.nan, upper, np.nan, upper, np.nan, most]
-        rows.append((f"{name}, {SIZE_UNIT[name]}", *column(np.array(cells) * MICRO)))
+        scaled = np.array(cells) * machine.shown.error(name).per_si
+        rows.append((_named(machine, name), *column(scaled)))
     percent = percent_text(float(found.attrs["probability"]))
     return Table(
         "sampled",
@@ -184,14 +186,15 @@ def _sampled_over(machine: Machine, found: xr.Dataset) -> Table:
     rows = []
     for at, name in enumerate(names):
         pose = where_highest(far[:, at])
-        cells = column(np.array([spread[:, at].max(), far[pose, at], most[:, at].max()]) * MICRO)
-        rows.append((f"{name}, {error_unit(name)}", at_text(machine, found, pose), *cells))
+        sizes = np.array([spread[:, at].max(), far[pose, at], most[:, at].max()])
+        cells = column(sizes * machine.shown.error(name).per_si)
+        rows.append((_named(machine, name), at_text(machine, found, pose), *cells))
     for at, name in enumerate(quantities(found)):
         upper = found["magnitude_upper"].values[:, at]
         pose = where_highest(upper)
         largest = found["magnitude_maximum"].values[:, at].max()
-        cells = column(np.array([np.nan, upper[pose], largest]) * MICRO)
-        rows.append((f"{name}, {SIZE_UNIT[name]}", at_text(machine, found, pose), *cells))
+        cells = column(np.array([np.nan, upper[pose], largest]) * machine.shown.error(name).per_si)
+        rows.append((_named(machine, name), at_text(machine, found, pose), *cells))
     return Table(
         "sampled_over",
         f"Sampled error over {found.sizes['pose']:,} poses",
@@ -223,13 +226,13 @@ def _bounds_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
         ends = [found[f"{kind}lower"].values[pose, at] for kind in ("", "reached_")]
         tops = [found[f"{kind}upper"].values[pose, at] for kind in ("reached_", "")]
         linear = found["linear"].values[pose, at]
-        row = np.array([ends[0], ends[1], tops[0], tops[1], linear]) * MICRO
-        cells = rounded(row, (-1, 1, -1, 1, 0))
-        rows.append((f"{name}, {error_unit(name)}", *cells))
+        row = np.array([ends[0], ends[1], tops[0], tops[1], linear])
+        cells = rounded(row * machine.shown.error(name).per_si, (-1, 1, -1, 1, 0))
+        rows.append((_named(machine, name), *cells))
     for at, name in enumerate(quantities(found)):
         size = [found[f"{kind}magnitude"].values[pose, at] for kind in ("reached_", "")]
-        cells = rounded(np.array([np.nan, np.nan, *size, np.nan]) * MICRO, (0, 0, -1, 1, 0))
-        rows.append((f"{name}, {SIZE_UNIT[name]}", *cells))
+        row = np.array([np.nan, np.nan, *size, np.nan]) * machine.shown.error(name).per_si
+        rows.append((_named(machine, name), *rounded(row, (0, 0, -1, 1, 0))))
     return Table(
         "bounds",
         "Guaranteed bounds",
@@ -266,14 +269,17 @@ def _unproven(machine: Machine, found: xr.Dataset) -> Table | None:
 def _region(machine: Machine, found: xr.Dataset) -> Table:
     rows = []
     for name, bound, reached, where in region_answers(found):
-        least = abs(reached) * MICRO
-        most = abs(bound) * MICRO
+        per_si = machine.shown.error(name).per_si
+        least = abs(reached) * per_si
+        most = abs(bound) * per_si
         gap = 100.0 * (most / least - 1.0) if least > 0 else np.nan
         cells = rounded(np.array([most, least]), (1, -1))
         rows.append(
             (
-                f"{name}, {unit_of(name)}",
-                pose_text(where, machine.commanded) if np.isfinite(where).all() else MISSING,
+                _named(machine, name),
+                pose_text(where, machine.commanded, machine.shown)
+                if np.isfinite(where).all()
+                else MISSING,
                 *cells,
                 *column(np.array([gap]), 1),
             )
@@ -329,7 +335,7 @@ def _unproven_where(machine: Machine, found: xr.Dataset) -> str:
     pose = np.asarray(found["where_unproven"].values)
     if not np.isfinite(pose).all():
         return reason
-    return f"{reason} at {pose_text(pose, machine.commanded)}"
+    return f"{reason} at {pose_text(pose, machine.commanded, machine.shown)}"
 
 
 def sentence(machine: Machine, found: xr.Dataset) -> str:
@@ -337,12 +343,13 @@ def sentence(machine: Machine, found: xr.Dataset) -> str:
     name, bound, reached, where = region_answers(found)[0]
     if str(found["status"].values) != PROVEN or not np.isfinite(bound):
         return f"No bound is proven over this region: {_unproven_where(machine, found)}."
-    unit = unit_of(name)
-    most, least = rounded(np.array([bound, reached]) * MICRO, (1, -1))
+    unit = machine.shown.error(name)
+    most, least = rounded(np.array([bound, reached]) * unit.per_si, (1, -1))
     what = "deviate" if name == "position" else "turn"
     return (
-        f"Nowhere in this region does the tool {what} more than {most} {unit}; "
-        f"{least} {unit} is reached at {pose_text(where, machine.commanded)}."
+        f"Nowhere in this region does the tool {what} more than {most} {unit.label}; "
+        f"{least} {unit.label} is reached at "
+        f"{pose_text(where, machine.commanded, machine.shown)}."
     )
 
 
@@ -375,7 +382,9 @@ def answers(study: Study) -> Answers:
         if at is not None:
             sizes["bound"] = _farther(study.bounds, at, "lower", "upper", "magnitude")
             status = str(study.bounds["status"].values[at])
-    return Answers(names, sizes, pose_text(place, study.machine.commanded), percent, status)
+    return Answers(
+        names, sizes, pose_text(place, study.machine.commanded, study.units), percent, status
+    )
 
 
 def _farther(found: xr.Dataset, pose: int, lower: str, upper: str, magnitude: str) -> Array:
@@ -394,9 +403,10 @@ def three_answers(study: Study) -> Table:
     found = answers(study)
     rows = []
     for at, name in enumerate(found.names):
-        row = np.array([found.sizes[kind][at] for kind in ANSWERS]) * MICRO
+        row = np.array([found.sizes[kind][at] for kind in ANSWERS])
+        row *= study.units.error(name).per_si
         cells = rounded(row, [1 if kind == "bound" else 0 for kind in ANSWERS])
-        rows.append((f"{name}, {unit_of(name)}", *cells))
+        rows.append((_named(study.machine, name), *cells))
     because = lacking(study)
     return Table(
         "three_answers",

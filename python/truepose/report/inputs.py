@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from truepose.machine.parts_of_machine import is_body
-from truepose.report.display import MICRO, MILLI, MISSING, nearest_middle, number, pose_text
+from truepose.machine.shown_units import Shown, ShownUnits
+from truepose.report.display import MISSING, nearest_middle, number, pose_text
 from truepose.report.result import in_file_units
 from truepose.report.tables import Table
 
@@ -15,10 +16,6 @@ if TYPE_CHECKING:
     from truepose.machine import Condition, Machine
     from truepose.sources._base import Deviation, Source
 
-KELVIN = 273.15
-SHOWN_UNIT = {"m": (MILLI, "mm"), "rad": (180.0 / np.pi, "°"), "1": (1.0, "")}
-"""SI unit of a parameter -> factor and unit for people."""
-DEVIATION_UNIT = {"m": (MICRO, "µm"), "rad": (MICRO, "µrad"), "1": (MICRO, "ppm")}
 MOST_DEVIATIONS = 60
 TRIED = 1000
 """Poses tried, from the middle outwards, for one that the machine can reach."""
@@ -33,20 +30,20 @@ def machine(it: Machine) -> Table:
         ("drives", ", ".join(f"{drive.name} ({drive.kind})" for drive in it.drives)),
         ("struts (closures)", f"{len(it.struts)}: " + ", ".join(strut.name for strut in it.struts)),
         ("parameters", str(len(it.parameters))),
-        ("characteristic length", f"{it.characteristic_length * MILLI:.6g} mm"),
-        ("home", pose_text(it.home, it.dof)),
+        ("characteristic length", it.shown.length.text(it.characteristic_length, 6)),
+        ("home", pose_text(it.home, it.dof, it.shown)),
     ]
     return Table("machine", "Machine", ("", ""), tuple(rows), words=2)
 
 
 def condition(of: Machine) -> Table:
     """Temperatures, what acts on the tool, the accuracy asked and what `--set` changed."""
-    it, asked = of.condition, of.accuracy
+    it, asked, units = of.condition, of.accuracy, of.shown
     rows = [
-        ("reference temperature", f"{_celsius(it.reference_temperature)} °C"),
-        ("temperature", f"{_celsius(it.default_temperature)} °C"),
+        ("reference temperature", _degrees(it.reference_temperature, units)),
+        ("temperature", _degrees(it.default_temperature, units)),
         *(
-            (f"temperature of {part}", f"{_celsius(value)} °C")
+            (f"temperature of {part}", _degrees(value, units))
             for part, value in it.part_temperatures.items()
         ),
         *_log(it),
@@ -54,20 +51,24 @@ def condition(of: Machine) -> Table:
             (f"temperature gradient of {part}", _gradient(part, value))
             for part, value in it.gradients.items()
         ),
-        ("force on the tool", _vector(it.force, "N")),
+        ("force on the tool", _vector(it.force, units.force)),
     ]
     if any(it.moment):
-        rows.append(("moment on the tool", _vector(it.moment, "N m")))
+        rows.append(("moment on the tool", _vector(it.moment, Shown("N m", 1.0))))
     if it.envelope is not None:
-        across = "" if it.envelope.normal is None else f" across {_vector(it.envelope.normal, '')}"
-        force = f"{it.envelope.force:.6g} N in any direction{across.rstrip()}"
+        across = (
+            ""
+            if it.envelope.normal is None
+            else f" across {_vector(it.envelope.normal, Shown('', 1.0))}"
+        )
+        force = f"{units.force.text(it.envelope.force, 6)} in any direction{across}"
         rows.append(("further force on the tool", force))
     if any(it.acceleration):
-        rows.append(("acceleration of the platform", _vector(it.acceleration, "m/s²")))
+        rows.append(("acceleration of the platform", _vector(it.acceleration, Shown("m/s²", 1.0))))
     if asked.target is not None:
-        rows.append(("accuracy asked", f"{asked.target * MICRO:.6g} µm"))
+        rows.append(("accuracy asked", asked.said("position")))
     if asked.angle_target is not None:
-        rows.append(("accuracy of angle asked", f"{asked.angle_target * MICRO:.6g} µrad"))
+        rows.append(("accuracy of angle asked", asked.said("orientation")))
     rows += [(f"--set {key}", value) for key, value in of.settings.items()]
     return Table("condition", "Condition", ("", ""), tuple(rows), words=2)
 
@@ -83,7 +84,7 @@ def _log(it: Condition) -> list[tuple[str, str]]:
 
 def _gradient(part: str, value: tuple[float, float, float]) -> str:
     if is_body(part):
-        return _vector(value, "K/m")
+        return _vector(value, Shown("K/m", 1.0))
     return f"{value[0]:.6g} K/m along it".replace("-", "\N{MINUS SIGN}")
 
 
@@ -165,10 +166,10 @@ def deviations(it: Machine) -> Table:
     alike: dict[tuple[str, str, str, str], list[str]] = {}
     for source, deviation in _deviations_at_middle(it):
         for at, parameter in enumerate(deviation.parameters):
-            factor, unit = DEVIATION_UNIT[it.units[parameter]]
+            unit = it.shown.small(it.units[parameter])
             shift, half = float(deviation.shift[0, at]), float(deviation.half[0, at])
-            band = f"\N{PLUS-MINUS SIGN}{number(half * factor, 3)}" if half else MISSING
-            key = (source.name, number(shift * factor, 3), band, unit)
+            band = f"\N{PLUS-MINUS SIGN}{number(half * unit.per_si, 3)}" if half else MISSING
+            key = (source.name, number(shift * unit.per_si, 3), band, unit.label)
             alike.setdefault(key, []).append(it.parameters[parameter])
     rows = [(name, _listed(parameters), *others) for (name, *others), parameters in alike.items()]
     more = f" The first {MOST_DEVIATIONS} of {len(rows)}." if len(rows) > MOST_DEVIATIONS else ""
@@ -204,15 +205,15 @@ def parameters(it: Machine) -> Table:
     """Every parameter with its nominal value."""
     rows = []
     for name, value, unit in zip(it.parameters, it.nominal, it.units, strict=True):
-        factor, shown = SHOWN_UNIT[unit]
-        rows.append((name, f"{number(float(value) * factor, 6)}", shown))
+        shown = it.shown.of(unit)
+        rows.append((name, number(float(value) * shown.per_si, 6), shown.label))
     return Table("parameters", "Parameters", ("parameter", "nominal value", "unit"), tuple(rows))
 
 
-def _celsius(kelvin: float) -> str:
-    return f"{kelvin - KELVIN:.6g}"
+def _degrees(kelvin: float, units: ShownUnits) -> str:
+    return f"{float(units.temperature(kelvin)):.6g} {units.degree}"
 
 
-def _vector(values: tuple[float, ...], unit: str) -> str:
-    parts = [f"{axis} {value:.6g}" for axis, value in zip("xyz", values, strict=True)]
-    return ", ".join(parts).replace("-", "\N{MINUS SIGN}") + f" {unit}"
+def _vector(values: tuple[float, ...], unit: Shown) -> str:
+    parts = [f"{axis} {value * unit.per_si:.6g}" for axis, value in zip("xyz", values, strict=True)]
+    return ", ".join(parts).replace("-", "\N{MINUS SIGN}") + f" {unit.label}".rstrip()

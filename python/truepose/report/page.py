@@ -60,7 +60,7 @@ def render(study: Study, machine_text: str = "") -> str:
         calibration_figures=[pair for pair in drawn if _of_calibration(pair[0])],
         calibration_tables=[]
         if study.calibration is None
-        else calibration.of_page(study.calibration),
+        else calibration.of_page(study.calibration, study.units),
         results=results,
         warnings=tables.warnings(study),
         inputs=[

@@ -9,13 +9,14 @@ import numpy as np
 
 from truepose.calibration.planning.plan import DOMINATED
 from truepose.machine.suggestion import counted
-from truepose.report.display import MICRO, column
+from truepose.report.display import column
 from truepose.report.result import in_file_units, pose_si
 from truepose.report.tables import MOST_LISTED, Table
 
 if TYPE_CHECKING:
     from truepose.calibration.planning.comparison import Comparison
     from truepose.calibration.planning.plan import Plan
+    from truepose.machine.shown_units import Shown
 
 NAMED = 6
 """Unknowns that are named; the others are counted."""
@@ -41,16 +42,16 @@ def curve(plan: Plan) -> Table:
     header = ["poses", "pose added"]
     columns = [[str(each) for each in shown], ["" if n == 0 else str(number_of[n]) for n in shown]]
     for at, (name, unit) in enumerate(_quantities(plan)):
-        header += [f"{name} rms, {unit}", f"highest, {unit}"]
+        header += [f"{name} rms, {unit.label}", f"highest, {unit.label}"]
         columns += [
-            _numbers(plan.rms[shown, at] * MICRO),
-            _numbers(plan.highest[shown, at] * MICRO),
+            _numbers(plan.rms[shown, at] * unit.per_si),
+            _numbers(plan.highest[shown, at] * unit.per_si),
         ]
     unit = _quantities(plan)[0][1]
     with np.errstate(invalid="ignore"):
-        bought = np.diff(plan.rms[shown, 0], prepend=np.nan) * -MICRO
+        bought = np.diff(plan.rms[shown, 0], prepend=np.nan) * -unit.per_si
     bought[~np.isfinite(bought)] = np.nan  # from undetermined to a number
-    header.append(f"buys, {unit} rms")
+    header.append(f"buys, {unit.label} rms")
     columns.append(_numbers(bought))
     return Table(
         "curve",
@@ -99,8 +100,8 @@ def poses(plan: Plan) -> Table:
 def sentences(plan: Plan) -> Iterator[str]:
     """What the plan comes to."""
     name, unit = _quantities(plan)[0]
-    first, last = plan.rms[[0, -1], 0] * MICRO
-    worst = plan.highest[-1, 0] * MICRO
+    first, last = plan.rms[[0, -1], 0] * unit.per_si
+    worst = plan.highest[-1, 0] * unit.per_si
     readings = counted(len(plan.poses), "pose")
     if not np.isfinite(last):
         yield (
@@ -112,7 +113,7 @@ def sentences(plan: Plan) -> Iterator[str]:
         takes = "takes" if len(plan.poses) == 1 else "take"
         yield (
             f"{readings} {takes} the uncertainty of the tool's {name} {before} {_number(last)} "
-            f"{unit} rms, {_number(worst)} {unit} at the worst pose."
+            f"{unit.label} rms, {_number(worst)} {unit.label} at the worst pose."
         )
     of_machine = list(range(plan.unknowns.n_machine))
     open_ = [at for at in of_machine if not np.isfinite(plan.after[at])]
@@ -136,10 +137,14 @@ def compared(comparison: Comparison) -> Iterator[str]:
         yield sentence[0].upper() + sentence[1:] + "."
 
 
-def _quantities(plan: Plan) -> list[tuple[str, str]]:
+def _quantities(plan: Plan) -> list[tuple[str, Shown]]:
+    units = plan.machine.shown
     turns = any(name.startswith("r") for name in plan.machine.components)
     moves = any(not name.startswith("r") for name in plan.machine.components)
-    return [("position", "µm")] * moves + [("orientation", "µrad")] * turns
+    return [
+        *[("position", units.error("position"))] * moves,
+        *[("orientation", units.error("orientation"))] * turns,
+    ]
 
 
 def _numbers(values: np.ndarray) -> list[str]:

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truepose.budget.poses import OK
-from truepose.report.display import MILLI, number, pose_text, where_highest
+from truepose.report.display import number, pose_text, where_highest
 from truepose.report.result import in_file_units, pose_in_file_units
 from truepose.report.tables import MOST_LISTED, Table
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
+    from truepose.machine.shown_units import ShownUnits
 
 EXPLAINED = 2000
 """Poses left out that are looked into; where more are, evenly spaced ones."""
@@ -35,11 +36,12 @@ class Reason:
     amount: float
     unit: str
 
-    def __str__(self) -> str:
+    def text(self, units: ShownUnits) -> str:
+        """The cause for people."""
         if self.what == "singular":
             return f"singular: conditioning down to {self.amount:.2g}"
-        factor, unit = (MILLI, "mm") if self.unit == "m" else (180.0 / np.pi, "°")
-        by = f"{number(abs(self.amount) * factor, 3)} {unit}"
+        unit = units.of(self.unit)
+        by = f"{number(abs(self.amount) * unit.per_si, 3)} {unit.label}"
         if self.what == "travel":
             side = "below" if self.amount < 0.0 else "above"
             return f"drive {self.name}: up to {by} {side} its travel"
@@ -120,9 +122,9 @@ def table(machine: Machine, found: Reach) -> Table:
         (str(name).replace("_", " "), f"{count:,}")
         for name, count in zip(names, counts, strict=True)
     ]
-    rows += [("because", str(reason)) for reason in found.reasons[:MOST_LISTED]]
+    rows += [("because", reason.text(machine.shown)) for reason in found.reasons[:MOST_LISTED]]
     if usable:
-        where = pose_text(found.worst_pose, machine.commanded)
+        where = pose_text(found.worst_pose, machine.commanded, machine.shown)
         rows.append(("worst conditioning", f"{found.worst_conditioning:.3g} at {where}"))
     return Table(
         "workspace",

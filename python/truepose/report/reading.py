@@ -6,24 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truepose.report.display import Array, error_unit, is_position, pose_text, where_highest
+from truepose.report.display import Array, is_position, pose_text, where_highest
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from truepose.machine import Machine
 
-SIZE_UNIT = {"position": "µm", "orientation": "µrad"}
-
 
 def percent_text(probability: float) -> str:
     """A probability as people write it: "95 %"."""
     return f"{100.0 * probability:.6g} %"
-
-
-def unit_of(name: str) -> str:
-    """Unit in which a component or a quantity is shown: "µm" or "µrad"."""
-    return SIZE_UNIT.get(name) or error_unit(name)
 
 
 def components(found: xr.Dataset) -> list[str]:
@@ -49,7 +42,7 @@ def poses_of(machine: Machine, found: xr.Dataset) -> Array:
 
 def at_text(machine: Machine, found: xr.Dataset, pose: int) -> str:
     """One pose of a result for people, counted in the result."""
-    return pose_text(poses_of(machine, found)[pose], machine.commanded)
+    return pose_text(poses_of(machine, found)[pose], machine.commanded, machine.shown)
 
 
 def worst_pose(found: xr.Dataset, magnitude: str) -> int:

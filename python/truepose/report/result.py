@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from truepose.machine.units import meant
 from truepose.report.display import is_position
 
 if TYPE_CHECKING:
@@ -186,7 +187,7 @@ class Result:
             return self._converted(once, "m")[0], _product(label, label)
         dimension = DIMENSION_OF.get(unit)
         if dimension is None:
-            return array, unit
+            return (meant(array) if array.dtype == np.float64 else array), unit
         to = self.machine.file_units[dimension]
         return to.to_file(array), to.label
 

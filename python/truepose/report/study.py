@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from truepose.machine import Machine
+    from truepose.machine.shown_units import ShownUnits
 
 Array = NDArray[np.float64]
 
@@ -126,6 +127,15 @@ class Study:
     def left_out_statuses(self) -> tuple[str, ...]:
         """Why each pose of `left_out` cannot be used."""
         return tuple(str(status) for status in self.values("left_out_status"))
+
+    @property
+    def units(self) -> ShownUnits:
+        """The units for people."""
+        return self.machine.shown
+
+    def shown(self, errors: Array) -> Array:
+        """Errors (..., component), SI, in the units for people."""
+        return self.units.errors(errors, self.components)
 
     def values(self, name: str) -> Array:
         """One variable of the budget as an array, in the axis order of the schema."""

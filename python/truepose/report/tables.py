@@ -1,10 +1,11 @@
 """The tables of the command line and of the report: the same text in both.
 
-Lengths of errors in µm, angles in µrad, percentages of the commanded coordinate.
+In the units for people (`truepose.machine.shown_units`), percentages of the commanded coordinate.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -13,12 +14,10 @@ import numpy as np
 
 from truepose.report.accuracy import Answer
 from truepose.report.display import (
-    MICRO,
     MISSING,
     Array,
     column,
     decimals_for,
-    error_unit,
     is_position,
     number,
     pose_text,
@@ -69,9 +68,11 @@ def ranking(study: Study) -> Table:
         [str(int(study.values("rank")[index])) for index in order],
     ]
     for part, name in enumerate(parts):
-        unit = "µm" if name == "position" else "µrad"
-        header += [f"highest {name}, {unit}", f"rms {name}, {unit}"]
-        columns += [column(study.values(kind)[order, part] * MICRO) for kind in ("highest", "rms")]
+        unit = study.units.error(name)
+        header += [f"highest {name}, {unit.label}", f"rms {name}, {unit.label}"]
+        columns += [
+            column(study.values(kind)[order, part] * unit.per_si) for kind in ("highest", "rms")
+        ]
     header.append("share, %")
     columns.append(column(study.values("share")[order] * 100, 1))
     table = Table(
@@ -87,11 +88,13 @@ def ranking(study: Study) -> Table:
 
 def highest_absolute(study: Study) -> Table:
     """Highest absolute error over the poses, per source and component (table 5, in form)."""
-    cells = [column(values * MICRO) for values in _highest(study, "highest", "overall_highest").T]
+    cells = [
+        column(values) for values in study.shown(_highest(study, "highest", "overall_highest")).T
+    ]
     return Table(
         "highest_absolute",
         "Highest absolute error",
-        ("source", *(f"{name}, {error_unit(name)}" for name in study.components)),
+        ("source", *(f"{name}, {study.units.error(name).label}" for name in study.components)),
         tuple(zip(_edge_labels(study), *cells, strict=True)),
         note="Over all poses, per axis of the base frame. Lower, upper: lengths and offsets all at "
         "that end of their bands, the rest at the shift; the ranking has the most a source can do.",
@@ -124,6 +127,7 @@ def compensation(study: Study) -> Table:
         ("after, upper edges", study.compensated("residual_upper")),
         ("after, bound", study.compensated("bound")),
     ]
+    units, names = study.units, (*components, "position")
     highest = np.stack(
         [
             np.append(np.nanmax(np.abs(errors), axis=0), np.nanmax(study.position_norm(errors)))
@@ -131,14 +135,13 @@ def compensation(study: Study) -> Table:
         ]
     )
     # The middle is at rounding level; the decimals of the other rows show it as zero.
-    cells = [column(values * MICRO, decimals_for(values * MICRO)) for values in highest.T]
+    cells = [column(values, decimals_for(values)) for values in units.errors(highest, names).T]
     return Table(
         "compensation",
         "Before and after compensation",
         (
             "highest over all poses",
-            *(f"{name}, {error_unit(name)}" for name in components),
-            "position, µm",
+            *(f"{name}, {units.error(name).label}" for name in names),
         ),
         tuple(zip([name for name, _ in rows], *cells, strict=True)),
         note="After: the corrected command driven through the actual machine. The bound is "
@@ -152,6 +155,7 @@ MOMENTS = 9
 
 def over_time(machine: Machine, found: xr.Dataset) -> Table:
     """The error at the first of the poses, at some moments of the temperature log and the worst."""
+    units = machine.shown
     times, error = found["time"].values, found["error"].values[:, 0]
     components = [str(name) for name in found["component"].values]
     size = np.linalg.norm(error[:, [is_position(name) for name in components]], axis=1)
@@ -161,19 +165,22 @@ def over_time(machine: Machine, found: xr.Dataset) -> Table:
     pose = np.array([found[f"pose_{name}"].values[0] for name in machine.commanded])
     columns = [
         [*(number(times[row] / 60.0, 2) for row in shown), f"{times[worst] / 60.0:.2f} (worst)"],
-        *(column(error[rows, index] * MICRO) for index in range(len(components))),
-        column(size[rows] * MICRO),
+        *(
+            column(error[rows, index] * units.error(name).per_si)
+            for index, name in enumerate(components)
+        ),
+        column(size[rows] * units.small_length.per_si),
     ]
     return Table(
         "over_time",
         "Error over time",
         (
             "time, min",
-            *(f"{name}, {error_unit(name)}" for name in components),
-            "position, µm",
+            *(f"{name}, {units.error(name).label}" for name in (*components, "position")),
         ),
         tuple(zip(*columns, strict=True)),
-        note=f"From the logged temperatures alone, exact, at {pose_text(pose, machine.commanded)}.",
+        note=f"From the logged temperatures alone, exact, at "
+        f"{pose_text(pose, machine.commanded, units)}.",
     )
 
 
@@ -188,7 +195,8 @@ def internal_forces(study: Study) -> Table:
     """What each source's misfit makes of force inside the structure, and what clearances take."""
     found = study.strained
     order = np.argsort(-found["highest_force_rigid"].values, kind="stable")
-    commanded = study.machine.commanded
+    commanded, units = study.machine.commanded, study.units
+    small, force_unit = units.small_length, units.force
     poses = np.stack([found[f"pose_{name}"].values for name in commanded], axis=-1)
     closures, places = [], []
     for source in order:
@@ -197,7 +205,7 @@ def internal_forces(study: Study) -> Table:
             force = np.abs(found["force_rigid"].values[:, source])
         pose, closure = divmod(where_highest(force.ravel()), force.shape[1])
         closures.append(str(found["closure"].values[closure]))
-        places.append(pose_text(poses[pose], commanded))
+        places.append(pose_text(poses[pose], commanded, units))
 
     def highest(name: str) -> Array:
         return np.asarray(np.abs(found[name].values[:, order]).max(axis=(0, 2)))
@@ -207,11 +215,11 @@ def internal_forces(study: Study) -> Table:
         [str(verdict) for verdict in found["verdict"].values[order]],
         closures,
         places,
-        column(highest("force")),
-        column(highest("force_rigid")),
+        column(highest("force") * force_unit.per_si),
+        column(highest("force_rigid") * force_unit.per_si),
         column(found["remaining"].values[order] * 100, 1),
-        column(highest("absorbed") * MICRO),
-        column(highest("strain") * MICRO),
+        column(highest("absorbed") * small.per_si),
+        column(highest("strain") * small.per_si),
     ]
     return Table(
         "internal_forces",
@@ -221,11 +229,11 @@ def internal_forces(study: Study) -> Table:
             "verdict",
             "closure",
             "at",
-            "highest force, N",
-            "without clearances, N",
+            f"highest force, {force_unit.label}",
+            f"without clearances, {force_unit.label}",
             "remains, %",
-            "absorbed, µm",
-            "strain, µm",
+            f"absorbed, {small.label}",
+            f"strain, {small.label}",
         ),
         tuple(zip(*columns, strict=True)),
         words=4,
@@ -238,15 +246,22 @@ def internal_forces(study: Study) -> Table:
 def closure_forces(study: Study) -> Table:
     """What each closure carries with all sources at their shifts and all loads."""
     found = study.strained
-    force = found["overall_force"].values
+    small, unit = study.units.small_length, study.units.force
+    force = found["overall_force"].values * unit.per_si
     absorbed, strain = (
-        np.abs(found[f"overall_{name}"].values).max(axis=0) * MICRO
+        np.abs(found[f"overall_{name}"].values).max(axis=0) * small.per_si
         for name in ("absorbed", "strain")
     )
     return Table(
         "closure_forces",
         "Forces in the closures",
-        ("closure", "lowest, N", "highest, N", "absorbed, µm", "strain, µm"),
+        (
+            "closure",
+            f"lowest, {unit.label}",
+            f"highest, {unit.label}",
+            f"absorbed, {small.label}",
+            f"strain, {small.label}",
+        ),
         tuple(
             zip(
                 [str(name) for name in found["closure"].values],
@@ -267,8 +282,8 @@ def answers(found: Sequence[Answer]) -> Table:
         (
             f"{answer.quantity} {answer.state}",
             {None: "no accuracy asked", True: "met", False: "NOT met"}[answer.met],
-            f"{number(answer.highest * MICRO, 1)} {answer.unit}",
-            MISSING if answer.asked is None else f"{number(answer.asked * MICRO, 1)} {answer.unit}",
+            f"{answer.amount} {answer.unit.label}",
+            _asked(answer),
             answer.at,
         )
         for answer in found
@@ -292,13 +307,25 @@ def warnings(study: Study) -> Table | None:
     return Table("warnings", "Warnings", ("",), tuple(rows)) if rows else None
 
 
+def _asked(answer: Answer) -> str:
+    """What is asked, as it was asked, and in the unit of the answer where that is another."""
+    if answer.asked is None:
+        return MISSING
+    said = answer.asked_text
+    same = re.sub(r"^u(?=m$|in$|rad$)", "µ", said.rpartition(" ")[2]) == answer.unit.label
+    unit = answer.unit
+    if same:
+        return said
+    return f"{said} ({number(answer.asked * unit.per_si, unit.decimals)} {unit.label})"
+
+
 def poses_left_out(study: Study) -> Table | None:
     """Poses that cannot be used and why, the first of them; None where all can be used."""
     count = len(study.left_out)
     if count == 0:
         return None
     rows = [
-        (pose_text(pose, study.machine.commanded), status.replace("_", " "))
+        (pose_text(pose, study.machine.commanded, study.units), status.replace("_", " "))
         for pose, status in zip(
             study.left_out[:MOST_LISTED], study.left_out_statuses[:MOST_LISTED], strict=True
         )
@@ -335,8 +362,8 @@ def _highest(study: Study, of_source: str, overall: str) -> Array:
 def total(study: Study) -> str:
     """One line: the most that all sources together can do to the position, and where."""
     size = study.position_norm(study.overall_worst)
-    worst = where_highest(size)
+    worst, unit = where_highest(size), study.units.small_length
     return (
-        f"All sources together: at most {number(float(size[worst]) * MICRO, 1)} µm, "
-        f"at {pose_text(study.poses[worst], study.machine.commanded)}."
+        f"All sources together: at most {number(float(size[worst]) * unit.per_si, 1)} "
+        f"{unit.label}, at {pose_text(study.poses[worst], study.machine.commanded, study.units)}."
     )

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from truepose.calibration.gate import words
+from truepose.machine.shown_units import shown_units
+from truepose.machine.units import FileUnit
 
 DELTA = (
     "delta radius",
@@ -34,7 +36,7 @@ JOINTS = tuple(f"base joint {axis} of strut {n}" for n in range(1, 7) for axis i
         (0.3e-9, "m", "0.00030 µm"),
         (0.2696, "m", "270 mm"),
         (np.radians(0.126), "rad", "0.13°"),
-        (80e-6, "rad", "80 µrad"),
+        (80e-6, "rad", "4.6 mdeg"),
         (-0.0185, "m", "−18 mm"),
         (0.0, "m", "0 µm"),
         (1.1e-5, "1/K", "1.1e−05 1/K"),
@@ -52,6 +54,15 @@ def test_stated_sizes_have_no_zeros_at_their_end() -> None:
     assert words.stated(10e-3, "m") == "10 mm"
     assert words.stated(2e-6, "m") == "2 µm"
     assert words.stated(np.radians(0.2), "rad") == "0.2°"
+
+
+def test_quantities_of_a_machine_in_inches_and_radians() -> None:
+    units = shown_units({"length": FileUnit("in", 0.0254), "angle": FileUnit("rad")})
+    assert words.quantity(0.254e-3, "m", units=units) == "0.010 in"
+    assert words.quantity(25.4e-6, "m", units=units) == "1000 µin"
+    assert words.quantity(80e-6, "rad", units=units) == "80 µrad"
+    assert words.quantity(0.01, "rad", units=units) == "0.010 rad"
+    assert words.stated(0.0254e-3, "m", units) == "0.001 in"
 
 
 def test_ratios() -> None:

@@ -268,7 +268,7 @@ def test_readings_that_no_machine_gives(capsys: Capture, tmp_path: Path) -> None
 def test_files_are_written_before_anything_is_printed(
     capsys: Capture, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def stopped(text: object) -> None:
+    def stopped(*found: object) -> None:
         raise RuntimeError
 
     monkeypatch.setattr("truepose.report.calibration.tables", stopped)

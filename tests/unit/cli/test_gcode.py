@@ -71,7 +71,7 @@ def test_orientation_has_rows_where_there_is_one(
     outcome = call(capsys, "gcode", HEXAPOD, part, "-o", tmp_path / "out.ngc")
     assert outcome.code == 0
     assert sum(line.startswith(" orientation") for line in outcome.out.splitlines()) == 2
-    assert "µrad" in outcome.out
+    assert "mdeg" in outcome.out
 
 
 def test_options_reach_the_correction(

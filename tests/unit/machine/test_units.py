@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 
 import numpy as np
 import pytest
 
 from truepose.machine.dimensions import DIMENSIONS
-from truepose.machine.units import FileUnit, QuantityError, UnitSystem, default_units, unit_of
+from truepose.machine.units import (
+    FileUnit,
+    QuantityError,
+    UnitSystem,
+    default_units,
+    meant,
+    unit_of,
+)
 
 DECLARED = {"length": "mm", "angle": "deg", "force": "kN", "temperature": "degC"}
 
@@ -135,7 +143,10 @@ def test_millimetres_come_back_as_they_were_written() -> None:
 def test_temperatures_go_both_ways() -> None:
     celsius = unit("degC", "temperature")
     assert celsius.to_si(20.0) == 293.15
-    assert celsius.to_file(308.15) == pytest.approx(35.0, abs=1e-12)
+    assert celsius.to_file(308.15) == 35.0
+    tenths = [Decimal(n) / 10 for n in range(-500, 1000)]
+    kelvins = np.array([float(tenth + Decimal("273.15")) for tenth in tenths])
+    assert celsius.to_file(kelvins).tolist() == [float(tenth) for tenth in tenths]
 
 
 def test_every_dimension_has_an_si_unit_that_measures_it() -> None:
@@ -144,3 +155,53 @@ def test_every_dimension_has_an_si_unit_that_measures_it() -> None:
             assert unit_of(dimension.si, dimension).scale == 1.0
         assert UnitSystem({}).read(dimension.example, name) != 0.0
     assert default_units().keys() == DIMENSIONS.keys()
+
+
+@pytest.mark.parametrize(
+    ("computed", "text"),
+    [
+        (124.99999999999999, "125.0"),
+        (350.00000000000006, "350.0"),
+        (-0.30000000000000004, "-0.3"),
+        (62.50000000000023, "62.5"),
+        (1e-9 * (1.0 + 2.3e-16), "1e-09"),
+        (1234567890.0000005, "1234567890.0"),
+        (6.0220000000000003e23, "6.022e+23"),
+        (0.0, "0.0"),
+        (math.inf, "inf"),
+        (math.nan, "nan"),
+    ],
+)
+def test_what_is_meant(computed: float, text: str) -> None:
+    assert repr(float(meant(computed))) == text
+
+
+def test_what_has_all_digits_keeps_them() -> None:
+    """By decimal arithmetic: changed is what a number of ten digits lies 5e-15 from, or less."""
+    random = np.random.default_rng(13)
+    values = random.uniform(1.0, 10.0, 3000) * 10.0 ** random.integers(-10, 10, 3000)
+    close = np.array([float(f"{value:.5g}") for value in values[:1000]])
+    close *= 1.0 + random.uniform(-8e-15, 8e-15, 1000)
+    near = np.concatenate([values, -close])
+    for value, found in zip(near.tolist(), meant(near).tolist(), strict=True):
+        few = float(f"{value:.9e}")
+        off = abs(Decimal(few) - Decimal(value)) / abs(Decimal(value))
+        if off < Decimal("4.5e-15"):
+            assert found == few
+        elif off > Decimal("5.5e-15"):
+            assert found == value
+    # Of numbers of all digits one in ten thousand at most lies as near: twice 5e-15 in 1e-10.
+    assert np.mean(meant(values) == values) > 0.998
+
+
+def test_a_file_is_given_what_was_meant() -> None:
+    inch = unit_of("in", DIMENSIONS["length"])
+    millimetre = unit_of("mm", DIMENSIONS["length"])
+    degree = unit_of("deg", DIMENSIONS["angle"])
+    tenths = [Decimal(n) / 10 for n in range(1, 2000, 7)]
+    for unit, si in ((inch, Decimal("0.0254")), (millimetre, Decimal("0.001"))):
+        values = [float(tenth * si) for tenth in tenths]
+        assert [repr(float(x)) for x in unit.to_file(values)] == [repr(float(t)) for t in tenths]
+    assert [float(x) for x in degree.to_file(np.deg2rad([float(t) for t in tenths]))] == [
+        float(t) for t in tenths
+    ]

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from made_calibration import UNKNOWNS, calibration
-from made_study import hexapod_study, planar_study
+from made_study import MADE_UNITS, hexapod_study, planar_study
 from truepose.report import calibration as told
 from truepose.report import page
 from truepose.report.figures import (
@@ -40,11 +40,14 @@ def study(request: pytest.FixtureRequest) -> Study:
 
 
 def named(found: xr.Dataset) -> dict[str, Table]:
-    return {table.name: table for table in told.tables(found)}
+    return {table.name: table for table in told.tables(found, MADE_UNITS)}
 
 
 def test_every_table_is_rectangular(study: Study) -> None:
-    for table in (*told.tables(study.calibrated), *told.of_page(study.calibrated)):
+    for table in (
+        *told.tables(study.calibrated, MADE_UNITS),
+        *told.of_page(study.calibrated, MADE_UNITS),
+    ):
         assert table.rows
         assert {len(row) for row in table.rows} == {len(table.header)}
 
@@ -55,7 +58,7 @@ def test_a_refusal_has_every_table_and_the_terminal_ends_with_what_to_do(study: 
         "suspicions", "outliers", "unknowns", "instruments", "undetermined", "residuals", "tool",
         "heed", "next",
     ]  # fmt: skip
-    page_names = [table.name for table in told.of_page(study.calibrated)]
+    page_names = [table.name for table in told.of_page(study.calibrated, MADE_UNITS)]
     assert sorted(page_names) == sorted(names)
     assert page_names[:3] == ["suspicions", "undetermined", "next"]
 

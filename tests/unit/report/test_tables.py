@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from made_study import hexapod_study, planar_study
+from truepose.machine.shown_units import METRIC
 from truepose.report import accuracy, inputs, tables
 from truepose.report.display import column, number, pose_text, where_highest
 from truepose.report.study import Study
@@ -101,7 +102,9 @@ def test_answers(study: Study) -> None:
     size = np.linalg.norm(study.overall_worst[:, study.positions], axis=1)
     assert position.highest == size.max()
     assert position.met is False
-    assert position.at == pose_text(study.poses[size.argmax()], study.machine.commanded)
+    assert position.at == pose_text(
+        study.poses[size.argmax()], study.machine.commanded, study.units
+    )
     assert position.number == study.budget["pose"].values[size.argmax()]
     assert accuracy.met(found, accuracy.BEFORE) is False
     turning = [answer for answer in found if answer.quantity == "orientation"]
@@ -128,7 +131,8 @@ def test_numbers() -> None:
     assert column([1234.5678, 0.001]) == ("1234.6", "0.0")
     assert column([0.0]) == ("0.0",)
     assert (
-        pose_text([-0.1, 0.2, -0.0], ["x", "z", "c"]) == "x \N{MINUS SIGN}100 mm, z 200 mm, c 0 °"
+        pose_text([-0.1, 0.2, -0.0], ["x", "z", "c"], METRIC)
+        == "x \N{MINUS SIGN}100 mm, z 200 mm, c 0 °"
     )
 
 

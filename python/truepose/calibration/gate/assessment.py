@@ -278,16 +278,16 @@ class Case:
         loose = [int(i) for i in np.argsort(-ratio, kind="stable") if ratio[i] > 1.0]
         if not loose:
             return []
-        at, unit = loose[0], self.unknowns.units[loose[0]]
+        at, unit, units = loose[0], self.unknowns.units[loose[0]], self.unknowns.shown
         half, sigma = float(self.half[at]), float(self.sigma[at])
         if np.isfinite(half) and own[at] > half:
-            known = f"its tolerance is {words.stated(half, unit)}"
+            known = f"its tolerance is {words.stated(half, unit, units)}"
         else:
-            known = f"its tolerance alone by {words.quantity(sigma, unit)}"
-        found = words.quantity(own[at], unit)
+            known = f"its tolerance alone by {words.quantity(sigma, unit, units=units)}"
+        found = words.quantity(own[at], unit, units=units)
         text = f"the data leave {self.labels[at]} uncertain by {found}, {known}"
         if np.isfinite(half) and own[at] > NOTHING * half:
-            tolerance = words.stated(half, unit)
+            tolerance = words.stated(half, unit, units)
             text = (
                 f"the data say next to nothing of {self.labels[at]}, its tolerance is {tolerance}"
             )
@@ -315,10 +315,11 @@ class Case:
         gained = any(size <= self.margin * was for _, _, size, was in found)
         if not found or (gained and not worse):
             return []
-        shown = worse or found
+        shown, units = worse or found, self.unknowns.shown
         whose = "of the machine as filed" if before is not None else "measured before"
         texts = [
-            f"{name} by {words.quantity(size, unit)}, against {words.quantity(was, unit)} {whose}"
+            f"{name} by {words.quantity(size, unit, units=units)}, against "
+            f"{words.quantity(was, unit, units=units)} {whose}"
             for name, unit, size, was in shown
         ]
         texts[0] = texts[0].replace(" by ", " would be uncertain by ", 1)

@@ -76,7 +76,7 @@ def directly(unknowns: Unknowns, uncertainty: Mapping[str, float]) -> list[Candi
             continue
         row = np.zeros((1, n))
         row[0, index] = 1.0 / sigma
-        to = f"(to {words.stated(sigma, unknowns.units[index])})"
+        to = f"(to {words.stated(sigma, unknowns.units[index], unknowns.shown)})"
         cost = EASY if "length" in re.split(r"[ _-]", label) else HARD
         single[label] = Candidate(label, cost, f"measure {label} {to}", row, direct=True)
         families.setdefault(words.family(label, labels)[0], []).append(label)

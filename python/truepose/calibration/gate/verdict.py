@@ -29,6 +29,7 @@ from truepose.calibration.gate.observability import (
     share,
 )
 from truepose.calibration.gate.remedy import CALIPER, Candidate, Remedy, directly, remedy_of
+from truepose.machine.shown_units import METRIC, ShownUnits
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
@@ -100,6 +101,7 @@ class Gate:
     birge: float
     degrees_of_freedom: float
     held_out: tuple[HeldOut, ...] = ()
+    shown: ShownUnits = METRIC
 
     @property
     def rank(self) -> int:
@@ -128,14 +130,15 @@ class Gate:
         for name, unit, after, before in both(self.after, self.before):
             if after == 0.0 and not before:
                 continue
-            known = words.quantity(after, unit)
+            known = words.quantity(after, unit, units=self.shown)
+            was = "" if before is None else words.quantity(before, unit, units=self.shown)
             texts.append(
                 f"{name} becomes known to {known} at the worst pose"
-                + ("" if before is None else f", against {words.quantity(before, unit)} before")
+                + (f", against {was} before" if was else "")
             )
         held = [
-            f"on poses that were not fitted the error falls from {_shown(each, each.before)} "
-            f"to {_shown(each, each.after)}"
+            "on poses that were not fitted the error falls from "
+            f"{_shown(each, each.before, self.shown)} to {_shown(each, each.after, self.shown)}"
             for each in self.held_out
             if each.before > ABOVE_NOISE * each.noise and each.after < each.before
         ]
@@ -199,7 +202,8 @@ def judge(
     )
     found = case.outcome()
     held = tuple(held_out)
-    reasons = [*found.reasons, *_of_held_out(held, margin), *_of_values(case, found)]
+    reasons = [*found.reasons, *_of_held_out(held, margin, unknowns.shown)]
+    reasons += _of_values(case, found)
     reasons += _of_noise(case)
     warnings = _warnings(case, found)
     remedy = None
@@ -231,16 +235,17 @@ def judge(
         birge=case.birge,
         degrees_of_freedom=case.degrees,
         held_out=held,
+        shown=unknowns.shown,
     )
 
 
-def _of_held_out(held: Iterable[HeldOut], margin: float) -> list[Reason]:
+def _of_held_out(held: Iterable[HeldOut], margin: float, units: ShownUnits) -> list[Reason]:
     """(c): poses that were not fitted do not confirm what the fit claims."""
     found = []
     for each in held:
         above = each.before > ABOVE_NOISE * each.noise and each.after > margin * each.before
         if above and not each.consistent:
-            was, now = _shown(each, each.before), _shown(each, each.after)
+            was, now = (_shown(each, size, units) for size in (each.before, each.after))
             change = f"falls from {was} to {now} only"
             if each.after >= each.before:
                 change = f"does not fall: {was} before, {now} after"
@@ -251,7 +256,7 @@ def _of_held_out(held: Iterable[HeldOut], margin: float) -> list[Reason]:
                     + (
                         "that is above the noise"
                         if each.unit == "1"
-                        else f"the noise is {_shown(each, each.noise)}"
+                        else f"the noise is {_shown(each, each.noise, units)}"
                     ),
                 )
             )
@@ -279,16 +284,16 @@ def _of_values(case: Case, found: Outcome) -> list[Reason]:
 
 
 def _absurd(case: Case, at: int, off: float) -> str:
-    unit = case.unknowns.units[at]
+    unit, units = case.unknowns.units[at], case.unknowns.shown
     nominal, half = float(case.nominal[at]), float(case.half[at])
     would = ""
     if np.isfinite(nominal):
-        would = f"{words.quantity(nominal + float(case.values[at]), unit, 4)}, "
+        would = f"{words.quantity(nominal + float(case.values[at]), unit, 4, units)}, "
     times = abs(off) / (half if np.isfinite(half) else float(case.sigma[at]))
     what = "its tolerance" if np.isfinite(half) else "the standard deviation of its tolerance"
     return (
-        f"{case.labels[at]} would be {would}{words.quantity(abs(off), unit, 3)} off its drawing, "
-        f"{words.times(times)} times {what}"
+        f"{case.labels[at]} would be {would}{words.quantity(abs(off), unit, 3, units)} off its "
+        f"drawing, {words.times(times)} times {what}"
     )
 
 
@@ -342,9 +347,11 @@ def _warnings(case: Case, found: Outcome) -> list[Reason]:
         warnings.append(Reason("not-needed", text))
     if not found.reasons:
         pairs = zip(both(found.after, None), case.reference(found.before), strict=True)
+        units = case.unknowns.shown
         for (name, unit, size, _), was in pairs:
             if was is not None and was > 0.0 and size > case.margin * was:
-                text = f"{name} is not known better than before, {words.quantity(size, unit)}"
+                known = words.quantity(size, unit, units=units)
+                text = f"{name} is not known better than before, {known}"
                 warnings.append(Reason("one-sided", text))
     return warnings
 
@@ -357,10 +364,10 @@ def _unlikely(case: Case) -> float:
     return float((np.cbrt(case.rms**2) - (1.0 - part)) / np.sqrt(part))
 
 
-def _shown(held: HeldOut, value: float) -> str:
+def _shown(held: HeldOut, value: float, units: ShownUnits) -> str:
     if held.unit == "1":
         return f"{words.times(value)} times the noise"
-    return words.quantity(value, held.unit)
+    return words.quantity(value, held.unit, units=units)
 
 
 def _or_nan(values: ArrayLike | None, n: int) -> Floats:

@@ -11,6 +11,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from truepose.machine.shown_units import METRIC, ShownUnits
+
 Floats = NDArray[np.float64]
 
 NAMED = 0.1
@@ -30,26 +32,18 @@ _OF_PART = re.compile(r"^(.+) of (?:the )?([A-Za-z]+)$")
 # --- numbers -------------------------------------------------------------------------------------
 
 
-def quantity(value: float, unit: str, digits: int = 2) -> str:
-    """A size in SI with sensible digits and unit: "3.7 mm", "65 µm", "0.13°", "80 µrad".
+def quantity(value: float, unit: str, digits: int = 2, units: ShownUnits = METRIC) -> str:
+    """A size in SI with sensible digits and unit: "3.7 mm", "65 µm", "0.13°", "8.0 mdeg".
 
-    From 0.1 mm on lengths are in mm, from 1 mrad on angles are in degrees.
+    From 0.1 mm (0.01 in) and 1 mrad on in the unit of dimensions, below in that of errors.
     """
     if not math.isfinite(value):
         return "without limit" if value > 0.0 else "–"
-    size = abs(value)
-    if unit == "m":
-        text = (
-            _digits(value * 1e3, digits) + " mm"
-            if size >= 0.999e-4
-            else _digits(value * 1e6, digits) + " µm"
-        )
-    elif unit == "rad":
-        text = (
-            _digits(math.degrees(value), digits) + "°"
-            if size >= 0.999e-3
-            else _digits(value * 1e6, digits) + " µrad"
-        )
+    if unit in ("m", "rad"):
+        small = abs(value) < (0.999 * units.least_dimension if unit == "m" else 0.999e-3)
+        shown = units.small(unit) if small else units.of(unit)
+        gap = "" if shown.label == "°" else " "
+        text = f"{_digits(value * shown.per_si, digits)}{gap}{shown.label}"
     elif unit == "1":
         text = _digits(value, digits)
     else:
@@ -57,11 +51,11 @@ def quantity(value: float, unit: str, digits: int = 2) -> str:
     return text.replace("-", "\N{MINUS SIGN}")
 
 
-def stated(value: float, unit: str) -> str:
+def stated(value: float, unit: str, units: ShownUnits = METRIC) -> str:
     """A size that somebody chose, without zeros at its end: "0.5 mm", "0.02 mm"."""
-    if unit == "m" and abs(value) >= 0.999e-5:
-        return _trimmed(f"{_digits(value * 1e3, 2)} mm")
-    return _trimmed(quantity(value, unit))
+    if unit == "m" and abs(value) >= 0.0999 * units.least_dimension:
+        return _trimmed(f"{_digits(value * units.length.per_si, 2)} {units.length.label}")
+    return _trimmed(quantity(value, unit, units=units))
 
 
 def _trimmed(text: str) -> str:

@@ -30,6 +30,7 @@ from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.errors import RequestError
 from truepose.machine import Machine
+from truepose.machine.shown_units import METRIC, ShownUnits
 from truepose.sources._base import Floats, Indices
 
 SLIGHT = 1.05
@@ -60,6 +61,7 @@ class Considered:
     alone: AtTool
     part: AtTool
     relative: bool
+    shown: ShownUnits = METRIC
 
 
 def considered(
@@ -104,6 +106,7 @@ def considered(
         tool.uncertainty(exact, none),
         tool.uncertainty(part, none),
         relative,
+        machine.shown,
     )
 
 
@@ -212,8 +215,8 @@ def _no_gain(found: Considered, margin: float, *, within: bool) -> list[Reason]:
     if not pairs or (gained and not worse):
         return []
     texts = [
-        f"{name} uncertain by {words.quantity(size, unit)}, against "
-        f"{words.quantity(was, unit)} of the machine as filed"
+        f"{name} uncertain by {words.quantity(size, unit, units=found.shown)}, against "
+        f"{words.quantity(was, unit, units=found.shown)} of the machine as filed"
         for name, unit, size, was in worse or pairs
     ]
     ending = "; but what is asked of the tool is kept without calibration" if within else ""
@@ -235,10 +238,14 @@ def _is_source(found: Considered) -> bool:
 
 
 def _one_sided(found: Considered, margin: float) -> list[Reason]:
-    return [
-        Reason("one-sided", f"{name} is not known better than before, {words.quantity(size, unit)}")
+    sizes = (
+        (name, words.quantity(size, unit, units=found.shown))
         for name, unit, size, was in _pairs(found)
         if was > 0.0 and size > margin * was
+    )
+    return [
+        Reason("one-sided", f"{name} is not known better than before, {size}")
+        for name, size in sizes
     ]
 
 
@@ -246,8 +253,8 @@ def _heed(found: Considered) -> list[Reason]:
     """What the tolerances that were not identified add, where it is more than slight."""
     pairs = list(zip(both(found.after, None), both(found.alone, None), strict=True))
     more = [
-        f"{name} would be known to {words.quantity(less, unit)} in place of "
-        f"{words.quantity(size, unit)}"
+        f"{name} would be known to {words.quantity(less, unit, units=found.shown)} in place of "
+        f"{words.quantity(size, unit, units=found.shown)}"
         for (name, unit, size, _), (*_, less, _) in pairs
         if size > SLIGHT * less
     ]

@@ -22,6 +22,7 @@ from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
+from truepose.machine.shown_units import METRIC, ShownUnits
 from truepose.machine.suggestion import did_you_mean
 from truepose.machine.units import QuantityError, UnitSystem
 from truepose.sources import Deviation
@@ -58,6 +59,8 @@ class Unknowns:
     """Of each instrument the unknowns of its origin x y z, rotation x y z and target x y z."""
     biases: dict[tuple[int, int, int], int] = dataclasses.field(default_factory=dict)
     """(instrument, observable, strut) -> the unknown that is added to the reading."""
+    shown: ShownUnits = METRIC
+    """The units in which people are told of them."""
 
     @property
     def count(self) -> int:
@@ -97,6 +100,7 @@ class Unknowns:
             {},
             {key: tuple(map(renumbered, own)) for key, own in self.frames.items()},
             {key: number - less for key, number in self.biases.items()},
+            self.shown,
         )
 
 
@@ -167,6 +171,7 @@ def unknowns_of(
         {at: each.property for at, each in enumerate(wanted) if each.property is not None},
         instruments.frames,
         instruments.biases,
+        machine.shown,
     )
 
 

@@ -17,7 +17,7 @@ from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.machine.condition import DEFAULT_PART
 from truepose.machine.dimensions import BY_UNIT, DIMENSIONS
-from truepose.machine.units import FileUnit, unit_of
+from truepose.machine.units import FileUnit, meant, unit_of
 from truepose.output import replacing
 
 
@@ -123,16 +123,21 @@ def _si(dimension: str) -> FileUnit:
 
 
 def _in_file(values: Floats, unit: FileUnit) -> Floats:
-    """Numbers in a file's unit which are, read back, the same in SI, where there are such."""
-    result = unit.to_file(values)
+    """Numbers in a file's unit which are, read back, the same in SI, where there are such.
+
+    Where the next double is a number of few digits, it is that one.
+    """
+    computed = unit.to_file_exactly(values)
+    result = computed
     for neighbour in (-math.inf, math.inf):
         for step in (1, 2):
-            near = unit.to_file(values)
+            near = computed
             for _ in range(step):
                 near = np.nextafter(near, neighbour)
             result = np.where(unit.to_si(result) == values, result, near)
-    closest = unit.to_file(values)
-    return np.where(unit.to_si(result) == values, result, closest)
+    result = np.where(unit.to_si(result) == values, result, computed)
+    few = meant(result)
+    return np.where(np.abs(few - result) <= np.spacing(np.abs(result)), few, result)
 
 
 class _Columns:

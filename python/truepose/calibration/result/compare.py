@@ -29,6 +29,7 @@ from truepose.calibration.result.bands import known
 from truepose.calibration.result.directions import deviation_of, directions, tilted, turned
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
+from truepose.machine.shown_units import Shown, ShownUnits
 from truepose.sources._base import Floats
 from truepose.sources.quantiles import normal_quantile
 
@@ -319,7 +320,7 @@ def _dataset(
         "poses_used": len(indices),
         "poses_left_out": len(numbers),
     }
-    dataset.attrs["verdict"] = verdict(dataset)
+    dataset.attrs["verdict"] = verdict(dataset, old.shown)
     return dataset
 
 
@@ -350,7 +351,7 @@ def _provenance(which: str, machine: Machine) -> dict[str, str]:
     }
 
 
-def verdict(found: xr.Dataset) -> str:
+def verdict(found: xr.Dataset, units: ShownUnits) -> str:
     """One sentence on what `compare` found, for people."""
     if not found.attrs["changed"]:
         normalised = np.abs(found["normalised_difference"].values)
@@ -360,9 +361,9 @@ def verdict(found: xr.Dataset) -> str:
         name = str(found["parameter"].values[largest])
         return (
             f"No change beyond uncertainty: {name} differs most, by {normalised[largest]:.2g} "
-            f"standard uncertainties; {_allowed(found)}."
+            f"standard uncertainties; {_allowed(found, units)}."
         )
-    tool = _at_tool(found)
+    tool = _at_tool(found, units)
     each = found["parameter_changed"].values
     if not each.any():
         return (
@@ -377,7 +378,7 @@ def verdict(found: xr.Dataset) -> str:
             str(found["parameter"].values[at]),
             float(found["difference"].values[at]),
             float(found["standard_uncertainty"].values[at]),
-            str(found["parameter_units"].values[at]),
+            units.small(str(found["parameter_units"].values[at])),
         )
         for at in order[:_NAMED]
     ]
@@ -385,35 +386,33 @@ def verdict(found: xr.Dataset) -> str:
     return f"The machine changed: {', '.join(parts)}{more}; {tool}."
 
 
-_SHOWN = {"m": "\N{MICRO SIGN}m", "rad": "\N{MICRO SIGN}rad", "1": "ppm"}
-
-
-def _amount(name: str, value: float, deviation: float, unit: str) -> str:
-    shown = _SHOWN[unit]
+def _amount(name: str, value: float, deviation: float, unit: Shown) -> str:
     sign = "\N{PLUS-MINUS SIGN}"
-    return f"{name} by {1e6 * value:.4g} {shown} ({sign} {2e6 * deviation:.2g})"
+    change, twice = unit.per_si * value, 2.0 * unit.per_si * deviation
+    return f"{name} by {change:.4g} {unit.label} ({sign} {twice:.2g})"
 
 
-def _allowed(found: xr.Dataset) -> str:
+def _allowed(found: xr.Dataset, units: ShownUnits) -> str:
     """What the difference would do to the tool, where it is no sign of a change."""
     likely = float(found.attrs["chi_square_probability"])
     return (
-        f"taken as they are the two files differ at the tool by up to {_largest(found)}, and what "
-        "both files say of their uncertainty allows it: without a change all parameters together "
-        f"differ so much in {100.0 * likely:.3g} % of cases"
+        f"taken as they are the two files differ at the tool by up to {_largest(found, units)}, "
+        "and what both files say of their uncertainty allows it: without a change all parameters "
+        f"together differ so much in {100.0 * likely:.3g} % of cases"
     )
 
 
-def _at_tool(found: xr.Dataset) -> str:
+def _at_tool(found: xr.Dataset, units: ShownUnits) -> str:
     verb = "moves" if found["quantity"].values[0] == "position" else "turns"
-    return f"the tool {verb} by up to {_largest(found)}"
+    return f"the tool {verb} by up to {_largest(found, units)}"
 
 
-def _largest(found: xr.Dataset) -> str:
+def _largest(found: xr.Dataset, units: ShownUnits) -> str:
     """What the difference does to the tool at the worst pose: a size, (its uncertainty, k = 2)."""
-    shown = _SHOWN[_QUANTITIES[str(found["quantity"].values[0])]]
+    unit = units.error(str(found["quantity"].values[0]))
     sizes = found["moved"].values[:, 0]
     at = int(sizes.argmax())
     deviation = float(found["moved_uncertainty"].values[at, 0])
     sign = "\N{PLUS-MINUS SIGN}"
-    return f"{1e6 * sizes[at]:.4g} {shown} ({sign} {2e6 * deviation:.2g}, k = 2)"
+    size, twice = unit.per_si * sizes[at], 2.0 * unit.per_si * deviation
+    return f"{size:.4g} {unit.label} ({sign} {twice:.2g}, k = 2)"

@@ -133,8 +133,9 @@ def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
     return [
         f"the uncertainty of what was found of {names} is not in this file, which has no place for "
         f"it: by the rest of what was found the tool's {what} at the worst pose is known to "
-        f"{words.quantity(without, unit)}, with it, at this file's temperatures and loads, to "
-        f"{words.quantity(with_them, unit)}"
+        f"{words.quantity(without, unit, units=machine.shown)}, with it, at this file's "
+        "temperatures and loads, to "
+        f"{words.quantity(with_them, unit, units=machine.shown)}"
     ]
 
 

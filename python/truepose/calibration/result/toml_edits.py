@@ -21,7 +21,7 @@ from truepose.machine.each import share_each
 from truepose.machine.settings import apply
 from truepose.machine.tables import owners
 from truepose.machine.text_file import FileKind, read_text
-from truepose.machine.units import UnitSystem
+from truepose.machine.units import UnitSystem, meant
 from truepose.sources import REGISTRY
 from truepose.sources._base import Floats
 
@@ -76,10 +76,10 @@ class MachineText:
         """Write a direction (3,), plain numbers."""
         row = self._row(table, part)
         if isinstance(row.get(key), Array):
-            for at, component in enumerate(axis):
+            for at, component in enumerate(meant(axis)):
                 row[key][at] = float(component)
         else:
-            row[key] = [float(component) for component in axis]
+            row[key] = [float(component) for component in meant(axis)]
 
     def set_property(self, path: str, dimension: str, value: float) -> None:
         """Write a property of a part, such as `strut.1.expansion`, SI."""
@@ -213,7 +213,7 @@ class MachineText:
     def _written(self, value: float, dimension: str, old: Any) -> float | str:
         """An SI value as the file writes such: with the unit of the `old` one, or the declared.
 
-        Of the numbers next to it the one that is read nearest.
+        Of the numbers next to it the one of few digits, else the one that is read nearest.
         """
         unit = None
         match = _NUMBER_AND_UNIT.match(old) if isinstance(old, str) else None
@@ -229,9 +229,12 @@ class MachineText:
         scale = self._units.read(form(1.0), dimension)
         start = value / scale
         near = [start, math.nextafter(start, math.inf), math.nextafter(start, -math.inf)]
-        return form(
-            min(near, key=lambda each: abs(self._units.read(form(each), dimension) - value))
-        )
+
+        def off(number: float) -> float:
+            return abs(self._units.read(form(number), dimension) - value)
+
+        few = float(meant(start))
+        return form(few if few in near else min(near, key=off))
 
 
 def _place(name: str) -> tuple[str, str, str, str | None]:

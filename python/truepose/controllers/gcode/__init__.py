@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from truepose.controllers.gcode._refusals import NoBetter
 from truepose.controllers.gcode.correct import correct_program
 from truepose.controllers.gcode.proof import Errors, Proof, Worst
+from truepose.controllers.gcode.tolerance import Tolerance
 
-__all__ = ["Errors", "Proof", "Worst", "correct_program"]
+__all__ = ["Errors", "NoBetter", "Proof", "Tolerance", "Worst", "correct_program"]

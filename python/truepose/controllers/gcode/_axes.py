@@ -55,8 +55,13 @@ class Axes:
         return turned
 
     def in_words(self, pose: Floats) -> str:
-        """A pose (n_commanded,), SI, as a program has it: "X200 Y100", machine coordinates."""
+        """A pose (n_commanded,), SI, as a program has it: "X200 Y100", machine coordinates.
+
+        Lengths in mm or, of a machine file in inches, in inches; angles in degrees.
+        """
         values = pose / self.scale
+        inches = MILLIMETRE * self.machine.shown.length.per_si
+        values = np.where(self._angles, values, values * inches)
         return " ".join(f"{n}{v:.6g}" for n, v in zip(self.names, values, strict=True))
 
     def home(self) -> dict[str, float]:

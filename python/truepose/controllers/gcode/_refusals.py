@@ -9,7 +9,7 @@ import numpy as np
 from truepose.budget.poses import faults_text
 from truepose.controllers.gcode._axes import AXES, Axes
 from truepose.controllers.gcode.division import TOO_SHORT, CannotCorrect, Limits, Moves
-from truepose.controllers.gcode.proof import Proof
+from truepose.controllers.gcode.proof import Proof, sizes
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 
@@ -24,7 +24,7 @@ def of_move(
     at = axes.in_words(failure.pose)
     if failure.status == TOO_SHORT:
         if np.isfinite(failure.off):
-            found = f"{failure.off * 1e6:.3g} µm off"
+            found = f"{machine.shown.small_length.text(failure.off)} off"
         else:
             found = "a way between two blocks that leaves what the machine can be commanded to,"
         return _refusal(
@@ -32,8 +32,9 @@ def of_move(
             "this move cannot be divided so that the tool stays on its path",
             file,
             line,
-            found=f"{found} in a piece of less than {2e3 * limits.least:g} mm, near {at}",
-            expected=f"within {limits.chord * 1e6:g} µm",
+            found=f"{found} in a piece of less than "
+            f"{machine.shown.length.text(2.0 * limits.least)}, near {at}",
+            expected=f"within {machine.shown.small_length.text(limits.chord)}",
             hint="allow more with --tolerance; a jump like that is what play makes where the load "
             "of a drive or strut changes its sign",
         )
@@ -86,17 +87,48 @@ def of_uncommanded_axis(axes: Axes, moves: Moves, file: Path) -> RequestError | 
     )
 
 
-def of_proof(proof: Proof, worst: float, line: int) -> RequestError:
+def of_proof(machine: Machine, proof: Proof, worst: float, line: int) -> RequestError:
     """The refusal of a corrected program that does not keep what it should."""
+    shown = machine.shown.small_length
     return _refusal(
         "gcode-proof",
         "the corrected program, read back, does not keep the tolerance; it is not written",
         Path(proof.source),
         line,
-        found=f"{worst * 1e6:.3g} µm",
-        expected=f"at most {proof.tolerance * 1e6:g} µm",
+        found=shown.text(worst),
+        expected=f"at most {shown.text(proof.tolerance)}",
         hint="give more --digits, or allow more with --tolerance",
     )
+
+
+class NoBetter(RequestError):  # noqa: N818 - a no with its reason
+    """A corrected program that is no better than the program was, with its `proof`."""
+
+    def __init__(self, machine: Machine, proof: Proof) -> None:
+        length, shown = machine.characteristic_length, machine.shown.small_length
+        pairs = (
+            (kind, old, new)
+            for kind, old, new in zip(
+                ("position", "orientation"),
+                sizes(proof.before, length),
+                sizes(proof.after, length),
+                strict=True,
+            )
+            if old is not None and new is not None
+        )
+        kind, old, new = max(pairs, key=lambda pair: pair[2] - pair[1])
+        where = f", {kind} times the characteristic length" if kind == "orientation" else ""
+        super().__init__(
+            Problem(
+                "gcode-no-better",
+                "the corrected program is no better than the program; it is not written",
+                file=proof.source,
+                found=f"{shown.text(new)} after, {shown.text(old)} before{where}",
+                expected="a smaller error after than before",
+                hint="give a smaller --tolerance or more --digits; --force writes it all the same",
+            )
+        )
+        self.proof = proof
 
 
 def _refusal(
@@ -122,4 +154,4 @@ def of_start(machine: Machine, axes: Axes, failure: CannotCorrect) -> RequestErr
     )
 
 
-__all__ = ["of_move", "of_proof", "of_start", "of_uncommanded_axis"]
+__all__ = ["NoBetter", "of_move", "of_proof", "of_start", "of_uncommanded_axis"]

@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -33,7 +33,8 @@ from truepose.controllers.gcode.division import (
     Moves,
     Stand,
 )
-from truepose.controllers.gcode.proof import Proof, Proving
+from truepose.controllers.gcode.proof import Proof, Proving, improves
+from truepose.controllers.gcode.tolerance import MOST, Tolerance, least_of, tolerance_for
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.machine.suggestion import one_of
@@ -42,8 +43,11 @@ from truepose.output import replacing, require_writable
 BATCH = 8192
 """Moves worked on at a time."""
 
-TOLERANCE = 5e-6
-"""m: how far the tool may leave the programmed path between two written blocks."""
+LOOKED_THROUGH = 1 << 15
+"""Moves of a program from which the tolerance follows: reading a long one twice takes its time.
+
+Later moves may be off by more, which makes the tolerance smaller than it need be.
+"""
 
 LEAST_PIECE = 1e-5
 """m: the shortest piece into which a move is divided."""
@@ -71,15 +75,23 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class _Options:
-    """What was asked, checked; coordinates by the axes' letters, mm and degrees."""
+    """What was asked, checked; coordinates by the axes' letters, mm and degrees.
 
-    limits: Limits
+    `tolerance`, m; None: it follows from the error before.
+    """
+
+    tolerance: float | None
+    interpolation: Interpolation
     digits: int
     axes: str
     units: str | None
     start: dict[str, float]
     offsets: dict[str, dict[str, float]]
     block_delete: bool | None
+
+    def limits(self, tolerance: float) -> Limits:
+        """What the division must hold."""
+        return Limits(tolerance, min(LEAST_PIECE, tolerance), self.interpolation)
 
     def corrector(self, program: Path, target: Path) -> _kernel.GcodeCorrector:
         """What reads a program and writes it anew."""
@@ -112,29 +124,33 @@ def correct_program(
     target: str | PathLike[str],
     condition: Condition | None = None,
     *,
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
     interpolation: str = "either",
     units: str | None = None,
     start: Positions | None = None,
     offsets: Mapping[str, Positions] | None = None,
     block_delete: bool | None = None,
     digits: int = DIGITS,
+    force: bool = False,
     progress: Progress | None = None,
 ) -> Proof:
     """Write the program `source` anew, corrected for the machine in `condition`, as `target`.
 
     `tolerance`, m: how far the tool may be off the programmed path; an angle counts times the
-    characteristic length. `interpolation`: "pose" where the controller solves its nominal inverse
-    all along a block, "either" where it may also drive its joints straight to the block's end.
-    `units`: "mm" or "inch" before G20 or G21. `start`: where the machine stands at first, by axis,
-    m and rad, machine coordinates; default home. `offsets` of "G54" to "G59.3" likewise.
-    `block_delete`: whether lines that begin with / are left out. `digits`: decimals of mm and
-    degrees. `progress` is called with lines done, and 0 for their unknown number in all.
+    characteristic length. Default: a share of the error before, as `Proof.tolerance_from` says,
+    at most 5 µm. `interpolation`: "pose" where the controller solves its nominal inverse all along
+    a block, "either" where it may also drive its joints straight to the block's end. `units`: "mm"
+    or "inch" before G20 or G21. `start`: where the machine stands at first, by axis, m and rad,
+    machine coordinates; default home. `offsets` of "G54" to "G59.3" likewise. `block_delete`:
+    whether lines that begin with / are left out. `digits`: decimals of mm and degrees. `force`:
+    write even what is no better than the program was. `progress` is called with lines done, and 0
+    for their unknown number in all.
 
     What was written is read back and proven before it gets its name: see `Proof`. Raises
-    `RequestError`: the program's problems with file, line and column (gcode-...), bad-correction
-    for an option, no-source, output-not-writable, output-is-input; `TrueposeError` as
-    `truepose.budget`.
+    `NoBetter`, a `RequestError` with that proof, where the error after is not less than the one
+    before (gcode-no-better); nothing is written then. Raises `RequestError`: the program's problems
+    with file, line and column (gcode-...), bad-correction for an option, no-source,
+    output-not-writable, output-is-input; `TrueposeError` as `truepose.budget`.
     """
     program, written = Path(source), Path(target)
     axes = Axes(machine)
@@ -142,21 +158,50 @@ def correct_program(
     _require_files(program, written)
     given = machine.condition if condition is None else condition
     required_sources(machine, given)
-    division = Division(ActualMachine(machine, given), axes, options.limits)
+    actual = ActualMachine(machine, given)
+    with _problems_of(program):
+        allowed = _tolerance(actual, axes, program, options)
+    division = Division(actual, axes, options.limits(allowed.value))
     with replacing(written) as temporary, _problems_of(program):
-        session = _Session(division, program, temporary, options)
-        return session.run(written, progress)
+        session = _Session(division, program, temporary, options, allowed)
+        proof = session.run(written, progress)
+        if not (proof.improves or force):
+            raise _refusals.NoBetter(machine, proof)
+        return proof
+
+
+def _tolerance(actual: ActualMachine, axes: Axes, program: Path, options: _Options) -> Tolerance:
+    """The tolerance that was asked for, or the one that follows from the error before."""
+    if options.tolerance is not None:
+        return Tolerance(options.tolerance, "asked")
+    reader = options.reader(program)
+
+    def batches() -> Iterator[Moves]:
+        # What cannot be read is refused in the order of lines where the program is corrected.
+        with suppress(_kernel.GcodeError):
+            left = LOOKED_THROUGH
+            while left > 0 and (moves := _moves_of(reader.read(min(BATCH, left)))):
+                left -= len(moves.line)
+                yield moves
+
+    return tolerance_for(Division(actual, axes, options.limits(MOST)), batches(), options.digits)
 
 
 class _Session:
     """One program on its way through division, writing and proof."""
 
     def __init__(
-        self, division: Division, program: Path, temporary: Path, options: _Options
+        self,
+        division: Division,
+        program: Path,
+        temporary: Path,
+        options: _Options,
+        allowed: Tolerance,
     ) -> None:
         self._division = division
         self._program = program
         self._options = options
+        self._allowed = allowed
         self._reader = options.reader(program)
         self._writing = _Writing(division, program, temporary, options)
 
@@ -212,15 +257,19 @@ class _Session:
 
     def _proof(self, target: Path, moves: int, approach: int | None) -> Proof:
         """The proof of what is written; `RequestError` (gcode-proof) if it breaks its promise."""
-        machine, limits = self._division.actual.machine, self._options.limits
+        machine, limits = self._division.actual.machine, self._division.limits
         proving = self._writing.proving
         before, after = proving.errors()
+        length = machine.characteristic_length
+        least = least_of(self._division, self._options.digits)
         proof = Proof(
             machine=machine.name,
             source=str(self._program),
             target=str(target),
             commanded=machine.commanded,
             tolerance=limits.chord,
+            tolerance_from=self._allowed,
+            improves=improves(before, after, length, least),
             interpolation=limits.interpolation,
             start=self._options.start,
             approach=approach,
@@ -230,10 +279,9 @@ class _Session:
             before=before,
             after=after,
         )
-        length = machine.characteristic_length
         for worst, unit in ((after.position, 1.0), (after.orientation, length)):
             if worst is not None and not worst.value * unit <= limits.chord:
-                raise _refusals.of_proof(proof, worst.value * unit, worst.line)
+                raise _refusals.of_proof(machine, proof, worst.value * unit, worst.line)
         return proof
 
 
@@ -360,7 +408,7 @@ def _file_problem(
 
 def _options(
     axes: Axes,
-    tolerance: float,
+    tolerance: float | None,
     interpolation: str,
     units: str | None,
     start: Positions | None,
@@ -381,7 +429,7 @@ def _options(
             )
         )
 
-    if not (np.isfinite(tolerance) and tolerance > 0.0):
+    if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0.0):
         refuse("tolerance", tolerance, "a length above zero, m")
     if interpolation not in get_args(Interpolation):
         refuse("interpolation", interpolation, one_of(get_args(Interpolation)))
@@ -400,7 +448,8 @@ def _options(
     if problems:
         raise RequestError(*problems)
     return _Options(
-        Limits(tolerance, min(LEAST_PIECE, tolerance), cast("Interpolation", interpolation)),
+        tolerance,
+        cast("Interpolation", interpolation),
         digits,
         axes.names,
         units,
@@ -426,4 +475,4 @@ def _named(
     return found
 
 
-__all__ = ["SYSTEMS", "TOLERANCE", "Positions", "correct_program"]
+__all__ = ["SYSTEMS", "Positions", "correct_program"]

@@ -20,6 +20,7 @@ import numpy as np
 
 from truepose.controllers.gcode._measure import Measure
 from truepose.controllers.gcode.division import Divided, Division, Moves, Points
+from truepose.controllers.gcode.tolerance import UNFELT, Tolerance
 from truepose.sources._base import Floats
 
 
@@ -53,8 +54,9 @@ class Proof:
     """What a corrected program is worth.
 
     `before`, `after`: errors of the program as it was, and as it was written, in the actual
-    machine. `moves` of the program, `blocks` written for them, `points` compared. `tolerance`, m,
-    and `interpolation` for which it holds. `approach`: the line of the first block, or None; it
+    machine; `improves`: whether it became better. `moves` of the program, `blocks` written for
+    them, `points` compared. `tolerance`, m, where that is from, and `interpolation` for which it
+    holds. `approach`: the line of the first block, or None; it
     begins where the machine is not corrected, and its path counts from its end on.
     """
 
@@ -63,6 +65,7 @@ class Proof:
     target: str
     commanded: tuple[str, ...]
     tolerance: float
+    tolerance_from: Tolerance
     interpolation: str
     start: dict[str, float]
     approach: int | None
@@ -71,6 +74,37 @@ class Proof:
     points: int
     before: Errors
     after: Errors
+    improves: bool
+
+
+def sizes(errors: Errors, length: float) -> tuple[float | None, float | None]:
+    """The largest position error and the largest angle times `length`, both m."""
+    position, turned = errors.position, errors.orientation
+    return (
+        None if position is None else position.value,
+        None if turned is None else turned.value * length,
+    )
+
+
+def improves(before: Errors, after: Errors, length: float, least: float) -> bool:
+    """Whether a program is better than it was, an angle counting times `length`, m.
+
+    The larger of both kinds of error must become smaller, and neither may grow beyond `UNFELT` of
+    the larger one before, or beyond `least`, m, which the written digits make by themselves. A
+    program that moves nothing is as good as it can be.
+    """
+    pairs = [
+        (old, new)
+        for old, new in zip(sizes(before, length), sizes(after, length), strict=True)
+        if old is not None and new is not None
+    ]
+    if not pairs:
+        return True
+    largest = max(old for old, _ in pairs)
+    unfelt = max(UNFELT * largest, least)
+    if any(new >= old and new > unfelt for old, new in pairs):
+        return False
+    return max(new for _, new in pairs) < largest
 
 
 @dataclass
@@ -182,4 +216,4 @@ class Proving:
         return self._before.errors(self._measure), self._after.errors(self._measure)
 
 
-__all__ = ["Errors", "Proof", "Proving", "Worst"]
+__all__ = ["Errors", "Proof", "Proving", "Worst", "improves", "sizes"]

@@ -316,9 +316,12 @@ def _both(machine: Machine, judged: Judged | Commandable) -> str:
 
 
 def _words(machine: Machine, found: Extent, unit: str) -> str:
+    shown = machine.shown.small(unit)
+    places = 2 if shown.per_si >= 1e6 else 4
+    highest, rms = (f"{v * shown.per_si:.{places}f}" for v in (found.highest, found.rms))
     return (
-        f"at most {found.highest * 1e6:.2f} µ{unit} (at {pose_in_words(machine, found.at)}), "
-        f"rms {found.rms * 1e6:.2f} µ{unit}"
+        f"at most {highest} {shown.label} (at {pose_in_words(machine, found.at)}), "
+        f"rms {rms} {shown.label}"
     )
 
 

@@ -10,7 +10,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from truepose.report.display import is_position, pose_unit, shown_poses
+from truepose.machine.shown_units import ShownUnits
+from truepose.report.display import is_position
 from truepose.report.figures._style import small
 
 Array = NDArray[np.float64]
@@ -25,16 +26,18 @@ class Places:
     """
 
     axes: tuple[str, ...]
+    units: tuple[str, ...]
     points: Array
     of_pose: NDArray[np.intp]
 
 
-def places_of(given: Array, names: Sequence[str]) -> Places:
+def places_of(given: Array, names: Sequence[str], units: ShownUnits) -> Places:
     """The coordinates that vary of poses (n, n_coordinate), m and rad.
 
     Positions first, at most three; at least two for a plane.
     """
-    poses = shown_poses(given, names)
+    labels = [units.pose(name).label for name in names]
+    poses = given * np.array([units.pose(name).per_si for name in names])
     varying = [index for index in range(len(names)) if np.ptp(poses[:, index]) > 0]
     positions = [index for index in range(len(names)) if is_position(names[index])]
     moving = [index for index in positions if index in varying]
@@ -42,14 +45,20 @@ def places_of(given: Array, names: Sequence[str]) -> Places:
     spare = [index for index in [*varying, *positions, *range(len(names))] if index not in moving]
     chosen = (moving + list(dict.fromkeys(spare))[: max(0, 2 - len(moving))])[:3]
     points, of_pose = np.unique(poses[:, sorted(chosen)], axis=0, return_inverse=True)
-    return Places(tuple(names[index] for index in sorted(chosen)), points, of_pose.reshape(-1))
+    at = sorted(chosen)
+    return Places(
+        tuple(names[index] for index in at),
+        tuple(labels[index] for index in at),
+        points,
+        of_pose.reshape(-1),
+    )
 
 
 def map_trace(
     places: Places,
     drawn: NDArray[np.intp],
     sizes: Array,
-    unit: str = "µm",
+    unit: str,
     scale: str = "coloraxis",
 ) -> go.Scatter | go.Heatmap:
     """Squares of a full grid in a plane as a heat map, anything else as coloured points.
@@ -97,8 +106,8 @@ def map_trace(
 
 def label_map_axes(figure: go.Figure, places: Places, n_map: int) -> None:
     """Names and looks of the axes of `n_map` maps, alone in their figure."""
-    labels = [f"{name}, {pose_unit(name)}" for name in places.axes]
-    same_unit = len({pose_unit(name) for name in places.axes}) == 1
+    labels = [f"{name}, {unit}" for name, unit in zip(places.axes, places.units, strict=True)]
+    same_unit = len(set(places.units)) == 1
     if len(places.axes) == 2:
         figure.update_xaxes(title_text=labels[0], constrain="domain", showgrid=False)
         figure.update_yaxes(title_text=labels[1], showgrid=False)

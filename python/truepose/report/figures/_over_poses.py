@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from truepose.report.display import error_unit, pose_text
+from truepose.report.display import pose_text
 from truepose.report.figures._style import finish
 from truepose.report.study import Study
 
@@ -51,7 +51,7 @@ def finish_panels(figure: go.Figure, study: Study) -> go.Figure:
     figure.update_xaxes(range=[first - margin, last + margin], zeroline=False)
     for component, name in enumerate(study.components):
         at = place(study, component)
-        figure.update_yaxes(title_text=f"error in {name}, {error_unit(name)}", **at)
+        figure.update_yaxes(title_text=f"error in {name}, {study.units.error(name).label}", **at)
         lowest = at["row"] == len(study.positions if at["col"] == 1 else study.rotations)
         if lowest:
             figure.update_xaxes(title_text="pose number", showticklabels=True, **at)
@@ -67,7 +67,9 @@ def add_pose_labels(figure: go.Figure, study: Study, drawn: NDArray[np.intp]) ->
     """Let the hover box of each panel say which pose the number stands for."""
     if len(drawn) > MOST_LABELLED:
         return  # the labels would weigh more than the lines
-    labels = [pose_text(study.poses[index], study.machine.commanded) for index in drawn]
+    labels = [
+        pose_text(study.poses[index], study.machine.commanded, study.units) for index in drawn
+    ]
     for component in range(len(study.components)):
         figure.add_trace(
             go.Scatter(

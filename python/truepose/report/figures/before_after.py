@@ -8,7 +8,6 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from truepose.report.display import MICRO
 from truepose.report.figures._over_poses import add_pose_labels, finish_panels, panels, place
 from truepose.report.figures._style import AFTER, BEFORE, drawn_poses, small, thinning_note
 from truepose.report.study import Study
@@ -33,7 +32,7 @@ def caption(study: Study) -> str:
 
 
 def figure(study: Study) -> go.Figure:
-    """One panel for each component: band and middle before and after, µm and µrad."""
+    """One panel for each component: band and middle before and after."""
     drawn = drawn_poses(study.position_norm(study.overall_worst))
     figure = panels(study)
     states = (
@@ -51,7 +50,7 @@ def figure(study: Study) -> go.Figure:
         ),
     )
     for name, colour, fill, errors in states:
-        edges = [values[drawn] * MICRO for values in errors]
+        edges = [study.shown(values[drawn]) for values in errors]
         for component in range(len(study.components)):
             lower, upper, middle = (edge[:, component] for edge in edges)
             common: dict[str, Any] = {"x": study.numbers[drawn], "legendgroup": name}

@@ -33,7 +33,8 @@ def figure(study: Study) -> go.Figure:
     """Two maps over the measured poses, each with its own scale."""
     found = study.calibrated
     names = study.machine.commanded
-    places = places_of(np.stack([found[f"row_{name}"].values for name in names], axis=-1), names)
+    poses = np.stack([found[f"row_{name}"].values for name in names], axis=-1)
+    places = places_of(poses, names, study.units)
     kinds = [("before", "normalised_before"), ("after", "normalised_after")]
     spatial = len(places.axes) == 3
     figure = make_subplots(

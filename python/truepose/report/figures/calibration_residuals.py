@@ -7,15 +7,14 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from truepose.calibration.identification.robust import OUTLIER
-from truepose.report.display import MICRO, Array
+from truepose.machine.shown_units import Shown
+from truepose.report.display import Array
 from truepose.report.figures._style import AFTER, BEFORE, OVERALL, finish, small
 from truepose.report.study import Study
 
 TITLE = "Residuals"
 NEEDS = "calibration"
 
-SHOWN = {"m": (MICRO, "µm"), "rad": (MICRO, "µrad"), "1": (1.0, "1")}
-"""SI unit of a reading -> factor and unit for people."""
 PANEL_HEIGHT = 270
 COVERAGE = 2.0
 """Standard uncertainties within which 95 of 100 readings should be."""
@@ -57,7 +56,8 @@ def figure(study: Study) -> go.Figure:
     sigma = found["uncertainty"].values
     for number, unit in enumerate(units):
         mine = found["observation_units"].values == unit
-        factor, shown = SHOWN[unit]
+        scale = Shown("1", 1.0) if unit == "1" else study.units.small(unit)
+        factor, shown = scale.per_si, scale.label
         sets = {
             name: (found[name].values * (sigma if normalised else 1.0))[mine] * factor
             for name, normalised in (

@@ -6,7 +6,6 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from truepose.report.display import MICRO
 from truepose.report.figures._maps import label_map_axes, map_trace, places_of
 from truepose.report.figures._style import COLOUR_SCALE, finish
 from truepose.report.study import Study
@@ -42,7 +41,9 @@ def figure(study: Study) -> go.Figure:
     """Two maps over the workspace, each with its own scale."""
     found = study.calibrated
     names = study.machine.commanded
-    places = places_of(np.stack([found[f"pose_{name}"].values for name in names], axis=-1), names)
+    places = places_of(
+        np.stack([found[f"pose_{name}"].values for name in names], axis=-1), names, study.units
+    )
     kinds = [when for when in ("before", "after") if np.isfinite(_sizes(study, when)).any()]
     spatial = len(places.axes) == 3
     figure = make_subplots(
@@ -53,7 +54,7 @@ def figure(study: Study) -> go.Figure:
         horizontal_spacing=GAP,
     )
     finish(figure, HEIGHT, margin=_MARGINS[spatial])
-    unit = "µm" if _quantity(study) == "position" else "µrad"
+    unit = study.units.error(_quantity(study)).label
     for number, when in enumerate(kinds):
         sizes = np.full(len(places.points), np.nan)
         at_poses = _sizes(study, when)
@@ -86,6 +87,6 @@ def _quantity(study: Study) -> str:
 
 
 def _sizes(study: Study, when: str) -> np.ndarray:
-    """(n_pose,) µm or µrad."""
-    sizes: np.ndarray = study.calibrated[f"tool_size_{when}"].values[:, 0] * MICRO
-    return sizes
+    """(n_pose,) in the unit for people."""
+    sizes: np.ndarray = study.calibrated[f"tool_size_{when}"].values[:, 0]
+    return sizes * study.units.error(_quantity(study)).per_si

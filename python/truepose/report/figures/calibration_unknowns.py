@@ -67,7 +67,11 @@ def figure(study: Study) -> go.Figure:
                 "type": "data", "array": small(2.0 * spread[drawn]), "thickness": 1.2, "width": 3
             },
             text=[
-                signed(float(found["value"].values[at]), str(found["unknown_units"].values[at]))
+                signed(
+                    float(found["value"].values[at]),
+                    str(found["unknown_units"].values[at]),
+                    study.units,
+                )
                 for at in drawn
             ],
             name="change found",

@@ -10,7 +10,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from truepose.report.display import MICRO, MILLI, Array, is_position
+from truepose.machine.shown_units import ShownUnits
+from truepose.report.display import Array, is_position
 from truepose.report.figures._style import INK, finish, small, source_colour
 from truepose.report.reading import percent_text
 from truepose.report.study import Study
@@ -64,7 +65,7 @@ def caption(study: Study) -> str:
 
 
 def figure(study: Study) -> go.Figure:
-    """One panel for each pair of axes, mm, equal scale on both."""
+    """One panel for each pair of axes, equal scale on both."""
     found = study.ellipses
     assert found is not None
     names = [str(name) for name in found["axis"].values]
@@ -76,12 +77,13 @@ def figure(study: Study) -> go.Figure:
         for nth, pose in enumerate(panel.poses):
             centre, outline = ellipse(found, pose, panel.axes)
             place = panel.places[nth]
-            _draw(figure, place, centre, outline, times, at, first=at == 1 and nth == 0)
+            first = at == 1 and nth == 0
+            _draw(figure, place, centre, outline, times, at, study.units, first=first)
             drawn.append(place + times * (centre + outline))
-        ranges = _ranges(np.concatenate(drawn))
+        ranges = _ranges(np.concatenate(drawn), study.units)
         where = {"row": 1, "col": at}
         figure.update_xaxes(
-            title_text=f"{names[panel.axes[0]]}, mm",
+            title_text=f"{names[panel.axes[0]]}, {study.units.length.label}",
             range=ranges[0],
             zeroline=False,
             constrain="domain",
@@ -90,7 +92,7 @@ def figure(study: Study) -> go.Figure:
             **where,
         )
         figure.update_yaxes(
-            title_text=f"{names[panel.axes[1]]}, mm",
+            title_text=f"{names[panel.axes[1]]}, {study.units.length.label}",
             range=ranges[1],
             zeroline=False,
             scaleanchor=f"x{at if at > 1 else ''}",
@@ -103,9 +105,9 @@ def figure(study: Study) -> go.Figure:
     return figure
 
 
-def _ranges(points: Array) -> list[list[float]]:
-    """Ends of both axes, mm, that leave some room about all points (n, 2), m."""
-    low, high = points.min(axis=0) * MILLI, points.max(axis=0) * MILLI
+def _ranges(points: Array, units: ShownUnits) -> list[list[float]]:
+    """Ends of both axes, for people, that leave some room about all points (n, 2), m."""
+    low, high = (end(axis=0) * units.length.per_si for end in (points.min, points.max))
     room = 0.05 * float((high - low).max()) or 1.0
     return [[float(a - room), float(b + room)] for a, b in zip(low, high, strict=True)]
 
@@ -198,15 +200,17 @@ def _draw(
     outline: Array,
     times: float,
     column: int,
+    units: ShownUnits,
     *,
     first: bool,
 ) -> None:
     """One ellipse about its centre, and the line to it from the commanded place."""
     panel = {"row": 1, "col": column}
     mean = place + times * centre
-    around = (mean + times * outline) * MILLI
-    size = np.linalg.norm(outline, axis=1).max() * MICRO
-    off = np.linalg.norm(centre) * MICRO
+    coarse, fine = units.length.per_si, units.small_length
+    around = (mean + times * outline) * coarse
+    size = np.linalg.norm(outline, axis=1).max() * fine.per_si
+    off = np.linalg.norm(centre) * fine.per_si
     figure.add_trace(
         go.Scatter(
             x=small(around[:, 0]),
@@ -219,15 +223,15 @@ def _draw(
             legendgroup="ellipse",
             showlegend=first,
             hoveron="fills",
-            text=f"half length {size:.3g} µm, centre {off:.3g} µm off",
+            text=f"half length {size:.3g} {fine.label}, centre {off:.3g} {fine.label} off",
             hoverinfo="text",
         ),
         **panel,
     )
     figure.add_trace(
         go.Scatter(
-            x=small(np.array([place[0], mean[0]]) * MILLI),
-            y=small(np.array([place[1], mean[1]]) * MILLI),
+            x=small(np.array([place[0], mean[0]]) * coarse),
+            y=small(np.array([place[1], mean[1]]) * coarse),
             mode="lines+markers",
             line={"color": source_colour(1), "width": 1.5},
             marker={"color": [INK, source_colour(1)], "size": [6, 4]},

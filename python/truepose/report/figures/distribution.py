@@ -7,9 +7,9 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from truepose.report.display import MICRO, MISSING, ROUNDING, Array, number
+from truepose.report.display import MISSING, ROUNDING, Array, number
 from truepose.report.figures._style import GRID, INK, OVERALL, finish, small, source_colour
-from truepose.report.reading import at_text, percent_text, quantities, unit_of, worst_pose
+from truepose.report.reading import at_text, percent_text, quantities, worst_pose
 from truepose.report.study import Study
 
 TITLE = "How the error is distributed"
@@ -38,7 +38,7 @@ def caption(study: Study) -> str:
 
 
 def figure(study: Study) -> go.Figure:
-    """One panel for each component and magnitude: share of the samples, % a bar, over µm, µrad."""
+    """One panel for each component and magnitude: share of the samples, % a bar."""
     found = study.monte_carlo
     assert found is not None
     pose = worst_pose(found, "magnitude_upper")
@@ -56,9 +56,11 @@ def figure(study: Study) -> go.Figure:
         for at, name in enumerate(names, start=1):
             panel = {"row": row, "col": at}
             values, interval, mean = _of(study, name, pose)
-            _draw(figure, levels, values * MICRO, interval * MICRO, mean * MICRO, panel)
+            unit = study.units.error(name)
+            per_si = unit.per_si
+            _draw(figure, levels, values * per_si, interval * per_si, mean * per_si, panel)
             title = f"|{name}|" if name in quantities(found) else f"error in {name}"
-            figure.update_xaxes(title_text=f"{title}, {unit_of(name)}", zeroline=False, **panel)
+            figure.update_xaxes(title_text=f"{title}, {unit.label}", zeroline=False, **panel)
             if at == 1:
                 figure.update_yaxes(title_text="samples, %", **panel)
     _add_legend(figure, percent_text(float(found.attrs["probability"])))

@@ -7,14 +7,13 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from truepose.report.display import MICRO, error_unit, pose_text
+from truepose.report.display import pose_text
 from truepose.report.figures._style import MOST_DRAWN, finish, small, source_colour
 from truepose.report.study import Study
 
 TITLE = "Error over time"
 NEEDS = "over_time"
 
-KELVIN = 273.15
 PANEL_HEIGHT = 220
 SCALES = ((2 * 3600.0, 3600.0, "h"), (300.0, 60.0, "min"), (0.0, 1.0, "s"))
 """(shortest span in s, seconds, unit) of the time axis."""
@@ -36,7 +35,7 @@ def caption(study: Study) -> str:
 
 
 def figure(study: Study) -> go.Figure:
-    """One panel for each error component, µm and µrad, and one for the temperatures, °C."""
+    """One panel for each error component, and one for the temperatures."""
     columns = [each for each in (study.positions, study.rotations) if each]
     rows = max(map(len, columns))
     specs: list[list[dict[str, int] | None]] = [
@@ -73,7 +72,8 @@ def _add_errors(
     figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: NDArray[np.intp]
 ) -> None:
     commanded = study.machine.commanded
-    errors = np.asarray(study.time["error"].values)[drawn] * MICRO
+    errors = np.asarray(study.time["error"].values)[drawn]
+    errors = study.shown(errors)
     for pose in range(errors.shape[1]):
         at = [float(study.time[f"pose_{name}"].values[pose]) for name in commanded]
         for column, components in enumerate(filter(None, (study.positions, study.rotations))):
@@ -82,7 +82,7 @@ def _add_errors(
                     go.Scatter(
                         x=x,
                         y=small(errors[:, pose, component]),
-                        name=pose_text(at, commanded),
+                        name=pose_text(at, commanded, study.units),
                         legendgroup=f"pose {pose}",
                         showlegend=row == column == 0,
                         mode="lines",
@@ -98,7 +98,9 @@ def _add_errors(
                 )
                 name = study.components[component]
                 figure.update_yaxes(
-                    title_text=f"error in {name}, {error_unit(name)}", row=row + 1, col=column + 1
+                    title_text=f"error in {name}, {study.units.error(name).label}",
+                    row=row + 1,
+                    col=column + 1,
                 )
 
 
@@ -106,7 +108,8 @@ def _add_temperatures(
     figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: NDArray[np.intp], row: int
 ) -> None:
     parts = [str(part) for part in study.time["part"].values]
-    temperatures = np.asarray(study.time["temperature"].values)[drawn] - KELVIN
+    temperatures = np.asarray(study.time["temperature"].values)[drawn]
+    temperatures = study.units.temperature(temperatures)
     log = study.machine.condition.temperature_log
     logged = [index for index, part in enumerate(parts) if log is not None and log.names(part)]
     # Parts that go by one column of the log, its default, are one line.
@@ -122,12 +125,12 @@ def _add_temperatures(
                 name=parts[same[0]] + more,
                 mode="lines",
                 line={"color": source_colour(number + 1), "width": 1.6},
-                hovertemplate="%{y:.2f} °C",
+                hovertemplate=f"%{{y:.2f}} {study.units.degree}",
             ),
             row=row,
             col=1,
         )
-    figure.update_yaxes(title_text="temperature, °C", row=row, col=1)
+    figure.update_yaxes(title_text=f"temperature, {study.units.degree}", row=row, col=1)
 
 
 def _drawn(study: Study) -> NDArray[np.intp]:

@@ -9,7 +9,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from truepose.report.display import MILLI, nearest_middle, pose_text
+from truepose.machine.shown_units import Shown
+from truepose.report.display import nearest_middle, pose_text
 from truepose.report.figures._outline import Outline, is_planar, outline
 from truepose.report.figures._style import INK, drawn_poses, finish, small
 from truepose.report.study import Study
@@ -22,24 +23,24 @@ GUIDEWAY, STRUT, PLATFORM, WORKSPACE = "#A8B1C0", "#0072B2", "#D55E00", "#009E73
 
 def caption(study: Study) -> str:
     """Which pose is drawn."""
-    pose = pose_text(study.poses[_shown(study)], study.machine.commanded)
+    pose = pose_text(study.poses[_shown(study)], study.machine.commanded, study.units)
     return f"Drawn to scale at {pose}, the pose of the workspace nearest its middle."
 
 
 def figure(study: Study) -> go.Figure:
-    """Guideways, struts, joints, platform and the poses evaluated, mm, equal scale on all axes."""
+    """Guideways, struts, joints, platform and the poses evaluated, equal scale on all axes."""
     machine = study.machine
     shape = outline(machine, study.poses[_shown(study)])
     drawn = drawn_poses(study.position_norm(study.overall_worst))
     workspace = machine.kernel.placement_of(study.poses[drawn])[:, :3]
-    planar = is_planar(machine)
+    planar, unit = is_planar(machine), study.units.length.label
     figure = go.Figure()
     for line in _lines(shape, workspace):
-        figure.add_trace(_trace(planar, **line))
+        figure.add_trace(_trace(planar, study.units.length, **line))
     if planar:
         finish(figure, 520)
-        figure.update_xaxes(title_text="x, mm", constrain="domain")
-        figure.update_yaxes(title_text="y, mm", scaleanchor="x", scaleratio=1)
+        figure.update_xaxes(title_text=f"x, {unit}", constrain="domain")
+        figure.update_yaxes(title_text=f"y, {unit}", scaleanchor="x", scaleratio=1)
         return figure
     axis = {"gridcolor": "#D5DBE5", "backgroundcolor": "#F6F8FB", "showbackground": True}
     return finish(
@@ -48,9 +49,9 @@ def figure(study: Study) -> go.Figure:
         margin={"l": 0, "r": 0, "t": 30, "b": 0},
         scene={
             "aspectmode": "data",
-            "xaxis": {"title": {"text": "x, mm"}, **axis},
-            "yaxis": {"title": {"text": "y, mm"}, **axis},
-            "zaxis": {"title": {"text": "z, mm"}, **axis},
+            "xaxis": {"title": {"text": f"x, {unit}"}, **axis},
+            "yaxis": {"title": {"text": f"y, {unit}"}, **axis},
+            "zaxis": {"title": {"text": f"z, {unit}"}, **axis},
             "camera": {
                 "eye": {"x": 1.4, "y": -1.9, "z": 0.75},
                 "center": {"x": 0, "y": 0, "z": -0.12},
@@ -126,12 +127,13 @@ def _joined(polylines: Iterable[Array]) -> Array:
     return np.concatenate([part for line in polylines for part in (np.asarray(line), gap)])
 
 
-def _trace(planar: bool, points: Array, **look: Any) -> go.Scatter | go.Scatter3d:
-    x, y, z = small(points * MILLI).T
+def _trace(planar: bool, unit: Shown, points: Array, **look: Any) -> go.Scatter | go.Scatter3d:
+    x, y, z = small(points * unit.per_si).T
+    places = 2 if unit.per_si > 100.0 else 4
+    names = "xy" if planar else "xyz"
+    hover = ", ".join(f"{n} %{{{n}:.{places}f}} {unit.label}" for n in names)
     if planar:
-        return go.Scatter(x=x, y=y, hovertemplate="x %{x:.2f} mm, y %{y:.2f} mm", **look)
+        return go.Scatter(x=x, y=y, hovertemplate=hover, **look)
     if "marker" in look:  # markers look larger in three dimensions
         look["marker"] = look["marker"] | {"size": max(2, look["marker"]["size"] - 3)}
-    return go.Scatter3d(
-        x=x, y=y, z=z, hovertemplate="x %{x:.2f} mm, y %{y:.2f} mm, z %{z:.2f} mm", **look
-    )
+    return go.Scatter3d(x=x, y=y, z=z, hovertemplate=hover, **look)

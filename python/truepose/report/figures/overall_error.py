@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from truepose.report.display import MICRO
 from truepose.report.figures._over_poses import (
     add_pose_labels,
     finish_panels,
@@ -35,11 +34,11 @@ def caption(study: Study) -> str:
 
 
 def figure(study: Study) -> go.Figure:
-    """One panel for each component: lower edge, shifts, upper edge, µm and µrad."""
+    """One panel for each component: lower edge, shifts, upper edge."""
     drawn = drawn_poses(study.position_norm(study.overall_worst))
     figure = panels(study)
     for variable, name, colour, dash in LINES:
-        errors = study.values(variable)[drawn] * MICRO
+        errors = study.shown(study.values(variable)[drawn])
         for component in range(len(study.components)):
             figure.add_trace(
                 go.Scatter(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from truepose.report.display import MICRO
 from truepose.report.figures._style import VERDICT_COLOURS, finish, small
 from truepose.report.study import Study
 
@@ -25,36 +24,37 @@ def caption(study: Study) -> str:
 
 
 def figure(study: Study) -> go.Figure:
-    """Horizontal bars, the largest on top: position in µm and, where it turns, angle in µrad."""
+    """Horizontal bars, the largest on top: position and, where it turns, angle."""
     asked = (study.machine.accuracy.target, study.machine.accuracy.angle_target)
-    parts = [("position", "µm", study.values("highest")[:, 0], asked[0])]
+    parts = [("position", study.units.error("position"), study.values("highest")[:, 0], asked[0])]
     if study.rotations:
-        parts.append(("orientation", "µrad", study.values("highest")[:, 1], asked[1]))
+        unit = study.units.error("orientation")
+        parts.append(("orientation", unit, study.values("highest")[:, 1], asked[1]))
     order = study.by_rank[::-1]
     verdicts = [str(study.values("verdict")[index]) for index in order]
     figure = make_subplots(rows=1, cols=len(parts), shared_yaxes=True, horizontal_spacing=0.08)
     for column, (part, unit, highest, target) in enumerate(parts, start=1):
         figure.add_trace(
             go.Bar(
-                x=small(highest[order] * MICRO),
+                x=small(highest[order] * unit.per_si),
                 y=[study.sources[index] for index in order],
                 orientation="h",
                 marker={"color": [VERDICT_COLOURS[verdict] for verdict in verdicts]},
-                text=[f"{value * MICRO:.4g}" for value in highest[order]],
+                text=[f"{value * unit.per_si:.4g}" for value in highest[order]],
                 textposition="auto",
                 customdata=verdicts,
-                hovertemplate=f"%{{y}}: %{{x:.3f}} {unit}, %{{customdata}}<extra></extra>",
+                hovertemplate=f"%{{y}}: %{{x:.3f}} {unit.label}, %{{customdata}}<extra></extra>",
                 showlegend=False,
             ),
             row=1,
             col=column,
         )
         figure.update_xaxes(
-            title_text=f"highest {part} error, {unit}", rangemode="tozero", row=1, col=column
+            title_text=f"highest {part} error, {unit.label}", rangemode="tozero", row=1, col=column
         )
         if target is not None:
             figure.add_vline(
-                x=target * MICRO, line={"color": "#1B2A41", "dash": "dash"}, row=1, col=column
+                x=target * unit.per_si, line={"color": "#1B2A41", "dash": "dash"}, row=1, col=column
             )
     for verdict in dict.fromkeys(reversed(verdicts)):
         figure.add_trace(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from truepose.report.display import MICRO
 from truepose.report.figures._over_poses import (
     add_pose_labels,
     finish_panels,
@@ -29,7 +28,7 @@ def caption(study: Study) -> str:
 
 
 def figure(study: Study) -> go.Figure:
-    """One panel for each component, one line for each source and edge, µm and µrad."""
+    """One panel for each component, one line for each source and edge."""
     drawn = drawn_poses(study.position_norm(study.overall_worst))
     figure = panels(study)
     for index, source in enumerate(study.sources):
@@ -38,7 +37,7 @@ def figure(study: Study) -> go.Figure:
         )
         for edge, dash in edges:
             name = f"error_{edge}" if edge else "error"
-            errors = study.values(name)[drawn, index] * MICRO
+            errors = study.shown(study.values(name)[drawn, index])
             for component in range(len(study.components)):
                 figure.add_trace(
                     go.Scatter(

@@ -6,10 +6,9 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from truepose.report.display import MICRO
+from truepose.report.display import is_length
 from truepose.report.figures._style import INK, finish, small
 from truepose.report.how_sure import ANSWERS, Answers, answers, lacking
-from truepose.report.reading import unit_of
 from truepose.report.study import Study
 
 TITLE = "How far off can the tool be?"
@@ -41,18 +40,19 @@ def caption(study: Study) -> str:
 
 
 def figure(study: Study) -> go.Figure:
-    """Grouped bars, one group for each component and magnitude, µm and µrad."""
+    """Grouped bars, one group for each component and magnitude."""
     found = answers(study)
     sides = [
-        [at for at, name in enumerate(found.names) if unit_of(name) == unit]
-        for unit in ("µm", "µrad")
+        [at for at, name in enumerate(found.names) if is_length(name) == length]
+        for length in (True, False)
     ]
     sides = [side for side in sides if side]
     figure = make_subplots(rows=1, cols=len(sides), horizontal_spacing=0.09)
     for column, side in enumerate(sides, start=1):
         names = [_label(found.names[at]) for at in side]
+        unit = study.units.error(found.names[side[0]])
         for kind in _there(found):
-            sizes = found.sizes[kind][side] * MICRO
+            sizes = found.sizes[kind][side] * unit.per_si
             figure.add_trace(
                 go.Bar(
                     x=names,
@@ -61,23 +61,23 @@ def figure(study: Study) -> go.Figure:
                     legendgroup=kind,
                     showlegend=column == 1,
                     marker={"color": COLOURS[kind]},
-                    hovertemplate="%{x}: %{y:.3f} " + unit_of(found.names[side[0]]),
+                    hovertemplate="%{x}: %{y:.3f} " + unit.label,
                 ),
                 row=1,
                 col=column,
             )
         figure.update_yaxes(
-            title_text=f"at most, {unit_of(found.names[side[0]])}",
+            title_text=f"at most, {unit.label}",
             rangemode="tozero",
             row=1,
             col=column,
         )
     asked = study.machine.accuracy.target
-    if asked is not None and unit_of(found.names[sides[0][0]]) == "µm":
+    if asked is not None and is_length(found.names[sides[0][0]]):
         line = {"color": INK, "dash": "dash", "width": 1.5}
-        figure.add_hline(y=asked * MICRO, line=line, row=1, col=1)
+        figure.add_hline(y=asked * study.units.small_length.per_si, line=line, row=1, col=1)
         # Named in the legend: beside the line its name would hide bars.
-        name = f"accuracy asked, {asked * MICRO:.6g} µm"
+        name = f"accuracy asked, {study.machine.accuracy.said('position')}"
         figure.add_trace(go.Scatter(x=[None], y=[None], mode="lines", line=line, name=name))
     finish(
         figure,

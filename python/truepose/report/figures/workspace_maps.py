@@ -9,7 +9,6 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from truepose.report.display import MICRO
 from truepose.report.figures._maps import Places, label_map_axes, map_trace, places_of
 from truepose.report.figures._style import COLOUR_SCALE, drawn_poses, finish, thinning_note
 from truepose.report.study import Study
@@ -27,7 +26,7 @@ TITLE_MARGIN = 30
 
 @dataclass(frozen=True)
 class Map:
-    """One map: its title and the worst position error at each place, µm (n_place,)."""
+    """One map: its title and the worst position error at each place (n_place,), for people."""
 
     title: str
     worst: Array
@@ -35,7 +34,7 @@ class Map:
 
 def caption(study: Study) -> str:
     """What the colour is, and what is not shown."""
-    places = places_of(study.poses, study.machine.commanded)
+    places = places_of(study.poses, study.machine.commanded, study.units)
     hidden = [
         name
         for index, name in enumerate(study.machine.commanded)
@@ -43,7 +42,8 @@ def caption(study: Study) -> str:
     ]
     text = (
         "Largest position error possible at each pose (the shift and the whole band of the "
-        "sources), µm. All maps share one colour scale from zero, so they may be compared."
+        f"sources), {study.units.small_length.label}. All maps share one colour scale from "
+        "zero, so they may be compared."
     )
     if hidden:
         text += f" Over {', '.join(hidden)} the largest is shown."
@@ -56,8 +56,8 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """A map for all sources together, one for each source, one for what compensation leaves."""
-    places = places_of(study.poses, study.machine.commanded)
-    maps = _maps(study, places)
+    places = places_of(study.poses, study.machine.commanded, study.units)
+    maps, unit = _maps(study, places), study.units.small_length
     drawn = _drawn(study, places)
     spatial = len(places.axes) == 3
     columns = min(PER_ROW, len(maps))
@@ -72,7 +72,7 @@ def figure(study: Study) -> go.Figure:
     )
     for number, each in enumerate(maps):
         figure.add_trace(
-            map_trace(places, drawn, each.worst),
+            map_trace(places, drawn, each.worst, unit.label),
             row=number // columns + 1,
             col=number % columns + 1,
         )
@@ -84,7 +84,7 @@ def figure(study: Study) -> go.Figure:
             "colorscale": COLOUR_SCALE,
             "cmin": 0.0,
             "cmax": highest if highest > 0 else 1.0,
-            "colorbar": {"title": {"text": "µm"}, "thickness": 16, "len": 0.9},
+            "colorbar": {"title": {"text": unit.label}, "thickness": 16, "len": 0.9},
         },
         margin={"l": 5, "r": 5, "t": 30 + TITLE_MARGIN, "b": 0}
         if spatial
@@ -95,10 +95,11 @@ def figure(study: Study) -> go.Figure:
 
 def _maps(study: Study, places: Places) -> list[Map]:
     """All sources together, what remains, then the sources by rank, at most `MOST_MAPS`."""
+    unit = study.units.small_length
 
     def over_places(worst: Array) -> Array:
         highest = np.zeros(len(places.points))
-        np.fmax.at(highest, places.of_pose, worst * MICRO)
+        np.fmax.at(highest, places.of_pose, worst * unit.per_si)
         return highest
 
     maps = [Map("all sources", over_places(study.position_norm(study.overall_worst)))]

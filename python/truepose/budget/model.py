@@ -26,7 +26,7 @@ from truepose.budget.dataset import (
     sizes,
 )
 from truepose.budget.evaluate import required_sources
-from truepose.budget.exact import displacement
+from truepose.budget.exact import at_shifts, displacement
 from truepose.budget.first_order import first_order
 from truepose.budget.inputs import Correlation, Input, correlation_matrix
 from truepose.budget.poses import OK, Progress, Walk, is_path, no_pose_left, requested_poses
@@ -331,8 +331,7 @@ class Models:
         total = len(self.table)
         for block in self._walk:
             moves = spread(self.machine, block, self.sources)
-            joints, placements = block.joints, block.placements
-            _, shifted = displacement(self.machine, joints, placements, moves.shift)
+            shifted = at_shifts(self.machine, block, moves.alone, moves.shift)
             usable = self._walk.keep(block.indices, shifted)
             for pose in np.flatnonzero(usable).tolist():
                 number = int(block.indices[pose])

@@ -32,6 +32,7 @@ from truepose.budget.comparison import quantities
 from truepose.budget.dataset import Schema, Variable, component_units, function_dataset, label
 from truepose.budget.drawing import Drawing
 from truepose.budget.model import FunctionModel, MachineModel, Model, Models, models
+from truepose.budget.of_all import lost_text
 from truepose.budget.poses import Progress
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
@@ -327,8 +328,19 @@ def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
     result = found.dataset(schema, rows, coords=coords)
     # Poses that were not come to are neither used nor left out.
     return result.assign_attrs(
-        plan.attrs, interrupted=interrupted, poses_left_out=result.sizes["left_out"]
+        plan.attrs,
+        interrupted=interrupted,
+        poses_left_out=result.sizes["left_out"],
+        not_assembled=lost_text(result["failed"], _drawn(result, plan)),
     )
+
+
+def _drawn(result: xr.Dataset, plan: _Plan) -> Indices:
+    """(n_pose,) or () base samples: Shapley shares draw as many once more."""
+    times = np.ones(result["failed"].shape, np.intp)
+    if "shapley" in result:
+        times += result["shapley"].notnull().any(("parameter", "component")).values
+    return plan.samples * times
 
 
 def _whole(
@@ -370,7 +382,9 @@ def _of_function(model: FunctionModel, plan: _Plan) -> xr.Dataset:
         name: variable for name, variable in {**SCHEMA, **CORRELATED}.items() if name in values
     }
     coords = _coords(model.names, model.sources, list(variables.sets))
-    return function_dataset(schema, values, model, coords=coords).assign_attrs(plan.attrs)
+    result = function_dataset(schema, values, model, coords=coords)
+    lost = lost_text(result["failed"], _drawn(result, plan), plain=True)
+    return result.assign_attrs(plan.attrs, not_assembled=lost)
 
 
 def _nothing_varies(file: str | None) -> Problem:

@@ -97,7 +97,7 @@ def _text(form: str, machine: Machine, found: Reach, answers: tuple[Answer, ...]
             f"pose_{name} [{in_file_units(machine, 0.0, pose_si(name))[1]}]"
             for name in machine.commanded
         ]
-        columns = ["quantity", "state", "highest", "asked", "units", "met", "pose"]
+        columns = ["quantity", "state", "highest", "asked", "units", "met", "pose", "not_assembled"]
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow([*columns, *where])
         for row in rows:

@@ -36,6 +36,10 @@ class QuantityError(ReadingError):
     """A value that is not the quantity wanted."""
 
 
+LARGEST = 1e50
+"""Of any quantity, in SI units: beyond it, products and squares of quantities are no numbers."""
+
+
 @dataclass(frozen=True)
 class FileUnit:
     """A unit that a file declares: `SI = value * scale + offset`. `label` is the file's word."""
@@ -102,6 +106,13 @@ class UnitSystem:
             )
         if not math.isfinite(result):
             raise _not_finite(value, wanted)
+        if abs(result) > LARGEST:
+            raise QuantityError(
+                "too-large",
+                f"expected {wanted.phrase}, found a number of no size that anything has",
+                found=shown_value(value),
+                expected=f"a number of at most {LARGEST:g} in SI units: {_expected(wanted)}",
+            )
         return result
 
     def _from_number(self, value: float, wanted: Dimension) -> float:

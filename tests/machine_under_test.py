@@ -61,6 +61,11 @@ class MachineUnderTest:
         at[36] = border[36]
         return np.asarray(self.box[:, 0] + at * (self.box[:, 1] - self.box[:, 0]))
 
+    @property
+    def three_poses(self) -> NDArray[np.float64]:
+        """(3, n_commanded) of them: one anywhere, one at a border, one at a corner."""
+        return self.poses[[0, 16, 36]]
+
     @cached_property
     def wild_poses(self) -> NDArray[np.float64]:
         """(400, n_commanded) in a box six times the workspace: some good, many beyond reach."""

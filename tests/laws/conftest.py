@@ -1,4 +1,4 @@
-"""Every law runs for every machine file shipped, and for the awkward ones of the tests.
+"""Every law runs for every machine file shipped; many for awkward ones of the tests or random ones.
 
 A new file in machines/ or tests/machines/ is tested as it stands.
 """
@@ -9,6 +9,7 @@ import pytest
 
 from build_machine import awkward_files, machine_files
 from machine_under_test import MachineUnderTest
+from random_machines import DRAWN, DrawnMachine
 
 SHIPPED = [MachineUnderTest(path) for path in machine_files()]
 AWKWARD = [MachineUnderTest(path) for path in awkward_files()]
@@ -25,4 +26,11 @@ def machine(request: pytest.FixtureRequest) -> MachineUnderTest:
 def shipped(request: pytest.FixtureRequest) -> MachineUnderTest:
     """One of the machines shipped."""
     found: MachineUnderTest = request.param
+    return found
+
+
+@pytest.fixture(params=DRAWN, ids=lambda machine: machine.name)
+def drawn(request: pytest.FixtureRequest) -> DrawnMachine:
+    """One of the 100 random machines."""
+    found: DrawnMachine = request.param
     return found

@@ -18,7 +18,6 @@ import truepose as tp
 from command_line import call
 from machine_texts import PLANAR, edited, load_text
 from truepose import _kernel
-from truepose.budget.of_all import OfAll
 from truepose.errors import RequestError
 from truepose.machine import Machine
 
@@ -98,6 +97,8 @@ def test_half_of_the_machines_are_within_where_a_third_is_lost(stretched: Machin
 @pytest.mark.parametrize("failed", [0, 40, 100, 101])
 def test_intervals_of_all_samples_are_those_of_sorted_numbers(failed: int) -> None:
     """2000 samples: of 5 % beyond, as many as 100 may have failed."""
+    from truepose.budget.of_all import OfAll
+
     random = np.random.default_rng(1)
     values = random.normal(size=2000 - failed)
     tallies = _kernel.Tallies(np.zeros((1, 1)), np.full((1, 1), 1e-3), 1, 1)

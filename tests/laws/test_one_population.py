@@ -30,7 +30,7 @@ OWN_REASONS = {
     "bounds": {"band"},
     "monte_carlo": {"band"},
     "uncertainty": set(),
-    "shares": set(),
+    "shares": {"band"},
 }
 
 

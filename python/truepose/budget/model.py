@@ -342,7 +342,7 @@ class Models:
             self._progress(total, total)
 
     def leave_out(self, model: MachineModel, status: int) -> None:
-        """Set a pose aside whose `status`, a kernel code, turned out not to be ok."""
+        """Set a pose aside for a reason that turned out, a kernel code or a number of `REASONS`."""
         self._walk.left_out.add(model.at.indices, np.array([status], np.uint8))
 
     def rows(self, schema: Schema, **others: int) -> Rows:

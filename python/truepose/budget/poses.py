@@ -311,6 +311,9 @@ def no_pose_left(
             expected="poses that the machine can reach, within travel and off singularities",
             hint="move the workspace, or check lengths, travel and working_mode"
             if nearest
+            else "narrow the bands of the tolerances, or keep away from singularities and the end "
+            "of the reach"
+            if set(names) <= {BAND, NO_BOUND}
             else "the nominal machine reaches them, but not as the error sources move it: look for "
             "a number of the wrong size or unit, or leave more travel for the correction",
         )

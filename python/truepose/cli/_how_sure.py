@@ -174,6 +174,11 @@ def with_how_sure(study: Study) -> Study:
         else:
             if found[name].attrs.get("interrupted"):
                 raise KeyboardInterrupt  # of a report nothing is wanted then
+    if "ellipses" in found:
+        there = found["ellipses"]["ellipse"].notnull().all(("axis", "other_axis")).values
+        found["ellipses"] = found["ellipses"].isel(pose=there)
+        if not there.any():
+            missing["ellipses"] = f"{found.pop('ellipses').attrs['not_assembled']}."
     return replace(
         study,
         worst_case=found.get("worst_case"),

@@ -423,6 +423,7 @@ def three_answers(study: Study) -> Table:
 
 LACKING = {
     "monte_carlo": "sampled answer",
+    "ellipses": "coverage ellipse",
     "bounds": "guaranteed bound",
     "worst_case": "worst case",
     "shares": "shares",

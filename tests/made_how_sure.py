@@ -191,6 +191,7 @@ def shares(machine: Any, poses: Array, *, correlated: bool = False) -> xr.Datase
         data["shapley"] = (each, share, "1")
     data["standard_deviation"] = (("pose", "component"), np.sqrt(variance.sum(axis=1)), "c")
     data["evaluations"] = (("pose",), np.full(len(poses), 7000), "1")
+    data["failed"] = (("pose",), np.zeros(len(poses), int), "1")
     coords = {
         "parameter": list(PARAMETERS),
         "parameter_source": ("parameter", list(SOURCES)),

@@ -96,7 +96,7 @@ def budget(
     *,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The error budget; see `truepose.budget.evaluate.budget`."""
+    """The error budget over the workspace, or at `poses`; see `truepose.budget.evaluate.budget`."""
     from truepose.budget.evaluate import budget as evaluate
 
     return evaluate(machine, poses, condition, progress=progress)
@@ -123,7 +123,7 @@ def over_time(
     *,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The error from a temperature log over time; see `truepose.budget.over_time.over_time`."""
+    """The error at home, or at `poses`, over a temperature log; see `truepose.budget.over_time`."""
     from truepose.budget.over_time import over_time as evaluate
 
     return evaluate(machine, poses, condition, times, progress=progress)

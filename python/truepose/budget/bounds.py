@@ -19,9 +19,10 @@ from truepose.budget.band_ends import Ends
 from truepose.budget.comparison import quantities
 from truepose.budget.dataset import Rows, Schema, Variable, assemble, quantity_coords, sizes
 from truepose.budget.evaluate import required_sources
+from truepose.budget.exact import at_shifts
 from truepose.budget.first_order import Mover, first_order
 from truepose.budget.over_region import bounds_over_region, no_proof, required_gap
-from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, requested_poses
+from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, of_band, requested_poses
 from truepose.budget.spread import Spread, spread
 from truepose.budget.vertices import worst_vertices
 from truepose.budget.worst import worst
@@ -69,7 +70,8 @@ def bounds(
 
     `status` is "proven", or says why nothing is: "near_singular", "box_too_wide" (the bands are too
     wide for the method, or a part of the region could not be divided further). Bounds without a
-    proof are missing. The Dataset, SI, is described in docs/results.md.
+    proof are missing. A pose at which a machine inside the bands was met that cannot be assembled
+    is left out as `band`. The Dataset, SI, is described in docs/results.md.
 
     Raises `RequestError`: no-finite-band, bad-truncation, bad-gap, bad-region, region-out-of-reach,
     no-proof (a machine or a source that cannot be enclosed), bad-poses, no-workspace, no-source,
@@ -111,14 +113,17 @@ def _at_poses(
     walk = Walk(machine, table, condition, path=poses is None and is_path(machine))
     done = 0
     for block in walk:
-        every = ends.narrowed(machine, spread(machine, block, sources))
+        every = spread(machine, block, sources)
+        usable = walk.keep(block.indices, at_shifts(machine, block, every.alone, every.shift))
+        done += int((~usable).sum())
+        block, every = block.select(usable), ends.narrowed(machine, every.select(usable))
         for start in range(0, block.indices.size, POSES):
             chosen = np.zeros(block.indices.size, np.bool_)
             chosen[start : start + POSES] = True
             part = block.select(chosen)
             moves = every.select(chosen)
             value, effects, status = first_order(machine, part, moves)
-            usable = walk.keep(part.indices, status)
+            usable = walk.keep(part.indices, of_band(status))
             if usable.any():
                 part, moves = part.select(usable), moves.select(usable)
                 order = (value[usable], effects[usable])
@@ -168,4 +173,4 @@ def _bounded(
         "reached_magnitude": found.most[:, 2 * m :],
         "linear": worst(value, moves.domain.reach(effects)),
     }
-    return values, walk.keep(block.indices, found.status)
+    return values, walk.keep(block.indices, of_band(found.status))

@@ -27,6 +27,7 @@ from truepose.budget.poses import (
     Walk,
     is_path,
     no_pose_left,
+    of_band,
     requested_poses,
 )
 from truepose.errors import Problem, RequestError
@@ -117,12 +118,13 @@ def budget(
     *,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The tool's error from each source alone and from all together, and their comparison.
+    """The error over the workspace, or at `poses`, from each source alone and from all together.
 
-    `poses` (..., n_commanded), SI, default the file's workspace; `condition`, default the file's;
-    `progress` is called with (poses done, poses in all). Loads and temperatures are evaluated at
-    nominal parameters and the commanded pose. The Dataset, SI, is described in docs/results.md;
-    errors are actual minus commanded, base frame (Gojtan & Hess-Coelho 2005, equations 3-9).
+    And how they compare. `poses` (..., n_commanded), SI, default the file's workspace; `condition`,
+    default the file's; `progress` is called with (poses done, poses in all). Loads and temperatures
+    are evaluated at nominal parameters and the commanded pose. The Dataset, SI, is described in
+    docs/results.md; errors are actual minus commanded, base frame (Gojtan & Hess-Coelho 2005,
+    equations 3-7; equation 8 for the percent of a source, 9 for that of all together).
 
     Raises `RequestError`: bad-poses, no-workspace, no-source, no-pose-left; `TrueposeError` where
     the condition asks for what the machine does not say (no-stiffness, no-expansion). What it warns
@@ -148,8 +150,8 @@ def budget(
         for found, deviation in zip(distributions, deviations, strict=True):
             found.update((str(deviation.distribution[k]), None) for k in deviation.banded)
         room = rows.room(block.indices.size)
-        values, statuses = _evaluate(machine, block, sources, deviations, room)
-        usable = walk.keep(block.indices, *statuses)
+        values, shifted, edges = _evaluate(machine, block, sources, deviations, room)
+        usable = walk.keep(block.indices, *shifted, *map(of_band, edges))
         rows.append(block, values, usable)
         if usable.any():
             for name, running in highest.items():
@@ -211,15 +213,18 @@ def _evaluate(
     sources: Sequence[Source],
     deviations: Sequence[Deviation],
     room: dict[str, np.ndarray],
-) -> tuple[dict[str, np.ndarray], list[np.ndarray]]:
+) -> tuple[dict[str, np.ndarray], list[np.ndarray], list[np.ndarray]]:
     """Every variable over poses for one block, and all statuses (n,) met on the way.
 
-    Those of each source are written into `room`.
+    First those at shifts, in the order of `exact.at_shifts`, then those at edges of the bands.
+    Variables of each source are written into `room`.
     """
     coordinate, defined = percent.coordinates(machine, block.placements)
     per_error = percent.per_error(coordinate, defined)
     values = {name: room[name] for name, variable in SCHEMA.items() if variable.dims == _EACH}
-    statuses: list[np.ndarray] = []
+    shifted: list[np.ndarray] = []
+    at_edges: list[np.ndarray] = []
+    nominal: list[np.ndarray] = []
     for at, deviation in enumerate(deviations):
         edges = exact.source_edges(machine, block, deviation)
         reach, spread, status = _band(machine, block, deviation)
@@ -230,13 +235,16 @@ def _evaluate(
         values["uncertainty"][:, at] = spread
         percent.percent(edges.lower, per_error, out=values["percent_lower"][:, at])
         percent.percent(edges.upper, per_error, out=values["percent_upper"][:, at])
-        statuses += [*edges.status, status]
+        shifted.append(edges.status[0])
+        at_edges += edges.status[1:]
+        nominal.append(status)
     overall = exact.overall_edges(
         machine,
         block,
         [(d, source.sets_overall_edges) for d, source in zip(deviations, sources, strict=True)],
     )
-    statuses += overall.status
+    shifted += [overall.status[0], *nominal]
+    at_edges += overall.status[1:]
     values |= {
         "overall_error": overall.error,
         "overall_error_lower": overall.lower,
@@ -247,7 +255,7 @@ def _evaluate(
         "joint_nominal": block.joints,
         "force": block.forces,
     }
-    return values, statuses
+    return values, shifted, at_edges
 
 
 def _band(

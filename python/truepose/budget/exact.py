@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.budget.poses import OK
+from truepose.budget.poses import OK, finite_or
 from truepose.machine import Machine
 from truepose.sources import Block, Deviation
 from truepose.sources._base import Floats, Indices
@@ -67,10 +67,14 @@ def displacement(
 ) -> tuple[Floats, np.ndarray]:
     """Where `joints` (n, n_joint) take the tool of the moved machine, less `placements` (n, 7).
 
-    Returns (n, n_component) errors, m and rad, and (n,) kernel status.
+    Returns (n, n_component) errors, m and rad, and (n,) kernel status; none is ok of an error that
+    is not finite.
     """
     columns, values = moved
-    return machine.kernel.displacement(joints, placements, columns, np.ascontiguousarray(values))
+    error, status = machine.kernel.displacement(
+        joints, placements, columns, np.ascontiguousarray(values)
+    )
+    return error, finite_or(status, error)
 
 
 def edges(machine: Machine, block: Block, centre: Moved, lower: Moved, upper: Moved) -> Edges:
@@ -85,6 +89,21 @@ def edges(machine: Machine, block: Block, centre: Moved, lower: Moved, upper: Mo
     low, at_low = _error(machine, block, lower)
     high, at_high = _error(machine, block, upper)
     return Edges(error, low, high, (centred, at_low, at_high))
+
+
+def at_shifts(machine: Machine, block: Block, alone: Iterable[Moved], all_: Moved) -> np.ndarray:
+    """(n,) kernel status of the nominal command with each source `alone`, and `all_`, at shifts.
+
+    Ok where the pose belongs to a run, the same for every command (`budget.poses`); else the first
+    status that is not.
+    """
+    shifted = [moved for moved in alone if moved[1].any()]
+    found = np.full(block.indices.size, OK, np.uint8)
+    # One source that moves anything is all of them together.
+    for moved in [*(shifted if len(shifted) > 1 else []), all_]:
+        _, status = _error(machine, block, moved)
+        found = np.where(found == OK, status, found)
+    return found
 
 
 def source_edges(machine: Machine, block: Block, deviation: Deviation) -> Edges:

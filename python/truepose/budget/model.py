@@ -26,7 +26,7 @@ from truepose.budget.dataset import (
     sizes,
 )
 from truepose.budget.evaluate import required_sources
-from truepose.budget.exact import displacement
+from truepose.budget.exact import at_shifts, displacement
 from truepose.budget.first_order import first_order
 from truepose.budget.inputs import Correlation, Input, correlation_matrix
 from truepose.budget.poses import OK, Progress, Walk, is_path, no_pose_left, requested_poses
@@ -336,8 +336,7 @@ class Models:
         total = len(self.table)
         for block in self._walk:
             moves = spread(self.machine, block, self.sources)
-            joints, placements = block.joints, block.placements
-            _, shifted = displacement(self.machine, joints, placements, moves.shift)
+            shifted = at_shifts(self.machine, block, moves.alone, moves.shift)
             usable = self._walk.keep(block.indices, shifted)
             for pose in np.flatnonzero(usable).tolist():
                 number = int(block.indices[pose])
@@ -348,7 +347,7 @@ class Models:
             self._progress(total, total)
 
     def leave_out(self, model: MachineModel, status: int) -> None:
-        """Set a pose aside whose `status`, a kernel code, turned out not to be ok."""
+        """Set a pose aside for a reason that turned out, a kernel code or a number of `REASONS`."""
         self._walk.left_out.add(model.at.indices, np.array([status], np.uint8))
 
     def rows(self, schema: Schema, **others: int) -> Rows:

@@ -3,6 +3,11 @@
 A sample is one machine: its variables are drawn once and it goes to every pose. Random numbers are
 counter-based (`truepose._kernel.Variables`), so a sample depends on the seed and its number alone.
 Memory does not grow with the samples: moments, extremes and histograms are kept.
+
+A sample that cannot be assembled is a machine too, and in no interval: what says of which share of
+the machines something holds (quantiles, intervals, ellipses) counts it as beyond both ends, as
+many samples on either side. Where too many fail for the share asked, there is no such number. What
+describes errors (mean, standard deviation, covariance, extremes) is of those that have one.
 """
 
 from __future__ import annotations
@@ -36,11 +41,20 @@ from truepose.budget.dataset import (
 )
 from truepose.budget.drawn import Adaptive, Draws, Enough, Fixed, Random, Sampler, sobol
 from truepose.budget.evaluate import required_sources
-from truepose.budget.exact import displacement
+from truepose.budget.exact import at_shifts
 from truepose.budget.first_order import first_order
 from truepose.budget.model import FunctionModel
+from truepose.budget.of_all import OfAll, lost_text
 from truepose.budget.percent import POSITIONS
-from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, requested_poses
+from truepose.budget.poses import (
+    BAND,
+    Progress,
+    Walk,
+    is_path,
+    no_pose_left,
+    reason_unless,
+    requested_poses,
+)
 from truepose.budget.spread import Spread, spread
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
@@ -53,9 +67,6 @@ if TYPE_CHECKING:
 POSES = 256
 """Poses that are sampled together: their histograms take some 50 MB."""
 
-NOT_CONVERGED = _kernel.STATUS.index("not_converged")
-"""The kernel's status of a pose at which no sample has a result."""
-
 LEVELS = np.linspace(0.0, 1.0, 201)
 """Probabilities of the quantiles that a result has."""
 
@@ -66,7 +77,7 @@ _EACH = ("pose", "component")
 _SIZE = ("pose", "quantity")
 
 SCHEMA: Schema = {
-    "mean": Variable(_EACH, "component", "mean of the error"),
+    "mean": Variable(_EACH, "component", "mean of the error, of samples that have one"),
     "standard_deviation": Variable(_EACH, "component", "standard deviation of the error"),
     "covariance": Variable((*_EACH, "other_component"), "covariance", "covariance of the error"),
     "lower": Variable(_EACH, "component", "lower end of the symmetric coverage interval"),
@@ -77,7 +88,9 @@ SCHEMA: Schema = {
     "maximum": Variable(_EACH, "component", "highest error of a sample"),
     "quantile": Variable((*_EACH, "level"), "component", "error that a share of samples is below"),
     "samples": Variable(("pose",), "1", "samples with a result", np.int64),
-    "failed": Variable(("pose",), "1", "samples without a result, left out", np.int64),
+    "failed": Variable(
+        ("pose",), "1", "samples without a result, beyond both ends of every interval", np.int64
+    ),
 }
 
 MACHINE: Schema = {
@@ -266,8 +279,7 @@ def _of_machine(
     interrupted = False
     for block in walk:
         every = spread(machine, block, sources)
-        _, shifted = displacement(machine, block.joints, block.placements, every.shift)
-        usable = walk.keep(block.indices, shifted)
+        usable = walk.keep(block.indices, at_shifts(machine, block, every.alone, every.shift))
         block, every = block.select(usable), every.select(usable)
         draws = asked.draws(every)
         for start in range(0, block.indices.size, POSES):
@@ -277,12 +289,10 @@ def _of_machine(
             sampler = _MachineSampler(machine, part, every.select(chosen))
             drawn = sampler.run(draws, asked.stop, account.add)
             interrupted = drawn.interrupted
-            if drawn.tallies is not None and (drawn.tallies.count > 0).any():
+            if drawn.tallies is not None:
                 values = sampler.values(drawn.tallies, asked.probability)
-                sampled = drawn.tallies.count > 1
-                rows.append(part, values, sampled)
-                lost = part.indices[~sampled]
-                walk.left_out.add(lost, np.full(lost.size, NOT_CONVERGED, np.uint8))
+                sampled = reason_unless(np.asarray(drawn.tallies.count) > 1, BAND)
+                rows.append(part, values, walk.keep(part.indices, sampled))
             if interrupted:
                 break
         if interrupted:
@@ -302,7 +312,9 @@ def _of_machine(
         coords["other_axis"] = label("other_axis", axes, "the other component")
     found = assemble(machine, given, schema, rows, table, walk.left_out, coords=coords)
     found.attrs |= {**asked.attrs, "interrupted": int(interrupted)}
-    return found
+    return found.assign_attrs(
+        not_assembled=lost_text(found["failed"], found["samples"] + found["failed"])
+    )
 
 
 class _MachineSampler(Sampler):
@@ -384,14 +396,16 @@ class _MachineSampler(Sampler):
         m = len(self.machine.components)
         values = statistics(tallies, m, probability)
         sizes = slice(m, m + len(self._kinds))
+        of_all = OfAll(tallies)
+        upper = of_all.below([probability])[..., 0]
         values |= {
             "magnitude_mean": np.asarray(tallies.mean)[:, sizes],
-            "magnitude_upper": tallies.quantiles([probability])[:, sizes, 0],
+            "magnitude_upper": upper[:, sizes],
             "magnitude_maximum": np.asarray(tallies.extremes)[:, sizes, 1],
-            "magnitude_quantile": tallies.quantiles(LEVELS.tolist())[:, sizes],
+            "magnitude_quantile": of_all.below(LEVELS.tolist())[:, sizes],
         }
         if self._axes:
-            factor = tallies.quantiles([probability])[:, -1, 0]
+            factor = upper[:, -1]
             values["ellipse_centre"] = self._centre
             values["ellipse"] = self._shape * np.square(factor)[:, np.newaxis, np.newaxis]
         return values
@@ -418,8 +432,9 @@ def _whitening(machine: Machine, centre: Floats, covariance: Floats) -> Floats:
 def statistics(tallies: _kernel.Tallies, m: int, probability: float) -> dict[str, np.ndarray]:
     """The variables of `SCHEMA` of the first m columns, over poses first."""
     tail = 0.5 * (1.0 - probability)
-    ends = tallies.quantiles([tail, 1.0 - tail])[:, :m]
-    shortest = np.asarray(tallies.shortest(probability))[:, :m]
+    of_all = OfAll(tallies)
+    ends = of_all.between([tail, 1.0 - tail])[:, :m]
+    shortest = of_all.shortest(probability)[:, :m]
     extremes = np.asarray(tallies.extremes)[:, :m]
     covariance = np.asarray(tallies.covariance)
     variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
@@ -433,7 +448,7 @@ def statistics(tallies: _kernel.Tallies, m: int, probability: float) -> dict[str
         "shortest_upper": shortest[..., 1],
         "minimum": extremes[..., 0],
         "maximum": extremes[..., 1],
-        "quantile": tallies.quantiles(LEVELS.tolist())[:, :m],
+        "quantile": of_all.between(LEVELS.tolist())[:, :m],
         "samples": np.asarray(tallies.count),
         "failed": np.asarray(tallies.failed),
     }
@@ -506,7 +521,9 @@ def _of_function(model: FunctionModel, asked: _Asked, progress: Progress | None)
         coords={"level": label("level", LEVELS, "share of the samples")},
     )
     found.attrs |= {**asked.attrs, "interrupted": int(drawn.interrupted)}
-    return found
+    return found.assign_attrs(
+        not_assembled=lost_text(found["failed"], found["samples"] + found["failed"], plain=True)
+    )
 
 
 __all__ = ["ELLIPSE", "LEVELS", "MACHINE", "SCHEMA", "monte_carlo", "statistics"]

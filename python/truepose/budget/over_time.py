@@ -38,9 +38,9 @@ def over_time(
     *,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The tool's error from the condition's temperature log, exact, at every time and pose.
+    """The tool's error at home, or at `poses`, from the condition's temperature log, at every time.
 
-    `poses` (..., n_commanded), SI, default home; `condition`, default the file's, must have a
+    Exact. `poses` (..., n_commanded), SI; `condition`, default the file's, must have a
     temperature log; `times` (n_time,), s, within the log, default the log's own. Only the thermal
     source acts. A pose that cannot be used at some time is left out. The Dataset, SI, is described
     in docs/results.md.

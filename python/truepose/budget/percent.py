@@ -1,6 +1,8 @@
-"""Percent: an error against the tool's coordinate at the same pose (equations 8 and 9).
+"""Percent: an error against the tool's coordinate at the same pose.
 
     percent = 100 |error| / |coordinate|
+
+of one source (equation 8 of the paper) or of all together (equation 9).
 
 It has no meaning for a rotation, nor where the coordinate is about zero.
 """

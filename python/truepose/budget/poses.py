@@ -1,5 +1,12 @@
 """The walk over the poses of a run: in blocks, what cannot be used set aside and counted.
 
+One rule says for every command which poses these are. A pose belongs to a run where the machine
+goes with the nominal command: as drawn, with each source alone at its shift, and with all of them
+together (`exact.at_shifts`). Where it does not, the pose is left out with the kernel's status,
+whatever was asked. What the bands do there is not the pose's but the command's: one that meets a
+machine inside the bands that cannot be assembled leaves the pose out as `band`, or counts it as a
+sample that failed, and no verdict is a yes there (`broken`).
+
 A block bounds the memory of everything that is kept a pose only while it is worked on, lets
 Ctrl-C and progress in between two blocks, and is long enough for the kernel's lanes and threads.
 """
@@ -31,6 +38,19 @@ Progress = Callable[[int, int], None]
 """Called with (poses done, poses in all), between blocks."""
 
 OK = _kernel.STATUS.index("ok")
+NOT_CONVERGED = _kernel.STATUS.index("not_converged")
+
+BAND = "band"
+"""Why a pose is left out at which some machines inside the bands cannot be assembled."""
+
+NO_BOUND = "no_bound"
+"""Why a pose is left out at which the bands are too wide for the law of what remains."""
+
+CORRECTION = "correction_"
+"""Begins why a pose is left out whose corrected command the machine cannot follow."""
+
+REASONS = (*_kernel.STATUS, BAND, NO_BOUND, *(f"{CORRECTION}{name}" for name in _kernel.STATUS))
+"""Why a pose may be left out: a kernel status, or what a command found that looked further."""
 
 
 def requested_poses(machine: Machine, poses: ArrayLike | None) -> Floats:
@@ -70,13 +90,13 @@ def _bad_poses(machine: Machine, found: str) -> RequestError:
 
 @dataclass
 class LeftOut:
-    """Poses that cannot be used: their numbers in the poses asked for, and why (kernel status)."""
+    """Poses that cannot be used: their numbers in the poses asked for, and why (`REASONS`)."""
 
     indices: list[Indices] = field(default_factory=list)
     status: list[np.ndarray] = field(default_factory=list)
 
     def add(self, indices: Indices, status: np.ndarray) -> None:
-        """Set aside the poses numbered `indices` (m,), of kernel status code `status` (m,)."""
+        """Set aside the poses numbered `indices` (m,), for the reasons numbered `status` (m,)."""
         if indices.size:
             self.indices.append(indices)
             self.status.append(status)
@@ -86,7 +106,7 @@ class LeftOut:
         if not self.indices:
             return np.empty(0, np.intp), np.empty(0, dtype="<U16")
         indices = np.concatenate(self.indices)
-        names = np.array(_kernel.STATUS)[np.concatenate(self.status)]
+        names = np.array(REASONS)[np.concatenate(self.status)]
         order = np.argsort(indices)
         return indices[order], names[order]
 
@@ -158,13 +178,71 @@ class Walk:
         return block.select(self.keep(block.indices, status))
 
     def keep(self, indices: Indices, *statuses: np.ndarray) -> Flags:
-        """(n,) whether every status of a pose is ok; the first that is not says why it is out."""
+        """(n,) whether every status of a pose is ok; the first that is not says why it is out.
+
+        `statuses` are kernel codes, or numbers of other `REASONS`.
+        """
         usable = np.ones(indices.size, np.bool_)
         for status in statuses:
             failed = usable & (status != OK)
             self.left_out.add(indices[failed], status[failed])
             usable &= ~failed
         return usable
+
+
+def finite_or(status: np.ndarray, *values: Floats) -> np.ndarray:
+    """(n,) kernel codes: `status`, and not converged where a row of `values` (n, k) has no number.
+
+    The last look at what goes on into results: no infinity reaches one with a status that is ok.
+    """
+    found = status
+    for rows in values:
+        with np.errstate(over="ignore", invalid="ignore"):
+            finite = np.isfinite(rows @ np.ones(rows.shape[1]))
+        found = np.where((found == OK) & ~finite, NOT_CONVERGED, found).astype(np.uint8)
+    return found
+
+
+def of_band(status: np.ndarray) -> np.ndarray:
+    """(n,) reasons for kernel codes (n,) of machines inside the bands: ok ones stay so."""
+    return reason_unless(status == OK, BAND)
+
+
+def reason_unless(fine: Flags, reason: str) -> np.ndarray:
+    """(n,) numbers of reasons: ok where `fine` (n,), else the one of that name."""
+    return np.where(fine, OK, REASONS.index(reason)).astype(np.uint8)
+
+
+def of_correction(status: np.ndarray) -> np.ndarray:
+    """(n,) reasons for kernel codes (n,) of corrected commands: ok ones stay so."""
+    first = REASONS.index(f"{CORRECTION}ok")
+    return np.where(status == OK, OK, first + status.astype(np.uint8)).astype(np.uint8)
+
+
+def broken(status: np.ndarray) -> Flags:
+    """(n,) whether a pose left out for the reason named `status` (n,) belongs to the run.
+
+    There no accuracy is kept: the machine that drawing and shifts describe goes there, but not all
+    inside the bands do, or nothing can be said of them, or the corrected command leads nowhere.
+    """
+    names = np.asarray(status, np.str_)
+    return np.asarray(~np.isin(names, _kernel.STATUS), np.bool_)
+
+
+def reason_text(status: str) -> str:
+    """Why a pose is left out, for people."""
+    if status == BAND:
+        return "some machines inside the bands cannot be assembled"
+    if status == NO_BOUND:
+        return "the bands are too wide for a bound"
+    if status.startswith(CORRECTION):
+        return f"correction {status.removeprefix(CORRECTION)}".replace("_", " ")
+    return status.replace("_", " ")
+
+
+def not_assembled_text(failed: int, every: int) -> str:
+    """How many samples the machine could not follow: "12 of 10,000 could not be assembled"."""
+    return f"{failed:,} of {every:,} could not be assembled"
 
 
 class Travel:
@@ -207,7 +285,8 @@ def no_pose_left(
     _, status = left_out.sorted()
     names, counts = np.unique(status, return_counts=True)
     found = ", ".join(
-        f"{count} {str(name).replace('_', ' ')}" for name, count in zip(names, counts, strict=True)
+        f"{count} {'where ' if name in (BAND, NO_BOUND) else ''}{reason_text(str(name))}"
+        for name, count in zip(names, counts, strict=True)
     )
     looked_at = np.unique(np.linspace(0, len(poses) - 1, EXPLAINED).astype(np.intp))
     nearest: tuple[float, str] | None = None
@@ -232,6 +311,9 @@ def no_pose_left(
             expected="poses that the machine can reach, within travel and off singularities",
             hint="move the workspace, or check lengths, travel and working_mode"
             if nearest
+            else "narrow the bands of the tolerances, or keep away from singularities and the end "
+            "of the reach"
+            if set(names) <= {BAND, NO_BOUND}
             else "the nominal machine reaches them, but not as the error sources move it: look for "
             "a number of the wrong size or unit, or leave more travel for the correction",
         )

@@ -32,7 +32,8 @@ from truepose.budget.comparison import quantities
 from truepose.budget.dataset import Schema, Variable, component_units, function_dataset, label
 from truepose.budget.drawing import Drawing
 from truepose.budget.model import FunctionModel, MachineModel, Model, Models, models
-from truepose.budget.poses import Progress
+from truepose.budget.of_all import lost_text
+from truepose.budget.poses import BAND, REASONS, Progress
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources._base import Floats, Indices
@@ -131,7 +132,8 @@ def shares(
     same for all poses, whatever else acts. Each needs 2 + (variables) + (sources) exact errors,
     more where variables are correlated. `confidence` is the probability of the intervals whose half
     widths stand beside the indices (bootstrap over base samples). A base sample at one point of
-    which the machine does not close is left out as a whole and counted in `failed`. Ctrl-C gives
+    which the machine does not close is left out as a whole and counted in `failed`; a pose with too
+    few others is left out as `band`. Ctrl-C gives
     the poses done so far, if any, with the attribute `interrupted` at 1.
 
     The shares of a component that does not vary at a pose, such as one that no variable moves, are
@@ -307,13 +309,19 @@ def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
         ]
     )
     poses: list[tuple[MachineModel, _Variables, dict[str, np.ndarray]]] = []
-    block, variables, interrupted = None, None, 0
+    block, variables, interrupted, lost = None, None, 0, False
     try:
         for _, model in found:
             if variables is None or model.block is not block:
                 block, variables = model.block, _Variables.of(model, plan.seed)
-            if variables.names:
-                poses.append((model, variables, _at_one_pose(model, variables, floor, plan)))
+            if not variables.names:
+                continue
+            values = _at_one_pose(model, variables, floor, plan)
+            if np.isfinite(values["standard_deviation"]).all():
+                poses.append((model, variables, values))
+            else:
+                found.leave_out(model, REASONS.index(BAND))
+                lost = True
     except KeyboardInterrupt:
         if not poses:
             raise
@@ -324,7 +332,7 @@ def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
         for _, each, _ in poses
         for name, source in zip(each.names, each.sources, strict=True)
     }
-    if variables is not None and not sources:
+    if variables is not None and not sources and not lost:
         raise RequestError(_nothing_varies(found.machine.file))
     names, groups = list(sources), list(dict.fromkeys(sources.values()))
     correlated = any(each.drawing.linked.size for _, each, _ in poses)
@@ -346,8 +354,19 @@ def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
     result = found.dataset(schema, rows, coords=coords)
     # Poses that were not come to are neither used nor left out.
     return result.assign_attrs(
-        plan.attrs, interrupted=interrupted, poses_left_out=result.sizes["left_out"]
+        plan.attrs,
+        interrupted=interrupted,
+        poses_left_out=result.sizes["left_out"],
+        not_assembled=lost_text(result["failed"], _drawn(result, plan)),
     )
+
+
+def _drawn(result: xr.Dataset, plan: _Plan) -> Indices:
+    """(n_pose,) or () base samples: Shapley shares draw as many once more."""
+    times = np.ones(result["failed"].shape, np.intp)
+    if "shapley" in result:
+        times += result["shapley"].notnull().any(("parameter", "component")).values
+    return plan.samples * times
 
 
 def _whole(
@@ -389,7 +408,9 @@ def _of_function(model: FunctionModel, plan: _Plan) -> xr.Dataset:
         name: variable for name, variable in {**SCHEMA, **CORRELATED}.items() if name in values
     }
     coords = _coords(model.names, model.sources, list(variables.sets))
-    return function_dataset(schema, values, model, coords=coords).assign_attrs(plan.attrs)
+    result = function_dataset(schema, values, model, coords=coords)
+    lost = lost_text(result["failed"], _drawn(result, plan), plain=True)
+    return result.assign_attrs(plan.attrs, not_assembled=lost)
 
 
 def _nothing_varies(file: str | None) -> Problem:

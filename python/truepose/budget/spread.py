@@ -30,7 +30,8 @@ ROUNDING = 1e-14
 class Spread:
     """The variables of all sources at the n poses of a block, and what they move.
 
-    `shift`: parameters, each once, and their values (n or 1, k0) where all variables are 0.
+    `shift`: parameters, each once, and their values (n or 1, k0) where all variables are 0;
+    `alone`: the same of each source.
     `columns` (k,): kernel parameter of each column that has a band; one may repeat.
     `variables` (k,): which variable moves the column; `swing` (n or 1, k): its deviation, m, rad
     or 1, where that variable is +1.
@@ -42,6 +43,7 @@ class Spread:
     """
 
     shift: Moved
+    alone: tuple[Moved, ...]
     columns: Indices
     variables: Indices
     swing: Floats
@@ -82,10 +84,10 @@ class Spread:
 
     def select(self, poses: Flags | slice) -> Spread:
         """The same at some poses of the block, as `Block.select` has them."""
-        parameters, shift = self.shift
         return dataclasses.replace(
             self,
-            shift=(parameters, shift if len(shift) == 1 else shift[poses]),
+            shift=_rows(self.shift, poses),
+            alone=tuple(_rows(each, poses) for each in self.alone),
             swing=self.swing if len(self.swing) == 1 else self.swing[poses],
         )
 
@@ -125,8 +127,10 @@ def spread(machine: Machine, block: Block, sources: Sequence[Source]) -> Spread:
     swings = [part.swing for part in parts]
     rows = max((len(swing) for swing in swings), default=1)
     empty = np.empty(0, np.intp)
+    alone = tuple((part.deviation.parameters, part.deviation.shift) for part in parts)
     return Spread(
-        shift=together([(p.deviation.parameters, p.deviation.shift) for p in parts]),
+        shift=together(alone),
+        alone=alone,
         columns=np.concatenate([empty, *(part.columns for part in parts)]),
         variables=np.concatenate(
             [empty, *(part.variables + at for part, at in zip(parts, first[:-1], strict=True))]
@@ -153,6 +157,12 @@ def spread(machine: Machine, block: Block, sources: Sequence[Source]) -> Spread:
             ],
         ),
     )
+
+
+def _rows(moved: Moved, poses: Flags | slice) -> Moved:
+    """Deviations at some poses of a block."""
+    parameters, shift = moved
+    return parameters, shift if len(shift) == 1 else shift[poses]
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,10 +31,12 @@ from truepose.budget.dataset import (
     sizes,
 )
 from truepose.budget.evaluate import FEW, required_sources
+from truepose.budget.exact import at_shifts
 from truepose.budget.first_order import first_order
 from truepose.budget.inputs import Input
 from truepose.budget.model import FunctionModel
 from truepose.budget.monte_carlo import monte_carlo
+from truepose.budget.of_all import lost_text
 from truepose.budget.poses import OK, Progress, Walk, is_path, no_pose_left, requested_poses
 from truepose.budget.propagation import combine, coverage_factor
 from truepose.budget.second_order_terms import second_order_uncertainty
@@ -238,10 +240,11 @@ def _of_machine(
             ROUNDING * scale,
         )
         room = rows.room(block.indices.size)
-        status = np.full(block.indices.size, OK, np.uint8)
+        status = at_shifts(machine, block, moves.alone, moves.shift)
         for start in range(0, block.indices.size, FEW):
             some = slice(start, start + FEW)
-            value, effects, status[some] = first_order(machine, block, moves, some)
+            value, effects, regular = first_order(machine, block, moves, some)
+            status[some] = np.where(status[some] == OK, regular, status[some])
             found = _answer(value, effects, variables, asked)
             if asked.sampled is not None:
                 numbers = asked.sampled.indexes["pose"].get_indexer(block.indices[some])
@@ -335,9 +338,11 @@ def _compared(
     columns = {
         name: np.asarray(sampled[name]) for name in ("mean", "standard_deviation", "lower", "upper")
     }
-    counts = np.asarray(sampled["samples"])
+    counts, failed = np.asarray(sampled["samples"]), np.asarray(sampled["failed"])
+    plain = "function" in sampled.attrs
     for at in np.flatnonzero(numbers >= 0):
         drawn = {name: column[numbers[at]] for name, column in columns.items()}
+        count, lost = int(counts[numbers[at]]), int(failed[numbers[at]])
         compared = compare(
             LinearAnswer(
                 **{
@@ -351,7 +356,7 @@ def _compared(
                 names=variables.names,
                 distributions=variables.distributions,
             ),
-            Sampled(samples=int(counts[numbers[at]]), **drawn),
+            Sampled(samples=count, lost=lost_text(lost, lost + count, plain=plain), **drawn),
             variables.outputs,
             variables.units,
             probability=asked.probability,

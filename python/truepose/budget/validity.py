@@ -57,6 +57,8 @@ class Sampled:
     lower: Floats
     upper: Floats
     samples: int
+    lost: str = "none"
+    """How many samples besides have no result, in words."""
 
 
 @dataclass(frozen=True)
@@ -92,12 +94,15 @@ def compare(
     """The comparison for outputs named `outputs`, of `units`, at one coverage `probability`.
 
     The tolerance is that of the sampled standard uncertainty (8.1.2 b, 8.1.3), and at least
-    `rounding` (m,).
+    `rounding` (m,). Where a sample has no result the linear law, which knows of none, is not valid.
     """
     stated = [numerical_tolerance(float(each), digits) for each in sampled.standard_deviation]
     tolerance = np.maximum(stated, rounding)
     lower, upper = np.abs(linear.lower - sampled.lower), np.abs(linear.upper - sampled.upper)
     valid = (lower <= tolerance) & (upper <= tolerance)
+    if sampled.lost != "none":
+        reason = f"{sampled.lost}, of which the linear law knows nothing"
+        return Compared(lower, upper, tolerance, np.zeros_like(valid), reason)
     reasons = []
     for at in np.flatnonzero(~valid).tolist():
         ends = [

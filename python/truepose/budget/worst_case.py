@@ -31,10 +31,19 @@ from truepose.budget.dataset import (
     sizes,
 )
 from truepose.budget.evaluate import required_sources
+from truepose.budget.exact import at_shifts
 from truepose.budget.first_order import Mover, first_order
 from truepose.budget.inputs import Input
 from truepose.budget.model import FunctionModel
-from truepose.budget.poses import OK, Progress, Walk, is_path, no_pose_left, requested_poses
+from truepose.budget.poses import (
+    OK,
+    Progress,
+    Walk,
+    is_path,
+    no_pose_left,
+    of_band,
+    requested_poses,
+)
 from truepose.budget.spread import spread
 from truepose.budget.vertices import Found, linear_norms, worst_vertices
 from truepose.budget.worst import worst
@@ -100,9 +109,10 @@ def worst_case(
     taken at its band of k standard deviations, which the attribute `unbounded` lists. Values in
     between the corners are not looked at, but for the shifts themselves.
 
-    Raises `RequestError`: bad-poses, no-workspace, no-source, no-pose-left, where a pose counts as
-    left out if the machine cannot close at one of its corners; not-finite where the function is not
-    finite at one; `TrueposeError` as the sources do.
+    A pose at which a machine at one of the corners cannot be assembled is left out as `band`.
+
+    Raises `RequestError`: bad-poses, no-workspace, no-source, no-pose-left; not-finite where the
+    function is not finite at a corner; `TrueposeError` as the sources do.
     """
     if isinstance(model, Machine):
         given = model.condition if condition is None else condition
@@ -122,7 +132,8 @@ def _of_machine(
     for block in walk:
         moves = spread(machine, block, sources)
         value, effects, status = first_order(machine, block, moves)
-        usable = walk.keep(block.indices, status)
+        shifted = at_shifts(machine, block, moves.alone, moves.shift)
+        usable = walk.keep(block.indices, shifted, status)
         found = worst_vertices(
             _only(usable, Mover(machine, block, moves)),
             value[usable],
@@ -132,7 +143,7 @@ def _of_machine(
         )
         block = block.select(usable)
         values = _values(found, value[usable], effects[usable], moves.domain, list(kinds.values()))
-        rows.append(block, values, walk.keep(block.indices, found.status))
+        rows.append(block, values, walk.keep(block.indices, of_band(found.status)))
         _collect(endless, moves.names, moves.distributions)
     if rows.count == 0:
         raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)

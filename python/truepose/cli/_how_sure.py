@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import truepose
+from truepose.budget.poses import broken
 from truepose.cli import _work
 from truepose.cli._options import Request
 from truepose.cli._progress import progress
@@ -121,7 +122,12 @@ def _bad_region(part: str, message: str, expected: str | None = None) -> Problem
 
 
 def keeps_accuracy(machine: Machine, found: xr.Dataset) -> bool:
-    """Whether the accuracy asked is proven to be kept: everywhere, and of all that is asked."""
+    """Whether the accuracy asked is proven to be kept: everywhere, and of all that is asked.
+
+    It is not where a machine inside the bands was met that cannot be assembled.
+    """
+    if "left_out_status" in found.coords and broken(found["left_out_status"].values).any():
+        return False
     asked = {"position": machine.accuracy.target, "orientation": machine.accuracy.angle_target}
     if not (found["status"].values == how_sure.PROVEN).all():
         return False
@@ -168,6 +174,11 @@ def with_how_sure(study: Study) -> Study:
         else:
             if found[name].attrs.get("interrupted"):
                 raise KeyboardInterrupt  # of a report nothing is wanted then
+    if "ellipses" in found:
+        there = found["ellipses"]["ellipse"].notnull().all(("axis", "other_axis")).values
+        found["ellipses"] = found["ellipses"].isel(pose=there)
+        if not there.any():
+            missing["ellipses"] = f"{found.pop('ellipses').attrs['not_assembled']}."
     return replace(
         study,
         worst_case=found.get("worst_case"),

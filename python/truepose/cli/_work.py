@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import truepose
-from truepose.budget.poses import faults_text
+from truepose.budget.poses import faults_text, reason_text
 from truepose.cli._options import Request
 from truepose.cli._progress import progress, waiting
 from truepose.cli._show import show_tables
@@ -211,7 +211,7 @@ def refuse_left_out(
 def _why(machine: Machine, pose: np.ndarray, status: str) -> str:
     """The status of a pose that cannot be used, and which part fails by how much."""
     because = faults_text(machine, machine.kernel.explain(pose))
-    return status.replace("_", " ") + (f": {because}" if because else "")
+    return reason_text(status) + (f": {because}" if because else "")
 
 
 def refuse_left_out_of(request: Request, machine: Machine, dataset: xr.Dataset) -> None:

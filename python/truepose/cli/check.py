@@ -110,7 +110,8 @@ def _text(
             f"pose_{name} [{in_file_units(machine, 0.0, pose_si(name))[1]}]"
             for name in machine.commanded
         ]
-        columns = ["quantity", "state", "highest", "asked", "units", "met", "not_included", "pose"]
+        columns = ["quantity", "state", "highest", "asked", "units", "met", "not_included"]
+        columns += ["pose", "not_assembled"]
         left_out = not_included_text(machine, machine.condition)
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow([*columns, *where])

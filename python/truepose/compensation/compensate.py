@@ -11,8 +11,18 @@ from numpy.typing import ArrayLike
 from truepose.budget import worst
 from truepose.budget.dataset import Rows, Schema, Variable, assemble, sizes
 from truepose.budget.evaluate import required_sources
-from truepose.budget.exact import Moved, displacement, together
-from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, requested_poses
+from truepose.budget.exact import Moved, at_shifts, displacement, together
+from truepose.budget.poses import (
+    NO_BOUND,
+    Progress,
+    Walk,
+    is_path,
+    no_pose_left,
+    of_band,
+    of_correction,
+    reason_unless,
+    requested_poses,
+)
 from truepose.compensation.second_order import SecondOrder, Step
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, Deviation
@@ -54,8 +64,10 @@ def compensate(
 
         |residual| <= bound + second_order
 
-    for every deviation inside the bands. `poses` (..., n_commanded), SI, default the file's
-    workspace. The Dataset, SI, and both terms are described in docs/results.md.
+    for every deviation inside the bands. Where they are too wide for that the pose is left out
+    (`no_bound`), as it is where a machine at an edge cannot be assembled (`band`) or the corrected
+    command not be followed (`correction_` and the kernel's status). `poses` (..., n_commanded), SI,
+    default the file's workspace. The Dataset, SI, and both terms are described in docs/results.md.
 
     Raises as `truepose.budget`.
     """
@@ -67,8 +79,18 @@ def compensate(
     walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
     for block in walk:
         deviations = [source.deviation(machine, given, block) for source in sources]
-        values, statuses = _correct(machine, block, deviations, second_order)
-        rows.append(block, values, walk.keep(block.indices, *statuses))
+        values, corrected, edges = _correct(machine, block, deviations, second_order)
+        alone = [(d.parameters, d.shift) for d in deviations]
+        shifted = at_shifts(machine, block, alone, together(alone))
+        bounded = np.isfinite(values["bound"] + values["second_order"]).all(axis=1)
+        usable = walk.keep(
+            block.indices,
+            shifted,
+            *map(of_correction, corrected),
+            *map(of_band, edges),
+            reason_unless(bounded, NO_BOUND),
+        )
+        rows.append(block, values, usable)
     if rows.count == 0:
         raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
     return assemble(machine, given, SCHEMA, rows, table, walk.left_out)
@@ -79,8 +101,11 @@ def _correct(
     block: Block,
     deviations: Sequence[Deviation],
     second_order: SecondOrder,
-) -> tuple[dict[str, np.ndarray], list[np.ndarray]]:
-    """Every variable over poses for one block, and all statuses (n,) met on the way."""
+) -> tuple[dict[str, np.ndarray], list[np.ndarray], list[np.ndarray]]:
+    """Every variable over poses for one block, and all statuses (n,) met on the way.
+
+    First those of the corrected command at the shifts, then those at edges of the bands.
+    """
     shift = together([(d.parameters, d.shift) for d in deviations])
     lower = together([(d.parameters, d.at_edge(-1.0)) for d in deviations])
     upper = together([(d.parameters, d.at_edge(+1.0)) for d in deviations])
@@ -92,7 +117,7 @@ def _correct(
     middle, at_middle = residual(shift)
     low, at_low = residual(lower)
     high, at_high = residual(upper)
-    statuses = [corrected, at_middle, at_low, at_high]
+    statuses = [corrected, at_middle]
 
     # Rounding of the inverse is no deviation: where nothing is known, nothing is corrected.
     centre = Step(*shift, joints - block.joints, middle)
@@ -115,4 +140,4 @@ def _correct(
         "bound": np.maximum(down, up),
         "second_order": second_order.bound(block, centre, band),
     }
-    return values, statuses
+    return values, statuses, [at_low, at_high]

@@ -36,6 +36,9 @@ class QuantityError(ReadingError):
     """A value that is not the quantity wanted."""
 
 
+LARGEST = 1e50
+"""Of any quantity, in SI units: beyond it, products and squares of quantities are no numbers."""
+
 FEW_DIGITS = 10
 """Significant digits of a number that somebody may have written."""
 
@@ -138,6 +141,13 @@ class UnitSystem:
             )
         if not math.isfinite(result):
             raise _not_finite(value, wanted)
+        if abs(result) > LARGEST:
+            raise QuantityError(
+                "too-large",
+                f"expected {wanted.phrase}, found a number of no size that anything has",
+                found=shown_value(value),
+                expected=f"a number of at most {LARGEST:g} in SI units: {_expected(wanted)}",
+            )
         return result
 
     def _from_number(self, value: float, wanted: Dimension) -> float:

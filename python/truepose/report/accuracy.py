@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -21,8 +22,10 @@ BEFORE, AFTER = "before compensation", "after compensation"
 class Answer:
     """One quantity against what was asked of it, SI. `asked` is None where nothing is asked.
 
-    `number` is that of its worst pose in the poses asked for, `pose` has the pose by freedom;
-    `units` are those for people, `asked_text` is what is asked as it was asked.
+    `number` is that of its worst pose in the poses asked for, `pose` has the pose by freedom.
+    `units` are those for people, `asked_text` is what is asked as it was asked. `broken` counts
+    poses of the run at which nothing is met, whatever `highest` is: some machine inside the bands
+    cannot be assembled there (`truepose.budget.poses.broken`).
     """
 
     quantity: str
@@ -33,6 +36,7 @@ class Answer:
     pose: Mapping[str, float]
     units: ShownUnits
     asked_text: str = ""
+    broken: int = 0
 
     def as_data(self, machine: Machine) -> dict[str, Any]:
         """The answer for programs, in the units of the machine's file."""
@@ -42,12 +46,13 @@ class Answer:
         return {
             "quantity": self.quantity,
             "state": self.state,
-            "highest": highest,
+            "highest": highest if math.isfinite(highest) else None,
             "asked": asked,
             "units": units,
             "pose": self.number,
             "at": pose_in_file_units(machine, self.pose),
             "met": self.met,
+            "not_assembled": self.broken,
         }
 
     @property
@@ -58,7 +63,7 @@ class Answer:
     @property
     def met(self) -> bool | None:
         """Whether the accuracy asked is kept; None where none is asked."""
-        return None if self.asked is None else bool(self.highest <= self.asked)
+        return None if self.asked is None else bool(self.highest <= self.asked) and not self.broken
 
     @property
     def amount(self) -> str:
@@ -83,19 +88,24 @@ def answers(study: Study) -> tuple[Answer, ...]:
     accuracy = study.machine.accuracy
     found = []
     for state, worst in states:
-        found.append(_answer(study, "position", state, study.position_norm(worst), accuracy.target))
+        broken = len(study.broken(corrected=state == AFTER))
+        sizes = [("position", study.position_norm(worst), accuracy.target)]
         if study.rotations:
-            size = study.rotation_norm(worst)
-            found.append(_answer(study, "orientation", state, size, accuracy.angle_target))
+            sizes.append(("orientation", study.rotation_norm(worst), accuracy.angle_target))
+        found += [_answer(study, name, state, size, asked, broken) for name, size, asked in sizes]
     return tuple(found)
 
 
-def _answer(study: Study, quantity: str, state: str, size: Array, asked: float | None) -> Answer:
+def _answer(
+    study: Study, quantity: str, state: str, size: Array, asked: float | None, broken: int
+) -> Answer:
     worst = where_highest(size)
     number = int(study.numbers[worst])
     pose = dict(zip(study.machine.commanded, study.poses[worst].tolist(), strict=True))
     said = study.machine.accuracy.said(quantity)
-    return Answer(quantity, state, float(size[worst]), asked, number, pose, study.units, said)
+    return Answer(
+        quantity, state, float(size[worst]), asked, number, pose, study.units, said, broken
+    )
 
 
 def met(found: tuple[Answer, ...], state: str) -> bool | None:

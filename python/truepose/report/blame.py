@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.budget.shares import first_to_tighten
+from truepose.machine.suggestion import counted
 from truepose.report.display import Array, column, is_position, where_highest
 from truepose.report.reading import at_text, components, position_of
 from truepose.report.tables import MOST_LISTED, Table
@@ -116,6 +117,13 @@ def _shares(machine: Machine, found: xr.Dataset, pose: int, of: str, part: str) 
                 f" Over all {found.sizes['pose']:,} poses together: {name}, {100 * share:.1f} % of "
                 "the variance."
             )
+    failed = int(found["failed"].values[pose])
+    lost = (
+        f" At this pose {counted(failed, 'base sample')} could not be assembled: the shares are "
+        "those of the machines that could."
+        if failed
+        else ""
+    )
     return Table(
         f"shares_{of}_{part}",
         f"Shares of the {part}'s variance, by {of}",
@@ -123,5 +131,5 @@ def _shares(machine: Machine, found: xr.Dataset, pose: int, of: str, part: str) 
         rows,
         note=f"At {at_text(machine, found, pose)}, where the tool spreads most, of the variances "
         "of all components together. First: what would go if this one were known; total: what "
-        "would stay if all others were; linear: to first order." + first + more,
+        "would stay if all others were; linear: to first order." + first + more + lost,
     )

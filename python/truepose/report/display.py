@@ -64,12 +64,16 @@ def pose_text(pose: ArrayLike, coordinates: Sequence[str], units: ShownUnits) ->
 
 
 def where_highest(sizes: ArrayLike) -> int:
-    """Index of the highest of `sizes` (n,), missing ones passed over.
+    """Index of the highest of `sizes` (n,), missing ones passed over; 0 where all are missing.
 
     Of those equal but for rounding it is the first, on every processor.
     """
     values = np.asarray(sizes, dtype=np.float64)
+    if np.isnan(values).all():
+        return 0
     highest = np.nanmax(values)
+    if np.isinf(highest):
+        return int(np.flatnonzero(values == highest)[0])
     return int(np.flatnonzero(values >= highest - ROUNDING * abs(highest))[0])
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truepose.budget.poses import not_assembled_text
 from truepose.machine.suggestion import counted
 from truepose.report.blame import shares
 from truepose.report.display import (
@@ -172,7 +173,10 @@ def _drawn(found: xr.Dataset, pose: int) -> str:
         digits = counted(int(found.attrs["digits"]), "digit")
         text += f" As many as make {digits} of the standard deviation stable (JCGM 101, 7.9)."
     if failed:
-        text += f" {failed:,} more could not be assembled and are in no number."
+        text += (
+            f" {not_assembled_text(failed, count + failed)}: they count as beyond both ends of "
+            "every interval, and are in no mean, standard deviation or extreme."
+        )
     if found.attrs.get("interrupted"):
         text += " Interrupted: fewer than were asked for."
     return text
@@ -207,8 +211,18 @@ def _sampled_over(machine: Machine, found: xr.Dataset) -> Table:
         ),
         tuple(rows),
         words=2,
-        note="Farthest: the end of the coverage interval that is farther from zero.",
+        note="Farthest: the end of the coverage interval that is farther from zero." + _lost(found),
     )
+
+
+def _lost(found: xr.Dataset) -> str:
+    """How many samples could not be assembled anywhere, and where too many for an interval."""
+    lost = str(found.attrs.get("not_assembled", "none"))
+    if lost == "none":
+        return ""
+    none = int(np.isnan(found["magnitude_upper"].values[:, 0]).sum())
+    where = f"; at {counted(none, 'pose')} so many that no interval is left" if none else ""
+    return f" Of all samples {lost}{where}."
 
 
 def bounds(machine: Machine, found: xr.Dataset) -> list[Table]:
@@ -419,6 +433,7 @@ def three_answers(study: Study) -> Table:
 
 LACKING = {
     "monte_carlo": "sampled answer",
+    "ellipses": "coverage ellipse",
     "bounds": "guaranteed bound",
     "worst_case": "worst case",
     "shares": "shares",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from truepose.budget.poses import broken
 from truepose.report.display import is_position
 
 if TYPE_CHECKING:
@@ -136,6 +137,30 @@ class Study:
     def shown(self, errors: Array) -> Array:
         """Errors (..., component), SI, in the units for people."""
         return self.units.errors(errors, self.components)
+
+    def broken(self, *, corrected: bool) -> set[tuple[float, ...]]:
+        """Poses of the run, m and rad, at which no accuracy is kept (`budget.poses.broken`).
+
+        With the nominal command, or if `corrected` with the corrected one too. Left out because of
+        what is inside the bands, or with samples that could not be assembled.
+        """
+        looked_at = [self.budget, self.worst_case, self.bounds]
+        found: set[tuple[float, ...]] = set()
+        for result in [self.budget, self.compensation] if corrected else looked_at:
+            if result is not None:
+                out = broken(result["left_out_status"].values)
+                found |= self._poses_of(result, "left_out_", out)
+        if self.monte_carlo is not None and not corrected:
+            found |= self._poses_of(
+                self.monte_carlo, "pose_", self.monte_carlo["failed"].values > 0
+            )
+        return found
+
+    def _poses_of(
+        self, result: xr.Dataset, prefix: str, chosen: NDArray[np.bool_]
+    ) -> set[tuple[float, ...]]:
+        columns = [result[prefix + name].values[chosen] for name in self.machine.commanded]
+        return set(zip(*(column.tolist() for column in columns), strict=True))
 
     def values(self, name: str) -> Array:
         """One variable of the budget as an array, in the axis order of the schema."""

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truepose.budget.poses import reason_text
+from truepose.machine.suggestion import counted
 from truepose.report.accuracy import Answer
 from truepose.report.display import (
     MISSING,
@@ -87,7 +89,10 @@ def ranking(study: Study) -> Table:
 
 
 def highest_absolute(study: Study) -> Table:
-    """Highest absolute error over the poses, per source and component (table 5, in form)."""
+    """Highest absolute error over the poses, per source and component (table 5, in form).
+
+    The rows of all sources together are not in that table of the paper.
+    """
     cells = [
         column(values) for values in study.shown(_highest(study, "highest", "overall_highest")).T
     ]
@@ -296,7 +301,17 @@ def answers(found: Sequence[Answer]) -> Table:
         words=5,
         note="At most: all sources at their shifts, and their bands added linearly (after "
         "compensation with the second-order term of its law); the exact error at an edge where "
-        "that is larger.",
+        "that is larger." + _broken(found),
+    )
+
+
+def _broken(found: Sequence[Answer]) -> str:
+    """What is said of poses at which nothing is met, whatever the numbers say."""
+    counts = {answer.state: answer.broken for answer in found if answer.broken}
+    return "".join(
+        f" NOT met {state} at {counted(count, 'pose')}: some machine inside the bands cannot be "
+        "assembled there, or the bands are too wide for a bound, or the correction leads nowhere."
+        for state, count in counts.items()
     )
 
 
@@ -325,7 +340,7 @@ def poses_left_out(study: Study) -> Table | None:
     if count == 0:
         return None
     rows = [
-        (pose_text(pose, study.machine.commanded, study.units), status.replace("_", " "))
+        (pose_text(pose, study.machine.commanded, study.units), reason_text(status))
         for pose, status in zip(
             study.left_out[:MOST_LISTED], study.left_out_statuses[:MOST_LISTED], strict=True
         )

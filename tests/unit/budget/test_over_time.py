@@ -10,6 +10,8 @@ import pytest
 import truepose as tp
 from build_machine import MACHINES
 from machine_texts import PLANAR, edited, load_text
+from truepose.budget.evaluate import budget
+from truepose.budget.over_time import over_time
 from truepose.errors import RequestError, TrueposeError
 from truepose.machine import Machine
 from truepose.machine.temperature_log import TemperatureLog
@@ -141,3 +143,23 @@ def test_a_log_of_a_part_that_does_not_say_how_it_expands() -> None:
     machine = tp.load(MACHINES / "hexapod.toml")
     condition = machine.condition.replace(temperature_log=heated({"tool": 3.0}))
     assert problem_of(tp.over_time, machine, condition=condition) == "no-expansion"
+
+
+def test_without_poses_it_is_home_and_a_budget_the_workspace(hexapod: Machine) -> None:
+    """And the first line of both says so, as it does in docs/results.md."""
+    for run, says in ((over_time, "home"), (budget, "workspace")):
+        assert says in str(run.__doc__).splitlines()[0]
+    page = (Path(__file__).parents[3] / "docs" / "results.md").read_text(encoding="utf-8")
+    assert "Without poses all are over the poses of the file's workspace, but `over_time`" in page
+    machine = hexapod
+    home = dict(zip(machine.dof, machine.home.tolist(), strict=True))
+    at_home = [home[freedom] for freedom in machine.commanded]
+    times = [0.0, 900.0]
+    found, asked = tp.over_time(machine, times=times), tp.over_time(machine, at_home, times=times)
+    assert np.array_equal(found.error.values, asked.error.values)
+    assert [float(found[f"pose_{name}"].values[0]) for name in machine.commanded] == at_home
+    everywhere = tp.budget(machine, condition=machine.condition.replace(temperature_log=None))
+    assert everywhere.sizes["pose"] + everywhere.sizes["left_out"] == len(machine.poses())
+    assert len(machine.poses()) > 1
+    places = [everywhere[f"pose_{name}"].values for name in machine.commanded]
+    assert np.array_equal(np.stack(places, axis=-1), machine.poses()[everywhere["pose"].values])

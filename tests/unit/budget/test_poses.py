@@ -58,7 +58,7 @@ def test_a_correction_out_of_travel_is_left_out(tmp_path: Path) -> None:
     machine = load_text(tmp_path, text)
     assert tp.budget(machine, [[0.3, 0.2]]).attrs["poses_left_out"] == 0
     found = tp.compensate(machine, [[0.3, 0.2], [0.3, 0.1]])
-    assert found.left_out_status.values.tolist() == ["out_of_travel"]
+    assert found.left_out_status.values.tolist() == ["correction_out_of_travel"]
     assert found.pose.values.tolist() == [1]
 
 

@@ -161,3 +161,22 @@ def test_a_dataset_is_written_and_read_again(title: str, name: str, tmp_path: Pa
         for name in dataset.variables:
             assert (read[name].values == dataset[name].values).all() or read[name].isnull().any()
         assert read.attrs == dataset.attrs
+
+
+def test_what_is_cited_of_the_paper() -> None:
+    """Equation 8 is the percent of a source, 9 that of all together; table 5 has sources only.
+
+    Of every variable with a percent or a highest error the page cites what belongs to it.
+    """
+    text = PAGE.split("\n## Budget\n")[1].split("\n## ")[0]
+    rows = [row for row in map(ROW.match, text.splitlines()) if row]
+    cited = {row["name"]: set(re.findall(r"eq\. [\d-]+|table \d", row["text"])) for row in rows}
+    for name, found in cited.items():
+        overall = name.startswith("overall_")
+        alone = name.removeprefix("overall_")
+        if alone in ("percent_lower", "percent_upper"):
+            assert found == {"eq. 9" if overall else "eq. 8"}, name
+        elif alone in ("highest_lower", "highest_upper"):
+            assert found == (set() if overall else {"table 5"}), name
+        else:
+            assert not found & {"eq. 8", "eq. 9", "table 5"}, name

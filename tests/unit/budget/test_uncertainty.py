@@ -195,7 +195,8 @@ def sampled(model: Any, poses: Any = None, condition: Any = None, **named: Any) 
     }
     samples = np.full(drawn.shape[1:-1], count)
     return xr.Dataset(
-        {name: (dims, values) for name, values in data.items()} | {"samples": (dims[:-1], samples)},
+        {name: (dims, values) for name, values in data.items()}
+        | {"samples": (dims[:-1], samples), "failed": (dims[:-1], np.zeros_like(samples))},
         coords,
         {"seed": named["seed"]},
     )

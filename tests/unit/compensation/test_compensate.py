@@ -10,6 +10,7 @@ import pytest
 import truepose as tp
 from build_machine import MACHINES
 from made_source import MadeSource, with_sources
+from truepose.errors import RequestError
 from truepose.sources import Deviation
 
 POSE = [0.3, 0.2]  # both struts at the same slope: 300 across, 400 up
@@ -100,6 +101,8 @@ def test_the_law_over_the_whole_box_of_the_file(machine: tp.Machine) -> None:
 
 def test_a_band_wider_than_the_struts_has_no_bound(machine: tp.Machine) -> None:
     wide = with_sources(machine, lengths(machine, half=0.5, edge=False))
-    found = tp.compensate(wide, POSE)
-    assert np.isinf(found.second_order).all()
-    assert np.isfinite(found.bound).all()
+    with pytest.raises(RequestError) as caught:
+        tp.compensate(wide, POSE)
+    (problem,) = caught.value.problems
+    assert problem.code == "no-pose-left"
+    assert "1 where the bands are too wide for a bound" in str(problem.found)

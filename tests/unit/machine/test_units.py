@@ -92,6 +92,8 @@ def test_a_quantity_becomes_si(
         ("inf mm", "length", "not-finite", "not finite"),
         ("1e309 mm", "length", "not-finite", "not finite"),
         ("1e308 km", "length", "not-finite", "not finite"),
+        ("1e54 mm", "length", "too-large", "no size that anything has"),
+        (-1e54, "length", "too-large", "no size that anything has"),
         (True, "length", "wrong-type", "expected a length, found true or false"),
         ([3], "length", "wrong-type", "expected a length, found a list"),
         ("", "length", "unknown-unit", "not a number with a unit"),

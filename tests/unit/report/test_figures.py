@@ -230,6 +230,11 @@ def test_the_histogram_has_the_shares_that_the_quantiles_say() -> None:
     edges, share = distribution.histogram(levels, steps, bars=5)
     assert share[[0, 2, 4]] == pytest.approx([0.25, 0.5, 0.25], abs=0.02)
     assert share.sum() == pytest.approx(1.0)
+    # A fifth that has no error, half of it below and half above, is in no bar.
+    within = (levels >= 0.1 - 1e-9) & (levels <= 0.9 + 1e-9)
+    edges, share = distribution.histogram(levels[within], levels[within], bars=8)
+    assert np.allclose(edges, np.linspace(0.1, 0.9, 9))
+    assert np.allclose(share, 0.1)
     edges, share = distribution.histogram(levels, np.full(101, 3.0))
     assert (edges[0], edges[-1], share.sum()) == (3.0, 3.0, 1.0)
 

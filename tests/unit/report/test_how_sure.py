@@ -55,7 +55,7 @@ def test_the_note_says_how_samples_were_drawn_and_which_failed(study: Study) -> 
     note = how_sure.sampled(study.machine, found)[0].note
     assert "4,000 scrambled Sobol points" in note
     assert "2 digits of the standard deviation stable" in note
-    assert "12 more could not be assembled" in note
+    assert "12 of 4,012 could not be assembled" in note
     assert "Interrupted" in note
 
 

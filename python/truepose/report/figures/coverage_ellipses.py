@@ -60,8 +60,18 @@ def caption(study: Study) -> str:
         f"Where the tool really is: the ellipse holds {percent} of the samples of the position "
         f"error, drawn {_magnified(study):,.0f} times as large as the workspace; the line leads "
         "from the commanded place to the mean. A long ellipse is a direction in which the machine "
-        f"is unsure. {int(found['samples'].values[0]):,} samples a pose." + shadow
+        f"is unsure. {int((found['samples'] + found['failed']).values[0]):,} samples a pose."
+        + shadow
+        + _lost(found)
     )
+
+
+def _lost(found: xr.Dataset) -> str:
+    """How many samples could not be assembled, where any could not."""
+    lost = str(found.attrs.get("not_assembled", "none"))
+    if lost == "none":
+        return ""
+    return f" Of all samples {lost}; where too many failed, no ellipse is drawn."
 
 
 def figure(study: Study) -> go.Figure:

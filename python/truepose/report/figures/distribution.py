@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from truepose.budget.poses import not_assembled_text
 from truepose.report.display import MISSING, ROUNDING, Array, number
 from truepose.report.figures._style import GRID, INK, OVERALL, finish, small, source_colour
 from truepose.report.reading import at_text, percent_text, quantities, worst_pose
@@ -28,9 +29,15 @@ def caption(study: Study) -> str:
     pose = worst_pose(found, "magnitude_upper")
     percent = percent_text(float(found.attrs["probability"]))
     failed = int(found["failed"].values[pose])
-    lost = f" {failed:,} further samples could not be assembled." if failed else ""
+    count = int(found["samples"].values[pose])
+    lost = (
+        f" {not_assembled_text(failed, count + failed)}: they are in no bar and no interval, "
+        "and the bars add up to the rest."
+        if failed
+        else ""
+    )
     return (
-        f"Exact error of {int(found['samples'].values[pose]):,} samples of all bands at "
+        f"Exact error of {count:,} samples of all bands at "
         f"{at_text(study.machine, found, pose)}, the pose of those sampled where the position is "
         f"farthest off. Dark: the {percent} coverage interval; the line is the mean. Of a "
         f"magnitude, {percent} lie below the end of the dark part." + lost
@@ -107,6 +114,7 @@ def _of(study: Study, name: str, pose: int) -> tuple[Array, Array, float]:
 def histogram(levels: Array, quantiles: Array, bars: int = BARS) -> tuple[Array, Array]:
     """Edges (bars + 1,) and share of the samples (bars,) from quantiles (n_level,) at `levels`.
 
+    Where the lowest level is not 0 or the highest not 1, the rest has no error and is in no bar.
     The distribution function between two quantiles is taken as a straight line; where quantiles
     are equal, as of a discrete distribution, it steps.
     """
@@ -114,7 +122,7 @@ def histogram(levels: Array, quantiles: Array, bars: int = BARS) -> tuple[Array,
     # A step at an edge counts below it.
     just_above = edges + ROUNDING * (edges[-1] - edges[0])
     below = np.interp(just_above, quantiles, levels)
-    below[0], below[-1] = 0.0, 1.0
+    below[0], below[-1] = levels[0], levels[-1]
     return edges, np.diff(below)
 
 
@@ -127,7 +135,7 @@ def _draw(
     panel: dict[str, int],
 ) -> None:
     finite = np.isfinite(quantiles)
-    if not finite.any():
+    if finite.sum() < 2:
         figure.add_annotation(text=MISSING, x=0.5, y=0.5, showarrow=False, **panel)
         return
     edges, share = histogram(levels[finite], quantiles[finite])

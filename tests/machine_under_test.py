@@ -6,13 +6,17 @@ import zlib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+import truepose as tp
 from build_machine import Description, description_of, grid_of
+from machine_file import File, file_at
 from reference_kinematics import Reference
 from truepose import _kernel
+from truepose.machine import Machine
 
 OK = _kernel.STATUS.index("ok")
 
@@ -34,6 +38,21 @@ class MachineUnderTest:
     @cached_property
     def reference(self) -> Reference:
         return Reference(self.description)
+
+    @cached_property
+    def loaded(self) -> Machine:
+        """The machine that the loader makes of the file."""
+        return tp.load(self.path)
+
+    @cached_property
+    def file(self) -> File:
+        """The file as plain tables, for a test to change."""
+        return file_at(self.path)
+
+    @cached_property
+    def parameter_units(self) -> dict[str, str]:
+        """Name -> unit of every parameter."""
+        return dict(zip(self.kernel.parameters, self.kernel.units, strict=True))
 
     @property
     def seed(self) -> int:
@@ -61,10 +80,13 @@ class MachineUnderTest:
         at[36] = border[36]
         return np.asarray(self.box[:, 0] + at * (self.box[:, 1] - self.box[:, 0]))
 
+    three: ClassVar = [0, 16, 36]
+    """Three of the poses: one anywhere, one at a border, one at a corner."""
+
     @property
     def three_poses(self) -> NDArray[np.float64]:
-        """(3, n_commanded) of them: one anywhere, one at a border, one at a corner."""
-        return self.poses[[0, 16, 36]]
+        """(3, n_commanded) these."""
+        return self.poses[self.three]
 
     @cached_property
     def wild_poses(self) -> NDArray[np.float64]:

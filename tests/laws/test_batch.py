@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from machine_under_test import OK, MachineUnderTest
+from random_machines import DrawnMachine
 from truepose import _kernel
 
 AGREES = 1e-12
@@ -225,3 +226,7 @@ def test_pickle_round_trip(machine: MachineUnderTest) -> None:
         assert (status == OK).all()
         assert np.array_equal(found, before.inverse(machine.poses))
         assert np.array_equal(after.forward(found), before.forward(found))
+
+
+def test_a_batch_of_a_drawn_machine_is_its_samples_one_by_one(drawn: DrawnMachine) -> None:
+    test_a_batch_is_its_samples_one_by_one(drawn, 9)

@@ -10,6 +10,7 @@ import pytest
 import truepose as tp
 from machine_under_test import OK, MachineUnderTest
 from made_source import MadeSource, random_deviation, sizes, with_sources
+from random_machines import DrawnMachine
 from truepose.budget.exact import together
 from truepose.machine import Machine
 from truepose.sources import Deviation
@@ -135,3 +136,7 @@ def test_what_is_not_linear_is_within_the_second_order(machine: MachineUnderTest
             assert (status == OK).all()
             remainder = np.abs(moved - found.residual_middle.values - sensitivity @ values)
             assert (remainder <= found.second_order.values + 1e-12).all()
+
+
+def test_with_exact_knowledge_nothing_remains_of_a_drawn_machine(drawn: DrawnMachine) -> None:
+    test_with_exact_knowledge_nothing_remains(drawn)

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from machine_under_test import OK, MachineUnderTest
+from random_machines import DrawnMachine
 from reference_kinematics import Reference, rotation_of, rotation_of_quaternion
 
 CLOSED = 1e-10  # m or rad against machines of some 0.3 m to 1 m
@@ -105,3 +106,8 @@ def test_poses_and_placements_are_two_ways_to_say_it(machine: MachineUnderTest) 
         assert np.abs(rotation - rotation_of_quaternion(other[3:])).max() < 1e-14
         angles = [pose[kernel.dof.index(n)] if n in kernel.dof else 0.0 for n in "abc"]
         assert np.abs(rotation - rotation_of(angles)).max() < 1e-14
+
+
+def test_forward_of_a_drawn_machine_returns_the_pose(drawn: DrawnMachine) -> None:
+    test_forward_returns_the_pose(drawn, "home")
+    test_every_pose_of_the_workspace_is_within_travel(drawn)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from build_machine import deviated
 from machine_under_test import OK, MachineUnderTest
+from random_machines import DrawnMachine
 from reference_kinematics import Reference, rotation_of_quaternion, vector_of
 from truepose import _kernel
 
@@ -167,3 +168,8 @@ def test_corrected_command_reaches_what_was_commanded(machine: MachineUnderTest)
     assert np.abs(joints - again).max() < 1e-12
     expected = small_displacements(placements, nominal, kernel.components)
     assert np.abs(errors - expected).max() < 1e-10
+
+
+def test_sensitivity_of_a_drawn_machine_is_one_on_all_roads(drawn: DrawnMachine) -> None:
+    test_sensitivity_is_the_central_difference(drawn)
+    test_virtual_work_gives_the_same_sensitivity(drawn)

@@ -8,7 +8,12 @@ from pathlib import Path
 import numpy as np
 
 import truepose as tp
+from compared_results import assert_same
+from machine_file import loaded
+from machine_file_units import CUSTOMARY, bare
 from machine_texts import PLANAR, edited, load_text
+from machine_under_test import MachineUnderTest
+from random_machines import DrawnMachine
 
 
 def in_other_units(text: str) -> str:
@@ -52,3 +57,23 @@ def test_unit_changes_change_nothing(tmp_path: Path) -> None:
                 assert (np.abs(first[name] - second[name]) <= 1e-12 + 1e-9 * scale).all(), name
             else:
                 assert (first[name] == second[name]).all(), name
+
+
+def in_inches_and_pounds_nothing_changes(machine: MachineUnderTest) -> None:
+    """Every quantity of the file in inch, rad, lbf, lb and degF, or in units made of these."""
+    other = loaded(bare(machine.file, machine.parameter_units, CUSTOMARY))
+    assert other.unit_labels["length"] == "in"
+    for run in (tp.budget, tp.compensate, tp.uncertainty, tp.worst_case):
+        # Searching vertices takes its time.
+        poses = machine.three_poses[: 1 if run is tp.worst_case else 3]
+        first, second = (run(each, poses) for each in (machine.loaded, other))
+        # How many vertices a search looks at is decided by which of two equal ones is larger.
+        assert_same(first, second, but=("vertices",))
+
+
+def test_a_shipped_machine_in_inches_and_pounds_is_the_same(shipped: MachineUnderTest) -> None:
+    in_inches_and_pounds_nothing_changes(shipped)
+
+
+def test_a_drawn_machine_in_inches_and_pounds_is_the_same(drawn: DrawnMachine) -> None:
+    in_inches_and_pounds_nothing_changes(drawn)

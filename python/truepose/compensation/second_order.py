@@ -21,7 +21,7 @@ struts
 bound the second differentials of A and B: a point that a rotation or a stretch by `turn` carries
 and that moves by `reach` to first order moves by no more than the products to second. On the
 platform the arm from the tool point is carried, and `own` is the motion of the joint centre in it.
-Where a drive's scale multiplies the strut's length, its deviation times the joint correction is
+The deviation of a drive's scale times the joint correction, of a crank times the arm as well, is
 added. Where the platform-side joint slides on a ring of radius rho about a point at the distance D
 from A's foot in its plane, it slides so that |v| stays least; by the second differential of a
 minimum that adds
@@ -195,9 +195,8 @@ class SecondOrder:
 
     def bound(self, block: Block, centre: Step, band: Sequence[Step]) -> Floats:
         """(n, n_component) the term, m and rad: 0 where nothing has a band."""
-        n_pose, n_closure = block.lengths.shape
         if not band:
-            return np.zeros((n_pose, len(self._machine.components)))
+            return np.zeros((len(block.lengths), len(self._machine.components)))
         geometry = self._geometry(block)
         unknown = self._movement(geometry, band[0])
         for step in band[1:]:
@@ -207,7 +206,7 @@ class SecondOrder:
             block.joints, block.placements, self._kernel.length_parameters
         )
         influence = np.abs(lengths)
-        arm, corrections = geometry.arm_length, self._corrections(centre, n_pose, n_closure)
+        arm, corrections = geometry.arm_length, self._corrections(geometry, centre)
         slide = geometry.slide_share
         guided = self._guided(block, centre, band)
         strained = self._strained(geometry, centre, band)
@@ -373,14 +372,29 @@ class SecondOrder:
                 angles[:, closure] = np.abs(joints[:, joint])
         return angles
 
-    def _corrections(self, centre: Step, n_pose: int, n_closure: int) -> Floats:
-        """(n, n_closure) absolute joint correction of the drive that carries each strut."""
-        steps = np.zeros((n_pose, n_closure))
-        if centre.joints is not None:
-            for closure, joint in enumerate(self._joint_of):
-                if joint >= 0:
-                    steps[:, closure] = np.abs(centre.joints[:, joint])
+    def _corrections(self, geometry: _Geometry, centre: Step) -> Floats:
+        """(n, n_closure) how far, m, the joint correction moves a base joint, or the strut's end.
+
+        It is that of the drive that carries the strut, absolute; of a crank's angle times its arm.
+        """
+        steps = np.zeros_like(geometry.length)
+        if centre.joints is None:
+            return steps
+        for closure, joint in enumerate(self._joint_of):
+            if joint >= 0:
+                steps[:, closure] = np.abs(centre.joints[:, joint])
+                if self._machine.drives[joint].coordinate == "angle":
+                    steps[:, closure] *= self._crank_arm(geometry, closure, joint)
         return steps
+
+    def _crank_arm(self, geometry: _Geometry, closure: int, joint: int) -> Floats:
+        """(n,) distance, m, of a base joint from the axis of the crank that carries it."""
+        drive = self._machine.drives[joint]
+        names = [f"{drive.part}.origin.{axis}" for axis in "xyz"]
+        origin = self._machine.nominal[[self._machine.parameters.index(name) for name in names]]
+        axis = np.asarray(drive.fields["axis"], np.float64)
+        arm = np.cross(axis, geometry.base[:, closure] - origin)
+        return np.asarray(np.linalg.norm(arm, axis=1))
 
     def _platform(self, moved: Floats, n_pose: int) -> tuple[Floats, Floats]:
         """Displacement and rotation vector, each (n, 1, 3)."""

@@ -11,6 +11,7 @@ import truepose as tp
 from build_machine import machine_files
 from calibration_under_test import CalibrationUnderTest, kinds_for
 from made_measurements import nominal_values
+from sweeps import one_a_machine, thinned
 from truepose.calibration.identification.problem import Prior, Problem
 from truepose.sources import Tolerance
 
@@ -18,7 +19,9 @@ MACHINES = {path.stem: tp.load(path) for path in machine_files()}
 CASES = [(name, kind) for name, machine in MACHINES.items() for kind in kinds_for(machine)]
 
 
-@pytest.fixture(params=CASES, ids=lambda case: f"{case[0]}-{case[1]}")
+@pytest.fixture(
+    params=thinned(CASES, one_a_machine(CASES)), ids=lambda case: f"{case[0]}-{case[1]}"
+)
 def case(request: pytest.FixtureRequest) -> CalibrationUnderTest:
     """A machine and an instrument."""
     name, kind = request.param

@@ -11,6 +11,7 @@ import truepose as tp
 from machine_under_test import OK, MachineUnderTest
 from made_source import MadeSource, random_deviation, sizes, with_sources
 from random_machines import DrawnMachine
+from sweeps import thinned
 from truepose.budget.exact import together
 from truepose.machine import Machine
 from truepose.sources import Deviation
@@ -56,7 +57,7 @@ def test_where_nothing_is_known_nothing_is_corrected(machine: MachineUnderTest) 
     assert np.abs(found.residual_upper - errors.error_upper.sel(source="band")).max() < 1e-12
 
 
-@pytest.mark.parametrize("scale", [0.1, 3.0])
+@pytest.mark.parametrize("scale", thinned([0.1, 3.0], {3.0}))
 @pytest.mark.parametrize("kind", ["lengths", "anything", "groups"])
 def test_what_remains_is_within_the_bound(
     machine: MachineUnderTest, kind: str, scale: float

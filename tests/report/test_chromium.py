@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import base64
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -174,24 +174,44 @@ def measurements(beside: Path) -> Path:
     return file
 
 
-@pytest.fixture(scope="module", params=thinned(MACHINES_SHOWN, {MEASURED, OVERCONSTRAINED}))
-def report(
-    request: pytest.FixtureRequest, browser: Any, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Visit]:
-    file = tmp_path_factory.mktemp("report") / f"{request.param}.html"
+@pytest.fixture(scope="module")
+def opened(
+    browser: Any, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[[str], Visit]]:
+    """A function: the page of a machine, which is made and opened once and stays open."""
+    pages: dict[str, Visit] = {}
+
+    def page_of(machine: str) -> Visit:
+        if machine not in pages:
+            file = tmp_path_factory.mktemp("report") / f"{machine}.html"
+            absent = write_report(machine, file)
+            pages[machine] = visit(browser, file, len(FIGURE_NAMES) - len(absent))
+            pages[machine].absent = frozenset(absent)
+        return pages[machine]
+
+    yield page_of
+    for seen in pages.values():
+        seen.page.close()
+
+
+def write_report(name: str, file: Path) -> set[str]:
+    """The page of a machine; returns the figures that have no place on it."""
     # A log, so that the figure over time is there; of all parts, at a temperature that rises.
     log = file.with_suffix(".csv")
     log.write_text("time (min),default (degC)\n0,20\n10,27\n60,30\n", encoding="utf-8")
-    machine = str(MACHINES / f"{request.param}.toml")
+    machine = str(MACHINES / f"{name}.toml")
     setting = f"condition.temperature_log={log}"
-    measured = [] if request.param != MEASURED else ["--measurements", str(measurements(file))]
+    measured = [] if name != MEASURED else ["--measurements", str(measurements(file))]
     assert run(["report", machine, "--set", setting, "--output", str(file), *measured]) == 0
-    absent = set() if request.param == OVERCONSTRAINED else ONLY_OVERCONSTRAINED
-    absent = absent if measured else absent | ONLY_MEASURED
-    seen = visit(browser, file, len(FIGURE_NAMES) - len(absent))
-    seen.absent = frozenset(absent)
-    yield seen
-    seen.page.close()
+    absent = set() if name == OVERCONSTRAINED else ONLY_OVERCONSTRAINED
+    return absent if measured else absent | ONLY_MEASURED
+
+
+@pytest.fixture(params=thinned(MACHINES_SHOWN, {MEASURED, OVERCONSTRAINED}))
+def report(request: pytest.FixtureRequest, opened: Callable[[str], Visit]) -> Visit:
+    seen = opened(request.param)
+    seen.page.bring_to_front()  # a page in the background is not drawn
+    return seen
 
 
 def pages_and_figures() -> Iterator[Any]:

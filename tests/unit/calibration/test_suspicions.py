@@ -37,7 +37,7 @@ from truepose.calibration.suspicions.nominal import turned
 from truepose.machine import Machine
 
 ALL = sorted(path.stem for path in MACHINES.glob("*.toml"))
-SOME = {"planar_two_slider", "linear_delta", "tricept", "hexapod", "overconstrained"}
+SOME = {"planar_two_slider", "tricept", "hexapod"}
 SPATIAL = ("hexapod", "walking_6psu", "hexaglide", "linapod", "hexapod_telescope")
 INCH = 25.4
 COUNT = 24
@@ -153,7 +153,7 @@ def test_two_joints_exchanged(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", thinned(ALL, SOME))
-@pytest.mark.parametrize("factor", [10.0, 1.0 / INCH, INCH, 0.1])
+@pytest.mark.parametrize("factor", thinned([10.0, 1.0 / INCH, INCH, 0.1]))
 def test_wrong_unit(name: str, factor: float) -> None:
     data = good(machine(name), "position")
     found = first(name, scaled(data, slice(None), factor))

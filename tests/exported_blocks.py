@@ -109,7 +109,7 @@ def agree(text: str, what: str, found: Array, unit: str) -> None:
 def at_stated_place(machine: tp.Machine, text: str, found: Array) -> None:
     """The pose named is the one where the error is highest."""
     line = next(line for line in text.splitlines() if AFTER in line)
-    place = re.search(r"at most [\d.]+ um \(at ([^)]*)\)", line)
+    place = re.search(r"at most [\d.]+ (?:um|uin) \(at ([^)]*)\)", line)
     assert place is not None
     named = [float(part.split("=")[1].split()[0]) for part in place[1].split(",")]
     scales = [

@@ -298,12 +298,21 @@ def genhexkins(hal: str, ini: str) -> Hexapod:
     return Hexapod(points("base"), points("platform"), np.array(home))
 
 
+STATED_IN = {
+    "um": ("um", 1.0),
+    "uin": ("um", 0.0254),
+    "urad": ("urad", 1.0),
+    "mdeg": ("urad", 1e3 * math.pi / 180.0),
+}
+
+
 def stated(text: str, what: str) -> dict[str, tuple[float, float]]:
-    """Highest and rms by unit (um, urad) in the line of a block's comment that has `what`."""
+    """Highest and rms (um, urad) in the line of a block's comment that has `what`, in any unit."""
     line = next(line for line in text.splitlines() if what in line).replace("µ", "u")
     found = {}
     for highest, unit, rms in re.findall(
-        r"at most ([\d.]+) (u\w+) \(at [^)]*\), rms ([\d.]+)", line
+        r"at most ([\d.]+) (um|uin|urad|mdeg) \(at [^)]*\), rms ([\d.]+)", line
     ):
-        found[unit] = (float(highest), float(rms))
+        name, times = STATED_IN[unit]
+        found[name] = (float(highest) * times, float(rms) * times)
     return found

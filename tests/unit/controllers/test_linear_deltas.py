@@ -112,7 +112,7 @@ def test_the_error_before_is_the_budgets() -> None:
         tp.budget(machine)["overall_error"].sel(component=["rx", "ry", "rz"]).values, axis=1
     )
     line = next(line for line in export.statement if "the platform turns" in line)
-    assert f"(before: {turned.max() / UM:.1f} µrad)" in line
+    assert f"(before: {np.degrees(turned.max()) * 1e3:.3f} mdeg)" in line
 
 
 def towers_of(angles: Sequence[float], radius: float) -> Array:

@@ -134,8 +134,9 @@ def test_the_interpolation_error_is_as_stated(name: str) -> None:
         at_place = wrong(machine, axes, values, there)[0 if key == "position_m" else 1][0]
         assert at_place == pytest.approx(said[key]["highest"], rel=1e-6)
     line = next(line for line in export.statement if line.startswith("interpolation"))
-    assert f"at most {said['position_m']['highest'] / UM:.2f} µm" in line
-    assert f"rms {said['position_m']['rms'] / UM:.2f} µm" in line
+    one, unit = (25.4e-9, "µin") if machine.file_units["length"].label == "in" else (UM, "µm")
+    assert f"at most {said['position_m']['highest'] / one:.2f} {unit}" in line
+    assert f"rms {said['position_m']['rms'] / one:.2f} {unit}" in line
     text = next(text for file, text in export.files.items() if file.endswith(".csv"))
     assert f"# {line.replace('µ', 'u')}\n" in text
 

@@ -114,10 +114,12 @@ def test_the_reason_says_which_joint_and_by_how_much(tmp_path: Path) -> None:
 
 
 def test_the_check_says_so_too(tmp_path: Path) -> None:
-    found = reach(limited(tmp_path, "base_joint", 30.0))
+    machine = limited(tmp_path, "base_joint", 30.0)
+    found = reach(machine)
     (reason,) = found.reasons
     assert reason.count == (found.status == "joint_limit").sum() == 11
-    assert str(reason) == "strut 1: leans up to 23.130 ° beyond the limit of its base joint"
+    text = reason.text(machine.shown)
+    assert text == "strut 1: leans up to 23.130 ° beyond the limit of its base joint"
 
 
 def test_where_no_pose_is_left_the_reason_is_told(tmp_path: Path) -> None:

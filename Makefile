@@ -112,9 +112,11 @@ distclean: clean ## remove the virtual environment too
 
 # ---- how it is made ----
 
-# A worker for each core, which therefore starts no threads of its own, neither the kernel's nor those
-# of linear algebra. What goes to which worker, and why, is in tests/conftest.py.
-PYTEST := TRUEPOSE_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses=auto --dist=loadgroup
+# A worker for each core, which therefore starts no threads of its own, neither the kernel's nor those of
+# linear algebra. A file goes to one worker whole, with what its tests share; in the order of their names,
+# so that the many short files of tests/unit, which come last, leave no worker idle.
+PYTEST := TRUEPOSE_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest \
+	--numprocesses=auto --dist=loadfile --no-loadscope-reorder
 
 # PyO3 looks at the same Python in every build, so that none of them undoes another's.
 CARGO := PYO3_PYTHON=$(abspath $(BIN)/python) cargo

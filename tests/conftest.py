@@ -1,4 +1,4 @@
-"""What all tests share: golden files, one folder for what they compile, and how workers split."""
+"""What all tests share: golden files, what was collected, and one folder for what they compile."""
 
 from __future__ import annotations
 
@@ -24,11 +24,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     config.stash[COLLECTED] = [member_of(item) for item in items]
-    if config.pluginmanager.hasplugin("xdist"):
-        # A file is one worker's, with what its tests share, unless it says otherwise.
-        for item in items:
-            if item.get_closest_marker("xdist_group") is None:
-                item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ without TCP keeps it from listening; RUNTESTS keeps its output where it can be r
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import shutil
@@ -254,11 +255,19 @@ def _linuxcnc(folder: Path, module: str) -> str:
         _give(folder)
         inside = _INSIDE.format(modules=MODULES, uid=NOBODY)
         return _to_its_end([*_UNSHARE, "sh", "-c", inside, "sh", str(folder)], folder, environment)
-    with _installed(folder, module) as place:
+    with _alone(), _installed(folder, module) as place:
         environment["HOME"] = str(place)
         as_nobody = ["setpriv", "--reuid", str(NOBODY), "--regid", str(NOBODY), "--clear-groups"]
         start = ["linuxcnc", str(place / "machine.ini")]
         return _to_its_end([*as_nobody, *start] if os.geteuid() == 0 else start, place, environment)
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    """No other worker runs LinuxCNC: without namespaces they would share its memory and modules."""
+    with (Path(tempfile.gettempdir()) / "truepose-linuxcnc.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 @contextmanager

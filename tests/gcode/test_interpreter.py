@@ -20,7 +20,7 @@ import pytest
 
 from gcode import linuxcnc
 from gcode.random_programs import SYSTEMS, Programs, mutated, soup
-from sweeps import thinned
+from sweeps import sweep, thinned
 from system_package import missing
 from truepose import _kernel
 
@@ -404,6 +404,7 @@ print(drain(sys.argv[2], "/dev/null"), resource.getrusage(resource.RUSAGE_SELF).
 """
 
 
+@sweep
 @pytest.mark.parametrize(
     "block", [b"G1 X1.25 Y-2 F100\nX3 Y1 (to and fro)\n", b"(nothing moves)\n"]
 )

@@ -30,7 +30,7 @@ def shipped(request: pytest.FixtureRequest) -> MachineUnderTest:
     return found
 
 
-@pytest.fixture(params=thinned(DRAWN, DRAWN[::20]), ids=lambda machine: machine.name)
+@pytest.fixture(params=thinned(DRAWN, DRAWN[::20]), ids=lambda machine: f"drawn-{machine.name}")
 def drawn(request: pytest.FixtureRequest) -> DrawnMachine:
     """One of the 100 random machines."""
     found: DrawnMachine = request.param

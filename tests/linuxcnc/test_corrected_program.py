@@ -70,9 +70,10 @@ def programmed(machine: Machine, program: Path) -> Floats:
     return axes.poses(np.concatenate(table))
 
 
+@sweep
 @pytest.mark.parametrize(
     ("name", "part"),
-    [pytest.param("planar_two_slider", PLANAR, marks=sweep), ("hexapod", HEXAPOD)],
+    [("planar_two_slider", PLANAR), ("hexapod", HEXAPOD)],
 )
 def test_the_actual_tool_stays_as_near_as_stated(name: str, part: str, tmp_path: Path) -> None:
     required()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from build_machine import MACHINES
+from sweeps import sweep
 from truepose.budget.inputs import Input
 
 analyze = pytest.importorskip("SALib.analyze.sobol")
@@ -67,6 +68,7 @@ def test_ishigami() -> None:
         assert (width < 0.05).all()
 
 
+@sweep
 @pytest.mark.parametrize("half", [0.3e-3, 30e-3], ids=["as toleranced", "a hundred times that"])
 def test_the_planar_machine(half: float) -> None:
     """SALib drives the exact model: `forward` of a machine with other strut lengths."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import truepose as tp
 from machine_texts import load_text
 from made_source import with_sources
-from sweeps import thinned
+from sweeps import sweep, thinned
 from truepose.machine import Machine
 
 Floats = NDArray[np.float64]
@@ -170,6 +170,7 @@ POSES = np.array([[0.0, 0.0, 0.0], [0.03, -0.02, 0.15]])
 LOADS = np.array([[60.0, -25.0, 3.0], [-10.0, 40.0, -1.5]])
 
 
+@sweep
 @pytest.mark.parametrize("load", thinned([*LOADS, *-LOADS[:1]]))
 @pytest.mark.parametrize(
     ("clearance", "backlash"), [(True, False), (False, True), (True, True)], ids=str

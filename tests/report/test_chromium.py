@@ -207,7 +207,7 @@ def write_report(name: str, file: Path) -> set[str]:
     return absent if measured else absent | ONLY_MEASURED
 
 
-@pytest.fixture(params=thinned(MACHINES_SHOWN, {MEASURED, OVERCONSTRAINED}))
+@pytest.fixture(params=thinned(MACHINES_SHOWN, {MEASURED}))
 def report(request: pytest.FixtureRequest, opened: Callable[[str], Visit]) -> Visit:
     seen = opened(request.param)
     seen.page.bring_to_front()  # a page in the background is not drawn
@@ -215,11 +215,10 @@ def report(request: pytest.FixtureRequest, opened: Callable[[str], Visit]) -> Vi
 
 
 def pages_and_figures() -> Iterator[Any]:
-    """Every figure on every page; once each in the quick suite, where a machine has it."""
+    """Every figure on every page; in the quick suite those of one machine."""
     for machine in MACHINES_SHOWN:
         for name in FIGURE_NAMES:
-            once = OVERCONSTRAINED if name in ONLY_OVERCONSTRAINED else MEASURED
-            yield pytest.param(machine, name, marks=() if machine == once else sweep)
+            yield pytest.param(machine, name, marks=() if machine == MEASURED else sweep)
 
 
 @pytest.mark.parametrize(("report", "name"), list(pages_and_figures()), indirect=["report"])

@@ -40,6 +40,10 @@ def standard_uncertainty(
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
 
+MANY = 1e9
+"""Degrees of freedom from which on Student's quantiles are the normal ones to 1e-9: no end."""
+
+
 @dataclass(frozen=True)
 class Combined:
     """The law of propagation, per output.
@@ -89,11 +93,13 @@ def combine(
     sets = _correlated_sets(len(dofs), correlation)
     member = (sets[:, np.newaxis] == np.unique(sets)).astype(np.float64)
     fewest = np.array([dofs[column > 0.0].min() for column in member.T])
-    fourth = np.square((weighed * each) @ member) @ (1.0 / fewest)
+    parts = np.square((weighed * each) @ member) / fewest
+    fourth, whole = parts.sum(axis=2), np.square(square)
     scale_dof = dof.copy()
-    np.divide(np.square(square), fourth, out=scale_dof, where=fourth > 0.0)
+    # A product is compared: where parts of finite degrees are next to nothing, their sum is as well.
+    np.divide(whole, fourth, out=scale_dof, where=fourth * MANY > whole)
     correlated = (member.sum(axis=0) > 1.0) & np.isfinite(fewest)
-    undefined = (np.abs(each) @ member)[..., correlated].any(axis=2)
+    undefined = parts[..., correlated].sum(axis=2) * MANY > whole
     return Combined(
         size, covariance, np.where(undefined, np.nan, scale_dof), np.sqrt(square), scale_dof
     )

@@ -98,6 +98,19 @@ def test_student_variables_enter_the_degrees_of_freedom_by_their_scale() -> None
     assert found.scale_dof[0, 0] == found.dof[0, 0]
 
 
+@pytest.mark.parametrize("part", [0.0, 1e-100, 1e-60, 1e-10, 1e-3])
+def test_parts_that_are_next_to_nothing_leave_the_degrees_of_freedom_without_end(
+    part: float,
+) -> None:
+    effects, dofs = np.array([[[1.0, part]]]), np.array([np.inf, 5.0])
+    found = combine(effects, np.ones(2), None, dofs)
+    assert np.isinf(found.dof[0, 0])
+    assert np.isfinite(coverage_factor(found.scale_dof, 0.95)).all()
+    # One part in a hundred is one: 5 (1.0001)^2 / 1e-8.
+    effects[0, 0, 1] = 1e-2
+    assert combine(effects, np.ones(2), None, dofs).dof[0, 0] == pytest.approx(5.001e8, rel=1e-4)
+
+
 @pytest.mark.parametrize("probability", [0.5, 0.6827, 0.95, 0.99, 0.9999])
 def test_coverage_factors_are_students(probability: float) -> None:
     dof = np.array([[1.0, 2.5, 16.75], [1e4, np.inf, 2.5]])

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from command_line import PLANAR, call
-from sweeps import thinned
+from sweeps import sweep, thinned
 
 FORMS = (".json", ".csv", ".nc")
 # Long enough that half of the text does not wait in a buffer of the file.
@@ -99,6 +99,7 @@ def test_kill_9_in_the_middle_of_writing(output: Path, there: bool) -> None:
     unchanged(output, there)
 
 
+@sweep
 def test_ended_by_the_system_inside_a_write(output: Path, there: bool, tmp_path: Path) -> None:
     limit = 20_000  # bytes; the files have several times as many
 

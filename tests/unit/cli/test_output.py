@@ -18,6 +18,7 @@ import xarray as xr
 
 import truepose
 from command_line import PLANAR, call
+from sweeps import sweep
 
 OUT_OF_REACH = "workspace.grid.x=[-900, 700, 9]"
 OF = {"budget": truepose.budget, "compensate": truepose.compensate}
@@ -194,6 +195,7 @@ def test_ctrl_c_leaves_the_old_file(
 HEARING = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
 
 
+@sweep
 def test_ctrl_c_in_the_middle_of_long_work(tmp_path: Path) -> None:
     grid = ["--set", "workspace.grid.x=[200,400,3000]", "--set", "workspace.grid.y=[100,300,300]"]
     process = subprocess.Popen(

@@ -15,6 +15,7 @@ import pytest
 
 import truepose
 from command_line import MACHINES, PLANAR, call
+from sweeps import sweep
 from truepose.errors import RequestError
 
 FEW = ["--set", "workspace.grid={ x = [250, 350, 2], y = [200, 200, 1] }"]
@@ -119,6 +120,7 @@ def test_a_distribution_without_ends_has_no_bound_until_it_is_cut(
     assert highest[0] < highest[2]
 
 
+@sweep
 def test_the_report_says_why_it_has_no_bound(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -13,6 +13,7 @@ import xarray as xr
 
 import truepose
 from command_line import MACHINES, call
+from sweeps import sweep
 
 FILE = MACHINES / "overconstrained.toml"
 PLAY = "each.strut.base_joint.clearance=0.005"
@@ -89,6 +90,7 @@ def test_a_machine_that_nothing_strains_is_refused(capsys: pytest.CaptureFixture
     assert done.out == ""
 
 
+@sweep
 def test_the_report_has_a_section_where_there_are_internal_forces(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -197,6 +197,7 @@ def test_arm_takes_it_without_a_warning(name: str, builds: Path) -> None:
     compiled(program(name), builds, ["-O1"], to="object", by="arm-linux-gnueabihf-gcc")
 
 
+@sweep
 @in_part
 def test_sanitizers_find_nothing(name: str, tmp_path: Path) -> None:
     """Good poses, far ones, and numbers that are none, under address and undefined sanitizers."""

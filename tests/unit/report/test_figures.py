@@ -10,6 +10,7 @@ import pytest
 
 from made_how_sure import shares, sure_study
 from made_study import hexapod_study, planar_study
+from sweeps import sweep
 from truepose.report import blame, figures, how_sure
 from truepose.report.figures import (
     FIGURES,
@@ -185,6 +186,7 @@ def test_many_poses_are_thinned_and_the_largest_stays(monkeypatch: pytest.Monkey
     assert "one in" not in source_errors.caption(planar_study())
 
 
+@sweep
 def test_values_are_kept_in_single_precision(study: Study) -> None:
     for each in figures.draw(study):
         for one in each.figure.data:

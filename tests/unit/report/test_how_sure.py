@@ -10,6 +10,7 @@ import pytest
 
 import made_how_sure as made
 from made_study import hexapod_study, planar_study
+from sweeps import sweep
 from truepose.report import blame, how_sure, page, reading
 from truepose.report.study import Study
 
@@ -140,6 +141,7 @@ def test_the_answers_side_by_side_are_of_one_pose(study: Study) -> None:
     )
 
 
+@sweep
 def test_what_is_missing_is_said_with_its_reason(study: Study) -> None:
     because = "a normal distribution has no ends (length of strut 1)."
     without = replace(study, bounds=None, missing={"bounds": because})

@@ -96,7 +96,7 @@ def combine(
     parts = np.square((weighed * each) @ member) / fewest
     fourth, whole = parts.sum(axis=2), np.square(square)
     scale_dof = dof.copy()
-    # A product is compared: where parts of finite degrees are next to nothing, their sum is as well.
+    # Compared by a product: where parts of finite degrees are next to nothing, so is their sum.
     np.divide(whole, fourth, out=scale_dof, where=fourth * MANY > whole)
     correlated = (member.sum(axis=0) > 1.0) & np.isfinite(fewest)
     undefined = parts[..., correlated].sum(axis=2) * MANY > whole

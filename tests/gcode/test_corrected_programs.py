@@ -232,7 +232,7 @@ PARTS = {"planar_two_slider": PLANAR_PART, "hexapod": HEXAPOD_PART}
 
 
 @pytest.mark.parametrize("interpolation", thinned(["pose", "either"], {"either"}))
-@pytest.mark.parametrize("name", PARTS)
+@pytest.mark.parametrize("name", thinned(PARTS))
 def test_the_actual_tool_follows_the_program(
     name: str, interpolation: str, read: Read, tmp_path: Path
 ) -> None:

@@ -177,6 +177,7 @@ def _study(machine: Any, poses: Array) -> Study:
         "error_lower": (per_source, shift - half, "m"),
         "error_upper": (per_source, shift + half, "m"),
         "worst": (per_source, worst, "m"),
+        "reach": (per_source, worst - np.abs(shift), "m"),
         "uncertainty": (per_source, half / np.sqrt(3), "m"),
         "percent_lower": (per_source, np.abs(shift - half) * inverse, "%"),
         "percent_upper": (per_source, np.abs(shift + half) * inverse, "%"),

@@ -47,6 +47,7 @@ SCHEMA: Schema = {
         _EACH, "component", "error from the source alone, lengths and offsets at the upper edge"
     ),
     "worst": Variable(_EACH, "component", "most that the source alone can do"),
+    "reach": Variable(_EACH, "component", "how far the source's band reaches, the farther way"),
     "uncertainty": Variable(_EACH, "component", "standard uncertainty from the source's band"),
     "percent_lower": Variable(_EACH, "%", "error_lower in % of the coordinate"),
     "percent_upper": Variable(_EACH, "%", "error_upper in % of the coordinate"),
@@ -232,6 +233,7 @@ def _evaluate(
         values["error_lower"][:, at] = edges.lower
         values["error_upper"][:, at] = edges.upper
         values["worst"][:, at] = worst.worst(edges.error, reach)
+        values["reach"][:, at] = np.maximum(*reach)
         values["uncertainty"][:, at] = spread
         percent.percent(edges.lower, per_error, out=values["percent_lower"][:, at])
         percent.percent(edges.upper, per_error, out=values["percent_upper"][:, at])

@@ -50,8 +50,9 @@ class Combined:
 
     `standard_uncertainty` (n, m), `covariance` (n, m, m); `dof` (n, m): effective degrees of
     freedom, NaN where there is no such number. `scale` and `scale_dof` (n, m): the interval is
-    Student's quantile for `scale_dof` times `scale`, the standard uncertainty but for Student's
-    variables, which enter with their scale.
+    Student's quantile for `scale_dof` times `scale`. That is the standard uncertainty where the
+    degrees of freedom are of its estimate; where they are of Student variables, the scale of the
+    Student distribution that has it for its standard deviation.
     """
 
     standard_uncertainty: Floats
@@ -100,9 +101,12 @@ def combine(
     np.divide(whole, fourth, out=scale_dof, where=fourth * MANY > whole)
     correlated = (member.sum(axis=0) > 1.0) & np.isfinite(fewest)
     undefined = parts[..., correlated].sum(axis=2) * MANY > whole
-    return Combined(
-        size, covariance, np.where(undefined, np.nan, scale_dof), np.sqrt(square), scale_dof
-    )
+    # Of one Student variable sqrt((dof - 2) / dof), of many next to one: a sum of them is normal.
+    student = np.zeros(len(dofs)) if scales is None else (scales < 1.0).astype(np.float64)
+    of_students = parts[..., student @ member > 0.0].sum(axis=2)
+    share = np.divide(of_students, whole, out=np.zeros_like(whole), where=whole > 0.0)
+    scale = size * np.sqrt(1.0 - 2.0 * share)
+    return Combined(size, covariance, np.where(undefined, np.nan, scale_dof), scale, scale_dof)
 
 
 def _correlated_sets(count: int, correlation: Floats | None) -> Indices:

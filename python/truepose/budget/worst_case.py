@@ -104,12 +104,12 @@ def worst_case(
     the file's; `progress` is called with (poses done, poses in all). Of a plain function: its
     `inputs`, as the second argument or by name. The Dataset, SI, is described in docs/results.md.
 
-    Every corner is evaluated where at most 12 variables have a band, else a directed search finds
-    the worst it can (`search` says which). A distribution without ends, such as a normal one, is
-    taken at its band of k standard deviations, which the attribute `unbounded` lists. Values in
-    between the corners are not looked at, but for the shifts themselves.
-
-    A pose at which a machine at one of the corners cannot be assembled is left out as `band`.
+    Every corner is evaluated where at most 12 variables have a band and none is of a direction that
+    is not known, else a directed search finds the worst it can (`search` says which). A
+    distribution without ends, such as a normal one, is taken at its band of k standard deviations,
+    which the attribute `unbounded` lists. Values in between the corners are not looked at, but for
+    the shifts themselves. A pose at which a machine at one of the corners cannot be assembled is
+    left out as `band`.
 
     Raises `RequestError`: bad-poses, no-workspace, no-source, no-pose-left; not-finite where the
     function is not finite at a corner; `TrueposeError` as the sources do.

@@ -275,7 +275,7 @@ def _tolerance(machine: Machine, proof: Proof, said: str) -> str:
         "error": f"{text}, {100.0 * proof.tolerance / (allowed.before or 1.0):.2g} % of the error "
         f"before ({before})",
         "most": f"{text}, the most that is taken by itself",
-        "digits": f"{text}, the least that --digits can hold",
+        "digits": f"{text}, ten times the rounding of --digits",
     }[allowed.reason]
 
 

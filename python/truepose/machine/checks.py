@@ -195,7 +195,9 @@ def _has_carriage(row: Mapping[str, Any]) -> bool:
 def _carriages(document: Document, validated: Validated) -> Iterator[Problem]:
     """What a carriage is made of is said of a drive that has one."""
     for index, row in enumerate(_rows(document, "drive")):
-        if "carriage" not in row or row.get("kind") not in drive_kinds() or _has_carriage(row):
+        kind = row.get("kind")
+        known = isinstance(kind, str) and kind in drive_kinds()
+        if "carriage" not in row or not known or _has_carriage(row):
             continue
         yield document.problem(
             "unwanted-carriage",

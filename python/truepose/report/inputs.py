@@ -141,12 +141,15 @@ def source_data(it: Machine) -> list[dict[str, object]]:
         }
         if source.name in found:
             deviation = found[source.name]
+            lower, upper = deviation.ends
             entry["deviations"] = [
                 {
                     "parameter": it.parameters[parameter],
                     "units": in_file_units(it, 0.0, it.units[parameter])[1],
                     "shift": in_file_units(it, deviation.shift[0, at], it.units[parameter])[0],
                     "half": in_file_units(it, deviation.half[0, at], it.units[parameter])[0],
+                    "lower": in_file_units(it, lower[0, at], it.units[parameter])[0],
+                    "upper": in_file_units(it, upper[0, at], it.units[parameter])[0],
                 }
                 for at, parameter in enumerate(deviation.parameters)
             ]
@@ -167,8 +170,13 @@ def deviations(it: Machine) -> Table:
     for source, deviation in _deviations_at_middle(it):
         for at, parameter in enumerate(deviation.parameters):
             unit = it.shown.small(it.units[parameter])
-            shift, half = float(deviation.shift[0, at]), float(deviation.half[0, at])
-            band = f"\N{PLUS-MINUS SIGN}{number(half * unit.per_si, 3)}" if half else MISSING
+            shift = float(deviation.shift[0, at])
+            low, high = (number(float(ends[0, at]) * unit.per_si, 3) for ends in deviation.ends)
+            band = f"{low} \N{HORIZONTAL ELLIPSIS} +{high}"
+            if not deviation.half[0, at]:
+                band = MISSING
+            elif deviation.ends[0][0, at] == -deviation.ends[1][0, at]:
+                band = f"\N{PLUS-MINUS SIGN}{high}"
             key = (source.name, number(shift * unit.per_si, 3), band, unit.label)
             alike.setdefault(key, []).append(it.parameters[parameter])
     rows = [(name, _listed(parameters), *others) for (name, *others), parameters in alike.items()]

@@ -101,7 +101,7 @@ class Study:
     @cached_property
     def has_band(self) -> tuple[bool, ...]:
         """Per source: whether it can do more than its error at the shift, anywhere."""
-        wider = self.values("worst") > np.abs(self.values("error"))
+        wider = self.values("reach") > 0.0
         return tuple(bool(wider[:, index].any()) for index in range(len(self.sources)))
 
     @cached_property
@@ -200,8 +200,7 @@ class Study:
         added because sources do not know of each other; or the exact error at an edge where that
         is larger, as in `remaining_worst`.
         """
-        bands = self.values("worst") - np.abs(self.values("error"))
-        linear = np.abs(self.values("overall_error")) + bands.sum(axis=1)
+        linear = np.abs(self.values("overall_error")) + self.values("reach").sum(axis=1)
         exact = [np.abs(self.values(f"overall_error_{edge}")) for edge in ("lower", "upper")]
         return np.asarray(np.maximum.reduce([linear, *exact]))
 

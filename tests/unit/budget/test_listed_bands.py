@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 import truepose as tp
+from command_line import call
 from machine_texts import PLANAR, edited, load_text
 from truepose.budget.inputs import Input
 from truepose.machine import Machine
@@ -111,3 +113,29 @@ def test_what_remains_is_at_most_what_the_values_leave(machine: Machine) -> None
     most = np.abs(remains).max(axis=0)
     assert (most <= found.bound + found.second_order).all()
     assert np.allclose(found.bound, most, rtol=5e-3)
+
+
+def test_what_is_answered_is_at_least_what_a_machine_of_the_list_reaches(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # The force moves the tool against the longer side of the list: |error| and reach do not add up
+    # to the worst of the source.
+    listed = "{ values = [0.2, -0.8], probabilities = [0.9, 0.1], distribution = 'discrete' }"
+    text = edited(
+        PLANAR, ("[-0.3, 0.3]", listed), ("temperature = 35\n", ""), ('"0.5 mm"', '"0.9 mm"')
+    )
+    machine = load_text(tmp_path, text)
+    budget, worst = tp.budget(machine), tp.worst_case(machine)
+    tolerance = budget.sel(source="tolerance")
+    slopes = np.abs(np.linalg.inv(directions(machine, machine.poses()))[:, :, 0])
+    # From the mean, 0.1 mm, it is 0.9 mm to the one value and 0.1 to the other.
+    assert np.allclose(tolerance.reach, 0.9e-3 * slopes, rtol=1e-9)
+    answer = json.loads(call(capsys, "check", tmp_path / "machine.toml", "--format", "json").out)
+    position = answer["answers"][0]
+    reached = 1e3 * float(worst.magnitude_exact.sel(quantity="position").max())
+    assert position["highest"] >= reached
+    (shown,) = (each for each in answer["sources"] if each["name"] == "tolerance")
+    (ends,) = shown["deviations"]
+    assert (ends["shift"], ends["lower"], ends["upper"]) == pytest.approx((0.1, -0.9, 0.1))
+    table = call(capsys, "check", tmp_path / "machine.toml").out
+    assert "\N{MINUS SIGN}900.000 \N{HORIZONTAL ELLIPSIS} +100.000" in table

@@ -92,9 +92,10 @@ def test_student_variables_enter_the_degrees_of_freedom_by_their_scale() -> None
     found = combine(effects, np.ones(3), None, dofs, scales)
     assert found.standard_uncertainty[0, 0] == pytest.approx(math.sqrt(29.0))
     squares = [9.0 * 3.0 / 5.0, 16.0 * 10.0 / 12.0, 4.0]
-    assert found.scale[0, 0] == pytest.approx(math.sqrt(sum(squares)))
     expected = sum(squares) ** 2 / (squares[0] ** 2 / 5.0 + squares[1] ** 2 / 12.0)
     assert found.dof[0, 0] == pytest.approx(expected)
+    # The Student distribution of these degrees that has the standard deviation sqrt(29).
+    assert found.scale[0, 0] == pytest.approx(math.sqrt(29.0 * (expected - 2.0) / expected))
     assert found.scale_dof[0, 0] == found.dof[0, 0]
 
 

@@ -377,3 +377,17 @@ def test_correlated_inputs_of_finite_degrees_have_no_effective_ones() -> None:
     assert np.isnan(found.effective_dof).all()
     # Wholly correlated, they are one of 7, of which the fewest degrees are known: 4.
     assert float(found.upper.squeeze()) == pytest.approx(7.0 * stats.t.ppf(0.975, 4), rel=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 2, 6, 30])
+@pytest.mark.parametrize("dof", [3.0, 6.0])
+def test_an_interval_of_several_student_inputs_holds_95_percent(count: int, dof: float) -> None:
+    # Their scales alone would make it sqrt((dof - 2) / dof) of a normal one where they are many.
+    inputs = {f"x{at}": Input.student_t(0.0, 1.0, dof) for at in range(count)}
+    found = tp.uncertainty(lambda **x: sum(x.values()), inputs)
+    random = np.random.default_rng(8)
+    unit = math.sqrt((dof - 2.0) / dof)
+    drawn = sum(unit * random.standard_t(dof, 200_000) for _ in range(count))
+    inside = np.abs(drawn) <= float(found.upper.squeeze())
+    # 2e5 samples know the share to 5e-4; that a Student distribution is only like the sum, to 1 %.
+    assert 0.94 < inside.mean() < 0.96

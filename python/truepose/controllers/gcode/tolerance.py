@@ -49,8 +49,9 @@ class Tolerance:
 
     "asked"; "error": a share of the error before, `SHARE` of the smaller of the largest position
     error and the largest angle times the characteristic length, as both are to become less, but at
-    least `UNFELT` of the larger; "most": that would be more than `MOST`; "digits": it would be less
-    than what the written digits hold. `before`, m: the larger of both errors, where looked up.
+    least `UNFELT` of the larger; "most": that, or what the written digits hold, is more than
+    `MOST`; "digits": it would be less than what they hold. `before`, m: the larger of both errors,
+    where looked up.
     """
 
     value: float
@@ -78,13 +79,13 @@ def tolerance_for(division: Division, batches: Iterable[Moves], digits: int) -> 
     least = least_of(division, digits)
     sizes = error_before(division, batches)
     if not sizes:
-        return Tolerance(min(least, MOST), "digits")
+        return Tolerance(MOST, "most") if least >= MOST else Tolerance(least, "digits")
     before = max(sizes)
     share = max(SHARE * min(sizes), UNFELT * before)
-    if share >= MOST:
+    if max(share, least) >= MOST:
         return Tolerance(MOST, "most", before)
     if share <= least:
-        return Tolerance(min(least, MOST), "digits", before)
+        return Tolerance(least, "digits", before)
     return Tolerance(share, "error", before)
 
 

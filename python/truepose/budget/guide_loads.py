@@ -71,10 +71,10 @@ def _of_any_direction(block: Block) -> Floats | None:
     if envelope is None:
         return None
     poses = block.requested[block.indices]
-    forces = []
-    for direction in envelope.directions:
-        wrench = np.array([[*(envelope.force * direction), 0.0, 0.0, 0.0]])
-        forces.append(block.machine.kernel.forces(poses, wrench, status=True)[0])
+    kernel = block.machine.kernel
+    forces = [
+        kernel.forces(poses, wrench[np.newaxis], status=True)[0] for wrench in envelope.wrenches
+    ]
     return np.stack(forces, axis=2)
 
 

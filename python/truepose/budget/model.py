@@ -90,7 +90,7 @@ class MachineModel:
         self.distributions, self.correlation = moves.distributions, moves.correlation
         self.streams, self.numbers = moves.streams, moves.numbers
         self.directions = moves.directions
-        self.dofs: Floats = np.array([each.dof or np.inf for each in moves.distributions])
+        self.dofs: Floats = np.array([each.degrees for each in moves.distributions], np.float64)
         self.outputs: tuple[str, ...] = machine.components
         self.output_units = tuple(component_units(machine))
 
@@ -161,7 +161,7 @@ class FunctionModel:
         self.streams: Indices = np.zeros(len(each), np.intp)
         self.numbers: Indices = np.arange(len(each), dtype=np.intp)
         self.dofs: Floats = np.array(
-            [min(one.dof, one.distribution.dof or np.inf) for one in each], np.float64
+            [min(one.dof, one.distribution.degrees) for one in each], np.float64
         )
         self._centre = np.array([one.centre for one in each], np.float64)
         self._half = np.array([one.half for one in each], np.float64)

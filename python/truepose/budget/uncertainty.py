@@ -3,10 +3,10 @@
     lower, upper = value -+ k u
 
 u by the law of propagation (`truepose.budget.propagation`), k of Student's distribution for the
-effective degrees of freedom; a Student variable enters k with its scale, u with its standard
-deviation, so that k of it alone is its own. Correlated inputs of finite degrees of freedom have no
-effective ones (NaN). Whether the interval may be used is for the comparison with sampling
-to say (JCGM 101:2008, clause 8; `truepose.budget.validity`).
+effective degrees of freedom, which takes a Student variable by its scale; the distribution taken
+has the standard deviation u, so that k of one alone is its own. Correlated inputs of finite degrees
+of freedom have no effective ones (NaN). Whether the interval may be used is for the comparison with
+sampling to say (JCGM 101:2008, clause 8; `truepose.budget.validity`).
 """
 
 from __future__ import annotations
@@ -234,7 +234,7 @@ def _of_machine(
             moves.names,
             moves.distributions,
             moves.correlation,
-            np.array([each.dof or np.inf for each in moves.distributions]),
+            np.array([each.degrees for each in moves.distributions], np.float64),
             machine.components,
             units,
             ROUNDING * scale,

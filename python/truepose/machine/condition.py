@@ -69,6 +69,12 @@ class Envelope:
         first /= np.linalg.norm(first)
         return np.stack([first, np.cross(normal, first)])
 
+    @property
+    def wrenches(self) -> Floats:
+        """(n_axis, 6) the force along each axis of `directions`, on the tool, N and N m."""
+        along = self.force * self.directions
+        return np.hstack([along, np.zeros_like(along)])
+
 
 @dataclass(frozen=True)
 class Condition:

@@ -44,7 +44,6 @@ def _of_any_direction(block: Block, columns: Indices) -> Floats | float:
     envelope = block.condition.envelope
     if envelope is None:
         return 0.0
-    wrenches = np.zeros((len(envelope.directions), 1, 6))
-    wrenches[:, 0, :3] = envelope.force * envelope.directions
-    squares = sum(np.square(block.loads_of(wrench, columns)) for wrench in wrenches)
+    loads = [block.loads_of(wrench[np.newaxis], columns) for wrench in envelope.wrenches]
+    squares = sum(np.square(load) for load in loads)
     return np.asarray(np.sqrt(squares))

@@ -58,6 +58,11 @@ class Distribution:
         return self.name
 
     @property
+    def degrees(self) -> float:
+        """Degrees of freedom of Student's distribution; inf of every other."""
+        return math.inf if self.dof is None else self.dof
+
+    @property
     def scale(self) -> float:
         """Scale of Student's distribution in its standard deviation; 1 of every other."""
         return 1.0 if self.dof is None else math.sqrt((self.dof - 2.0) / self.dof)

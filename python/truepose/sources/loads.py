@@ -106,10 +106,10 @@ def _with_envelope(block: Block, envelope: Envelope, shift: np.ndarray) -> Devia
     columns, compliance = block.compliances
     shifts, halves, signs = [shift], [np.zeros_like(shift)], [np.ones_like(shift)]
     groups = [np.full(columns.size, OWN_GROUP)]
-    axes = envelope.directions
-    for group, axis in enumerate(axes):
-        wrench = np.array([[*(envelope.force * axis), 0.0, 0.0, 0.0]])
-        moved = np.broadcast_to(block.loads_of(wrench, columns) * compliance, compliance.shape)
+    axes = envelope.wrenches
+    for group, wrench in enumerate(axes):
+        load = block.loads_of(wrench[np.newaxis], columns)
+        moved = np.broadcast_to(load * compliance, compliance.shape)
         shifts.append(np.zeros_like(moved))
         halves.append(np.abs(moved))
         signs.append(np.where(moved < 0.0, -1.0, 1.0))

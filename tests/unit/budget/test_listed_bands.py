@@ -139,3 +139,23 @@ def test_what_is_answered_is_at_least_what_a_machine_of_the_list_reaches(
     assert (ends["shift"], ends["lower"], ends["upper"]) == pytest.approx((0.1, -0.9, 0.1))
     table = call(capsys, "check", tmp_path / "machine.toml").out
     assert "\N{MINUS SIGN}900.000 \N{HORIZONTAL ELLIPSIS} +100.000" in table
+
+
+def test_a_list_and_a_force_to_its_longer_side_are_answered_together(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Both joints on the platform are off alike, so that the tool is off by the list, the other way:
+    # from its mean, -0.1 mm, up to 0.8 mm; and the force moves it that way too.
+    listed = "{ values = [0.2, -0.8], probabilities = [0.9, 0.1], group = 'p' }"
+    text = edited(
+        PLANAR,
+        ("length_tolerance = [-0.3, 0.3]\n", ""),
+        ("temperature = 35\nforce = { x = 1200, y = -1500 }", "force = { x = 8000 }"),
+        ("x = [200, 400, 5], y = [100, 300, 3]", "x = [300, 300, 1], y = [200, 200, 1]"),
+        ("[accuracy]", f'[tolerance]\n"strut.*.platform.x" = {listed}\n[accuracy]'),
+    )
+    machine = load_text(tmp_path, text)
+    by_force = float(tp.budget(machine).error.sel(source="elastic", component="x").squeeze())
+    answer = json.loads(call(capsys, "check", tmp_path / "machine.toml", "--format", "json").out)
+    assert by_force > 0.5e-3
+    assert answer["answers"][0]["highest"] >= 1e3 * (by_force + 0.8e-3) * (1.0 - 1e-6)

@@ -29,6 +29,7 @@ __all__ = [
     "elements",
     "gcode_codes",
     "instruction_set",
+    "largest",
     "least_squares",
     "threads",
     "toml_lines",
@@ -444,6 +445,21 @@ def instruction_set() -> str:
 
 def use_instruction_set(name: str) -> None:
     """Run batches on the named instruction set, or on the best there is ("best")."""
+
+def largest(
+    centre: ArrayLike,
+    effects: ArrayLike,
+    middle: Sequence[float],
+    half: Sequence[float],
+    directions: Sequence[Sequence[int]],
+    quantities: Sequence[Sequence[int]],
+) -> _Floats:
+    """(n, q, 5): the largest length from above, one that is reached, and its direction (3).
+
+    Of the errors `centre` (n, m) + `effects` (n, m, v) t over t between `middle` -+ `half` (v,),
+    but for the variables of `directions`, which are together a unit vector; for each of the
+    `quantities`, components of a length, at most three.
+    """
 
 def least_squares(
     residual: Callable[[_Floats], ArrayLike],

@@ -11,6 +11,7 @@ pub mod dispatch;
 pub mod element;
 pub mod identification;
 pub mod kinematics;
+pub mod largest;
 pub mod linear;
 pub mod machine;
 pub mod proof;

@@ -9,6 +9,7 @@ mod evaluate;
 mod failure;
 mod gcode;
 mod identification;
+mod largest;
 mod least_squares;
 mod machine;
 mod proof;
@@ -94,6 +95,7 @@ fn _kernel(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(instruction_set, module)?)?;
     module.add_function(wrap_pyfunction!(use_instruction_set, module)?)?;
     module.add_function(wrap_pyfunction!(elements::elements, module)?)?;
+    module.add_function(wrap_pyfunction!(largest::largest, module)?)?;
     module.add_function(wrap_pyfunction!(least_squares::least_squares, module)?)?;
     module.add_function(wrap_pyfunction!(toml_lines::toml_lines, module)?)?;
     module.add_function(wrap_pyfunction!(machine::_rebuild, module)?)?;

@@ -1,7 +1,7 @@
 """Comparison: which sources dominate and which may be ignored, over all poses (tables 5 and 6).
 
-Position and orientation are never added: what is compared of each is the norm, over its
-components, of the worst error at a pose.
+Position and orientation are never added: what is compared of each is the largest length that the
+source alone can make it (`budget.largest`), be it a band or known.
 """
 
 from __future__ import annotations
@@ -48,24 +48,19 @@ class Highest:
         np.fmax(self.value, np.fmax.reduce(absolute, axis=0), out=self.value)
 
 
-class NormStatistics:
-    """Running highest and root mean square of the worst error's norm, a source and quantity."""
+class LengthStatistics:
+    """Running highest and root mean square of the largest error, a source and quantity."""
 
-    def __init__(self, n_source: int, kinds: dict[str, Indices]) -> None:
-        self._kinds = kinds
-        self._squares = np.zeros((n_source, len(kinds)))
+    def __init__(self, n_source: int, n_quantity: int) -> None:
+        self._squares = np.zeros((n_source, n_quantity))
         self._count = 0
-        self.highest: Floats = np.zeros((n_source, len(kinds)))
+        self.highest: Floats = np.zeros((n_source, n_quantity))
 
-    def add(self, worst: Floats) -> None:
-        """`worst` (n, n_source, n_component) of more poses."""
-        self._count += len(worst)
-        for index, columns in enumerate(self._kinds.values()):
-            of_kind = worst[:, :, columns]
-            squares = np.einsum("nsc,nsc->ns", of_kind, of_kind)
-            self._squares[:, index] += squares.sum(axis=0)
-            highest = np.sqrt(squares.max(axis=0, initial=0.0))
-            np.maximum(self.highest[:, index], highest, out=self.highest[:, index])
+    def add(self, lengths: Floats) -> None:
+        """`lengths` (n, n_source, n_quantity) of more poses."""
+        self._count += len(lengths)
+        self._squares += np.square(lengths).sum(axis=0)
+        np.maximum(self.highest, lengths.max(axis=0, initial=0.0), out=self.highest)
 
     @property
     def rms(self) -> Floats:

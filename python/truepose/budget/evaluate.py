@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,9 @@ from truepose.budget.dataset import (
     label,
     sizes,
 )
+from truepose.budget.first_order import effects_at, rows_of
 from truepose.budget.guide_loads import GuideLoads
+from truepose.budget.largest import largest, lengths
 from truepose.budget.poses import (
     OK,
     Progress,
@@ -30,9 +33,11 @@ from truepose.budget.poses import (
     of_band,
     requested_poses,
 )
+from truepose.budget.spread import spread_of
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, Deviation, Source, acting
+from truepose.sources._base import Floats, Indices
 
 _EACH = ("pose", "source", "component")
 _ALL = ("pose", "component")
@@ -67,6 +72,9 @@ SCHEMA: Schema = {
     "percent_defined": Variable(
         _ALL, "1", "whether the coordinate is large enough for a percent of it", np.bool_
     ),
+    "linear_maximum": Variable(
+        ("pose", "quantity"), "quantity", "linear maximum: largest error of all sources together"
+    ),
     "joint_nominal": Variable(("pose", "joint"), "joint", "joint coordinate, nominal command"),
     "force": Variable(
         ("pose", "closure"), "N", "closure force under all that acts, a strut's tension positive"
@@ -87,11 +95,13 @@ SCHEMA: Schema = {
     "overall_highest_percent_upper": Variable(
         ("component",), "%", "highest overall_percent_upper over poses"
     ),
-    "highest": Variable(("source", "quantity"), "quantity", "highest norm of worst over poses"),
-    "rms": Variable(
-        ("source", "quantity"), "quantity", "root mean square of the norm of worst over poses"
+    "highest": Variable(
+        ("source", "quantity"), "quantity", "highest linear maximum of the source over poses"
     ),
-    "share": Variable(("source",), "1", "highest position worst over the sum of all sources'"),
+    "rms": Variable(
+        ("source", "quantity"), "quantity", "root mean square of the source's linear maximum"
+    ),
+    "share": Variable(("source",), "1", "highest position error over the sum of all sources'"),
     "rank": Variable(("source",), "1", "place of the source by its share, 1 the largest", np.intp),
     "verdict": Variable(("source",), "1", "negligible, relevant or dominant", str),
 }
@@ -141,7 +151,7 @@ def budget(
         name: comparison.Highest(tuple(lengths[dim] for dim in SCHEMA[name].dims))
         for name in _HIGHEST
     }
-    statistics = comparison.NormStatistics(len(sources), kinds)
+    statistics = comparison.LengthStatistics(len(sources), len(kinds))
     guides = GuideLoads(machine)
     distributions: list[dict[str, None]] = [{} for _ in sources]
 
@@ -151,13 +161,13 @@ def budget(
         for found, deviation in zip(distributions, deviations, strict=True):
             found.update((str(deviation.distribution[k]), None) for k in deviation.banded)
         room = rows.room(block.indices.size)
-        values, shifted, edges = _evaluate(machine, block, sources, deviations, room)
+        values, alone, shifted, edges = _evaluate(machine, block, sources, deviations, room)
         usable = walk.keep(block.indices, *shifted, *map(of_band, edges))
         rows.append(block, values, usable)
         if usable.any():
             for name, running in highest.items():
                 running.add(values[_HIGHEST[name]][usable])
-            statistics.add(values["worst"][usable])
+            statistics.add(alone[usable])
             guides.add(block, usable)
     if rows.count == 0:
         raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
@@ -214,11 +224,12 @@ def _evaluate(
     sources: Sequence[Source],
     deviations: Sequence[Deviation],
     room: dict[str, np.ndarray],
-) -> tuple[dict[str, np.ndarray], list[np.ndarray], list[np.ndarray]]:
+) -> tuple[dict[str, np.ndarray], Floats, list[np.ndarray], list[np.ndarray]]:
     """Every variable over poses for one block, and all statuses (n,) met on the way.
 
-    First those at shifts, in the order of `exact.at_shifts`, then those at edges of the bands.
-    Variables of each source are written into `room`.
+    Besides, the largest lengths (n, n_source, n_quantity) of each source alone. Statuses are first
+    those at shifts, in the order of `exact.at_shifts`, then those at edges of the bands. Variables
+    of each source are written into `room`.
     """
     coordinate, defined = percent.coordinates(machine, block.placements)
     per_error = percent.per_error(coordinate, defined)
@@ -226,26 +237,30 @@ def _evaluate(
     shifted: list[np.ndarray] = []
     at_edges: list[np.ndarray] = []
     nominal: list[np.ndarray] = []
+    kinds = list(comparison.quantities(machine.components).values())
+    alone = np.empty((block.indices.size, len(sources), len(kinds)))
     for at, deviation in enumerate(deviations):
         edges = exact.source_edges(machine, block, deviation)
-        reach, spread, status = _band(machine, block, deviation)
+        band = _band(machine, block, deviation, edges.error, kinds)
         values["error"][:, at] = edges.error
         values["error_lower"][:, at] = edges.lower
         values["error_upper"][:, at] = edges.upper
-        values["worst"][:, at] = worst.worst(edges.error, reach)
-        values["reach"][:, at] = np.maximum(*reach)
-        values["uncertainty"][:, at] = spread
+        values["worst"][:, at] = worst.worst(edges.error, band.reach)
+        values["reach"][:, at] = np.maximum(*band.reach)
+        values["uncertainty"][:, at] = band.uncertainty
+        alone[:, at] = band.largest
         percent.percent(edges.lower, per_error, out=values["percent_lower"][:, at])
         percent.percent(edges.upper, per_error, out=values["percent_upper"][:, at])
         shifted.append(edges.status[0])
         at_edges += edges.status[1:]
-        nominal.append(status)
+        nominal.append(band.status)
     overall = exact.overall_edges(
         machine,
         block,
         [(d, source.sets_overall_edges) for d, source in zip(deviations, sources, strict=True)],
     )
-    shifted += [overall.status[0], *nominal]
+    together, regular = _together(machine, block, sources, deviations, overall.error, kinds)
+    shifted += [overall.status[0], *nominal, regular]
     at_edges += overall.status[1:]
     values |= {
         "overall_error": overall.error,
@@ -254,37 +269,81 @@ def _evaluate(
         "overall_percent_lower": percent.percent(overall.lower, per_error),
         "overall_percent_upper": percent.percent(overall.upper, per_error),
         "percent_defined": defined,
+        "linear_maximum": together,
         "joint_nominal": block.joints,
         "force": block.forces,
     }
-    return values, shifted, at_edges
+    return values, alone, shifted, at_edges
+
+
+@dataclass(frozen=True)
+class _Band:
+    """What one source's band does at n poses: m and rad.
+
+    `reach`: down and up, (n, n_component); `uncertainty` (n, n_component), standard; `largest`
+    (n, n_quantity); `status` (n,), the kernel's.
+    """
+
+    reach: tuple[Floats, Floats]
+    uncertainty: Floats
+    largest: Floats
+    status: np.ndarray
 
 
 def _band(
-    machine: Machine, block: Block, deviation: Deviation
-) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
-    """How far a source reaches down and up, its standard uncertainty, (n, n_component), a status.
-
-    The status (n,) is the kernel's.
-    """
+    machine: Machine,
+    block: Block,
+    deviation: Deviation,
+    error: Floats,
+    kinds: Sequence[Indices],
+) -> _Band:
+    """Of one source, whose `error` at its shift is known."""
     n_pose = block.indices.size
     down = np.zeros((n_pose, len(machine.components)))
-    up, spread = np.zeros_like(down), np.zeros_like(down)
+    up, uncertain = np.zeros_like(down), np.zeros_like(down)
     status = np.full(n_pose, OK, np.uint8)
-    if deviation.banded.size:
-        for start in range(0, n_pose, FEW):
-            poses = slice(start, start + FEW)
-            effects, sigmas, status[poses] = worst.variable_effects(
-                machine, block, deviation, poses
-            )
-            # Sizes first, then their squares, in the one place; what is correlated keeps its signs.
-            correlation = deviation.banded_correlation
-            scratch = effects if correlation is None else None
-            down[poses], up[poses] = deviation.domain.reach(effects, scratch)
-            spread[poses] = propagation.standard_uncertainty(
-                effects, sigmas, scratch=effects, correlation=correlation
-            )
-    return (down, up), spread, status
+    if not deviation.banded.size:
+        return _Band((down, up), uncertain, lengths(error, kinds), status)
+    far = np.empty((n_pose, len(kinds)))
+    correlation = deviation.banded_correlation
+    for start in range(0, n_pose, FEW):
+        poses = slice(start, start + FEW)
+        effects, sigmas, status[poses] = worst.variable_effects(machine, block, deviation, poses)
+        far[poses] = largest(error[poses], effects, deviation.domain, kinds).length
+        # Sizes first, then their squares, in the one place; what is correlated keeps its signs.
+        scratch = effects if correlation is None else None
+        down[poses], up[poses] = deviation.domain.reach(effects, scratch)
+        uncertain[poses] = propagation.standard_uncertainty(
+            effects, sigmas, scratch=effects, correlation=correlation
+        )
+    return _Band((down, up), uncertain, far, status)
+
+
+def _together(
+    machine: Machine,
+    block: Block,
+    sources: Sequence[Source],
+    deviations: Sequence[Deviation],
+    error: Floats,
+    kinds: Sequence[Indices],
+) -> tuple[Floats, np.ndarray]:
+    """The largest lengths (n, n_quantity) of all sources together, and the kernel's status (n,).
+
+    From the `error` (n, n_component) with all of them at their shifts.
+    """
+    moves = spread_of(machine, sources, deviations)
+    n_pose = block.indices.size
+    status = np.full(n_pose, OK, np.uint8)
+    if not moves.names:
+        return lengths(error, kinds), status
+    far = np.empty((n_pose, len(kinds)))
+    parameters, shift = moves.shift
+    for start in range(0, n_pose, FEW):
+        poses = slice(start, start + FEW)
+        moved = (parameters, np.ascontiguousarray(rows_of(shift, poses)))
+        effects, status[poses] = effects_at(machine, block, moves, moved, poses)
+        far[poses] = largest(error[poses], effects, moves.domain, kinds).length
+    return far, status
 
 
 __all__ = ["SCHEMA", "budget", "required_sources"]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from truepose.budget.exact import displacement
+from truepose.budget.exact import Moved, displacement
 from truepose.budget.poses import OK
 from truepose.budget.spread import Spread
 from truepose.machine import Machine
@@ -32,13 +32,27 @@ def first_order(
     parameters, shift = spread.shift
     moved = np.ascontiguousarray(rows_of(shift, poses))
     value, status = displacement(machine, joints, placements, (parameters, moved))
-    slopes, regular = machine.kernel.sensitivity_moved(
-        joints, placements, spread.columns, parameters, moved
+    slopes, regular = effects_at(machine, block, spread, (parameters, moved), poses)
+    return value, slopes, np.where(status == OK, regular, status)
+
+
+def effects_at(
+    machine: Machine, block: Block, spread: Spread, moved: Moved, poses: slice = EVERY
+) -> tuple[Floats, np.ndarray]:
+    """Effects (n, m, n_variable), m and rad, where the parameters are `moved`, and a status (n,).
+
+    At some `poses` of the block; `moved` at these.
+    """
+    slopes, status = machine.kernel.sensitivity_moved(
+        block.joints[poses], block.placements[poses], spread.columns, *moved
     )
     slopes *= rows_of(spread.swing, poses)[:, np.newaxis]
-    member = np.zeros((spread.columns.size, len(spread.names)))
+    count = len(spread.names)
+    if np.array_equal(spread.variables, np.arange(count)):
+        return slopes, status
+    member = np.zeros((spread.columns.size, count))
     member[np.arange(spread.columns.size), spread.variables] = 1.0
-    return value, slopes @ member, np.where(status == OK, regular, status)
+    return slopes @ member, status
 
 
 class Mover:

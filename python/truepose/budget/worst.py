@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.budget.exact import together
 from truepose.machine import Machine
 from truepose.sources import Block, Deviation
 from truepose.sources._base import Floats, Indices
@@ -27,12 +28,19 @@ def variable_effects(
 
     Returns effects (n, n_component, n_variable) over the variables that have a band, m and rad,
     the half band of each in standard deviations (n_variable,), and a kernel status (n,). The
-    sensitivities are those of the nominal machine at the commanded pose.
+    sensitivities are those of the machine at the source's shift, where the command takes it.
     """
     banded = deviation.banded
-    sensitivity, status = machine.kernel.sensitivity_at(
-        block.joints[poses], block.placements[poses], deviation.parameters[banded]
-    )
+    joints, placements = block.joints[poses], block.placements[poses]
+    columns = deviation.parameters[banded]
+    parameters, shift = together([(deviation.parameters, deviation.shift)])
+    if shift.any():
+        moved = np.ascontiguousarray(shift if len(shift) == 1 else shift[poses])
+        sensitivity, status = machine.kernel.sensitivity_moved(
+            joints, placements, columns, parameters, moved
+        )
+    else:
+        sensitivity, status = machine.kernel.sensitivity_at(joints, placements, columns)
     effects, variable = by_variable(deviation, sensitivity, poses)
     sigmas = np.empty(effects.shape[2])
     sigmas[variable] = [deviation.distribution[column].sigmas for column in banded]

@@ -34,6 +34,7 @@ from truepose.budget.evaluate import required_sources
 from truepose.budget.exact import at_shifts
 from truepose.budget.first_order import Mover, first_order
 from truepose.budget.inputs import Input
+from truepose.budget.largest import largest
 from truepose.budget.model import FunctionModel
 from truepose.budget.poses import (
     OK,
@@ -45,7 +46,7 @@ from truepose.budget.poses import (
     requested_poses,
 )
 from truepose.budget.spread import spread
-from truepose.budget.vertices import Found, linear_norms, worst_vertices
+from truepose.budget.vertices import Found, worst_vertices
 from truepose.budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
@@ -61,14 +62,11 @@ SCHEMA: Schema = {
     "exact": Variable(_EACH, "component", "largest |error| at a corner of the bands"),
     "exact_lower": Variable(_EACH, "component", "least error at a corner of the bands"),
     "exact_upper": Variable(_EACH, "component", "largest error at a corner of the bands"),
-    "magnitude_linear": Variable(_SIZE, "quantity", "largest norm to first order"),
+    "magnitude_linear": Variable(_SIZE, "quantity", "linear maximum: largest error to first order"),
     "magnitude_exact": Variable(_SIZE, "quantity", "largest norm at a corner of the bands"),
     "search": Variable(("pose",), "1", "every vertex or directed: how corners were found", object),
     "vertices": Variable(("pose",), "1", "corners evaluated", np.intp),
 }
-
-POSES = 256
-"""Poses whose linear worst cases are computed at once."""
 
 
 @overload
@@ -189,24 +187,11 @@ def _values(
         "exact": np.maximum(np.abs(lower), np.abs(upper)),
         "exact_lower": lower,
         "exact_upper": upper,
-        "magnitude_linear": _linear_magnitudes(value, effects, domain, quantities),
+        "magnitude_linear": largest(value, effects, domain, quantities).length,
         "magnitude_exact": found.most[:, 2 * n_output :],
         "search": np.full(n_pose, found.search, object),
         "vertices": found.evaluated,
     }
-
-
-def _linear_magnitudes(
-    value: Floats, effects: Floats, domain: Domain, quantities: Sequence[Indices]
-) -> Floats:
-    """(n, q) largest norm of each quantity at a corner of the linear model."""
-    magnitudes = np.zeros((len(value), len(quantities)))
-    for start in range(0, len(value), POSES):
-        poses = slice(start, start + POSES)
-        for number, columns in enumerate(quantities):
-            norms, _ = linear_norms(value[poses][:, columns], effects[poses][:, columns], domain)
-            magnitudes[poses, number] = norms.max(axis=1)
-    return magnitudes
 
 
 def _collect(

@@ -33,18 +33,15 @@ def test_highest_passes_over_what_is_missing() -> None:
     assert np.isnan(highest.value[1])
 
 
-def test_norms_keep_position_and_orientation_apart_over_blocks() -> None:
-    worst = np.random.default_rng(5).uniform(size=(20, 2, 6))
-    whole, parts = (comparison.NormStatistics(2, BOTH) for _ in range(2))
-    whole.add(worst)
-    for block in np.split(worst, [3, 11]):
+def test_lengths_are_gathered_over_blocks() -> None:
+    lengths = np.random.default_rng(5).uniform(size=(20, 3, 2))
+    whole, parts = (comparison.LengthStatistics(3, 2) for _ in range(2))
+    whole.add(lengths)
+    for block in np.split(lengths, [3, 11]):
         parts.add(block)
-    position = np.linalg.norm(worst[:, :, :3], axis=2)
-    orientation = np.linalg.norm(worst[:, :, 3:], axis=2)
     for found in (whole, parts):
-        assert np.allclose(found.highest[:, 0], position.max(axis=0), rtol=1e-14)
-        assert np.allclose(found.highest[:, 1], orientation.max(axis=0), rtol=1e-14)
-        assert np.allclose(found.rms[:, 1], np.sqrt((orientation**2).mean(axis=0)), rtol=1e-14)
+        assert np.array_equal(found.highest, lengths.max(axis=0))
+        assert np.allclose(found.rms, np.sqrt((lengths**2).mean(axis=0)), rtol=1e-14)
 
 
 def test_shares_add_up_and_nothing_is_shared_of_nothing() -> None:

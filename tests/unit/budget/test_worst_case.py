@@ -201,7 +201,6 @@ def test_poses_in_parts_are_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     poses = machine.poses()[:7]
     whole = tp.worst_case(machine, poses)
     monkeypatch.setattr("truepose.budget.poses.BLOCK", 3)
-    monkeypatch.setattr("truepose.budget.worst_case.POSES", 2)
     parts = tp.worst_case(machine, poses)
     xr.testing.assert_allclose(parts, whole, rtol=1e-13)
 

@@ -96,7 +96,8 @@ def test_the_uncertainty_is_that_of_the_values(tmp_path: Path) -> None:
     found = tp.budget(load_text(tmp_path, edited(PLANAR, ("[-0.3, 0.3]", written))))
     alone = tp.budget(load_text(tmp_path, PLANAR))
     ratio = np.std(values) / (0.3 / np.sqrt(3.0))
-    assert np.allclose(found.uncertainty[:, 0], ratio * alone.uncertainty[:, 0], rtol=1e-12)
+    # The slopes are those about their mean, 50 um off.
+    assert np.allclose(found.uncertainty[:, 0], ratio * alone.uncertainty[:, 0], rtol=5e-4)
 
 
 @pytest.mark.parametrize(

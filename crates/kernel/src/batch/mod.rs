@@ -21,6 +21,7 @@ pub use forward::{displacement, displacements, forward_poses};
 pub use inverse::inverses;
 pub use moved::moved_sensitivities;
 pub use samples::{Deviations, Rows, Samples};
+pub(crate) use threads::for_chunks;
 pub use threads::{set_threads, share_out, threads};
 
 /// Samples of one chunk.

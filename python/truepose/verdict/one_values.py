@@ -17,7 +17,7 @@ from tomlkit.items import Comment, Item, Table, Whitespace
 
 from truepose.calibration.result.toml_edits import MachineText
 from truepose.machine import Machine
-from truepose.machine.dimensions import BY_UNIT
+from truepose.machine.dimensions import BY_UNIT, FREEDOMS
 from truepose.machine.document import ARRAY_TABLES
 from truepose.machine.each import EACH
 from truepose.machine.tables.workspace import WAYS
@@ -36,7 +36,7 @@ _LEANS = ("squareness", "parallelism")
 _FORCES = ("force", "cutting", "kienzle")
 _DRIVE_SOURCES = ("backlash", "sensor", "actuator", "guideway")
 _LENGTH_TOLERANCE = "length_tolerance"
-_OTHERS = "# what else the machine's parts deviate by at this pose, which follows the pose:"
+_OTHERS = "# what else its parts deviate by at this pose:"
 
 
 class OneValues:
@@ -134,8 +134,10 @@ class OneValues:
     # --- inside
 
     def _freedom(self, freedom: str, value: float) -> float | str:
-        dimension = "length" if freedom in "xyz" else "angle"
-        return self._text.written(value, dimension, None)
+        dimension = FREEDOMS[freedom]
+        unit = self._machine.file_units[dimension]
+        # A grid's 50.000000000000014 mm is 50 mm, to the rounding of a coordinate.
+        return self._text.written(float(unit.to_si(unit.to_file(value))), dimension, None)
 
     def _band(self, name: str, value: float) -> Item:
         """A band of equal limits."""

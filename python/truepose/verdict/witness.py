@@ -33,6 +33,9 @@ BEFORE, AFTER = "before compensation", "after compensation"
 NAMED = 4
 """Causes that are named; more are counted."""
 
+COARSE = 10.0
+"""Of the least length that is a dimension: a deviation said as one, 400 mm and not 400000 µm."""
+
 AT_END = 1e-9
 """Of a variable's interval: how near to an end it stands at the end."""
 
@@ -206,6 +209,8 @@ class Witness:
             direction = ", ".join(f"{component + 0.0:.3f}" for component in unit)
             return f"force of {shown.force.text(size)} along ({direction})"
         small: Shown = shown.small(cause.unit)
+        if cause.unit == "m" and abs(cause.deviation) >= COARSE * shown.least_dimension:
+            small = shown.length
         sign = "-" if cause.deviation < 0.0 else "+"
         amount = f"{sign}{small.text(abs(cause.deviation))}"
         where = f"at {amount}"

@@ -13,6 +13,7 @@ is written as tolerances of equal limits: so the file says every deviation, what
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from truepose.calibration.result.toml_edits import MachineText
 from truepose.errors import Problem, RequestError, TrueposeError
 from truepose.machine import Machine, load
 from truepose.machine.dimensions import BY_UNIT
+from truepose.machine.temperature_log import TemperatureLog
 from truepose.output import replacing, require_writable
 from truepose.sources import REGISTRY, acting
 from truepose.sources._base import Floats
@@ -42,6 +44,9 @@ ROUNDING = 1e-13
 
 NO_DIFFERENCE = 1e-12
 """Of a source's largest deviation of one unit: a difference that is rounding."""
+
+NOTHING_LEFT = 1e-15
+"""Of the sum of what several sources do to a parameter: what is left is rounding."""
 
 SAME_JOINT = 1e-14
 """Of a drive's travel: a joint coordinate that is the same."""
@@ -160,18 +165,20 @@ class _Writing:
     def _same_condition(self, draft: Machine) -> bool:
         """Whether the file says the condition of the run, its force of unknown direction known."""
         given, force = self._machine.condition, self._witness.force
-        if force is not None:
-            given = given.replace(force=(force + np.array(given.force)).tolist())
-        found = draft.condition.replace(force=given.force)
+        wanted = np.array(given.force) + (0.0 if force is None else force)
+        found = draft.condition
+        off = np.abs(np.array(found.force) - wanted).max()
         return bool(
-            found == given.replace(envelope=0.0)
-            and np.allclose(draft.condition.force, given.force, rtol=1e-12, atol=0.0)
+            off <= ROUNDING * np.abs(wanted).max()
+            and _same_log(given.temperature_log, found.temperature_log)
+            and replace(given, force=found.force, temperature_log=None, envelope=None)
+            == replace(found, temperature_log=None)
         )
 
     def _wanting(self, draft: Machine) -> dict[str, float]:
         """What the draft lacks to be the witness, SI, by parameter; where bands were, zeros too."""
         wanted, found = self._deviations(self._witness.by_source), self._deviations(_known(draft))
-        total = np.zeros(len(draft.parameters))
+        total, parts = np.zeros((2, len(draft.parameters)))
         units = np.array(draft.units)
         for name in dict.fromkeys([*wanted, *found]):
             nothing = np.zeros(len(total))
@@ -184,7 +191,9 @@ class _Writing:
                 if name in found:
                     difference[small] = 0.0
             total += difference
+            parts += np.abs(difference)
         total += self._machine.nominal - draft.nominal
+        total[np.abs(total) <= NOTHING_LEFT * parts] = 0.0
         bands = {
             int(column)
             for column, variable in zip(
@@ -263,6 +272,19 @@ class _Writing:
             lines += ["What follows the pose (play, phases, resolution) is its deviation there."]
         head = "".join(f"# {line}\n" for line in lines)
         self._text.toml = tomlkit.parse(f"{head}\n{self._text.text()}")
+
+
+def _same_log(one: TemperatureLog | None, other: TemperatureLog | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return bool(
+        np.array_equal(one.times, other.times)
+        and one.temperatures.keys() == other.temperatures.keys()
+        and all(
+            np.array_equal(values, other.temperatures[part])
+            for part, values in one.temperatures.items()
+        )
+    )
 
 
 def _known(draft: Machine) -> dict[str, Floats]:

@@ -12,6 +12,7 @@ import pytest
 import truepose as tp
 from build_machine import machine_files
 from machine_texts import PLANAR, edited, load_text
+from made_source import MadeSource, with_sources
 from random_machines import DRAWN, DrawnMachine
 from sweeps import thinned
 from truepose._kernel import STATUS
@@ -20,7 +21,7 @@ from truepose.budget.poses import OK, Walk, is_path
 from truepose.budget.spread import spread
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.sources import acting
+from truepose.sources import Deviation, acting
 from truepose.verdict.witness import AFTER, BEFORE, Witness
 from truepose.verdict.witness_file import write_witness
 
@@ -413,3 +414,35 @@ def test_a_number_that_the_file_does_not_give_is_not_written(tmp_path: Path) -> 
         write_witness(machine, wrong, tmp_path / "witness.toml", original=original)
     assert refused.value.problems[0].code == "witness-not-written"
     assert [path.name for path in tmp_path.iterdir()] == ["machine.toml"]
+
+
+def test_where_a_source_alone_cannot_be_assembled_all_is_one_source(tmp_path: Path) -> None:
+    """A budget leaves out a pose that one source alone takes out of reach."""
+    text = edited(
+        PLANAR,
+        ("[-0.3, 0.3]", "[-400, 0.3]"),
+        ("1.1e-5 1/K", "1e-2 1/K"),
+        ("[200, 400, 5], y = [100, 300, 3]", "[200, 200, 1], y = [100, 100, 1]"),
+    )
+    machine = load_text(tmp_path, text)
+    (block,) = Walk(machine, machine.poses(), machine.condition)
+    of_pose = spread(machine, block, acting(machine)).at(0)
+    moved = of_pose.parameters_moved(-np.ones((1, 1)))
+    error, status = displacement(machine, block.joints, block.placements, moved)
+    assert status[0] == OK
+    witness = Witness(
+        BEFORE, "position", machine, block.requested[0], 0, block.joints[0], of_pose, -np.ones(1),
+        error[0], float(np.linalg.norm(error[0])),
+    )  # fmt: skip
+    alone = {"strut.1.length": float(witness.by_source["tolerance"][moved[0][0]])}
+    assert alone["strut.1.length"] == pytest.approx(-0.4)
+    written = assert_same(machine, witness, tmp_path / "witness.toml", tmp_path / "machine.toml")
+    assert [source.name for source in acting(written)] == ["tolerance"]
+    assert np.array_equal(written.nominal, machine.nominal)
+
+
+def test_a_direction_replaced_and_a_source_of_ones_own_are_deviations(tmp_path: Path) -> None:
+    machine = load_text(tmp_path, FULL).replace({"drive.d1.axis.u": 2e-4, "drive.d2.scale": 1.0001})
+    column = machine.parameters.index("drive.d2.origin.x")
+    own = MadeSource("made", Deviation.of([column], 1e-5, 2e-5))
+    both_states(with_sources(machine, *machine.sources, own), tmp_path)

@@ -85,6 +85,8 @@ def assert_same(machine: Machine, witness: Witness, path: Path, original: Path) 
     """Write it, read it back by the public door, and let the budget say its size."""
     write_witness(machine, witness, path, original=original)
     written = tp.load(path)
+    if witness.state == BEFORE and not machine.replaced:
+        assert np.array_equal(written.nominal, machine.nominal)
     if witness.status != "ok":
         with pytest.raises(RequestError) as refused:
             tp.budget(written)
@@ -446,3 +448,65 @@ def test_a_direction_replaced_and_a_source_of_ones_own_are_deviations(tmp_path: 
     column = machine.parameters.index("drive.d2.origin.x")
     own = MadeSource("made", Deviation.of([column], 1e-5, 2e-5))
     both_states(with_sources(machine, *machine.sources, own), tmp_path)
+
+
+GRID = "[workspace]\ngrid = { x = [200, 400, 5], y = [100, 300, 3] }"
+FORCE = "force = { x = 1200, y = -1500 }"
+DOTTED = 'tolerance."strut.2.length" = 0.1\ntolerance."drive.*.offset" = [0.01, 0.02]\n'
+STRUT = 'base = [0, 0, 0], platform = [0, 0, 0], length = 500, section_area = "28 mm^2"'
+
+FORMS = {
+    "dotted keys": edited(
+        PLANAR,
+        (
+            'name = "d1"',
+            'name = "d1"\nsensor.resolution = "1 um"\nsensor.scale_error = "+-3 ppm"\n'
+            "backlash.play = 0.003",
+        ),
+        (GRID, "[workspace]\ngrid.x = [200, 400, 5]\ngrid.y = [100, 300, 3]"),
+    ),
+    "tables of tables": edited(
+        PLANAR,
+        (GRID, "[workspace.grid]\nx = [200, 400, 5]\ny = [100, 300, 3]\n[workspace.home]\nx = 300"),
+        (FORCE, "[condition.force]\nx = 1200\n[condition.envelope]\nforce = 9\nnormal = [0, 0, 1]"),
+        (
+            "[condition]",
+            '[each.drive.sensor]\nresolution = "2 um"\nscale_error = ["1 ppm", "4 ppm"]\n'
+            '[each.strut.base_joint]\nclearance = "3 um"\n[tolerance."strut.2.length"]\n'
+            'band = 0.1\ndistribution = "triangular"\n[condition]',
+        ),
+    ),
+    "dotted tolerances": DOTTED + PLANAR,
+    "inline tolerances": 'tolerance = { "strut.2.length" = 0.1, "*.scale" = [0, 1e-6] }\n' + PLANAR,
+    "inline each": "each = { drive = { sensor = { resolution = 0.001, scale_error = 1e-6 } } }\n"
+    + PLANAR,
+    "inline rows": 'strut = [\n  { name = "1", drive = "d1", length_tolerance = "IT7", '
+    + STRUT
+    + ', material = "steel" }, # first\n  { name = "2", drive = "d2", '
+    "base_joint = { clearance = 0.01 }, "
+    + STRUT
+    + ', material = "steel" },\n]\n'
+    + PLANAR[: PLANAR.index("[[strut]]")]
+    + PLANAR[PLANAR.index("[condition]") :],
+    "cutting data": edited(
+        PLANAR,
+        (
+            FORCE,
+            'envelope = { force = "1 kN", normal = [0, 0, 1] }\n[condition.kienzle]\n'
+            'specific_force = "2000 MPa"\nexponent = 0.25\nchip_thickness = 0.1\nwidth = 2\n'
+            "direction = [1, 0.5, 0]",
+        ),
+    ),
+    "lines of Windows": PLANAR.replace("\n", "\r\n"),
+}
+
+
+@pytest.mark.parametrize("form", thinned(FORMS, ["tables of tables", "cutting data"]))
+def test_every_form_of_text(tmp_path: Path, form: str) -> None:
+    (tmp_path / "machine.toml").write_text(FORMS[form], encoding="utf-8", newline="")
+    machine = tp.load(tmp_path / "machine.toml")
+    for witness, written, text in both_states(machine, tmp_path):
+        assert "What temperatures" not in text
+        force = np.array(machine.condition.force)
+        wanted = force if witness.force is None else force + witness.force
+        assert np.allclose(written.condition.force, wanted, rtol=1e-14, atol=0.0)

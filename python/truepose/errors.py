@@ -133,6 +133,8 @@ CATALOGUE: dict[str, str] = {
     "output-ending": "the ending of the output file does not say what to write",
     "output-is-input": "the output would write over the machine file",
     "output-exists": "a new file is wanted where there is one already",
+    "machine-file-changed": "a machine file that is not the one that was read",
+    "witness-not-written": "a witness that a machine file cannot say",
     "unknown-kind": "a kind of machine that is not in the library",
     # controllers
     "unknown-controller": "a controller that there is no adapter for",

@@ -58,23 +58,28 @@ class MachineText:
         self._machine = machine
         self._folder = original.parent
 
+    @property
+    def document(self) -> Document:
+        """What was read, as validated: settings, and what rows share, stand in it."""
+        return self._document
+
     # --- values
 
     def set_parameter(self, name: str, value: float) -> None:
         """Write a parameter (no direction's) of the kernel, SI."""
         table, part, key, component = _place(name)
-        row = self._row(table, part)
+        row = self.row(table, part)
         dimension = BY_UNIT[self._machine.units[self._machine.parameters.index(name)]]
         if component is None:
-            row[key] = self._written(value, dimension, row.get(key))
+            row[key] = self.written(value, dimension, row.get(key))
             return
         self._own_list(row, table, part, key, dimension)
         at = _XYZ.index(component)
-        row[key][at] = self._written(value, dimension, row[key][at])
+        row[key][at] = self.written(value, dimension, row[key][at])
 
     def set_direction(self, table: str, part: str, key: str, axis: Floats) -> None:
         """Write a direction (3,), plain numbers."""
-        row = self._row(table, part)
+        row = self.row(table, part)
         if isinstance(row.get(key), Array):
             for at, component in enumerate(meant(axis)):
                 row[key][at] = float(component)
@@ -85,8 +90,44 @@ class MachineText:
         """Write a property of a part, such as `strut.1.expansion`, SI."""
         path, _, key = path.rpartition(".")
         table, _, part = path.partition(".")
-        row = self._row(table, part)
-        row[key] = self._written(value, dimension, row.get(key))
+        row = self.row(table, part)
+        row[key] = self.written(value, dimension, row.get(key))
+
+    def row(self, table: str, part: str) -> Any:
+        """The row or table of the text that a part's keys are written in."""
+        if table == "tool":
+            return self.toml["machine"]
+        if not part:
+            if table not in self.toml:
+                self.toml[table] = tomlkit.table()
+            return self.toml[table]
+        return next(row for row in self.toml[table] if row.get("name") == part)
+
+    def written(self, value: float, dimension: str, old: Any) -> float | str:
+        """An SI value as the file writes such: with the unit of the `old` one, or the declared.
+
+        Of the numbers next to it the one of few digits, else the one that is read nearest.
+        """
+        unit = None
+        match = _NUMBER_AND_UNIT.match(old) if isinstance(old, str) else None
+        if match is not None and match[1]:
+            unit = match[1]
+        elif dimension not in self._units.declared and dimension != "ratio":
+            unit = DIMENSIONS[dimension].si
+
+        def form(number: float) -> float | str:
+            return number if unit is None else f"{number!r} {unit}"
+
+        # Where the scale has no offset, which no parameter's has, reading is a multiplication.
+        scale = self._units.read(form(1.0), dimension)
+        start = value / scale
+        near = [start, math.nextafter(start, math.inf), math.nextafter(start, -math.inf)]
+
+        def off(number: float) -> float:
+            return abs(self._units.read(form(number), dimension) - value)
+
+        few = float(meant(start))
+        return form(few if few in near else min(near, key=off))
 
     # --- tolerances
 
@@ -99,11 +140,11 @@ class MachineText:
         dimension = BY_UNIT[self._machine.units[at]]
         written: dict[str, Any] = dict(stated)
         if "band" in written:
-            written["band"] = [self._written(each, dimension, None) for each in written["band"]]
+            written["band"] = [self.written(each, dimension, None) for each in written["band"]]
         if "standard_deviation" in written:
-            deviation = self._written(written["standard_deviation"], dimension, None)
+            deviation = self.written(written["standard_deviation"], dimension, None)
             written["standard_deviation"] = deviation
-        inline = _inline(written)
+        inline = inline_table(written)
         for index, column in enumerate(self._machine.kernel.length_parameters[: self._n_strut]):
             if column == at and _LENGTH_TOLERANCE in self._document.data["strut"][index]:
                 _put(self.toml["strut"][index], _LENGTH_TOLERANCE, inline)
@@ -156,7 +197,7 @@ class MachineText:
         if rows is None or isinstance(rows, AoT):
             self.append(f"[[correlation]]\n{CORRELATION_NOTE}\n{body}")
             return
-        rows.append(_inline(tomlkit.parse(body).unwrap()))
+        rows.append(inline_table(tomlkit.parse(body).unwrap()))
 
     # --- the file
 
@@ -186,16 +227,6 @@ class MachineText:
 
     # --- inside
 
-    def _row(self, table: str, part: str) -> Any:
-        """The row or table of the text that a part's keys are written in."""
-        if table == "tool":
-            return self.toml["machine"]
-        if not part:
-            if table not in self.toml:
-                self.toml[table] = tomlkit.table()
-            return self.toml[table]
-        return next(row for row in self.toml[table] if row.get("name") == part)
-
     def _own_list(self, row: Any, table: str, part: str, key: str, dimension: str) -> None:
         """Give a row a list of its own where it has the shared or the usual one."""
         if key in row:
@@ -206,35 +237,9 @@ class MachineText:
         values = dict(zip(self._machine.parameters, self._machine.kernel.nominal, strict=True))
         given = shared if isinstance(shared, list) else [None] * len(_XYZ)
         row[key] = [
-            each if each is not None else self._written(float(values[name]), dimension, None)
+            each if each is not None else self.written(float(values[name]), dimension, None)
             for name, each in zip(names, given, strict=True)
         ]
-
-    def _written(self, value: float, dimension: str, old: Any) -> float | str:
-        """An SI value as the file writes such: with the unit of the `old` one, or the declared.
-
-        Of the numbers next to it the one of few digits, else the one that is read nearest.
-        """
-        unit = None
-        match = _NUMBER_AND_UNIT.match(old) if isinstance(old, str) else None
-        if match is not None and match[1]:
-            unit = match[1]
-        elif dimension not in self._units.declared and dimension != "ratio":
-            unit = DIMENSIONS[dimension].si
-
-        def form(number: float) -> float | str:
-            return number if unit is None else f"{number!r} {unit}"
-
-        # Where the scale has no offset, which no parameter's has, reading is a multiplication.
-        scale = self._units.read(form(1.0), dimension)
-        start = value / scale
-        near = [start, math.nextafter(start, math.inf), math.nextafter(start, -math.inf)]
-
-        def off(number: float) -> float:
-            return abs(self._units.read(form(number), dimension) - value)
-
-        few = float(meant(start))
-        return form(few if few in near else min(near, key=off))
 
 
 def _place(name: str) -> tuple[str, str, str, str | None]:
@@ -255,7 +260,7 @@ def _put(table: Any, key: str, inline: InlineTable) -> None:
         table[key] = inline
 
 
-def _inline(values: Mapping[str, Any]) -> InlineTable:
+def inline_table(values: Mapping[str, Any]) -> InlineTable:
     """An inline table, with the spaces that people put into one."""
     keys = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in values.items())
     found = tomlkit.value(f"{{ {keys} }}")

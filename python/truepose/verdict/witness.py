@@ -1,0 +1,279 @@
+"""A witness: one machine inside the set, at one pose, solved exactly.
+
+    actual parameters = nominal + shift + sum over columns of swing t[variable]
+
+with one value t of every variable. What is told of it, to people and to programs: which parameter
+stands at which end, from where the force of unknown direction comes, at which pose.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from truepose.budget.comparison import quantities
+from truepose.budget.exact import Moved
+from truepose.budget.first_order import first_order
+from truepose.budget.poses import pose_in_words
+from truepose.budget.spread import Spread
+from truepose.machine import Machine
+from truepose.machine.dimensions import BY_UNIT, FREEDOMS
+from truepose.machine.shown_units import Shown
+from truepose.sources import Block, acting
+from truepose.sources._base import Floats, Indices
+
+BEFORE, AFTER = "before compensation", "after compensation"
+"""States: the nominal command, the corrected one."""
+
+NAMED = 4
+"""Causes that are named; more are counted."""
+
+COARSE = 10.0
+"""Of the least length that is a dimension: a deviation said as one, 400 mm and not 400000 µm."""
+
+AT_END = 1e-9
+"""Of a variable's interval: how near to an end it stands at the end."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One variable of a witness, or the force of unknown direction.
+
+    `parameter`: the first that it moves, `more` how many others move with it; `end` is "upper" or
+    "lower" where that parameter stands at an end of its band, else empty; `deviation` of that
+    parameter by its source, `unit` m, rad or 1. `sigmas`: of a distribution that has no end, the
+    standard deviations at which the variable stands, else 0. `share`: of the witness's size, to
+    first order; nan where no error is known. `force` (3,) N, base axes, and no parameter, of a
+    force of unknown direction.
+    """
+
+    source: str
+    parameter: str
+    more: int
+    end: str
+    deviation: float
+    unit: str
+    sigmas: float
+    share: float
+    force: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Witness:
+    """One machine inside the set at one pose, in a state: `BEFORE` or `AFTER` compensation.
+
+    `machine` is the nominal one in the condition of the run; `pose` (n_commanded,), m or rad, and
+    its `number` in the run; `joints` (n_joint,) as commanded there; `spread` the variables at this
+    pose alone (`Spread.at`) and `t` (n_variable,) their values. `error` (n_component,), m and rad,
+    is exact, its part `quantity` ("position" or "orientation") of length `size`. Of a machine that
+    cannot be assembled `error` is None, `size` is inf and `status` the kernel's word for why.
+    """
+
+    state: str
+    quantity: str
+    machine: Machine
+    pose: Floats
+    number: int
+    joints: Floats
+    spread: Spread
+    t: Floats
+    error: Floats | None
+    size: float
+    status: str = "ok"
+
+    @property
+    def moved(self) -> Moved:
+        """Parameters (k,), each once, and their deviations (1, k) from nominal."""
+        return self.spread.parameters_moved(np.asarray(self.t, np.float64)[np.newaxis])
+
+    @property
+    def components(self) -> Indices:
+        """Numbers of the error's components that the quantity has."""
+        return quantities(self.machine.components)[self.quantity]
+
+    @cached_property
+    def by_source(self) -> Mapping[str, Floats]:
+        """(n_parameter,) deviation from each source alone; their sum is all of it."""
+        names = [source.name for source in acting(self.machine, self.machine.condition)]
+        found = {name: np.zeros(len(self.machine.parameters)) for name in names}
+        for name, (parameters, shift) in zip(names, self.spread.alone, strict=True):
+            np.add.at(found[name], parameters, shift[0])
+        moves = self.spread.swing[0] * self.t[self.spread.variables]
+        for column, variable in enumerate(self.spread.variables):
+            found[self.spread.sources[variable]][self.spread.columns[column]] += moves[column]
+        return found
+
+    @property
+    def force(self) -> Floats | None:
+        """(3,) N, base axes, of the force of unknown direction; None where there is none."""
+        envelope = self.machine.condition.envelope
+        if envelope is None or not self.spread.directions:
+            return None
+        (members,) = self.spread.directions
+        return np.asarray(envelope.force * (self.t[members] @ envelope.directions))
+
+    @cached_property
+    def block(self) -> Block:
+        """The pose as sources see it, with the joints commanded."""
+        machine = self.machine
+        pose = np.asarray(self.pose, np.float64)[np.newaxis]
+        _, placements, _ = machine.kernel.place(pose)
+        joints = np.asarray(self.joints, np.float64)[np.newaxis]
+        first = np.zeros(1, np.intp)
+        return Block(machine, machine.condition, pose, first, joints, placements)
+
+    @cached_property
+    def _parts(self) -> Floats:
+        """(n_variable,) what each variable adds to the size, to first order.
+
+        Of a machine that cannot be assembled the length of what it moves the tool by.
+        """
+        _, effects, _ = first_order(self.machine, self.block, self.spread)
+        along = np.nan_to_num(effects[0][self.components]) * self.t
+        if self.error is None or not self.size > 0.0:
+            return np.asarray(np.sqrt(np.square(along).sum(axis=0)))
+        return np.asarray(self.error[self.components] / self.size @ along)
+
+    def causes(self) -> list[Cause]:
+        """Every variable, the one with the largest part in the error first."""
+        known = self.error is not None and self.size > 0.0
+        directed = [int(v) for members in self.spread.directions for v in members]
+        shares = self._parts / self.size if known else np.full(len(self._parts), math.nan)
+        found = [
+            (float(abs(self._parts[v])), self._cause(v, float(shares[v])))
+            for v in range(len(self.spread.names))
+            if v not in directed
+        ]
+        force = self.force
+        if force is not None:
+            # Components are orthogonal; to first order their parts add up with their signs.
+            part = float(self._parts[directed].sum())
+            share = part / self.size if known else math.nan
+            x, y, z = force.tolist()
+            found.append((abs(part), Cause("loads", "", 0, "", 0.0, "N", 0.0, share, (x, y, z))))
+        return [cause for _, cause in sorted(found, key=lambda each: -each[0])]
+
+    def _cause(self, variable: int, share: float) -> Cause:
+        spread, machine = self.spread, self.machine
+        columns = np.flatnonzero(spread.variables == variable)
+        source, swing = spread.sources[variable], float(spread.swing[0, columns[0]])
+        parameter = int(spread.columns[columns[0]])
+        value = float(self.t[variable])
+        same = [
+            column
+            for column in np.flatnonzero(spread.columns == parameter)
+            if spread.sources[spread.variables[column]] == source
+        ]
+        # Where a source has several bands on a parameter its middle is none of theirs alone.
+        deviation = swing * value
+        if len(same) == 1:
+            deviation = float(self.by_source[source][parameter])
+        distribution = spread.distributions[variable]
+        lower, upper = float(spread.domain.lower[variable]), float(spread.domain.upper[variable])
+        room = AT_END * (upper - lower)
+        end = 1.0 if value >= upper - room else -1.0 if value <= lower + room else 0.0
+        end *= math.copysign(1.0, swing)
+        return Cause(
+            source,
+            machine.parameters[parameter],
+            len({int(spread.columns[column]) for column in columns}) - 1,
+            {1.0: "upper", -1.0: "lower"}.get(end, ""),
+            deviation,
+            machine.units[parameter],
+            0.0 if distribution.bounded else value * math.copysign(distribution.sigmas, swing),
+            share,
+        )
+
+    def words(self, most: int = NAMED) -> list[str]:
+        """For people: the pose, then the causes, the most important first.
+
+        More than `most` are counted. In the units in which the machine's file is answered.
+        """
+        causes = self.causes()
+        lines = [f"{self.state}, at {pose_in_words(self.machine, self.pose)}"]
+        lines += [self._said(cause) for cause in causes[:most]]
+        if len(causes) > most:
+            lines.append(f"and {len(causes) - most} more")
+        return lines
+
+    def _said(self, cause: Cause) -> str:
+        shown = self.machine.shown
+        if cause.force is not None:
+            size = math.hypot(*cause.force)
+            unit = [component / size if size else 0.0 for component in cause.force]
+            direction = ", ".join(f"{component + 0.0:.3f}" for component in unit)
+            return f"force of {shown.force.text(size)} along ({direction})"
+        small: Shown = shown.small(cause.unit)
+        if cause.unit == "m" and abs(cause.deviation) >= COARSE * shown.least_dimension:
+            small = shown.length
+        sign = "-" if cause.deviation < 0.0 else "+"
+        amount = f"{sign}{small.text(abs(cause.deviation))}"
+        where = f"at {amount}"
+        if cause.sigmas:
+            where = f"at {cause.sigmas:+.3g} standard deviations ({amount})"
+        elif cause.end:
+            where = f"at its {cause.end} end ({amount})"
+        of = "" if cause.source == "tolerance" else f" ({cause.source})"
+        more = f" and {cause.more} that vary with it" if cause.more else ""
+        return f"{cause.parameter}{more}{of} {where}"
+
+    def as_data(self) -> dict[str, Any]:
+        """For programs, ready for JSON, in the units of the machine's file.
+
+        `parameters`: total deviation of each from nominal. `causes`: as `Cause`, the most
+        important first. Without numbers that JSON has not: `size` is None of a machine that cannot
+        be assembled.
+        """
+        machine = self.machine
+        columns, values = self.moved
+        freedoms = zip(machine.commanded, self.pose.tolist(), strict=True)
+        size = self._in_file_units(self.size, "m" if self.quantity == "position" else "rad")
+        data: dict[str, Any] = {
+            "state": self.state,
+            "quantity": self.quantity,
+            "pose": {
+                name: self._in_file_units(value, "m" if FREEDOMS[name] == "length" else "rad")
+                for name, value in freedoms
+            },
+            "pose_number": int(self.number),
+            "status": self.status,
+            "size": None if self.error is None else size,
+            "parameters": {
+                machine.parameters[column]: self._in_file_units(value, machine.units[column])
+                for column, value in zip(columns.tolist(), values[0].tolist(), strict=True)
+            },
+            "causes": [self._cause_data(cause) for cause in self.causes()],
+        }
+        force = self.force
+        if force is not None:
+            unit = machine.file_units["force"]
+            sizes = unit.to_file(force).tolist()
+            data["force"] = {"value": sizes, "unit": unit.label}
+        return data
+
+    def _in_file_units(self, value: float, si: str) -> dict[str, Any]:
+        unit = self.machine.file_units[BY_UNIT[si]]
+        number = float(unit.to_file(value)) if math.isfinite(value) else None
+        return {"value": number, "unit": unit.label}
+
+    def _cause_data(self, cause: Cause) -> dict[str, Any]:
+        share = cause.share if math.isfinite(cause.share) else None
+        if cause.force is not None:
+            return {"source": cause.source, "parameter": None, "end": None, "share": share}
+        return {
+            "source": cause.source,
+            "parameter": cause.parameter,
+            "more": cause.more,
+            "end": cause.end or None,
+            "deviation": self._in_file_units(cause.deviation, cause.unit),
+            "standard_deviations": cause.sigmas or None,
+            "share": share,
+        }
+
+
+__all__ = ["AFTER", "BEFORE", "Cause", "Witness"]

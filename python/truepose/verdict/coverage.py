@@ -51,6 +51,9 @@ MOST_POSES = 1_000
 TOGETHER = 8_000_000
 """Lengths kept at once."""
 
+ROUNDING = 1e-9
+"""Of a number: a smaller difference does not tell the worst of two poses."""
+
 Answer = Literal["met", "NOT met", "undecided"]
 
 
@@ -170,8 +173,8 @@ class _Sampled:
 
     @property
     def worst(self) -> int:
-        """Where the number is largest; of equal ones the first pose of the run."""
-        largest = np.flatnonzero(self.estimate == self.estimate.max())
+        """Where the number is largest; of equal ones, but for rounding, the first of the run."""
+        largest = np.flatnonzero(self.estimate >= self.estimate.max() * (1.0 - ROUNDING))
         return int(min(largest.tolist(), key=lambda at: self.poses[at].number))
 
     @property

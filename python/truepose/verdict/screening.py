@@ -142,13 +142,16 @@ class Screen:
         if not every:
             raise ValueError("no pose")
         least = (1.0 - WITHIN) * best.level(few, sure=True)
-        kept, best = [], _Largest(self._sized)
+        kept, best, again = [], _Largest(self._sized), 0
         for number, (block, spread) in enumerate(self._states):
+            again += 1
             chosen = upper[number] >= least
             if chosen.any():
                 part = self._part(number, block.select(chosen), _select(spread, chosen), many)
                 kept.append(part)
                 best.add(part, part.estimate)
+        if again != len(upper):
+            raise ValueError("states that can be gone through but once")
         least = (1.0 - WITHIN) * best.level(many, sure=False)
         within = [part.only(part.estimate >= least) for part in kept]
         poses = [

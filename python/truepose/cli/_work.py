@@ -20,7 +20,6 @@ from truepose.cli._progress import progress, waiting
 from truepose.cli._show import show_tables
 from truepose.errors import Problem, RequestError
 from truepose.machine.suggestion import counted
-from truepose.machine.workspace import Accuracy
 from truepose.output import require_writable
 from truepose.report import formats
 from truepose.report.display import nearest_middle, pose_text, where_highest
@@ -46,7 +45,7 @@ def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMAT
     if request.output is not None:
         require_writable(request.output, endings, [request.machine_file])
     machine = truepose.load(request.machine_file, settings=request.settings)
-    if request.require_accuracy and machine.accuracy == Accuracy():
+    if request.require_accuracy and not machine.accuracy.asks:
         raise RequestError(
             Problem(
                 "no-accuracy",

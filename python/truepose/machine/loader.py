@@ -163,6 +163,7 @@ def _accuracy(document: Document, validated: Validated, table: AccuracyTable | N
         table.angle_target,
         said("target", "length"),
         said("angle_target", "angle"),
+        table.at,
     )
 
 

@@ -214,6 +214,8 @@ def _shown(value: Any) -> str:
 
 def _takes(schema: Json) -> str:
     """What a key takes, in words."""
+    if "x-takes" in schema:
+        return str(schema["x-takes"])
     if "x-dimension" in schema:
         return _takes_quantity(schema, schema["x-dimension"])
     if "x-poses" in schema:

@@ -14,6 +14,9 @@ LARGEST_GRID = 10_000_000
 MOST_STEPS = 1e15
 """More steps are not told apart: they are far too many."""
 
+WORST = "worst"
+"""What a machine file says where an accuracy is asked of every machine inside the bands."""
+
 Floats = NDArray[np.float64]
 
 
@@ -123,6 +126,8 @@ def along(waypoints: Floats, counts: NDArray[np.intp]) -> Floats:
 class Accuracy:
     """What is asked: largest position error in m, largest orientation error in rad; or None.
 
+    `at`: the share of all machines that must keep it at the worst pose, in (0, 1); None where
+    every machine inside the bands must.
     `target_text`, `angle_target_text`: as the file, or the user, says them, with their unit.
     """
 
@@ -130,6 +135,17 @@ class Accuracy:
     angle_target: float | None = None
     target_text: str = ""
     angle_target_text: str = ""
+    at: float | None = None
+
+    @property
+    def asks(self) -> bool:
+        """Whether anything is asked, of position or orientation."""
+        return self.target is not None or self.angle_target is not None
+
+    @property
+    def at_text(self) -> str:
+        """Whom it is asked of as a machine file says it: "worst", or "95 %"."""
+        return WORST if self.at is None else f"{100.0 * self.at:.12g} %"
 
     def said(self, quantity: str) -> str:
         """What is asked of "position" or "orientation" as it was asked; empty where nothing is."""

@@ -545,3 +545,34 @@ def test_a_calibration_table_is_checked(tmp_path: Path, old: str, new: str, code
     (problem,) = caught.value.problems
     assert problem.code == code
     assert problem.line is not None
+
+
+@pytest.mark.parametrize(
+    ("asked", "settings", "wanted"),
+    [
+        ('[accuracy]\ntarget = "0.5 mm"', (), 0.95),
+        ('[accuracy]\ntarget = "0.5 mm" # mine\n\n# below\n[platform]\nmass = "0 kg"', (), 0.95),
+        ('[accuracy]\ntarget = "0.5 mm"\nat = "worst"', (), None),
+        ('[accuracy]\ntarget = "0.5 mm"\nat = "99 %"', (), 0.99),
+        ('[accuracy]\ntarget = "0.5 mm"', ("accuracy.at=worst",), None),
+        ('[accuracy]\ntarget = "0.5 mm"', ("accuracy.at=90 %",), 0.9),
+        ("", ("accuracy.target=0.5 mm",), 0.95),
+        ("[accuracy]", (), None),
+        ("", (), None),
+    ],
+)
+def test_what_is_asked_is_asked_at_a_coverage(
+    tmp_path: Path, asked: str, settings: tuple[str, ...], wanted: float | None
+) -> None:
+    """Where the original says nothing of it: normal bands have no ends that a worst case needs."""
+    text = edited(PLANAR, ('[accuracy]\ntarget = "0.5 mm"', asked))
+    path, machine = filed(tmp_path, text, *settings)
+    unknowns = unknown(machine, {"strut.1.length": 1.0})
+    written, said = write(tmp_path, path, machine, unknowns, [1e-4], np.eye(1) * 1e-12)
+    assert written.accuracy.at == wanted
+    assert written.accuracy.target == machine.accuracy.target
+    assert written.accuracy.target_text == machine.accuracy.target_text
+    found = tomllib.loads(said).get("accuracy", {})
+    assert ("at" in found) == (wanted is not None or "worst" in asked + "".join(settings))
+    if "below" in asked:
+        assert '# mine\nat = "95 %"\n\n# below\n[platform]' in said

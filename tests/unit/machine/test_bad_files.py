@@ -47,6 +47,7 @@ KIENZLE = (
 )
 STRUT = "length_tolerance = [-0.3, 0.3]"
 DRIVE = "working_mode"
+ASKED = 'target = "0.5 mm"'
 
 
 def said(key: str, value: str, where: str = STRUT) -> tuple[str, str]:
@@ -235,6 +236,19 @@ CASES = [
     bad("negative", *said("gravity", '"-9.81 m/s^2"', FORCE), "gravity", "zero or more"),
     bad("unknown-freedom", 'target = "0.5 mm"', 'target = "0.5 mm"\nangle_target = 1',
         "angle_target", "cannot turn"),
+    bad("unknown-choice", *said("at", '"wurst"', ASKED), "wurst", 'did you mean "worst"?'),
+    bad("unknown-choice", *said("at", '"2 sigma"', ASKED), "2 sigma", '"95 %" or 0.95'),
+    bad("unknown-choice", *said("at", '"95 %%"', ASKED), "95 %%", '"worst", or a coverage'),
+    bad("unknown-choice", *said("at", '"95 mm"', ASKED), "95 mm", '"worst", or a coverage'),
+    bad("wrong-type", *said("at", "[0.95]", ASKED), "[0.95]", "accuracy.at", "found a list"),
+    bad("wrong-type", *said("at", "true", ASKED), "at = true", "found true or false"),
+    bad("bad-probability", *said("at", "95", ASKED), "at = 95", '95 % is written "95 %" or 0.95'),
+    bad("bad-probability", *said("at", "0", ASKED), "at = 0", "both excluded", "the share of"),
+    bad("bad-probability", *said("at", '"-5 %"', ASKED), "-5 %", "both excluded"),
+    bad("bad-probability", *said("at", "1.0", ASKED), "at = 1.0", 'at = "worst" asks it of every'),
+    bad("bad-probability", *said("at", '"100 %"', ASKED), "100 %", 'at = "worst"'),
+    bad("bad-probability", *said("at", '"180 %"', ASKED), "180 %", 'at = "worst"'),
+    bad("not-finite", *said("at", "nan", ASKED), "nan", "not finite"),
 ]  # fmt: skip
 
 

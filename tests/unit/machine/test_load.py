@@ -57,6 +57,38 @@ def test_what_the_file_says(tmp_path: Path) -> None:
     assert sources == ["tolerance", "thermal", "elastic", "loads"]
 
 
+@pytest.mark.parametrize(
+    ("written", "coverage", "text"),
+    [
+        (None, None, "worst"),
+        ('"worst"', None, "worst"),
+        ('"95 %"', 0.95, "95 %"),
+        ('"99.7%"', 0.997, "99.7 %"),
+        ('"90 percent"', 0.9, "90 %"),
+        ('"0.5"', 0.5, "50 %"),
+        ("0.95", 0.95, "95 %"),
+    ],
+)
+def test_at_which_coverage_an_accuracy_is_asked(
+    tmp_path: Path, written: str | None, coverage: float | None, text: str
+) -> None:
+    key = "" if written is None else f"at = {written}\n"
+    accuracy = load_text(tmp_path, edited(PLANAR, ("[accuracy]\n", f"[accuracy]\n{key}"))).accuracy
+    assert accuracy.at == coverage
+    assert (accuracy.at_text, accuracy.target) == (text, 0.0005)
+    if written is not None:
+        told = load_text(tmp_path, PLANAR, f"accuracy.at={written}").accuracy
+        assert told == accuracy
+
+
+def test_a_coverage_alone_asks_nothing(tmp_path: Path) -> None:
+    text = edited(PLANAR, ('target = "0.5 mm"', 'at = "95 %"'))
+    accuracy = load_text(tmp_path, text).accuracy
+    assert accuracy.at == pytest.approx(0.95)
+    assert not accuracy.asks
+    assert load_text(tmp_path, PLANAR).accuracy.asks
+
+
 def test_the_poses_run_first_axis_fastest(tmp_path: Path) -> None:
     machine = load_text(tmp_path, PLANAR)
     poses = machine.poses()

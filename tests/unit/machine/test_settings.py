@@ -101,6 +101,8 @@ def test_a_later_setting_wins(tmp_path: Path) -> None:
         ("acuracy.target=1", "unknown-key", 'did you mean "accuracy"?'),
         ("strut.1.length=-501", "not-positive", "given by --set strut.1.length=-501"),
         ("strut.1.length=3 N", "wrong-dimension", "expected a length, found a force"),
+        ("accuracy.at=best", "unknown-choice", "given by --set accuracy.at=best"),
+        ("accuracy.at=95", "bad-probability", '95 % is written "95 %" or 0.95'),
         ("condition.temperature=4O", "unknown-unit", "4O"),
         ("workspace.grid.x=[200, 400, 0]", "grid-count", "one or more"),
         ("schema=2", "unsupported-schema", "--set schema=2"),

@@ -3,12 +3,16 @@
 Every parameter that the unknowns move has its identified value, or, with `as_shifts`, keeps the one
 that the controller has and gets the deviation as the middle of its band. Bands are normal, of the
 identified covariance, with all correlations. What the file says besides, comments included, stays.
+
+An accuracy that is asked of every machine inside the bands, because the file does not say of how
+many, is asked at a coverage: ends of normal bands are no ends, and what a calibration knows, it
+knows by the correlations, which the worst case does not count.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -22,12 +26,16 @@ from truepose.calibration.result.directions import PartDirection, directions, ti
 from truepose.calibration.result.toml_edits import MachineText, warning_comment
 from truepose.errors import MachineFileError, Problem, RequestError
 from truepose.machine import Machine, load
+from truepose.machine.workspace import Accuracy
 from truepose.output import replacing, require_writable
 from truepose.sources import REGISTRY
 from truepose.sources._base import Deviation, Floats, Indices
 
 DEFAULT_COVERAGE = 2.0
 """Half bands in standard deviations."""
+
+AT = 0.95
+"""At which coverage the accuracy is asked where the original does not say (`[accuracy] at`)."""
 
 ENDING = ".toml"
 
@@ -131,6 +139,7 @@ def write_calibrated(
     for edit in property_edits(machine, unknowns, given):
         text.set_property(*edit)
     _write_bands(text, machine, result, coverage)
+    given_at = text.set_coverage(Accuracy(at=AT).at_text)
     text.move_to(path.parent)
     _write_provenance(text, machine, provenance, warnings)
     with replacing(path) as temporary:
@@ -141,7 +150,8 @@ def write_calibrated(
             problem = error.problems[0]
             raise _not_written(path, f"{problem.code}: {problem.message}") from error
         filed = load(original, settings=dict(machine.settings), registry=REGISTRY)
-        _require_same(path, filed, result, written)
+        asked = replace(filed.accuracy, at=AT) if given_at else filed.accuracy
+        _require_same(path, filed, result, asked, written)
     return load(path, registry=REGISTRY)
 
 
@@ -328,7 +338,9 @@ def _write_provenance(
     text.toml = tomlkit.parse(lines + text.text())
 
 
-def _require_same(path: Path, filed: Machine, result: _Result, written: Machine) -> None:
+def _require_same(
+    path: Path, filed: Machine, result: _Result, asked: Accuracy, written: Machine
+) -> None:
     """Refuse a file that, read again, is not the machine that was to be written.
 
     `filed`: the original with its settings, whose condition may not be the one calibrated in.
@@ -344,7 +356,7 @@ def _require_same(path: Path, filed: Machine, result: _Result, written: Machine)
         if wanted is not None and np.abs(each.axis - wanted).max() > _SAME:
             raise _not_written(path, f"{each.table}.{each.part}.{each.key} differs")
     _require_same_bands(path, filed, result, written)
-    if written.accuracy != filed.accuracy or written.condition != filed.condition:
+    if written.accuracy != asked or written.condition != filed.condition:
         raise _not_written(path, "condition or accuracy differ")
     strange = set(written.data_files.values()) - set(filed.data_files.values())
     if strange:

@@ -129,6 +129,23 @@ class MachineText:
         few = float(meant(start))
         return form(few if few in near else min(near, key=off))
 
+    def set_coverage(self, at: str) -> bool:
+        """Write at which coverage the accuracy is asked, where the file asks one and says none.
+
+        Returns whether it did.
+        """
+        table = self.toml.get("accuracy")
+        if not table or "at" in table:
+            return False
+        # What stands below its last key, tomlkit takes for the table's: comments of the next one.
+        body = table.value.body if isinstance(table, Table) else []
+        last = max((place for place, (key, _) in enumerate(body) if key is not None), default=-1)
+        below = body[last + 1 :]
+        del body[last + 1 :]
+        table["at"] = at
+        body.extend(below)
+        return True
+
     # --- tolerances
 
     def set_tolerance(self, name: str, stated: Mapping[str, Any]) -> None:

@@ -1,0 +1,236 @@
+"""Which poses may be the worst at a coverage, from the linear model: what is sampled exactly.
+
+At every pose the same variables, drawn from their distributions with their correlations, go through
+value + effects @ t (`budget.first_order`), and the quantile of the lengths is taken. It is that of
+|N(c, C)| where variables are normal, and of what they are where they are not; the farthest point of
+an ellipsoid of that coverage is none (42 to 300 % larger).
+
+Few draws tell which poses are far from the largest, more draws, at the rest, which lie within
+`WITHIN` of it. These draws are none of those that the answer is made of, so that the poses chosen
+do not depend on them, and an interval that holds at each holds at the poses chosen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.budget.drawn import Random
+from truepose.budget.exact import displacement
+from truepose.budget.first_order import first_order
+from truepose.budget.poses import OK
+from truepose.budget.spread import Spread
+from truepose.machine import Machine
+from truepose.sources import Block
+from truepose.sources._base import Flags, Floats, Indices
+from truepose.verdict.order_statistics import Ranks, ranks
+
+State = tuple[Block, Spread]
+"""Some poses as they are commanded, and what is unknown there."""
+
+WITHIN = 0.1
+"""Of the largest: poses whose first-order number is smaller by more are not sampled."""
+
+FIRST = 1 << 40
+"""Number of the first sample that poses are screened with; no run draws as many."""
+
+TAIL = (50, 200)
+"""Screening draws beyond the quantile, at all poses and at those left."""
+
+FEWEST = (1_000, 8_000)
+MOST = (20_000, 80_000)
+"""Screening draws at a pose; at coverages that want more, a lower quantile tells the poses."""
+
+RISK = 0.002
+"""Of screening a pose out by chance, roughly: draws are the same at every pose."""
+
+PILOTS = 8
+"""Poses of the largest first-order numbers at which the exact ones are taken, for the scale."""
+
+AT_ONCE = 4_000_000
+"""Components of linear errors that are worked on together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """One pose that is sampled: its `number` in the run, and the state there.
+
+    `part`: poses of one part have the same variables, and the same `draws` of them.
+    """
+
+    machine: Machine
+    number: int
+    part: int
+    block: Block
+    spread: Spread
+    draws: Random
+    columns: Indices
+
+    def sizes(self, t: Floats) -> Floats:
+        """(s,) lengths of the exact error where the variables are t (s, v); inf where none."""
+        parameters, moved = self.spread.parameters_moved(t)
+        joints = np.repeat(self.block.joints, len(t), axis=0)
+        placements = np.repeat(self.block.placements, len(t), axis=0)
+        error, status = displacement(self.machine, joints, placements, (parameters, moved))
+        length = np.sqrt(np.square(error[:, self.columns]).sum(axis=1))
+        return np.where(status == OK, length, np.inf)
+
+
+@dataclass(frozen=True)
+class Screened:
+    """The poses to sample, of the largest first-order number first, and how many there were.
+
+    `within`: poses that may be the worst, of which `poses` are those to be sampled.
+    """
+
+    poses: list[Pose]
+    within: int
+    every: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """Some poses of a block: first-order estimates of the quantile with its ends, each (n,)."""
+
+    number: int
+    block: Block
+    spread: Spread
+    draws: Random
+    estimate: Floats
+    lower: Floats
+    upper: Floats
+
+    def only(self, chosen: Flags) -> _Part:
+        """Some of them."""
+        return _Part(
+            self.number,
+            self.block.select(chosen),
+            _select(self.spread, chosen),
+            self.draws,
+            self.estimate[chosen],
+            self.lower[chosen],
+            self.upper[chosen],
+        )
+
+
+class Screen:
+    """A run of poses at a coverage: `states` is gone through twice."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        states: Iterable[State],
+        columns: Indices,
+        probability: float,
+        seed: int,
+    ) -> None:
+        """`columns`: components of the quantity."""
+        self._machine, self._states, self._columns = machine, states, columns
+        self._probability, self._seed = probability, seed
+
+    def candidates(self, most: int) -> Screened:
+        """The poses that may be the worst, at most so many; those without first order are."""
+        few, many = (self._ranks(stage) for stage in range(2))
+        upper, best = [], _Largest(self._sized)
+        for number, (block, spread) in enumerate(self._states):
+            part = self._part(number, block, spread, few)
+            upper.append(part.upper)
+            best.add(part, part.lower)
+        every = sum(each.size for each in upper)
+        if not every:
+            raise ValueError("no pose")
+        least = (1.0 - WITHIN) * best.level(few, sure=True)
+        kept, best, again = [], _Largest(self._sized), 0
+        for number, (block, spread) in enumerate(self._states):
+            again += 1
+            chosen = upper[number] >= least
+            if chosen.any():
+                part = self._part(number, block.select(chosen), _select(spread, chosen), many)
+                kept.append(part)
+                best.add(part, part.estimate)
+        if again != len(upper):
+            raise ValueError("states that can be gone through but once")
+        least = (1.0 - WITHIN) * best.level(many, sure=False)
+        within = [part.only(part.estimate >= least) for part in kept]
+        poses = [
+            (float(part.estimate[at]), self._pose(part, at))
+            for part in within
+            for at in _largest(part.estimate, most)
+        ]
+        poses.sort(key=lambda each: (-each[0], each[1].number))
+        count = sum(part.estimate.size for part in within)
+        return Screened([pose for _, pose in poses[:most]], count, every)
+
+    def _ranks(self, stage: int) -> Ranks:
+        """How many draws, and which of them in order."""
+        wanted = TAIL[stage] / (1.0 - self._probability)
+        count = int(min(max(wanted, FEWEST[stage]), MOST[stage]))
+        return ranks(count, min(self._probability, 1.0 - TAIL[stage] / count), RISK)
+
+    def _part(self, number: int, block: Block, spread: Spread, of: Ranks) -> _Part:
+        draws = Random(spread, self._seed)
+        t = draws.rows(FIRST, of.count)
+        value, effects, status = first_order(self._machine, block, spread)
+        value, effects = value[:, self._columns], effects[:, self._columns]
+        found = np.empty((3, len(value)))
+        step = max(1, AT_ONCE // (of.count * self._columns.size))
+        for start in range(0, len(value), step):
+            rows = slice(start, start + step)
+            errors = effects[rows] @ t.T
+            errors += value[rows, :, np.newaxis]
+            found[:, rows] = np.sqrt(of.of(np.square(errors, out=errors).sum(axis=1)))
+        # Without a first order nothing says that it is not the worst; nor that it is.
+        found[:, status != OK] = np.array([[np.inf], [0.0], [np.inf]])
+        return _Part(number, block, spread, draws, *found)
+
+    def _pose(self, part: _Part, at: int) -> Pose:
+        one = part.only(_at(part.estimate, at))
+        number = int(one.block.indices[0])
+        return Pose(
+            self._machine, number, one.number, one.block, one.spread, one.draws, self._columns
+        )
+
+    def _sized(self, part: _Part, at: int, count: int) -> Floats:
+        """(count,) exact lengths at a pose, of the screening draws."""
+        return self._pose(part, at).sizes(part.draws.rows(FIRST, count))
+
+
+class _Largest:
+    """How large the largest number is: by first order, and exactly where that is largest.
+
+    Near singularities the exact number may be well below that of first order, and another pose's
+    the largest: poses are measured against the smaller of the two.
+    """
+
+    def __init__(self, sized: Callable[[_Part, int, int], Floats]) -> None:
+        self._sized = sized
+        self._linear = 0.0
+        self._found: list[tuple[float, _Part]] = []
+
+    def add(self, part: _Part, numbers: Floats) -> None:
+        """Numbers (n,) of more poses, by first order; those that are not finite are none."""
+        finite = np.isfinite(numbers)
+        self._linear = max(self._linear, float(numbers.max(initial=0.0, where=finite)))
+        few = [part.only(_at(part.estimate, at)) for at in _largest(part.estimate, PILOTS)]
+        self._found += [(float(each.estimate[0]), each) for each in few]
+        self._found = sorted(self._found, key=lambda each: -each[0])[:PILOTS]
+
+    def level(self, of: Ranks, *, sure: bool) -> float:
+        """What poses are measured against, m or rad; `sure`: the lower end of the exact one."""
+        exact = [of.of(self._sized(part, 0, of.count))[int(sure)] for _, part in self._found]
+        return min(self._linear, float(max(exact)))
+
+
+def _largest(values: Floats, most: int) -> Indices:
+    """Places of the largest of `values`, at most so many; of equal ones the first."""
+    return np.asarray(np.argsort(-values, kind="stable")[:most], np.intp)
+
+
+def _select(spread: Spread, chosen: Flags) -> Spread:
+    return spread if chosen.all() else spread.select(chosen)
+
+
+def _at(values: Floats, at: int) -> Flags:
+    return np.asarray(np.arange(values.size) == at)

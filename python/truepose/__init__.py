@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from truepose.controllers import export
     from truepose.controllers.gcode import correct_program
     from truepose.machine import Condition, Machine
+    from truepose.verdict.accuracy import accuracy
 
     __version__: str
 
@@ -41,6 +42,7 @@ _WHERE = {
     "Condition": "truepose.machine",
     "Input": "truepose.budget.inputs",
     "Machine": "truepose.machine",
+    "accuracy": "truepose.verdict.accuracy",
     "bounds": "truepose.budget.bounds",
     "calibrate": "truepose.calibration.calibrate",
     "correct_program": "truepose.controllers.gcode",
@@ -58,6 +60,7 @@ __all__ = [
     "Input",
     "Machine",
     "__version__",
+    "accuracy",
     "bounds",
     "budget",
     "calibrate",

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import truepose
+from truepose.budget.comparison import quantities
 from truepose.budget.poses import broken
 from truepose.cli import _work
 from truepose.cli._options import Request
@@ -20,11 +21,14 @@ from truepose.machine.units import UnitSystem
 from truepose.report import how_sure, reading
 from truepose.report.display import is_position, nearest_middle, where_highest
 from truepose.report.study import Study
+from truepose.verdict.accuracy import at_coverage
+from truepose.verdict.states import STATES, Population
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from truepose.machine import Machine
+    from truepose.verdict.answer import Answer
 
 SAMPLES = 100_000
 """Samples at each of the report's two poses: two digits of a standard deviation."""
@@ -32,6 +36,9 @@ ELLIPSE_SAMPLES = 10_000
 """Samples at each of the poses of which the report draws an ellipse."""
 SEED = 0
 """Of the report, so that the same file gives the same page."""
+
+COVERAGE = 0.95
+"""At which the report says how far off the tool is over the workspace."""
 
 UNITS = {"monte_carlo": "samples", "ellipses": "samples"}
 """What is counted in the progress of a result, where not poses."""
@@ -148,9 +155,8 @@ def with_how_sure(study: Study) -> Study:
     if not any(study.has_band):
         return study
     machine = study.machine
-    size = study.position_norm if study.positions else study.rotation_norm
     middle = int(nearest_middle(study.poses)[0])
-    two = list(dict.fromkeys([middle, where_highest(size(study.overall_worst))]))
+    two = list(dict.fromkeys([middle, where_highest(study.largest)]))
     poses = study.poses[two]
     sampling = partial(truepose.monte_carlo, machine, seed=SEED)
     work: dict[str, Callable[..., Any]] = {
@@ -181,6 +187,7 @@ def with_how_sure(study: Study) -> Study:
             missing["ellipses"] = f"{found.pop('ellipses').attrs['not_assembled']}."
     return replace(
         study,
+        sampled=_at_95(machine),
         worst_case=found.get("worst_case"),
         monte_carlo=found.get("monte_carlo"),
         ellipses=found.get("ellipses"),
@@ -188,6 +195,17 @@ def with_how_sure(study: Study) -> Study:
         shares=found.get("shares"),
         missing=missing,
     )
+
+
+def _at_95(machine: Machine) -> tuple[Answer, ...]:
+    """The errors that 95 % of all machines stay below, at the worst poses of the workspace."""
+    with progress("coverage") as report:
+        population = Population.of(machine, progress=report)
+        return tuple(
+            at_coverage(population, state, kind, COVERAGE, None)
+            for state in STATES
+            for kind in quantities(machine.components)
+        )
 
 
 def _why(refusal: RequestError) -> str:

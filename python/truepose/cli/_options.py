@@ -24,6 +24,7 @@ class Request:
     output: Path | None = None
     strict: bool = False
     require_accuracy: bool = False
+    witness: Path | None = None
 
 
 def _note_format(context: click.Context, _: click.Parameter, value: str) -> str:
@@ -77,6 +78,16 @@ accuracy_option = click.option(
     "--require-accuracy",
     is_flag=True,
     help="Exit with code 1 when the accuracy asked in the machine file is not met.",
+)
+
+
+witness_option = click.option(
+    "--witness",
+    "witness",
+    metavar="FILE.toml",
+    type=click.Path(path_type=Path),
+    help="Where the accuracy asked is NOT met: write the machine that exceeds it, as a machine "
+    "file at its pose.",
 )
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
+    from truepose.report.accuracy import Told
     from truepose.report.tables import Table
 
 PIPED_WIDTH = 160
@@ -18,6 +19,17 @@ PIPED_WIDTH = 160
 
 def show_tables(tables: Iterable[Table]) -> None:
     """Print tables for people on stdout, in colour on a terminal."""
+    from rich.text import Text
+
+    for table in tables:
+        shown: list[Any] = [Text(table.title, style="bold"), _rich(table)]
+        if table.note:
+            shown.append(Text(table.note, style="dim"))
+        _print([*shown, Text()])
+
+
+def _print(shown: Iterable[Any]) -> None:
+    """Print what rich can render on stdout, in colour on a terminal."""
     from rich.console import Console
 
     terminal = sys.stdout.isatty()
@@ -29,13 +41,26 @@ def show_tables(tables: Iterable[Table]) -> None:
         force_terminal=terminal,
         width=None if terminal else PIPED_WIDTH,
     )
-    for table in tables:
-        console.print(f"[bold]{table.title}[/bold]")
-        console.print(_rich(table))
-        if table.note:
-            console.print(table.note, style="dim")
-        console.print()
+    for each in shown:
+        console.print(each)
     sys.stdout.write(text.getvalue())
+
+
+COLOURS = {"met": "green", "missed": "red", "open": "yellow", "none": "default"}
+"""Of an answer's word."""
+
+
+def show_answers(answers: Iterable[Told]) -> None:
+    """Print the answers, a line each, before anything else."""
+    from rich.text import Text
+
+    lines = []
+    for each in answers:
+        lines.append(Text.assemble((each.word, f"bold {COLOURS[each.colour]}"), f"  {each.line}"))
+        if each.witness:
+            lines.append(Text(f"  witness: {each.witness}", style="dim"))
+    if lines:
+        _print([*lines, Text()])
 
 
 def _rich(table: Table) -> RichTable:

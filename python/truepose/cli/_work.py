@@ -17,20 +17,24 @@ import truepose
 from truepose.budget.poses import faults_text, reason_text
 from truepose.cli._options import Request
 from truepose.cli._progress import progress, waiting
-from truepose.cli._show import show_tables
+from truepose.cli._show import show_answers, show_tables
 from truepose.errors import Problem, RequestError
 from truepose.machine.suggestion import counted
 from truepose.output import require_writable
 from truepose.report import formats
+from truepose.report.accuracy import told
 from truepose.report.display import nearest_middle, pose_text, where_highest
 from truepose.report.result import Result
 from truepose.report.study import Study, warnings_of
 from truepose.report.tables import Table
+from truepose.verdict import witness_file
+from truepose.verdict.answer import NOT_MET, STATES
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from truepose.machine import Machine
+    from truepose.verdict.answer import Answer
 
 MOST_PROBLEMS = 20
 """Poses named one by one when `--strict` refuses them."""
@@ -94,9 +98,16 @@ def over_time(request: Request, machine: Machine) -> xr.Dataset:
     return found
 
 
+def judge(machine: Machine, *states: str) -> tuple[Answer, ...]:
+    """The verdict over the file's workspace in the states asked, by default both."""
+    with progress("accuracy") as report:
+        return truepose.accuracy(machine, states=states or STATES, progress=report)
+
+
 def study_of(request: Request, machine: Machine) -> Study:
-    """The machine with both results."""
-    return Study(machine, evaluate(request, machine), correct(request, machine))
+    """The machine with both results, and the verdict on both."""
+    evaluated, corrected = evaluate(request, machine), correct(request, machine)
+    return Study(machine, evaluated, corrected, judge(machine))
 
 
 def with_time(study: Study) -> Study:
@@ -129,16 +140,50 @@ def with_strain(request: Request, study: Study) -> Study:
     return replace(study, strain=strain(request, study.machine))
 
 
-def deliver(request: Request, result: Result, tables: Iterable[Table | None]) -> None:
-    """Write the output file if one is asked for, and print the result in the format asked."""
+def deliver(
+    request: Request,
+    result: Result,
+    tables: Iterable[Table | None],
+    answers: Sequence[Answer] = (),
+) -> None:
+    """Write the output file if one is asked for, and print the result in the format asked.
+
+    For people the `answers` come first.
+    """
     if request.output is not None:
         formats.write(result, request.output)
     if request.format == "table":
+        show_answers(told(result.machine, answers))
         show_tables(table for table in tables if table is not None)
     else:
         sys.stdout.writelines(formats.text(result, f".{request.format}"))
     if request.output is not None:
         note_written(request.output)
+
+
+def write_witness(request: Request, answers: Sequence[Answer], state: str) -> None:
+    """Write the witness of the first answer of a state that is NOT met, where it is asked for.
+
+    Raises `RequestError` (no-witness) where there is none.
+    """
+    path = request.witness
+    if path is None:
+        return
+    for answer in answers:
+        if answer.state == state and answer.answer == NOT_MET and answer.example is not None:
+            example, original = answer.example, request.machine_file
+            witness_file.write_witness(example.machine, example, path, original=original)
+            note_written(path)
+            return
+    words = [f"{each.quantity}: {each.answer or 'nothing asked'}" for each in answers]
+    raise RequestError(
+        Problem(
+            "no-witness",
+            "there is no witness to write",
+            found=f"{state}, " + ", ".join(dict.fromkeys(words)),
+            expected="an accuracy asked that is NOT met: the machine that exceeds it is the witness",
+        )
+    )
 
 
 def exit_code(request: Request, met: bool | None) -> int:

@@ -57,11 +57,18 @@ def command(region: str | None, gap: float | None, truncate: float | None, **opt
     from truepose.cli import _how_sure, _work
     from truepose.report import how_sure
     from truepose.report.result import Result
+    from truepose.verdict.answer import BEFORE, met
 
     request = Request(**options)
     machine = _work.read_machine(request)
     found = _how_sure.bound(request, machine, region, gap, truncate)
-    _work.deliver(request, Result("bounds", machine, found), how_sure.bounds(machine, found))
+    result, tables = Result("bounds", machine, found), how_sure.bounds(machine, found)
+    if region is None and truncate is None:
+        answers = _work.judge(machine, BEFORE)
+        _work.deliver(request, result, tables, answers)
+        return _work.exit_code(request, met(answers, BEFORE))
+    # Another set of machines or of poses than the verdict is on: what is proven of that.
+    _work.deliver(request, result, tables)
     if region is not None and request.format == "table":
         click.echo(how_sure.sentence(machine, found))
     return _work.exit_code(request, _how_sure.keeps_accuracy(machine, found))

@@ -15,27 +15,38 @@ from truepose.cli._options import (
     set_option,
     strict_option,
     takes,
+    witness_option,
 )
 
 
 @click.command("budget")
-@takes(machine_argument, set_option, format_option, output_option, strict_option, accuracy_option)
+@takes(
+    machine_argument,
+    set_option,
+    format_option,
+    output_option,
+    strict_option,
+    accuracy_option,
+    witness_option,
+)
 def command(**options: Any) -> int:
     """Predict the error from each source, and compare them.
 
     Every pose of the workspace is evaluated exactly: the nominal command driven through the
     machine as each source makes it, and as all together make it. With --require-accuracy the
-    exit code is 1 when the most that all sources can do exceeds the accuracy asked.
+    exit code is 1 when it is not certain that the machine, commanded as it is, keeps the accuracy
+    asked.
     """
     from truepose.cli import _work
-    from truepose.report import accuracy, tables
+    from truepose.report import tables
     from truepose.report.result import Result
     from truepose.report.study import Study
+    from truepose.verdict.answer import BEFORE, met
 
     request = Request(**options)
     machine = _work.read_machine(request)
     study = Study(machine, _work.evaluate(request, machine))
-    answers = accuracy.answers(study)
+    answers = _work.judge(machine, BEFORE)
     _work.deliver(
         request,
         Result("budget", machine, study.budget),
@@ -43,8 +54,10 @@ def command(**options: Any) -> int:
             tables.ranking(study),
             tables.highest_absolute(study),
             tables.highest_percent(study),
-            tables.answers(answers),
+            tables.answers(machine, answers),
             tables.poses_left_out(study),
         ],
+        answers,
     )
-    return _work.exit_code(request, accuracy.met(answers, accuracy.BEFORE))
+    _work.write_witness(request, answers, BEFORE)
+    return _work.exit_code(request, met(answers, BEFORE))

@@ -14,13 +14,14 @@ from truepose.cli._options import (
     set_option,
     strict_option,
     takes,
+    witness_option,
 )
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
-    from truepose.report.accuracy import Answer
     from truepose.report.reach import Reach
     from truepose.report.tables import Table
+    from truepose.verdict.answer import Answer
 
 
 @click.command("check")
@@ -30,18 +31,21 @@ if TYPE_CHECKING:
     format_option,
     output_option_of(".json or .csv"),
     strict_option,
+    witness_option,
 )
 def command(**options: Any) -> int:
     """Say what a machine file holds, and if it is accurate enough.
 
-    Exit code 1 when the machine, commanded as it is, may exceed the accuracy asked; what
-    compensation would leave is shown beside it.
+    Exit code 1 unless it is certain that the machine, commanded as it is, keeps the accuracy
+    asked; what compensation would leave is shown beside it.
     """
     from truepose.cli import _work
     from truepose.output import replacing
-    from truepose.report import accuracy, inputs
+    from truepose.report import inputs
+    from truepose.report.accuracy import told
     from truepose.report.reach import reach
     from truepose.report.study import warnings_of
+    from truepose.verdict.answer import AFTER, BEFORE, met
 
     request = Request(**options)
     machine = _work.read_machine(request, [".json", ".csv"])
@@ -53,11 +57,12 @@ def command(**options: Any) -> int:
     # Without a source the file may still be asked about its workspace, unless it asks for more.
     asked = machine.accuracy.target is not None or machine.accuracy.angle_target is not None
     if asked or any(inputs.acting(machine)):
-        study = _work.study_of(request, machine)
-        answers, warnings = accuracy.answers(study), warnings_of(study.budget)
+        warnings = warnings_of(_work.evaluate(request, machine))
+        answers = _work.judge(machine)
     if request.format == "table":
-        from truepose.cli._show import show_tables
+        from truepose.cli._show import show_answers, show_tables
 
+        show_answers(told(machine, answers))
         show_tables(_tables(machine, found, answers))
     else:
         click.echo(_text(request.format, machine, found, answers, warnings))
@@ -67,7 +72,9 @@ def command(**options: Any) -> int:
             text = _text(form, machine, found, answers, warnings)
             temporary.write_text(text + "\n", encoding="utf-8")
         _work.note_written(request.output)
-    return int(accuracy.met(answers, accuracy.BEFORE) is False)
+    kept = met(answers, BEFORE) is not False
+    _work.write_witness(request, answers, AFTER if kept else BEFORE)
+    return int(not kept)
 
 
 def _tables(machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> list[Table]:
@@ -84,7 +91,7 @@ def _tables(machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> list
         inputs.deviations(machine),
         reach.table(machine, found),
     ]
-    return [*shown, tables.answers(answers)] if answers else shown
+    return [*shown, tables.answers(machine, answers)] if answers else shown
 
 
 def _text(
@@ -100,10 +107,11 @@ def _text(
     import json
 
     from truepose.report import inputs, reach
+    from truepose.report.accuracy import as_data
     from truepose.report.result import in_file_units, pose_si
     from truepose.sources import NO_MATERIAL, not_included, not_included_text
 
-    rows = [answer.as_data(machine) for answer in answers]
+    rows = [as_data(machine, answer) for answer in answers]
     if form == "csv":
         buffer = io.StringIO()
         where = [
@@ -111,7 +119,7 @@ def _text(
             for name in machine.commanded
         ]
         columns = ["quantity", "state", "highest", "asked", "units", "met", "not_included"]
-        columns += ["pose", "not_assembled"]
+        columns += ["pose", "not_assembled", "answer", "witness", "linear", "bound", "rests_on"]
         left_out = not_included_text(machine, machine.condition)
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow([*columns, *where])

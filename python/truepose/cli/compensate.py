@@ -15,29 +15,45 @@ from truepose.cli._options import (
     set_option,
     strict_option,
     takes,
+    witness_option,
 )
 
 
 @click.command("compensate")
-@takes(machine_argument, set_option, format_option, output_option, strict_option, accuracy_option)
+@takes(
+    machine_argument,
+    set_option,
+    format_option,
+    output_option,
+    strict_option,
+    accuracy_option,
+    witness_option,
+)
 def command(**options: Any) -> int:
     """Correct the command for what is known, and show what remains.
 
     The corrected joint coordinates of every pose are driven through the machine at both edges
-    and at the middle of the bands. With --require-accuracy the exit code is 1 when the most
-    that remains exceeds the accuracy asked.
+    and at the middle of the bands. With --require-accuracy the exit code is 1 when it is not
+    certain that the machine keeps the accuracy asked with corrected commands.
     """
     from truepose.cli import _work
-    from truepose.report import accuracy, tables
+    from truepose.report import tables
     from truepose.report.result import Result
+    from truepose.verdict.answer import AFTER, met
 
     request = Request(**options)
     study = _work.study_of(request, _work.read_machine(request))
     assert study.compensation is not None
-    answers = accuracy.answers(study)
+    answers = study.accuracy
     _work.deliver(
         request,
         Result("compensate", study.machine, study.compensation),
-        [tables.compensation(study), tables.answers(answers), tables.poses_left_out(study)],
+        [
+            tables.compensation(study),
+            tables.answers(study.machine, answers),
+            tables.poses_left_out(study),
+        ],
+        answers,
     )
-    return _work.exit_code(request, accuracy.met(answers, accuracy.AFTER))
+    _work.write_witness(request, answers, AFTER)
+    return _work.exit_code(request, met(answers, AFTER))

@@ -44,13 +44,15 @@ def command(**options: Any) -> int:
 
     Evaluates, compares and compensates, samples, bounds and shares out the error at two poses,
     prints the tables, and writes the page, which opens from disk without a network. With
-    --require-accuracy the exit code is 1 when the most that remains
-    after compensation exceeds the accuracy asked.
+    --require-accuracy the exit code is 1 when it is not certain that the accuracy asked is kept
+    after compensation.
     """
     from truepose.cli import _how_sure, _work
-    from truepose.cli._show import show_tables
+    from truepose.cli._show import show_answers, show_tables
     from truepose.output import require_writable
-    from truepose.report import accuracy, how_sure, tables
+    from truepose.report import how_far, how_sure, tables
+    from truepose.report.accuracy import told
+    from truepose.verdict.answer import AFTER, met
 
     if options["output"] is None:
         options["output"] = Path(options["machine_file"].stem + ".html")
@@ -66,17 +68,18 @@ def command(**options: Any) -> int:
     study = _work.with_calibration(study, measurements)
     text = request.machine_file.read_text(encoding="utf-8")
     page.write(study, request.output, text)
-    answers = accuracy.answers(study)
+    show_answers(told(machine, study.accuracy))
     shown = [
         tables.ranking(study),
         tables.highest_absolute(study),
         tables.highest_percent(study),
         tables.compensation(study),
         *tables.strain(study),
+        how_far.table(study),
         *how_sure.in_short(study),
-        tables.answers(answers),
+        tables.answers(machine, study.accuracy),
         tables.poses_left_out(study),
     ]
     show_tables(table for table in shown if table is not None)
     _work.note_written(request.output)
-    return _work.exit_code(request, accuracy.met(answers, accuracy.AFTER))
+    return _work.exit_code(request, met(study.accuracy, AFTER))

@@ -7,7 +7,6 @@ the functions return it. In the units for people (`truepose.machine.shown_units`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +27,6 @@ from truepose.report.reading import (
     at_text,
     components,
     percent_text,
-    poses_of,
     quantities,
     worst_pose,
 )
@@ -46,31 +44,6 @@ UNPROVEN = {
     "near_singular": "too near a singularity for a proof",
 }
 """What a status without a proof means."""
-
-ANSWERS = {
-    "sampled": "sampled, {percent} of all",
-    "farthest": "sampled, farthest",
-    "linear": "linear worst case",
-    "exact": "exact worst corner",
-    "bound": "guaranteed bound",
-}
-"""The answers to "how far off can the tool be?", by rising caution."""
-
-
-@dataclass(frozen=True)
-class Answers:
-    """How far the tool may be off at one pose, by every road.
-
-    `names` are the components and quantities; `sizes` has for each answer (`ANSWERS`) what it says
-    of each name (n_name,), m and rad: the farther end of its interval. Missing ones are NaN; of
-    the bound `status` says why.
-    """
-
-    names: tuple[str, ...]
-    sizes: dict[str, Array]
-    at: str
-    percent: str
-    status: str = PROVEN
 
 
 def rounded(values: Array, senses: Sequence[int]) -> tuple[str, ...]:
@@ -367,70 +340,6 @@ def sentence(machine: Machine, found: xr.Dataset) -> str:
     )
 
 
-def answers(study: Study) -> Answers:
-    """Every answer at the worst pose of those looked at, side by side.
-
-    What a result does not say, or where it is not there, is NaN.
-    """
-    worst = study.worst_case
-    assert worst is not None
-    pose = worst_pose(worst, "magnitude_linear")
-    place = poses_of(study.machine, worst)[pose]
-    names = (*components(worst), *quantities(worst))
-    sizes = {name: np.full(len(names), np.nan) for name in ANSWERS}
-    for kind in ("linear", "exact"):
-        sizes[kind] = np.concatenate(
-            [np.abs(worst[kind].values[pose]), worst[f"magnitude_{kind}"].values[pose]]
-        )
-    percent = ""
-    if study.monte_carlo is not None:
-        found = study.monte_carlo
-        percent = percent_text(float(found.attrs["probability"]))
-        at = _same_pose(study.machine, found, place)
-        if at is not None:
-            sizes["sampled"] = _farther(found, at, "lower", "upper", "magnitude_upper")
-            sizes["farthest"] = _farther(found, at, "minimum", "maximum", "magnitude_maximum")
-    status = PROVEN
-    if study.bounds is not None:
-        at = _same_pose(study.machine, study.bounds, place)
-        if at is not None:
-            sizes["bound"] = _farther(study.bounds, at, "lower", "upper", "magnitude")
-            status = str(study.bounds["status"].values[at])
-    return Answers(
-        names, sizes, pose_text(place, study.machine.commanded, study.units), percent, status
-    )
-
-
-def _farther(found: xr.Dataset, pose: int, lower: str, upper: str, magnitude: str) -> Array:
-    ends = np.maximum(np.abs(found[lower].values[pose]), np.abs(found[upper].values[pose]))
-    return np.concatenate([ends, found[magnitude].values[pose]])
-
-
-def _same_pose(machine: Machine, found: xr.Dataset, pose: Array) -> int | None:
-    """Index in a result of a pose (n_commanded,), if it is there."""
-    same = np.flatnonzero((poses_of(machine, found) == pose).all(axis=1))
-    return int(same[0]) if same.size else None
-
-
-def three_answers(study: Study) -> Table:
-    """Linear, sampled and guaranteed side by side, at the worst pose."""
-    found = answers(study)
-    rows = []
-    for at, name in enumerate(found.names):
-        row = np.array([found.sizes[kind][at] for kind in ANSWERS])
-        row *= study.units.error(name).per_si
-        cells = rounded(row, [1 if kind == "bound" else 0 for kind in ANSWERS])
-        rows.append((_named(study.machine, name), *cells))
-    because = lacking(study)
-    return Table(
-        "three_answers",
-        "How far off can the tool be?",
-        ("", *(title.format(percent=found.percent) for title in ANSWERS.values())),
-        tuple(rows),
-        note=" ".join([f"At {found.at}, without regard to the sign.", *because]),
-    )
-
-
 LACKING = {
     "monte_carlo": "sampled answer",
     "ellipses": "coverage ellipse",
@@ -444,10 +353,6 @@ LACKING = {
 def lacking(study: Study) -> list[str]:
     """Sentences on what is not there, and why."""
     said = {name: why for name, why in study.missing.items() if name in LACKING}
-    if study.bounds is not None and study.worst_case is not None:
-        status = answers(study).status
-        if status != PROVEN:
-            said["bounds"] = f"{unproven_text(status)}."
     return [f"No {LACKING[name]}: {why}" for name, why in said.items()]
 
 
@@ -456,7 +361,7 @@ def unproven_text(status: str) -> str:
     return UNPROVEN.get(status, status.replace("_", " "))
 
 
-IN_SHORT = ("three_answers", "shares_parameter_position", "shares_parameter_orientation", "lacking")
+IN_SHORT = ("shares_parameter_position", "shares_parameter_orientation", "lacking")
 """Names of the tables that the report prints as well; the page has them all."""
 
 
@@ -468,8 +373,6 @@ def in_short(study: Study) -> list[Table]:
 def tables(study: Study) -> list[Table]:
     """All that the report's page shows of these results."""
     shown: list[Any] = []
-    if study.worst_case is not None:
-        shown.append(three_answers(study))
     for result, of in (
         (study.monte_carlo, sampled),
         (study.bounds, bounds),

@@ -11,18 +11,17 @@ from plotly.offline import get_plotlyjs
 
 from truepose.calibration.gate.words import sentence
 from truepose.output import replacing
-from truepose.report import calibration, how_sure, inputs, tables
-from truepose.report.accuracy import AFTER, BEFORE, answers, met
+from truepose.report import calibration, how_far, how_sure, inputs, tables
+from truepose.report.accuracy import gains, told
 from truepose.report.figures import Drawn, draw
 from truepose.report.study import Study
 
 LIMITS = (
     "These results hold for the sources found in the machine file and for the poses evaluated, "
     "nothing else. Sources that the file does not name (backlash, joint clearance, wear, control "
-    "and measuring errors, bending of frame, platform and guides) are not in them. Highest values "
-    "add the bands linearly and, with the exact simulation at both edges, are not a guaranteed "
-    "enclosure; where a guaranteed bound is given it says so, and holds at the poses that it "
-    "names. Loads and temperatures act on the nominal machine at the commanded pose."
+    "and measuring errors, bending of frame, platform and guides) are not in them. A linear maximum "
+    "is of first order; a witness is one machine, solved exactly; a proven bound says so, and "
+    "holds at the poses that it names. Loads and temperatures act on the nominal machine at the commanded pose."
 )
 FIGURE_SETTINGS = {"displaylogo": False, "responsive": True, "displayModeBar": "hover"}
 
@@ -37,11 +36,11 @@ def render(study: Study, machine_text: str = "") -> str:
         loader=jinja2.FunctionLoader(_resource),
     )
     environment.filters["capitalise"] = sentence
-    found = answers(study)
     results = [tables.ranking(study), tables.highest_absolute(study), tables.highest_percent(study)]
     if study.compensation is not None:
         results.append(tables.compensation(study))
     results += tables.strain(study)
+    results += [tables.answers(study.machine, study.accuracy), how_far.table(study)]
     results += how_sure.tables(study)
     left_out = tables.poses_left_out(study)
     if left_out is not None:
@@ -51,10 +50,8 @@ def render(study: Study, machine_text: str = "") -> str:
         study=study,
         machine=study.machine,
         attrs=study.budget.attrs,
-        answers=found,
-        before=met(found, BEFORE),
-        after=met(found, AFTER),
-        total=tables.total(study),
+        answers=told(study.machine, study.accuracy),
+        gains=gains(study.accuracy),
         figures=[pair for pair in drawn if not _of_calibration(pair[0])],
         calibration=None if study.calibration is None else study.calibration.attrs,
         calibration_figures=[pair for pair in drawn if _of_calibration(pair[0])],

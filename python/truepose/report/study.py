@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from truepose.budget.poses import broken
 from truepose.report.display import is_position
 
 if TYPE_CHECKING:
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
 
     from truepose.machine import Machine
     from truepose.machine.shown_units import ShownUnits
+    from truepose.verdict.answer import Answer
 
 Array = NDArray[np.float64]
 
@@ -39,12 +39,15 @@ class Study:
     `monte_carlo`, `bounds` and `shares` are those of the functions of these names at a few of the
     poses, `ellipses` is a `monte_carlo` at more of them with fewer samples; `missing` says, by
     name, why one of them is not there. `calibration` is that of `truepose.calibrate`, where there
-    are measurements. All values here are SI.
+    are measurements. `accuracy` are the answers of `truepose.accuracy` over the same poses,
+    `sampled` the same at a coverage of 95 %. All values here are SI.
     """
 
     machine: Machine
     budget: xr.Dataset
     compensation: xr.Dataset | None = None
+    accuracy: tuple[Answer, ...] = ()
+    sampled: tuple[Answer, ...] = ()
     over_time: xr.Dataset | None = None
     strain: xr.Dataset | None = None
     worst_case: xr.Dataset | None = None
@@ -138,30 +141,6 @@ class Study:
         """Errors (..., component), SI, in the units for people."""
         return self.units.errors(errors, self.components)
 
-    def broken(self, *, corrected: bool) -> set[tuple[float, ...]]:
-        """Poses of the run, m and rad, at which no accuracy is kept (`budget.poses.broken`).
-
-        With the nominal command, or if `corrected` with the corrected one too. Left out because of
-        what is inside the bands, or with samples that could not be assembled.
-        """
-        looked_at = [self.budget, self.worst_case, self.bounds]
-        found: set[tuple[float, ...]] = set()
-        for result in [self.budget, self.compensation] if corrected else looked_at:
-            if result is not None:
-                out = broken(result["left_out_status"].values)
-                found |= self._poses_of(result, "left_out_", out)
-        if self.monte_carlo is not None and not corrected:
-            found |= self._poses_of(
-                self.monte_carlo, "pose_", self.monte_carlo["failed"].values > 0
-            )
-        return found
-
-    def _poses_of(
-        self, result: xr.Dataset, prefix: str, chosen: NDArray[np.bool_]
-    ) -> set[tuple[float, ...]]:
-        columns = [result[prefix + name].values[chosen] for name in self.machine.commanded]
-        return set(zip(*(column.tolist() for column in columns), strict=True))
-
     def values(self, name: str) -> Array:
         """One variable of the budget as an array, in the axis order of the schema."""
         return np.asarray(self.budget[name].values)
@@ -194,25 +173,22 @@ class Study:
 
     @cached_property
     def overall_worst(self) -> Array:
-        """(n_pose, n_component) the most that all sources together can do.
+        """(n_pose, n_component) the most that all sources together can do to each component.
 
         |overall error with every source at its shift| + each source's linear band, the bands
         added because sources do not know of each other; or the exact error at an edge where that
-        is larger, as in `remaining_worst`.
+        is larger. No machine has all of them at once: `largest` is what one can do.
         """
         linear = np.abs(self.values("overall_error")) + self.values("reach").sum(axis=1)
         exact = [np.abs(self.values(f"overall_error_{edge}")) for edge in ("lower", "upper")]
         return np.asarray(np.maximum.reduce([linear, *exact]))
 
     @cached_property
-    def remaining_worst(self) -> Array:
-        """(n_pose, n_component) the most that remains after compensation.
+    def largest(self) -> Array:
+        """(n_pose,) linear maximum of the position, of the orientation where nothing moves."""
+        return np.asarray(self.values("linear_maximum")[:, 0])
 
-        The linear bound with the second-order term of the compensation's law, or what the
-        re-simulation found where that is larger.
-        """
-        bound = self.compensated("bound") + self.compensated("second_order")
-        simulated = [
-            np.abs(self.compensated(f"residual_{edge}")) for edge in ("lower", "middle", "upper")
-        ]
-        return np.asarray(np.maximum.reduce([bound, *simulated]))
+    @cached_property
+    def remaining_largest(self) -> Array:
+        """(n_pose,) the same after compensation; missing where no corrected command leads."""
+        return np.asarray(self.compensated("linear_maximum")[:, 0])

@@ -5,7 +5,6 @@ In the units for people (`truepose.machine.shown_units`), percentages of the com
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -13,10 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.budget.poses import reason_text
-from truepose.machine.suggestion import counted
-from truepose.report.accuracy import Answer
+from truepose.report.accuracy import gains, told
 from truepose.report.display import (
-    MISSING,
     Array,
     column,
     decimals_for,
@@ -31,6 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from truepose.machine import Machine
+    from truepose.verdict.answer import Answer
 
 MOST_LISTED = 20
 """Rows of a list of poses shown to people; files for programs hold them all."""
@@ -123,20 +121,26 @@ def highest_percent(study: Study) -> Table:
 def compensation(study: Study) -> Table:
     """Highest absolute error per component and of the position, before and after."""
     components = study.components
-    rows: list[tuple[str, Array]] = [
-        ("before, lower edges", study.values("overall_error_lower")),
-        ("before, shifts only", study.values("overall_error")),
-        ("before, upper edges", study.values("overall_error_upper")),
-        ("after, lower edges", study.compensated("residual_lower")),
-        ("after, shifts only", study.compensated("residual_middle")),
-        ("after, upper edges", study.compensated("residual_upper")),
-        ("after, bound", study.compensated("bound")),
+    rows: list[tuple[str, Array, Array | None]] = [
+        ("before, lower edges", study.values("overall_error_lower"), None),
+        ("before, shifts only", study.values("overall_error"), None),
+        ("before, upper edges", study.values("overall_error_upper"), None),
+        ("before, worst case", study.overall_worst, study.largest),
+        ("after, lower edges", study.compensated("residual_lower"), None),
+        ("after, shifts only", study.compensated("residual_middle"), None),
+        ("after, upper edges", study.compensated("residual_upper"), None),
+        ("after, worst case", study.compensated("bound"), study.remaining_largest),
     ]
-    units, names = study.units, (*components, "position")
+    units, names = study.units, (*components, *(["position"] if study.positions else []))
     highest = np.stack(
         [
-            np.append(np.nanmax(np.abs(errors), axis=0), np.nanmax(study.position_norm(errors)))
-            for _, errors in rows
+            np.append(
+                np.nanmax(np.abs(errors), axis=0),
+                [np.nanmax(study.position_norm(errors) if size is None else size)]
+                if study.positions
+                else [],
+            )
+            for _, errors, size in rows
         ]
     )
     # The middle is at rounding level; the decimals of the other rows show it as zero.
@@ -148,9 +152,10 @@ def compensation(study: Study) -> Table:
             "highest over all poses",
             *(f"{name}, {units.error(name).label}" for name in names),
         ),
-        tuple(zip([name for name, _ in rows], *cells, strict=True)),
-        note="After: the corrected command driven through the actual machine. The bound is "
-        "linear in the deviations and holds up to a term of second order in them.",
+        tuple(zip([name for name, _, _ in rows], *cells, strict=True)),
+        note="After: the corrected command driven through the actual machine. Edges: lengths and "
+        "offsets all at that end of their bands. Worst case: of each component by itself, and of "
+        "the position what one machine can do (linear maximum); both of first order.",
     )
 
 
@@ -281,38 +286,49 @@ def closure_forces(study: Study) -> Table:
     )
 
 
-def answers(found: Sequence[Answer]) -> Table:
-    """What the machine can do at its worst pose against the accuracy asked."""
+def answers(machine: Machine, found: Sequence[Answer]) -> Table:
+    """What the machine can do against the accuracy asked: the three known numbers of each."""
+    sampled = any(answer.coverage is not None for answer in found)
     rows = [
         (
-            f"{answer.quantity} {answer.state}",
-            {None: "no accuracy asked", True: "met", False: "NOT met"}[answer.met],
-            f"{answer.amount} {answer.unit.label}",
-            _asked(answer),
-            answer.at,
+            each.name,
+            each.word,
+            *(
+                f"{each.amount(one.value, side)} {each.unit.label}"
+                for one, side in (
+                    (each.answer.witness, -1),
+                    (each.answer.linear, 0),
+                    (each.answer.bound, 1),
+                )
+            ),
+            each.asked,
+            each.at(each.answer.told),
+            each.answer.rests_on,
         )
-        for answer in found
+        for each in told(machine, found)
     ]
+    names = ("at least", "quantile", "at most") if sampled else NUMBERS
     return Table(
         "answers",
         "Against the accuracy asked",
-        ("", "answer", "at most", "asked", "at"),
+        ("", "answer", *names, "asked", "at", "rests on"),
         tuple(rows),
-        words=5,
-        note="At most: all sources at their shifts, and their bands added linearly (after "
-        "compensation with the second-order term of its law); the exact error at an edge where "
-        "that is larger." + _broken(found),
+        words=2,
+        note=" ".join([_SAMPLED if sampled else _NUMBERS, *gains(found)]),
     )
 
 
-def _broken(found: Sequence[Answer]) -> str:
-    """What is said of poses at which nothing is met, whatever the numbers say."""
-    counts = {answer.state: answer.broken for answer in found if answer.broken}
-    return "".join(
-        f" NOT met {state} at {counted(count, 'pose')}: some machine inside the bands cannot be "
-        "assembled there, or the bands are too wide for a bound, or the correction leads nowhere."
-        for state, count in counts.items()
-    )
+NUMBERS = ("witness", "linear maximum", "proven bound")
+"""The numbers that are known of a largest error."""
+
+_NUMBERS = (
+    "Witness: the largest error found of one machine inside the bands, solved exactly. Linear "
+    "maximum: of all of them, to first order. Proven bound: no machine inside the bands exceeds it."
+)
+_SAMPLED = (
+    "At a coverage: the quantile of the error's length at the worst pose, and the ends of its "
+    "confidence interval of 99 %."
+)
 
 
 def warnings(study: Study) -> Table | None:
@@ -320,18 +336,6 @@ def warnings(study: Study) -> Table | None:
     sentences = [warning["sentence"] for warning in warnings_of(study.budget)]
     rows = [(f"{text[:1].upper()}{text[1:]}.",) for text in sentences]
     return Table("warnings", "Warnings", ("",), tuple(rows)) if rows else None
-
-
-def _asked(answer: Answer) -> str:
-    """What is asked, as it was asked, and in the unit of the answer where that is another."""
-    if answer.asked is None:
-        return MISSING
-    said = answer.asked_text
-    same = re.sub(r"^u(?=m$|in$|rad$)", "µ", said.rpartition(" ")[2]) == answer.unit.label
-    unit = answer.unit
-    if same:
-        return said
-    return f"{said} ({number(answer.asked * unit.per_si, unit.decimals)} {unit.label})"
 
 
 def poses_left_out(study: Study) -> Table | None:
@@ -372,13 +376,3 @@ def _highest(study: Study, of_source: str, overall: str) -> Array:
         rows += [lower[index], upper[index]] if band else [upper[index]]
     rows += [study.values(f"{overall}_lower"), study.values(f"{overall}_upper")]
     return np.stack(rows)
-
-
-def total(study: Study) -> str:
-    """One line: the most that all sources together can do to the position, and where."""
-    size = study.position_norm(study.overall_worst)
-    worst, unit = where_highest(size), study.units.small_length
-    return (
-        f"All sources together: at most {number(float(size[worst]) * unit.per_si, 1)} "
-        f"{unit.label}, at {pose_text(study.poses[worst], study.machine.commanded, study.units)}."
-    )

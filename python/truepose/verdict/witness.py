@@ -26,9 +26,7 @@ from truepose.machine.dimensions import BY_UNIT, FREEDOMS
 from truepose.machine.shown_units import Shown
 from truepose.sources import Block, acting
 from truepose.sources._base import Floats, Indices
-
-BEFORE, AFTER = "before compensation", "after compensation"
-"""States: the nominal command, the corrected one."""
+from truepose.verdict.states import AFTER, BEFORE
 
 NAMED = 4
 """Causes that are named; more are counted."""

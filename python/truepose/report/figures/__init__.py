@@ -23,12 +23,12 @@ from truepose.report.figures import (
     coverage_ellipses,
     distribution,
     error_over_time,
+    how_far,
     internal_forces,
     machine_drawing,
     overall_error,
     ranking,
     source_errors,
-    three_answers,
     tornado,
     workspace_maps,
 )
@@ -45,7 +45,7 @@ FIGURES: tuple[ModuleType, ...] = (
     source_errors,
     overall_error,
     workspace_maps,
-    three_answers,
+    how_far,
     distribution,
     coverage_ellipses,
     tornado,
@@ -66,11 +66,16 @@ class Drawn:
     needs: str | None = None
 
 
+def _there(result: object) -> bool:
+    """Whether a study has a result: a Dataset, or answers, of which there may be none."""
+    return len(result) > 0 if isinstance(result, tuple) else result is not None
+
+
 def draw(study: Study) -> Iterator[Drawn]:
     """Every registered figure of a study, in the order of the report."""
     for module in FIGURES:
         needed: str | None = getattr(module, "NEEDS", None)
-        if needed is not None and getattr(study, needed) is None:
+        if needed is not None and not _there(getattr(study, needed)):
             continue
         yield Drawn(
             name=module.__name__.rpartition(".")[2],

@@ -19,7 +19,7 @@ NEEDS = "compensation"
 
 def caption(study: Study) -> str:
     """What the bands are."""
-    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    drawn = drawn_poses(study.largest)
     free = [name for name in study.machine.dof if name not in study.machine.commanded]
     parasitic = (
         f" Freedoms that are not commanded ({', '.join(free)}) cannot be corrected." if free else ""
@@ -33,7 +33,7 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """One panel for each component: band and middle before and after."""
-    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    drawn = drawn_poses(study.largest)
     figure = panels(study)
     states = (
         (

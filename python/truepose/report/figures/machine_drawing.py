@@ -31,7 +31,7 @@ def figure(study: Study) -> go.Figure:
     """Guideways, struts, joints, platform and the poses evaluated, equal scale on all axes."""
     machine = study.machine
     shape = outline(machine, study.poses[_shown(study)])
-    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    drawn = drawn_poses(study.largest)
     workspace = machine.kernel.placement_of(study.poses[drawn])[:, :3]
     planar, unit = is_planar(machine), study.units.length.label
     figure = go.Figure()

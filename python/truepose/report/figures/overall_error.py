@@ -25,7 +25,7 @@ LINES = (
 
 def caption(study: Study) -> str:
     """What the lines are."""
-    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    drawn = drawn_poses(study.largest)
     return (
         "Exact error with all sources acting together: every source at its known shift, and the "
         "toleranced lengths all at their lower and all at their upper edge."
@@ -35,7 +35,7 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """One panel for each component: lower edge, shifts, upper edge."""
-    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    drawn = drawn_poses(study.largest)
     figure = panels(study)
     for variable, name, colour, dash in LINES:
         errors = study.shown(study.values(variable)[drawn])

@@ -19,7 +19,7 @@ TITLE = "Error of each source at each pose"
 
 def caption(study: Study) -> str:
     """What the lines are."""
-    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    drawn = drawn_poses(study.largest)
     return (
         "Exact error of each source alone, actual minus commanded, in the base frame. Where a "
         "source has a band, the solid line has its lengths and offsets all at their upper edge, "
@@ -29,7 +29,7 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """One panel for each component, one line for each source and edge."""
-    drawn = drawn_poses(study.position_norm(study.overall_worst))
+    drawn = drawn_poses(study.largest)
     figure = panels(study)
     for index, source in enumerate(study.sources):
         edges = (

@@ -102,9 +102,9 @@ def _maps(study: Study, places: Places) -> list[Map]:
         np.fmax.at(highest, places.of_pose, worst * unit.per_si)
         return highest
 
-    maps = [Map("all sources", over_places(study.position_norm(study.overall_worst)))]
+    maps = [Map("all sources", over_places(study.largest))]
     if study.compensation is not None:
-        remaining = study.position_norm(study.remaining_worst)
+        remaining = study.remaining_largest
         maps.append(Map("after compensation", over_places(remaining)))
     worst = study.position_norm(study.values("worst"))
     maps += [Map(study.sources[index], over_places(worst[:, index])) for index in study.by_rank]

@@ -1,0 +1,72 @@
+"""How far off the tool can be, over the whole workspace: the known numbers side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from truepose.report.accuracy import AFTER, BEFORE
+from truepose.report.display import MISSING, column, decimals_for
+from truepose.report.study import Study
+from truepose.report.tables import Table
+
+NUMBERS = {
+    "sampled": "95 %",
+    "witness": "witness",
+    "linear": "linear maximum",
+    "bound": "proven bound",
+}
+"""The numbers, by rising caution."""
+
+
+@dataclass(frozen=True)
+class HowFar:
+    """One quantity in one state: m or rad by the names of `NUMBERS`, NaN where there is none."""
+
+    quantity: str
+    state: str
+    sizes: Mapping[str, float]
+
+
+def how_far(study: Study) -> list[HowFar]:
+    """Every quantity before and after compensation.
+
+    At a coverage the verdict's own numbers are of that; the worst case is then not asked.
+    """
+    rows = []
+    sampled = {(each.state, each.quantity): each for each in study.sampled}
+    for answer in study.accuracy:
+        share = sampled.get((answer.state, answer.quantity))
+        worst = answer.coverage is None
+        sizes = {
+            "sampled": math.nan if share is None else share.linear.value,
+            "witness": answer.witness.value if worst else math.nan,
+            "linear": answer.linear.value if worst else math.nan,
+            "bound": answer.bound.value if worst else math.nan,
+        }
+        finite = {name: size if math.isfinite(size) else math.nan for name, size in sizes.items()}
+        rows.append(HowFar(answer.quantity, answer.state, finite))
+    return rows
+
+
+def table(study: Study) -> Table:
+    """The same as a table."""
+    rows = []
+    for row in how_far(study):
+        unit = study.units.error(row.quantity)
+        sizes = [row.sizes[name] * unit.per_si for name in NUMBERS]
+        cells = column(sizes, decimals_for(sizes))
+        rows.append((row.quantity, row.state, *cells, unit.label))
+    return Table(
+        "how_far",
+        "How far off can the tool be?",
+        ("", "", *NUMBERS.values(), ""),
+        tuple(rows),
+        words=2,
+        note="The largest over all poses. 95 %: at the worst pose so many of all machines inside "
+        f"the bands stay below it, sampled and solved exactly. {MISSING}: there is no such number.",
+    )
+
+
+__all__ = ["AFTER", "BEFORE", "NUMBERS", "HowFar", "how_far", "table"]

@@ -1,0 +1,279 @@
+"""The verdict: whether a machine keeps the accuracy asked, one function for every command.
+
+    met         a bound that holds is at most the target, at every pose
+    NOT met     a machine inside the set, solved exactly, exceeds it: the witness
+    undecided   neither: what is known is between which two numbers
+
+The bound is the linear maximum with its proven remainder (`survey`) or, where that does not decide,
+the proof engine's, asked with an effort counted in boxes. At a coverage the number is a quantile
+(`coverage`). Before and after compensation are the same set at two commands (`states`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truepose import _kernel
+from truepose.budget.comparison import quantities
+from truepose.budget.poses import OK, Progress
+from truepose.machine import Condition, Machine
+from truepose.sources._base import Floats, Indices
+from truepose.verdict import engine
+from truepose.verdict.answer import MET, NOT_MET, UNDECIDED, Answer, Number
+from truepose.verdict.coverage import coverage
+from truepose.verdict.search import farthest
+from truepose.verdict.states import STATES, Population, State
+from truepose.verdict.survey import Survey, survey
+from truepose.verdict.witness import Witness
+
+LOOKED_AT = 4
+"""Poses at which a witness is searched for, of the worst by the linear maximum."""
+
+EXACT = "one machine inside the bands, solved exactly"
+REMAINDER = "the linear maximum and its proven remainder"
+ENGINE = "the proof engine"
+
+
+def accuracy(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    *,
+    states: Sequence[str] = STATES,
+    progress: Progress | None = None,
+) -> tuple[Answer, ...]:
+    """Whether the accuracy asked in the machine file is kept, before and after compensation.
+
+    An `Answer` for each of the `states`, of the position and, where the platform turns, of the
+    orientation; also where nothing is asked, for its numbers. `poses` (..., n_commanded), SI,
+    default the file's workspace; `condition`, default the file's; `progress` is called with (poses
+    done, poses in all).
+
+    Raises as `truepose.budget`.
+    """
+    population = Population.of(machine, poses, condition, progress)
+    found: list[Answer] = []
+    for state in states:
+        found += answers(population, state)
+    return tuple(found)
+
+
+def answers(population: Population, state: str) -> list[Answer]:
+    """The answers of one state."""
+    machine = population.machine
+    kinds = quantities(machine.components)
+    asked = [
+        {"position": machine.accuracy.target, "orientation": machine.accuracy.angle_target}[kind]
+        for kind in kinds
+    ]
+    if machine.accuracy.at is not None:
+        return [
+            at_coverage(population, state, kind, machine.accuracy.at, target)
+            for kind, target in zip(kinds, asked, strict=True)
+        ]
+    found = survey(population.states(state), list(kinds.values()))
+    seen = [
+        _witnessed(population, state, found, at, columns)
+        for at, columns in enumerate(kinds.values())
+    ]
+    open_ = [
+        target is not None and not _exceeds(witness, target)
+        for witness, target in zip(seen, asked, strict=True)
+    ]
+    proof = _proved(population, state, found, asked, open_)
+    return [
+        _answer(population, state, kind, at, asked[at], found, seen[at], proof)
+        for at, kind in enumerate(kinds)
+    ]
+
+
+def at_coverage(
+    population: Population, name: str, kind: str, probability: float, target: float | None
+) -> Answer:
+    """The answer of one quantity in one state at a coverage: the quantile at the worst pose.
+
+    Where the machine cannot be commanded so at some pose, no share of all machines keeps anything.
+    """
+    lost = [
+        state.at(int(np.flatnonzero(state.status != OK)[0]))
+        for state in population.states(name)
+        if (state.status != OK).any()
+    ]
+    if lost:
+        columns = quantities(population.machine.components)[kind]
+        witness = _at_pose(lost[0], kind, columns)
+        none = Number(witness.size, witness.number, witness.pose)
+        answer = None if target is None else NOT_MET
+        return Answer(kind, name, target, answer, none, none, none, _of_witness(witness), witness)
+    sampled = coverage(
+        population.machine,
+        ((state.block, state.spread) for state in population.states(name)),
+        kind,
+        probability,
+        target,
+    )
+    pose = population.table[sampled.pose]
+    estimate, lower, upper = (
+        Number(value, sampled.pose, pose)
+        for value in (sampled.estimate, sampled.lower, sampled.upper)
+    )
+    return Answer(
+        kind, name, target, sampled.answer, lower, estimate, upper, sampled.rests_on, None, sampled
+    )
+
+
+def _exceeds(witness: Witness, target: float) -> bool:
+    return not witness.size <= target
+
+
+def _witnessed(
+    population: Population, name: str, found: Survey, at: int, columns: Indices
+) -> Witness:
+    """The farthest machine at the poses where the linear one, or its first witness, is farthest."""
+    machine = population.machine
+    kind = list(quantities(machine.components))[at]
+    chosen = np.unique(
+        np.concatenate(
+            [
+                _largest(found.linear[:, at], LOOKED_AT),
+                _largest(found.witness[:, at], 1),
+                _largest(found.bound[:, at], 1),
+            ]
+        )
+    )
+    best: Witness | None = None
+    for state in population.at(name, found.numbers[chosen]):
+        for pose in range(state.block.indices.size):
+            one = state.at(pose)
+            seen = _at_pose(one, kind, columns)
+            if best is None or seen.size > best.size:
+                best = seen
+    assert best is not None
+    return best
+
+
+def _largest(values: Floats, count: int) -> Indices:
+    """Indices of the largest `values` (n,), the first of equal ones first."""
+    return np.argsort(-values, kind="stable")[:count]
+
+
+def _at_pose(state: State, kind: str, columns: Indices) -> Witness:
+    """The farthest machine of a state at one pose."""
+    number = int(state.block.indices[0])
+    word = _kernel.STATUS[int(state.status[0])]
+    t, error, size = np.zeros(len(state.spread.names)), None, np.inf
+    if state.status[0] == OK:
+        reached = farthest(state, columns)
+        t, size = reached.t, reached.size
+        word = _kernel.STATUS[reached.status]
+        error = reached.error if reached.status == OK else None
+    return Witness(
+        state=state.name,
+        quantity=kind,
+        machine=state.machine.with_condition(state.block.condition),
+        pose=state.block.requested[number],
+        number=number,
+        joints=state.block.joints[0],
+        spread=state.spread,
+        t=t,
+        error=error,
+        size=size,
+        status=word,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Proof:
+    """Bounds (n, q) after the engine was asked, where it was (n,), in how many boxes, and refusals."""
+
+    bound: Floats
+    asked: np.ndarray
+    boxes: int
+    refused: str
+
+
+def _proved(
+    population: Population,
+    name: str,
+    found: Survey,
+    asked: Sequence[float | None],
+    open_: Sequence[bool],
+) -> _Proof:
+    """The survey's bounds, and the engine's where these do not decide what is open."""
+    bound = found.bound.copy()
+    limits = np.array([np.inf if target is None else target for target in asked])
+    above = np.asarray(open_) & (bound > limits)
+    needed = np.flatnonzero(above.any(axis=1))
+    worst = np.where(above, bound / limits, 0.0).max(axis=1)[needed]
+    # Where no remainder is proven the linear maximum says which pose is worst.
+    worst = np.where(np.isfinite(worst), worst, (found.linear / limits).max(axis=1)[needed])
+    in_order = engine.by_need(worst, needed)
+    looked = np.zeros(len(bound), np.bool_)
+    left, refused = engine.EFFORT, ""
+    for start in range(0, in_order.size, engine.AT_ONCE):
+        if left <= 0 or refused:
+            break
+        rows = np.sort(in_order[start : start + engine.AT_ONCE])
+        for state in population.at(name, found.numbers[rows]):
+            refused = engine.refused(state)
+            each = min(engine.EACH, max(1, left // state.block.indices.size))
+            proven, used = engine.bounds(state, asked, each)
+            left -= used
+            at = np.searchsorted(found.numbers, state.block.indices)
+            bound[at] = np.minimum(bound[at], proven)
+            looked[at] = np.isfinite(proven).all(axis=1)
+    return _Proof(bound, looked, engine.EFFORT - left, refused)
+
+
+def _answer(
+    population: Population,
+    name: str,
+    kind: str,
+    at: int,
+    target: float | None,
+    found: Survey,
+    witness: Witness,
+    proof: _Proof,
+) -> Answer:
+    linear = _number(population, found, found.linear[:, at])
+    bound = _number(population, found, proof.bound[:, at])
+    seen = Number(witness.size, witness.number, witness.pose)
+    # An enclosure holds what rounding may do; what was found is not above it for that reason.
+    answer, rests_on = None, "the linear maximum"
+    if target is not None:
+        if _exceeds(witness, target):
+            answer, rests_on = NOT_MET, _of_witness(witness)
+        elif bound.value <= target:
+            by_engine = bool((found.bound[:, at] > target).any())
+            answer = MET
+            rests_on = f"{REMAINDER}, {ENGINE} ({proof.boxes:,} boxes)" if by_engine else REMAINDER
+        else:
+            answer, rests_on = UNDECIDED, _why_open(bound, proof)
+    return Answer(kind, name, target, answer, seen, linear, bound, rests_on, witness)
+
+
+def _number(population: Population, found: Survey, values: Floats) -> Number:
+    row = int(np.argmax(values))
+    number = int(found.numbers[row])
+    return Number(float(values[row]), number, population.table[number])
+
+
+def _of_witness(witness: Witness) -> str:
+    if witness.status == "ok":
+        return EXACT
+    return f"{EXACT}: it cannot be assembled ({witness.status.replace('_', ' ')})"
+
+
+def _why_open(bound: Number, proof: _Proof) -> str:
+    if proof.refused:
+        return f"no proof: {proof.refused}"
+    if np.isinf(bound.value):
+        return f"no proof within {proof.boxes:,} boxes"
+    return f"what is found and what is proven, within {proof.boxes:,} boxes"
+
+
+__all__ = ["accuracy", "answers", "at_coverage"]

@@ -1,0 +1,91 @@
+"""An answer: what is asked of one quantity in one state, whether it is met, and what says so."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from truepose.verdict.states import AFTER, BEFORE, STATES
+
+if TYPE_CHECKING:
+    from truepose.sources._base import Floats
+    from truepose.verdict.coverage import CoverageAnswer
+    from truepose.verdict.witness import Witness
+
+MET, NOT_MET, UNDECIDED = "met", "NOT met", "undecided"
+
+
+@dataclass(frozen=True)
+class Number:
+    """A length, m, or an angle, rad, and the pose it is of: its number in the run, and itself, SI.
+
+    `value` is inf where there is no such number: no bound, or no machine that can be assembled.
+    """
+
+    value: float
+    number: int
+    pose: Floats
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One quantity in one state against what was asked of it.
+
+    `answer`: `MET`, `NOT_MET` or `UNDECIDED`; None where nothing is `asked` (m or rad).
+    `witness`: the largest error found of one machine inside the bands, solved exactly; `linear`:
+    linear maximum; `bound`: proven not to be exceeded. Each is the largest over all poses; at a
+    coverage they are the estimated quantile (linear) and the ends of its confidence interval.
+    `rests_on`: what the answer rests on, in words. `example`: the witness as a machine; None where
+    none was looked for. `coverage`: what was sampled, where the answer is at a coverage.
+    """
+
+    quantity: str
+    state: str
+    asked: float | None
+    answer: str | None
+    witness: Number
+    linear: Number
+    bound: Number
+    rests_on: str
+    example: Witness | None = None
+    coverage: CoverageAnswer | None = None
+
+    @property
+    def met(self) -> bool | None:
+        """True for met alone; None where nothing is asked."""
+        return None if self.answer is None else self.answer == MET
+
+    @property
+    def told(self) -> Number:
+        """The number that goes with the answer.
+
+        Met: the bound. NOT met: the witness. Else the linear maximum; at a coverage the quantile.
+        """
+        if self.coverage is not None:
+            return self.linear
+        return {MET: self.bound, NOT_MET: self.witness}.get(self.answer or "", self.linear)
+
+    @property
+    def not_assembled(self) -> bool:
+        """Whether the witness is a machine that cannot be assembled, or cannot be commanded so."""
+        return math.isinf(self.witness.value)
+
+
+def met(answers: tuple[Answer, ...], state: str) -> bool | None:
+    """Whether everything asked is met in one state; None where nothing is asked."""
+    found = [each.met for each in answers if each.state == state and each.met is not None]
+    return all(found) if found else None
+
+
+__all__ = [
+    "AFTER",
+    "BEFORE",
+    "MET",
+    "NOT_MET",
+    "STATES",
+    "UNDECIDED",
+    "Answer",
+    "Number",
+    "met",
+]

@@ -1,0 +1,61 @@
+"""The proof engine, asked where linear maximum and remainder do not decide."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from truepose.budget.comparison import quantities
+from truepose.sources._base import Floats, Indices
+from truepose.verdict.states import State
+
+EFFORT = 4096
+"""Boxes in all, for one state."""
+
+EACH = 512
+"""Boxes at one pose."""
+
+AT_ONCE = 8
+"""Poses that share what is left of the effort."""
+
+PROVEN = "proven"
+
+
+def bounds(state: State, targets: Sequence[float | None], boxes: int) -> tuple[Floats, int]:
+    """Proven bounds (n, q) of all quantities at the poses of a state, and the boxes that it took.
+
+    inf where nothing is proven. `targets` (q,): no more is proven than that they are kept; `boxes`
+    at each pose at most.
+    """
+    machine, block = state.machine, state.block
+    kinds = quantities(machine.components)
+    nothing = np.full((block.indices.size, len(kinds)), np.inf)
+    if machine.kernel.overconstrained or not len(state.spread.names):
+        return nothing, 0
+    moves = state.spread.centred()
+    shifted, shift = moves.shift
+    _, _, magnitude, status, used = machine.kernel.bounds_at(
+        block.joints,
+        block.placements,
+        shifted,
+        np.ascontiguousarray(shift),
+        moves.columns,
+        moves.variables.tolist(),
+        np.ascontiguousarray(moves.swing),
+        [members.tolist() for members in moves.directions],
+        most_boxes=boxes,
+        targets=[np.inf if target is None else target for target in targets],
+    )
+    proven = np.asarray(status, object) == PROVEN
+    return np.where(proven[:, np.newaxis], magnitude, nothing), int(np.sum(used))
+
+
+def refused(state: State) -> str:
+    """Why the engine has nothing to say of a machine; empty where it has."""
+    return "more closures than freedoms" if state.machine.kernel.overconstrained else ""
+
+
+def by_need(bound: Floats, numbers: Indices) -> Indices:
+    """`numbers` (n,) of poses in the order of their `bound` (n,), the worst first."""
+    return numbers[np.argsort(-bound, kind="stable")]

@@ -1,0 +1,158 @@
+"""The two states of a machine: as it is commanded, and as compensation commands it.
+
+A state at some poses is a block, whose joints are what is commanded, and the spread of all sources
+there. All that takes these two serves both states alike: before and after are the same set of
+machines, asked by the same functions, at two commands.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truepose.budget.evaluate import required_sources
+from truepose.budget.exact import at_shifts
+from truepose.budget.poses import (
+    BLOCK,
+    OK,
+    Progress,
+    Walk,
+    is_path,
+    no_pose_left,
+    requested_poses,
+)
+from truepose.budget.spread import Spread, spread
+from truepose.compensation.corrected import corrected
+from truepose.machine import Condition, Machine
+from truepose.sources import Block
+from truepose.sources._base import Flags, Floats, Indices
+
+BEFORE, AFTER = "before compensation", "after compensation"
+STATES = (BEFORE, AFTER)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """One state at n poses.
+
+    `block`: its `joints` are what is commanded, its `indices` the numbers of the poses in the run;
+    `spread`: what all sources leave unknown at that command; `status` (n,): the kernel's, ok where
+    the machine can be commanded so.
+    """
+
+    name: str
+    machine: Machine
+    block: Block
+    spread: Spread
+    status: np.ndarray
+
+    def select(self, poses: Flags) -> State:
+        """The same at the poses where `poses` (n,)."""
+        return dataclasses.replace(
+            self,
+            block=self.block.select(poses),
+            spread=self.spread if poses.all() else self.spread.select(poses),
+            status=self.status[poses],
+        )
+
+    def at(self, pose: int) -> State:
+        """The same at one of the poses."""
+        chosen = np.zeros(self.block.indices.size, np.bool_)
+        chosen[pose] = True
+        return self.select(chosen)
+
+
+class Population:
+    """The poses that belong to a run (`budget.poses`), in either state; iterated as often as asked.
+
+    Up to one block of poses is kept, more are walked over anew.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        table: Floats,
+        condition: Condition,
+        *,
+        path: bool,
+        of_file: bool,
+        progress: Progress | None = None,
+    ) -> None:
+        """`table` (n, n_commanded): poses asked for, SI; `of_file`: they are the machine file's."""
+        self.machine, self.table, self.condition = machine, table, condition
+        self.sources = required_sources(machine, condition)
+        self._path, self._of_file, self._progress = path, of_file, progress
+        self._kept: dict[str, list[State]] = {}
+
+    @classmethod
+    def of(
+        cls,
+        machine: Machine,
+        poses: ArrayLike | None = None,
+        condition: Condition | None = None,
+        progress: Progress | None = None,
+    ) -> Self:
+        """At `poses` (..., n_commanded), SI, default the file's; `condition`, default the file's.
+
+        Raises `RequestError`: bad-poses, no-workspace, no-source.
+        """
+        return cls(
+            machine,
+            requested_poses(machine, poses),
+            machine.condition if condition is None else condition,
+            path=poses is None and is_path(machine),
+            of_file=poses is None,
+            progress=progress,
+        )
+
+    def states(self, name: str) -> Iterator[State]:
+        """The population in one state, in blocks.
+
+        Raises `RequestError` (no-pose-left) where it is empty.
+        """
+        if name in self._kept:
+            yield from self._kept[name]
+            return
+        found: list[State] = []
+        for block, moves in self._blocks():
+            state = self._state(name, block, moves)
+            if len(self.table) <= BLOCK:
+                found.append(state)
+            yield state
+        if found:
+            self._kept[name] = found
+
+    def at(self, name: str, numbers: Indices) -> Iterator[State]:
+        """The population at the poses numbered so in the run, those in one block together."""
+        for state in self.states(name):
+            chosen = np.isin(state.block.indices, numbers)
+            if chosen.any():
+                yield state.select(np.asarray(chosen, np.bool_))
+
+    def _blocks(self) -> Iterator[tuple[Block, Spread]]:
+        walk = Walk(self.machine, self.table, self.condition, self._progress, path=self._path)
+        none = True
+        for block in walk:
+            moves = spread(self.machine, block, self.sources)
+            shifted = at_shifts(self.machine, block, moves.alone, moves.shift)
+            usable = walk.keep(block.indices, shifted)
+            if usable.any():
+                none = False
+                yield block.select(usable), moves if usable.all() else moves.select(usable)
+        if none:
+            raise no_pose_left(self.machine, self.table, walk.left_out, of_file=self._of_file)
+
+    def _state(self, name: str, block: Block, moves: Spread) -> State:
+        if name == BEFORE:
+            fine = np.full(block.indices.size, OK, np.uint8)
+            return State(name, self.machine, block, moves, fine)
+        commanded, moves, status = corrected(self.machine, block, self.sources)
+        return State(name, self.machine, commanded, moves, status)
+
+
+__all__ = ["AFTER", "BEFORE", "STATES", "Population", "State"]

@@ -1,0 +1,90 @@
+"""The largest error at every pose: to first order, what it is proven not to exceed, what is reached.
+
+    linear maximum          the largest length of the set of errors, to first order
+    + proven remainder  =   bound
+    the machine at which the linear one is largest, solved exactly  =  the first witness
+
+The linear maximum itself is of no machine: it may be a little above or below what there is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.budget.first_order import Mover, first_order
+from truepose.budget.largest import largest
+from truepose.budget.poses import OK
+from truepose.compensation.remainder import Remainder
+from truepose.sources._base import Floats, Indices
+from truepose.verdict.states import State
+
+POSES = 1024
+"""Poses whose effects stay in the cache together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What is known of the errors of q quantities at n poses, m and rad.
+
+    `numbers` (n,) of the poses in the run; `linear` (n, q): linear maximum; `bound` (n, q): with
+    the proven remainder, inf where there is none; `witness` (n, q): of the machine where the
+    linear maximum is reached, solved exactly: inf where it cannot be assembled. `status` (n,): the
+    kernel's of the state, ok where it can be commanded; the others are inf.
+    """
+
+    numbers: Indices
+    linear: Floats
+    bound: Floats
+    witness: Floats
+    status: np.ndarray
+
+
+def survey(states: Iterable[State], quantities: Sequence[Indices]) -> Survey:
+    """Over all poses of the states; `quantities`: components of each length."""
+    parts = [
+        _surveyed(state.select(_part(state, start)), quantities)
+        for state in states
+        for start in range(0, state.block.indices.size, POSES)
+    ]
+    return Survey(
+        *(
+            np.concatenate([getattr(part, name) for part in parts])
+            for name in ("numbers", "linear", "bound", "witness", "status")
+        )
+    )
+
+
+def _part(state: State, start: int) -> np.ndarray:
+    chosen = np.zeros(state.block.indices.size, np.bool_)
+    chosen[start : start + POSES] = True
+    return chosen
+
+
+def _surveyed(state: State, quantities: Sequence[Indices]) -> Survey:
+    machine, block, spread = state.machine, state.block, state.spread
+    value, effects, status = first_order(machine, block, spread)
+    status = np.where(state.status == OK, status, state.status)
+    fine = np.asarray(status == OK, np.bool_)
+    shape = (block.indices.size, len(quantities))
+    linear, bound, witness = (np.full(shape, np.inf) for _ in range(3))
+    if fine.any():
+        usable = state.select(fine)
+        value, effects = value[fine], effects[fine]
+        far = largest(value, effects, spread.domain, quantities)
+        linear[fine] = far.length
+        beyond = Remainder(machine).bound(usable.block, usable.spread, value, effects)
+        bound[fine] = np.where(beyond.proven[:, np.newaxis], far.length + beyond.norms, np.inf)
+        mover = Mover(machine, usable.block, usable.spread)
+        maximisers = far.maximiser(effects, spread.domain, quantities)
+        every = np.arange(int(fine.sum()))
+        for at, columns in enumerate(quantities):
+            reached, failed = mover(every, maximisers[:, at].copy())
+            sizes = np.sqrt(np.square(reached[:, columns]).sum(axis=1))
+            witness[fine, at] = np.where(failed == OK, sizes, np.inf)
+    return Survey(block.indices, linear, bound, witness, status)
+
+
+__all__ = ["Survey", "survey"]

@@ -116,9 +116,17 @@ class Spread:
 
 def spread(machine: Machine, block: Block, sources: Sequence[Source]) -> Spread:
     """All sources at the poses of `block`: the variables that have a band at one of them."""
+    deviations = [source.deviation(machine, block.condition, block) for source in sources]
+    return spread_of(machine, sources, deviations)
+
+
+def spread_of(
+    machine: Machine, sources: Sequence[Source], deviations: Sequence[Deviation]
+) -> Spread:
+    """The same from the sources' deviations, where these are known."""
     parts = [
-        _part(machine, source, position, source.deviation(machine, block.condition, block))
-        for position, source in enumerate(sources)
+        _part(machine, source, position, deviation)
+        for position, (source, deviation) in enumerate(zip(sources, deviations, strict=True))
     ]
     counts = [len(part.names) for part in parts]
     first = np.cumsum([0, *counts])

@@ -209,9 +209,10 @@ class Study:
         """(n_pose, n_component) the most that remains after compensation.
 
         The linear bound with the second-order term of the compensation's law, or what the
-        re-simulation found where that is larger.
+        re-simulation found where that is larger; infinite where nothing is proven.
         """
-        bound = self.compensated("bound") + self.compensated("second_order")
+        beyond = np.where(np.isnan(found := self.compensated("second_order")), np.inf, found)
+        bound = self.compensated("bound") + beyond
         simulated = [
             np.abs(self.compensated(f"residual_{edge}")) for edge in ("lower", "middle", "upper")
         ]

@@ -43,13 +43,10 @@ NOT_CONVERGED = _kernel.STATUS.index("not_converged")
 BAND = "band"
 """Why a pose is left out at which some machines inside the bands cannot be assembled."""
 
-NO_BOUND = "no_bound"
-"""Why a pose is left out at which the bands are too wide for the law of what remains."""
-
 CORRECTION = "correction_"
 """Begins why a pose is left out whose corrected command the machine cannot follow."""
 
-REASONS = (*_kernel.STATUS, BAND, NO_BOUND, *(f"{CORRECTION}{name}" for name in _kernel.STATUS))
+REASONS = (*_kernel.STATUS, BAND, *(f"{CORRECTION}{name}" for name in _kernel.STATUS))
 """Why a pose may be left out: a kernel status, or what a command found that looked further."""
 
 
@@ -223,7 +220,7 @@ def broken(status: np.ndarray) -> Flags:
     """(n,) whether a pose left out for the reason named `status` (n,) belongs to the run.
 
     There no accuracy is kept: the machine that drawing and shifts describe goes there, but not all
-    inside the bands do, or nothing can be said of them, or the corrected command leads nowhere.
+    inside the bands do, or the corrected command leads nowhere.
     """
     names = np.asarray(status, np.str_)
     return np.asarray(~np.isin(names, _kernel.STATUS), np.bool_)
@@ -233,8 +230,6 @@ def reason_text(status: str) -> str:
     """Why a pose is left out, for people."""
     if status == BAND:
         return "some machines inside the bands cannot be assembled"
-    if status == NO_BOUND:
-        return "the bands are too wide for a bound"
     if status.startswith(CORRECTION):
         return f"correction {status.removeprefix(CORRECTION)}".replace("_", " ")
     return status.replace("_", " ")
@@ -285,7 +280,7 @@ def no_pose_left(
     _, status = left_out.sorted()
     names, counts = np.unique(status, return_counts=True)
     found = ", ".join(
-        f"{count} {'where ' if name in (BAND, NO_BOUND) else ''}{reason_text(str(name))}"
+        f"{count} {'where ' if name == BAND else ''}{reason_text(str(name))}"
         for name, count in zip(names, counts, strict=True)
     )
     looked_at = np.unique(np.linspace(0, len(poses) - 1, EXPLAINED).astype(np.intp))
@@ -313,7 +308,7 @@ def no_pose_left(
             if nearest
             else "narrow the bands of the tolerances, or keep away from singularities and the end "
             "of the reach"
-            if set(names) <= {BAND, NO_BOUND}
+            if set(names) <= {BAND}
             else "the nominal machine reaches them, but not as the error sources move it: look for "
             "a number of the wrong size or unit, or leave more travel for the correction",
         )

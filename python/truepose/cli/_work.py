@@ -181,7 +181,7 @@ def write_witness(request: Request, answers: Sequence[Answer], state: str) -> No
             "no-witness",
             "there is no witness to write",
             found=f"{state}, " + ", ".join(dict.fromkeys(words)),
-            expected="an accuracy asked that is NOT met: the machine that exceeds it is the witness",
+            expected="an accuracy that is NOT met: the machine that exceeds it is the witness",
         )
     )
 

@@ -6,6 +6,7 @@ other kinematics is asked for another pose instead:
 
     corrected(X) = forward(inverse(X, nominal + shifts(X)), nominal)
 
+(of sources that follow the joints with the shifts at those very joints, `corrected.py`),
 and takes the actual machine, which stands where its shifts are those of the pose it stands at,
 
     actual(p) = Y  with  Y = forward(inverse(p, nominal), nominal + shifts(Y)),
@@ -25,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from truepose import _kernel
 from truepose.budget.exact import Moved, displacement, together
 from truepose.budget.poses import BLOCK, OK, requested_poses
+from truepose.compensation.corrected import corrected_joints
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, acting
@@ -139,13 +141,15 @@ class Known:
     """Some poses, and how far every parameter is known to be off its nominal value there.
 
     `block`: those of the poses that have joints and a balance of forces, with their numbers in
-    `block.indices` (m,); `moved`: parameters and their deviations (m or 1, k); `status` (n,) why
-    the others have none.
+    `block.indices` (m,); `moved`: parameters and their deviations (m or 1, k) with the nominal
+    command; `status` (n,) why the others have none; `followed`: a source deviates as the joints
+    that are commanded say, so that with another command `moved` is another.
     """
 
     block: Block
     moved: Moved
     status: Codes
+    followed: bool = False
 
     def spread(self, status: Codes) -> Codes:
         """(n,) of all poses, from `status` (m,) of those in the block.
@@ -214,7 +218,7 @@ class ActualMachine:
             placed[block.indices[failed]] = balanced[failed]
             block = block.select(~failed)
             moved = self._moved(block)
-        return Known(block, moved, placed)
+        return Known(block, moved, placed, block.is_followed)
 
     def _moved(self, block: Block) -> Moved:
         """What the sources move, each at its shift. Raises `ValueError` if that is not finite."""
@@ -234,7 +238,9 @@ class ActualMachine:
         poses = _requested(known.block)
         if not len(poses):
             return Command(np.empty((0, len(self.machine.joints))), poses, np.empty(0, np.uint8))
-        joints, _, corrected = self.machine.kernel.corrected(poses, *known.moved)
+        joints, _, corrected = corrected_joints(
+            known.block, known.moved, lambda moved: moved, self._moved if known.followed else None
+        )
         nominal, solved = displacement(self.machine, joints, known.block.placements, UNMOVED)
         found = self.poses_from(known.block.placements, nominal, poses)
         return Command(joints, found, _first(corrected, solved))
@@ -243,11 +249,13 @@ class ActualMachine:
         """Where `joints` (m, n_joint) take the tool, less the poses of `known`.
 
         (m, n_component) and a status (m,). The shifts are those of the poses of `known`, not of
-        the ones reached: second order, as in `truepose.budget`.
+        the ones reached: second order, as in `truepose.budget`. What follows the joints deviates
+        as `joints` say.
         """
         if not len(joints):
             return np.empty((0, len(self.machine.components))), np.empty(0, np.uint8)
-        return displacement(self.machine, joints, known.block.placements, known.moved)
+        moved = self._moved(known.block.sent_to(joints)) if known.followed else known.moved
+        return displacement(self.machine, joints, known.block.placements, moved)
 
     def reached(self, joints: Floats, near: Floats) -> tuple[Floats, Codes]:
         """Where `joints` (n, n_joint) take the tool, by iteration from `near` (n, n_commanded).

@@ -8,25 +8,24 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from truepose.budget import worst
 from truepose.budget.dataset import Rows, Schema, Variable, assemble, sizes
 from truepose.budget.evaluate import required_sources
-from truepose.budget.exact import Moved, at_shifts, displacement, together
+from truepose.budget.exact import at_shifts, displacement, together
+from truepose.budget.first_order import first_order
 from truepose.budget.poses import (
-    NO_BOUND,
     Progress,
     Walk,
     is_path,
     no_pose_left,
     of_band,
     of_correction,
-    reason_unless,
     requested_poses,
 )
-from truepose.compensation.second_order import SecondOrder, Step
+from truepose.budget.spread import spread_of
+from truepose.compensation.corrected import corrected_deviations
+from truepose.compensation.remainder import Remainder
 from truepose.machine import Condition, Machine
-from truepose.sources import Block, Deviation
-from truepose.sources._base import Floats
+from truepose.sources import Block, Deviation, Source
 
 _ALL = ("pose", "component")
 
@@ -42,10 +41,15 @@ SCHEMA: Schema = {
     "residual_middle": Variable(
         _ALL, "component", "error of the corrected command, every source at its shift"
     ),
-    "bound": Variable(_ALL, "component", "linear, group-aware reach of the bands of all sources"),
-    "second_order": Variable(
-        _ALL, "component", "what the residual may exceed the bound by, of second order"
+    "bound": Variable(
+        _ALL, "component", "linear reach of the bands of all sources, at the corrected command"
     ),
+    "second_order": Variable(
+        _ALL,
+        "component",
+        "what the residual may exceed the bound by, proven; missing where it is not",
+    ),
+    "proven": Variable(("pose",), "1", "whether second_order is proven", np.bool_),
 }
 
 
@@ -58,14 +62,15 @@ def compensate(
 ) -> xr.Dataset:
     """The corrected command at every pose, and what remains, by re-simulation.
 
-    The corrected joints are `inverse(X, nominal + sum of the sources' shifts)`; they are driven
-    through the machine with the deviations at their shifts (middle) and with the lengths and
-    offsets of every source at both edges of their bands. On the commanded freedoms
+    The corrected joints are `inverse(X, nominal + sum of the sources' shifts)`, the shifts taken at
+    these very joints where they follow them; they are driven through the machine with the
+    deviations at their shifts (middle) and with the lengths and offsets of every source at both
+    edges of their bands. On the commanded freedoms
 
         |residual| <= bound + second_order
 
-    for every deviation inside the bands. Where they are too wide for that the pose is left out
-    (`no_bound`), as it is where a machine at an edge cannot be assembled (`band`) or the corrected
+    for every deviation inside the bands, where `proven`; elsewhere `second_order` is missing. A
+    pose is left out where a machine at an edge cannot be assembled (`band`) or the corrected
     command not be followed (`correction_` and the kernel's status). `poses` (..., n_commanded), SI,
     default the file's workspace. The Dataset, SI, and both terms are described in docs/results.md.
 
@@ -75,20 +80,15 @@ def compensate(
     table = requested_poses(machine, poses)
     sources = required_sources(machine, given)
     rows = Rows(machine, SCHEMA, sizes(machine, len(table)))
-    second_order = SecondOrder(machine)
+    remainder = Remainder(machine)
     walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
     for block in walk:
         deviations = [source.deviation(machine, given, block) for source in sources]
-        values, corrected, edges = _correct(machine, block, deviations, second_order)
         alone = [(d.parameters, d.shift) for d in deviations]
         shifted = at_shifts(machine, block, alone, together(alone))
-        bounded = np.isfinite(values["bound"] + values["second_order"]).all(axis=1)
+        values, followed, edges = _correct(machine, block, sources, deviations, remainder)
         usable = walk.keep(
-            block.indices,
-            shifted,
-            *map(of_correction, corrected),
-            *map(of_band, edges),
-            reason_unless(bounded, NO_BOUND),
+            block.indices, shifted, *map(of_correction, followed), *map(of_band, edges)
         )
         rows.append(block, values, usable)
     if rows.count == 0:
@@ -99,45 +99,30 @@ def compensate(
 def _correct(
     machine: Machine,
     block: Block,
-    deviations: Sequence[Deviation],
-    second_order: SecondOrder,
+    sources: Sequence[Source],
+    nominal: list[Deviation],
+    remainder: Remainder,
 ) -> tuple[dict[str, np.ndarray], list[np.ndarray], list[np.ndarray]]:
     """Every variable over poses for one block, and all statuses (n,) met on the way.
 
-    First those of the corrected command at the shifts, then those at edges of the bands.
+    From the deviations at the `nominal` command. First the statuses of the corrected command at
+    the shifts, then those at edges of the bands.
     """
-    shift = together([(d.parameters, d.shift) for d in deviations])
-    lower = together([(d.parameters, d.at_edge(-1.0)) for d in deviations])
-    upper = together([(d.parameters, d.at_edge(+1.0)) for d in deviations])
-    joints, _, corrected = machine.kernel.corrected(block.requested[block.indices], *shift)
-
-    def residual(moved: Moved) -> tuple[Floats, np.ndarray]:
-        return displacement(machine, joints, block.placements, moved)
-
-    middle, at_middle = residual(shift)
-    low, at_low = residual(lower)
-    high, at_high = residual(upper)
-    statuses = [corrected, at_middle]
-
-    # Rounding of the inverse is no deviation: where nothing is known, nothing is corrected.
-    centre = Step(*shift, joints - block.joints, middle)
-    down, up = np.zeros_like(middle), np.zeros_like(middle)
-    band: list[Step] = []
-    for deviation in deviations:
-        if not deviation.banded.size:
-            continue
-        effects, _, status = worst.variable_effects(machine, block, deviation)
-        for reach, of_source in zip((down, up), deviation.domain.reach(effects), strict=True):
-            reach += of_source
-        band += second_order.steps(deviation, effects)
-        statuses.append(status)
+    after, deviations, corrected = corrected_deviations(block, sources, nominal)
+    spread = spread_of(machine, sources, deviations)
+    middle, effects, at_middle = first_order(machine, after, spread)
+    bounds = remainder.bound(after, spread, middle, effects)
     values = {
-        "joint": joints,
+        "joint": after.joints,
         "joint_nominal": block.joints,
-        "residual_lower": low,
-        "residual_upper": high,
         "residual_middle": middle,
-        "bound": np.maximum(down, up),
-        "second_order": second_order.bound(block, centre, band),
+        "bound": np.maximum(*spread.domain.reach(effects)),
+        "second_order": bounds.components,
+        "proven": bounds.proven,
     }
-    return values, statuses, [at_low, at_high]
+    edges = []
+    for name, side in (("residual_lower", -1.0), ("residual_upper", +1.0)):
+        moved = together([(each.parameters, each.at_edge(side)) for each in deviations])
+        values[name], status = displacement(machine, after.joints, after.placements, moved)
+        edges.append(status)
+    return values, [corrected, at_middle], edges

@@ -12,7 +12,7 @@ from truepose.machine.condition import (
     Envelope,
 )
 from truepose.machine.cutting import cutting_force, kienzle_force
-from truepose.machine.elements import drive_kinds
+from truepose.machine.elements import drive_kinds, strut_geometry
 from truepose.machine.file_table import FileTable
 from truepose.machine.materials import MATERIALS
 from truepose.machine.parts_of_machine import (
@@ -82,10 +82,14 @@ def _rows(validated: Validated, model: type[Model], table: str) -> list[tuple[Mo
 
 def struts(validated: Validated) -> tuple[Strut, ...]:
     """Every `[[strut]]`."""
-    return tuple(map(_strut, validated.rows(StrutTable)))
+    rows, own = validated.rows(StrutTable), validated.rows(strut_geometry())
+    axes = [tuple(getattr(each, "ring_axis", None) or ()) for each in own]
+    return tuple(
+        _strut(row, axis if any(axis) else None) for row, axis in zip(rows, axes, strict=True)
+    )
 
 
-def _strut(row: StrutTable) -> Strut:
+def _strut(row: StrutTable, ring_axis: Vector | None) -> Strut:
     material = MATERIALS.get(row.material or "")
     modulus = row.modulus
     if modulus is None and material is not None:
@@ -103,6 +107,7 @@ def _strut(row: StrutTable) -> Strut:
         _joint(row.base_joint),
         _joint(row.platform_joint),
         row.base_stiffness,
+        ring_axis,
     )
 
 

@@ -123,7 +123,8 @@ class Strut:
     Pa, `expansion` in 1/K, `stiffness` (axial, outright) in N/m; None where the file says nothing.
     `mass` in kg, its centre at the fraction `centre_of_mass` of the way from the base joint to the
     platform joint. `base_stiffness` (N/m, infinite where rigid) is that of the carriage or frame at
-    the base joint, along its x y z; None: rigid.
+    the base joint, along its x y z; None: rigid. `ring_axis`: of the ring on which its platform
+    joint slides, platform axes.
     """
 
     name: str
@@ -138,6 +139,7 @@ class Strut:
     base_joint: Joint = field(default_factory=Joint)
     platform_joint: Joint = field(default_factory=Joint)
     base_stiffness: Vector | None = None
+    ring_axis: Vector | None = None
 
     @property
     def part(self) -> str:

@@ -54,7 +54,7 @@ class Told:
         return colours.get(self.answer.answer or "", "none")
 
     def amount(self, value: float, side: int = 0) -> str:
-        """A size without its unit: rounded up for `side` 1, down for -1; a dash where there is none.
+        """A size without its unit, rounded up for `side` 1, down for -1; a dash where there is none.
 
         With so many decimals that it does not look like the target where it is not.
         """
@@ -100,7 +100,8 @@ class Told:
         said = self.machine.accuracy.said(answer.quantity)
         if said.rpartition(" ")[2].replace("u", "µ", 1) == self.unit.label:
             return said
-        return f"{said} ({number(answer.asked * self.unit.per_si, self.unit.decimals)} {self.unit.label})"
+        unit = self.unit
+        return f"{said} ({number(answer.asked * unit.per_si, unit.decimals)} {unit.label})"
 
     def at(self, of: Number) -> str:
         """The pose of a number."""

@@ -19,9 +19,10 @@ from truepose.report.study import Study
 LIMITS = (
     "These results hold for the sources found in the machine file and for the poses evaluated, "
     "nothing else. Sources that the file does not name (backlash, joint clearance, wear, control "
-    "and measuring errors, bending of frame, platform and guides) are not in them. A linear maximum "
-    "is of first order; a witness is one machine, solved exactly; a proven bound says so, and "
-    "holds at the poses that it names. Loads and temperatures act on the nominal machine at the commanded pose."
+    "and measuring errors, bending of frame, platform and guides) are not in them. A linear "
+    "maximum is of first order; a witness is one machine, solved exactly; a proven bound says so, "
+    "and holds at the poses that it names. Loads and temperatures act on the nominal machine at "
+    "the commanded pose."
 )
 FIGURE_SETTINGS = {"displaylogo": False, "responsive": True, "displayModeBar": "hover"}
 

@@ -33,6 +33,8 @@ class Block:
     `travel` (n, n_joint): direction, -1 or +1, in which each joint last moved on its way along the
     path into the pose, 0 where it has not moved yet; None where the poses are no path.
     `times` (n,): s, where the run is over a temperature log; else None.
+    `corrected` (n, n_joint): joint coordinates that the drives are sent to instead of `joints`;
+    None where they go there. Loads, lengths and directions are those of `joints` all the same.
     """
 
     machine: Machine
@@ -43,6 +45,7 @@ class Block:
     placements: Floats
     travel: Floats | None = None
     times: Floats | None = None
+    corrected: Floats | None = None
 
     def select(self, usable: Flags) -> Block:
         """The poses where `usable` (n,); the block itself where all are."""
@@ -55,7 +58,28 @@ class Block:
             placements=self.placements[usable],
             travel=None if self.travel is None else self.travel[usable],
             times=None if self.times is None else self.times[usable],
+            corrected=None if self.corrected is None else self.corrected[usable],
         )
+
+    @cached_property
+    def drive_joints(self) -> Floats:
+        """(n, n_joint) coordinates that the drives are at: `corrected`, else `joints`.
+
+        For what happens at a drive's own coordinate, as a periodic error of its screw does.
+        """
+        return self.joints if self.corrected is None else self.corrected
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether a source has asked for `drive_joints`: it deviates as the command says."""
+        return "drive_joints" in vars(self)
+
+    def sent_to(self, corrected: Floats) -> Block:
+        """The same poses with the drives at `corrected` (n, n_joint); nothing else is different."""
+        block = dataclasses.replace(self, corrected=corrected)
+        known = {name: value for name, value in vars(self).items() if name not in _OF_COMMAND}
+        vars(block).update(known)
+        return block
 
     @cached_property
     def lengths(self) -> Floats:
@@ -230,6 +254,10 @@ class Block:
             return self.condition.temperature_rise(part)
         rise = self.condition.temperature_rise(part, self.times)
         return rise if isinstance(rise, float) else rise[:, np.newaxis]
+
+
+_OF_COMMAND = ("corrected", "drive_joints")
+"""What of a block depends on where its drives are sent to."""
 
 
 def rotations_of(placements: Floats) -> Floats:

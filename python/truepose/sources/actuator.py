@@ -153,10 +153,10 @@ class Actuator:
                 add_scale_error(columns, machine, each.drive, each.lead_error, each.zero_at)
             offset = machine.parameters.index(f"{each.drive}.offset")
             if each.periodic is not None:
-                _add_periodic(columns, offset, each.periodic, block.joints[:, each.joint])
+                _add_periodic(columns, offset, each.periodic, block.drive_joints[:, each.joint])
             if each.table is not None:
                 travel = None if block.travel is None else block.travel[:, each.joint]
-                _add_table(columns, offset, each.table, block.joints[:, each.joint], travel)
+                _add_table(columns, offset, each.table, block.drive_joints[:, each.joint], travel)
         return columns.deviation()
 
 

@@ -260,7 +260,7 @@ class Guideway:
         columns = Columns()
         for rail in self.rails:
             moved = _Moved(columns, machine, rail.drive)
-            joint = block.joints[:, rail.joint]
+            joint = block.drive_joints[:, rail.joint]
             for shape in rail.shapes:
                 reach = shape.amplitude * SHAPES[shape.shape]((joint - shape.start) / shape.period)
                 moved.along(shape.direction, **{"shift" if shape.known else "swing": reach})

@@ -137,7 +137,7 @@ class _Moved:
         self._add(self._at[f"{drive.part}.scale"], strain)
         fixed = -strain * fixed_at
         if gradient:
-            way = self.block.joints[:, [index]] - fixed_at
+            way = self.block.drive_joints[:, [index]] - fixed_at
             fixed = fixed + scale * along_line(expansion, 0.0, gradient, way)
         if fixed.any():
             self._add(self._at[f"{drive.part}.offset"], fixed)
@@ -189,7 +189,7 @@ class _Moved:
         origin = self._nominal_of(drive.part, "origin")
         axis = np.asarray(drive.fields["axis"], np.float64)
         scale, offset = self._driven(drive)
-        way = scale * self.block.joints[:, [index]] + offset
+        way = scale * self.block.drive_joints[:, [index]] + offset
         for strut in self._carried(drive):
             base = self._point(strut, "base")
             if drive.coordinate == "angle":

@@ -188,10 +188,9 @@ def _at_pose(state: State, kind: str, columns: Indices) -> Witness:
 
 @dataclass(frozen=True, eq=False)
 class _Proof:
-    """Bounds (n, q) after the engine was asked, where it was (n,), in how many boxes, and refusals."""
+    """Bounds (n, q) after the engine was asked, in how many boxes, and why it was not."""
 
     bound: Floats
-    asked: np.ndarray
     boxes: int
     refused: str
 
@@ -212,7 +211,6 @@ def _proved(
     # Where no remainder is proven the linear maximum says which pose is worst.
     worst = np.where(np.isfinite(worst), worst, (found.linear / limits).max(axis=1)[needed])
     in_order = engine.by_need(worst, needed)
-    looked = np.zeros(len(bound), np.bool_)
     left, refused = engine.EFFORT, ""
     for start in range(0, in_order.size, engine.AT_ONCE):
         if left <= 0 or refused:
@@ -225,8 +223,7 @@ def _proved(
             left -= used
             at = np.searchsorted(found.numbers, state.block.indices)
             bound[at] = np.minimum(bound[at], proven)
-            looked[at] = np.isfinite(proven).all(axis=1)
-    return _Proof(bound, looked, engine.EFFORT - left, refused)
+    return _Proof(bound, engine.EFFORT - left, refused)
 
 
 def _answer(

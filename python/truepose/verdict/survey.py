@@ -1,4 +1,4 @@
-"""The largest error at every pose: to first order, what it is proven not to exceed, what is reached.
+"""The largest error at every pose: to first order, proven not to be exceeded, and reached.
 
     linear maximum          the largest length of the set of errors, to first order
     + proven remainder  =   bound

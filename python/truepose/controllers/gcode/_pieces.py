@@ -80,7 +80,7 @@ def selected(known: Known, which: Flags) -> Known:
     """What is known at some of the poses (n,), all of which have joints."""
     columns, values = known.moved
     moved = values if len(values) == 1 else np.ascontiguousarray(values[which])
-    return Known(known.block.select(which), (columns, moved), known.status[which])
+    return Known(known.block.select(which), (columns, moved), known.status[which], known.followed)
 
 
 __all__ = ["Looked", "Nodes", "Pieces", "joined", "selected"]

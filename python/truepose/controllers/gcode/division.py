@@ -235,7 +235,7 @@ class _Batch:
         self.at_end: Moved = UNMOVED
         self.nodes = self._corrected(numbers, np.ones(count), moves.end, first=0)
         ends = self.known[0][1]
-        if len(self.known) == 1 and ends is not None:
+        if len(self.known) == 1 and ends is not None and not ends.followed:
             self.moved = ends.moved
         starts = self.axes.poses(moves.start)
         before = np.concatenate([stand.asked[np.newaxis], self.nodes.asked[:-1]])

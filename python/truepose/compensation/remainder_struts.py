@@ -1,0 +1,300 @@
+"""Remainder of struts: two joint centres at a distance.
+
+    F = |B - A| - L,    B = p + d + exp(r) (arm + w)
+
+with the displacement d of the tool point, the turn r, and w what the platform's own dimensions
+move. A moves as its drive says: on the frame by its own deviation alone; on a carriage to
+`origin + base + s axis`, on a crank to `origin + Rot(axis, angle) base`, where the way s and the
+angle are linear in the variables (the command does not change) and an axis that tilts stays a unit
+vector. With v = B - A, u its direction, l its length, and the relative motion to first order
+
+    delta = d + r x arm + w - (what A moves)
+
+the part of second order is
+
+    |delta across u|^2 / (2 l) + u . (r x (r x arm)) / 2 + u . (r x w) - (that of u . A)
+
+That of an arm
+by its angle t is `k x (k x base) t^2 / 2` with its axis k; what else moves A beyond first order,
+tilts of axes and ways along them, is bounded with the rest. Along itself a strut moves by what its
+length deviates, to first order: its closure says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.compensation import majorants
+from truepose.compensation.motion import Motion, Names, Tilt, cross, norm, skew
+from truepose.compensation.remainder_closures import Closures, Products, turned_about
+from truepose.machine import Machine
+from truepose.machine.parts_of_machine import Drive
+from truepose.sources._base import Floats, Indices
+
+CLOSED = 1e-8
+"""By how much of its length a strut may miss where the machine stands: rounding, and no more."""
+
+KINDS = ("slider", "crank", "telescopic")
+"""Kinds of drive that are known here."""
+
+
+@dataclass
+class _Base:
+    """The base-side joint of one strut: where it is, and what moves it beyond first order.
+
+    `place` (n, 3), and of each parameter that moves it by how much it does, (n or 1, 3) per unit.
+    `bent` (n,): the most of its motion that is not linear. Of an arm `angle` (n or 1, v), the form
+    of how far it turns, and `bend` (n, 3): k x (k x base); else None.
+    """
+
+    place: Floats
+    slopes: list[tuple[int, Floats]]
+    bent: Floats
+    angle: Floats | None = None
+    bend: Floats | None = None
+
+
+class Bases:
+    """The base-side joints of a machine's struts, and their lengths."""
+
+    def __init__(self, machine: Machine, struts: Sequence[int]) -> None:
+        self._names = Names(machine)
+        self._drives = {drive.name: (at, drive) for at, drive in enumerate(machine.drives)}
+        self._struts = [machine.struts[at] for at in struts]
+        self._lengths = [int(machine.kernel.length_parameters[at]) for at in struts]
+
+    @property
+    def known(self) -> bool:
+        """Whether all drives are of kinds that are known here."""
+        return all(drive.kind in KINDS for _, drive in self._drives.values())
+
+    def base(self, motion: Motion, which: int) -> _Base:
+        """Of one of the struts."""
+        strut = self._struts[which]
+        point = self._names.point(f"{strut.part}.base")
+        base = motion.values(point)
+        drive = self._drives.get(strut.drive or "")
+        zero = np.zeros(len(motion.position))
+        if drive is None or drive[1].kind == "telescopic":
+            slopes = [
+                (int(at), axis[np.newaxis]) for at, axis in zip(point, np.eye(3), strict=True)
+            ]
+            return _Base(base, slopes, zero)
+        on = self._on_carriage if drive[1].kind == "slider" else self._on_crank
+        return on(motion, *drive, point, base)
+
+    def length(self, motion: Motion, which: int) -> tuple[Floats, Floats]:
+        """(n or 1,) length of a strut, and the most that it deviates, linear in the variables."""
+        parameter = self._lengths[which]
+        drive = self._drives.get(self._struts[which].drive or "")
+        if drive is None or drive[1].kind != "telescopic":
+            form = motion.forms([parameter])[:, 0]
+            return motion.parameters[:, parameter], motion.reach(form)
+        joint = motion.joints[:, drive[0]]
+        scale = self._names[f"{drive[1].part}.scale"]
+        offset, ratio = motion.parameters[:, parameter], motion.parameters[:, scale]
+        return offset + ratio * joint, motion.reach(self._way(motion, drive[0], drive[1]))
+
+    def _way(self, motion: Motion, joint: int, drive: Drive) -> Floats:
+        """(n or 1, v) form of scale q + offset."""
+        offset, scale = (self._names[f"{drive.part}.{name}"] for name in ("offset", "scale"))
+        form = motion.forms([offset, scale])
+        if not form[:, 1].any():
+            return form[:, 0]
+        return np.asarray(form[:, 0] + motion.joints[:, joint, np.newaxis] * form[:, 1])
+
+    def _driven(
+        self, motion: Motion, joint: int, drive: Drive
+    ) -> tuple[Floats, list[tuple[int, Floats]], Floats]:
+        """Way or angle (n,), its parameters with their factors (n or 1, 1), and its reach (n,)."""
+        offset, scale = (self._names[f"{drive.part}.{name}"] for name in ("offset", "scale"))
+        q = motion.joints[:, joint]
+        way = motion.parameters[:, offset] + motion.parameters[:, scale] * q
+        factors = [(offset, np.ones((1, 1))), (scale, q[:, np.newaxis])]
+        return way, factors, motion.reach(self._way(motion, joint, drive))
+
+    def _tilt(self, motion: Motion, drive: Drive) -> tuple[Tilt, Indices]:
+        tilts = self._names.tilts(f"{drive.part}.axis")
+        return Tilt.of(motion, np.asarray(drive.fields["axis"], np.float64), tilts), tilts
+
+    def _on_carriage(
+        self, motion: Motion, joint: int, drive: Drive, point: Indices, base: Floats
+    ) -> _Base:
+        way, factors, reach = self._driven(motion, joint, drive)
+        tilt, tilts = self._tilt(motion, drive)
+        origin = self._names.point(f"{drive.part}.origin")
+        place = motion.values(origin) + base + way[:, np.newaxis] * tilt.axis
+        slopes = [(at, factor * tilt.axis) for at, factor in factors]
+        slopes += [
+            (int(at), way[:, np.newaxis] * tilt.slopes[:, number])
+            for number, at in enumerate(tilts)
+        ]
+        for points in (point, origin):
+            slopes += [
+                (int(at), axis[np.newaxis]) for at, axis in zip(points, np.eye(3), strict=True)
+            ]
+        bent = np.abs(way) * majorants.unit_bent(tilt.reach, tilt.along)
+        bent = bent + reach * majorants.unit(tilt.reach, tilt.along)
+        return _Base(place, slopes, bent)
+
+    def _on_crank(
+        self, motion: Motion, joint: int, drive: Drive, point: Indices, base: Floats
+    ) -> _Base:
+        angle, factors, reach = self._driven(motion, joint, drive)
+        tilt, tilts = self._tilt(motion, drive)
+        origin = self._names.point(f"{drive.part}.origin")
+        axis, sine, cosine = tilt.axis, np.sin(angle)[:, None], np.cos(angle)[:, None]
+
+        def turned(vector: Floats) -> Floats:
+            along = (axis * vector).sum(axis=1, keepdims=True) * axis
+            turned: Floats = along + cosine * (vector - along) + sine * cross(axis, vector)
+            return turned
+
+        arm = turned(base)
+        across = cross(axis, arm)
+        slopes = [(at, factor * across) for at, factor in factors]
+        for number, at in enumerate(tilts):
+            change = tilt.slopes[:, number]
+            axial = change * (axis * base).sum(axis=1, keepdims=True)
+            axial = axial + axis * (change * base).sum(axis=1, keepdims=True)
+            slopes.append((int(at), sine * cross(change, base) + (1.0 - cosine) * axial))
+        for at, direction in zip(point, np.eye(3), strict=True):
+            slopes.append((int(at), turned(np.broadcast_to(direction, axis.shape))))
+        for at, direction in zip(origin, np.eye(3), strict=True):
+            slopes.append((int(at), direction[np.newaxis]))
+        own = norm(motion.reach(motion.forms(point)))
+        size = norm(base)
+        bent = majorants.turn_bent(reach) * norm(across) + majorants.turn(reach) * own
+        if tilt.reach.any():
+            # sin(angle) a x base + (1 - cos(angle)) [a (k . base) + k (a . base) + a (a . base)],
+            # a what is added to the axis k, less the part of it that is linear.
+            more, tilted = majorants.turn(reach), majorants.unit(tilt.reach, tilt.along)
+            swung = np.abs(sine[:, 0]) + more
+            raised = 1.0 - cosine[:, 0] + more
+            linear = (1.0 + tilt.along) * tilt.reach
+            whole = (swung + 2.0 * raised) * tilted + raised * tilted**2
+            bent = bent + whole * (size + own)
+            bent = bent - (np.abs(sine[:, 0]) + 2.0 * (1.0 - cosine[:, 0])) * linear * size
+        place = motion.values(origin) + arm
+        form = self._way(motion, joint, drive)
+        return _Base(place, slopes, bent, form, cross(axis, across))
+
+
+class Struts:
+    """The struts of a machine whose platform-side joints stay where they are."""
+
+    def __init__(self, machine: Machine, struts: Sequence[int]) -> None:
+        self._struts = list(struts)
+        self._bases = Bases(machine, struts)
+        self._names = Names(machine)
+        self._tool = self._names.point("tool")
+        parts = [machine.struts[at].part for at in struts]
+        self._platform = np.array([self._names.point(f"{part}.platform") for part in parts])
+        self.parameters = machine.kernel.length_parameters[self._struts].astype(np.intp)
+        """Parameters whose sensitivities `closures` takes, (k,)."""
+
+    @property
+    def known(self) -> bool:
+        """Whether nothing is there that is not known here."""
+        return self._bases.known
+
+    def closures(self, motion: Motion, sensitivity: Floats) -> list[Closures]:
+        """At the poses of a motion, from sensitivities (n, m, k) to `parameters`."""
+        n, count = len(motion.position), len(self._struts)
+        bases = [self._bases.base(motion, at) for at in range(count)]
+        lengths = [self._bases.length(motion, at) for at in range(count)]
+        arm = motion.arms(self._platform, self._tool)
+        base = np.stack([np.broadcast_to(each.place, (n, 3)) for each in bases], axis=1)
+        v = motion.position[:, np.newaxis] + arm - base
+        length = norm(v)
+        unit = v / length[:, :, np.newaxis]
+        stated = np.stack([np.broadcast_to(each, n) for each, _ in lengths], axis=1)
+        along = np.stack([np.broadcast_to(each, n) for _, each in lengths], axis=1)
+
+        rows = self._across(motion, unit, arm, bases)
+        across = norm(motion.reach(rows))
+        own = self._own(motion)
+        moved = norm(motion.reach(own))
+        bent = np.stack([np.broadcast_to(each.bent, n) for each in bases], axis=1)
+        half = np.repeat(0.5 / length[:, :, np.newaxis], 2, axis=2)
+        arms = _arms(motion, bases, unit)
+        size, turn = norm(arm), norm(motion.turn_reach)[:, np.newaxis]
+        arched = np.zeros_like(across)
+        if arms is not None:
+            arched = np.abs(arms.coefficient[:, :, 0]) * motion.reach(arms.one[:, :, 0]) ** 2
+
+        def rest(shift: Floats, further: Floats) -> Floats:
+            whole, more = turn + further, shift + further * size
+            carried = majorants.turn_bent(whole) * size + majorants.turn(whole) * moved + bent
+            found = majorants.length_bent(length, across + more + carried, along + more + carried)
+            signed = (across + more) ** 2 * half[:, :, 0]
+            signed = signed + 0.5 * whole**2 * size + whole * moved + arched
+            return np.asarray(np.maximum(found + carried - signed, 0.0))
+
+        found = Closures(
+            sensitivity,
+            (Products(half, rows, rows), *(() if arms is None else (arms,))),
+            turned_about(arm, unit),
+            carried_about(motion, own, unit) if own.any() else None,
+            rest,
+            np.asarray((np.abs(length - stated) <= CLOSED * length).all(axis=1)),
+        )
+        return [found]
+
+    def _across(self, motion: Motion, unit: Floats, arm: Floats, bases: list[_Base]) -> Floats:
+        """(n, s, 2, v) forms of the relative motion across each strut."""
+        n, count = unit.shape[:2]
+        frame = np.stack(across_of(unit), axis=2)  # (n, s, 2, 3)
+        flat = frame.reshape(n, 2 * count, 3)
+        rows = motion.of_platform(flat, np.repeat(arm, 2, axis=1))
+        own = (flat @ motion.rotation).reshape(n, count, 2, 3)
+        for at in range(count):
+            mine = rows[:, 2 * at : 2 * at + 2]
+            for parameter, slope in bases[at].slopes:
+                if motion.of_parameter(parameter):
+                    motion.add(mine, parameter, -(frame[:, at] @ slope[:, :, np.newaxis])[:, :, 0])
+            for axis, parameter in enumerate(self._platform[at]):
+                motion.add(mine, int(parameter), own[:, at, :, axis])
+        for axis, parameter in enumerate(self._tool):
+            motion.add(rows, int(parameter), -own[:, :, :, axis].reshape(n, -1))
+        return rows.reshape(n, count, 2, -1)
+
+    def _own(self, motion: Motion) -> Floats:
+        """(n or 1, s, 3, v) w, what the platform's own dimensions move each joint, its axes."""
+        forms = motion.forms(self._platform.ravel())
+        forms = forms.reshape(len(motion.swing), len(self._struts), 3, -1)
+        return np.asarray(forms - motion.forms(self._tool)[:, np.newaxis])
+
+
+def carried_about(motion: Motion, own: Floats, along: Floats) -> Floats:
+    """(n, c, 3, v) Q of `along . (r x w) = r . Q t`.
+
+    Of forms w (n or 1, c, 3, v) in the platform's axes.
+    """
+    found: Floats = -(skew(along) @ motion.rotation[:, np.newaxis]) @ own
+    return found
+
+
+def _arms(motion: Motion, bases: list[_Base], unit: Floats) -> Products | None:
+    """Of struts on cranks: the part of second order by the angle alone."""
+    if all(each.angle is None for each in bases):
+        return None
+    n, count = unit.shape[:2]
+    coefficient = np.zeros((n, count, 1))
+    form = np.zeros((n, count, 1, motion.effects.shape[2]))
+    for at, each in enumerate(bases):
+        if each.angle is not None and each.bend is not None:
+            coefficient[:, at, 0] = -0.5 * (each.bend * unit[:, at]).sum(axis=1)
+            form[:, at, 0] = each.angle
+    return Products(coefficient, form, form)
+
+
+def across_of(unit: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors (..., 3) across unit vectors, and across each other."""
+    least = np.argmin(np.abs(unit), axis=-1)
+    first = np.eye(3)[least] - np.take_along_axis(unit, least[..., None], -1) * unit
+    first = first / norm(first)[..., np.newaxis]
+    return first, cross(unit, first)

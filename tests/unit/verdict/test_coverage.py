@@ -24,6 +24,7 @@ from truepose.errors import RequestError
 from truepose.machine import Envelope, Machine
 from truepose.sources import Block
 from truepose.verdict import coverage as module
+from truepose.verdict import screening
 from truepose.verdict.coverage import CoverageAnswer, coverage
 from two_slider import LENGTH, RAILS, displaced, tool
 
@@ -222,7 +223,7 @@ def test_it_does_not_matter_how_the_poses_come(tmp_path: Path) -> None:
 
 def test_states_that_can_be_gone_through_but_once_are_refused(tmp_path: Path) -> None:
     machine = load_text(tmp_path, PLANAR)
-    with pytest.raises(ValueError, match="once"):
+    with pytest.raises(ValueError, match="but once"):
         coverage(machine, iter(states(machine)), "position", P)
     with pytest.raises(ValueError, match="no pose"):
         coverage(machine, [], "position", P)

@@ -12,7 +12,7 @@ do not depend on them, and an interval that holds at each holds at the poses cho
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +45,9 @@ MOST = (20_000, 80_000)
 
 RISK = 0.002
 """Of screening a pose out by chance, roughly: draws are the same at every pose."""
+
+REFINED = 4
+"""Of the poses that may be sampled: how many times as many are screened with more draws."""
 
 PILOTS = 8
 """Poses of the largest first-order numbers at which the exact ones are taken, for the scale."""
@@ -127,32 +130,22 @@ class Screen:
         seed: int,
     ) -> None:
         """`columns`: components of the quantity."""
+        if iter(states) is states:
+            raise ValueError("states that can be gone through but once")
         self._machine, self._states, self._columns = machine, states, columns
         self._probability, self._seed = probability, seed
 
     def candidates(self, most: int) -> Screened:
         """The poses that may be the worst, at most so many; those without first order are."""
-        few, many = (self._ranks(stage) for stage in range(2))
-        upper, best = [], _Largest(self._sized)
-        for number, (block, spread) in enumerate(self._states):
-            part = self._part(number, block, spread, few)
-            upper.append(part.upper)
-            best.add(part, part.lower)
-        every = sum(each.size for each in upper)
-        if not every:
-            raise ValueError("no pose")
-        least = (1.0 - WITHIN) * best.level(few, sure=True)
-        kept, best, again = [], _Largest(self._sized), 0
-        for number, (block, spread) in enumerate(self._states):
-            again += 1
-            chosen = upper[number] >= least
-            if chosen.any():
-                part = self._part(number, block.select(chosen), _select(spread, chosen), many)
+        chosen, left = self._coarsely(most * REFINED)
+        many, largest = self._ranks(1), _Largest(self._sized)
+        kept = []
+        for (number, (block, spread)), wanted in zip(self._numbered(), chosen, strict=True):
+            if wanted.any():
+                part = self._part(number, block.select(wanted), _select(spread, wanted), many)
                 kept.append(part)
-                best.add(part, part.estimate)
-        if again != len(upper):
-            raise ValueError("states that can be gone through but once")
-        least = (1.0 - WITHIN) * best.level(many, sure=False)
+                largest.add(part, part.estimate)
+        least = (1.0 - WITHIN) * largest.level(many, sure=False)
         within = [part.only(part.estimate >= least) for part in kept]
         poses = [
             (float(part.estimate[at]), self._pose(part, at))
@@ -160,8 +153,31 @@ class Screen:
             for at in _largest(part.estimate, most)
         ]
         poses.sort(key=lambda each: (-each[0], each[1].number))
-        count = sum(part.estimate.size for part in within)
+        count = left + sum(part.estimate.size for part in within)
+        every = sum(each.size for each in chosen)
         return Screened([pose for _, pose in poses[:most]], count, every)
+
+    def _coarsely(self, most: int) -> tuple[list[Flags], int]:
+        """The poses of each block that few draws leave, at most so many, and how many more."""
+        few, largest = self._ranks(0), _Largest(self._sized)
+        found = []
+        for number, (block, spread) in self._numbered():
+            part = self._part(number, block, spread, few)
+            found.append((part.estimate, part.upper))
+            largest.add(part, part.lower)
+        if not found:
+            raise ValueError("no pose")
+        least = (1.0 - WITHIN) * largest.level(few, sure=True)
+        likely = np.concatenate([estimate[upper >= least] for estimate, upper in found])
+        enough = np.sort(likely)[-most] if likely.size > most else 0.0
+        chosen = [(upper >= least) & (estimate >= enough) for estimate, upper in found]
+        return chosen, likely.size - sum(int(each.sum()) for each in chosen)
+
+    def _numbered(self) -> Iterator[tuple[int, State]]:
+        """The states that have a pose."""
+        for number, state in enumerate(self._states):
+            if state[0].indices.size:
+                yield number, state
 
     def _ranks(self, stage: int) -> Ranks:
         """How many draws, and which of them in order."""

@@ -8,10 +8,19 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from truepose.budget.dataset import Rows, Schema, Variable, assemble, sizes
+from truepose.budget.comparison import quantities
+from truepose.budget.dataset import (
+    Rows,
+    Schema,
+    Variable,
+    assemble,
+    quantity_coords,
+    sizes,
+)
 from truepose.budget.evaluate import required_sources
 from truepose.budget.exact import at_shifts, displacement, together
 from truepose.budget.first_order import first_order
+from truepose.budget.largest import largest
 from truepose.budget.poses import (
     Progress,
     Walk,
@@ -43,6 +52,12 @@ SCHEMA: Schema = {
     ),
     "bound": Variable(
         _ALL, "component", "linear reach of the bands of all sources, at the corrected command"
+    ),
+    "linear_maximum": Variable(
+        ("pose", "quantity"), "quantity", "linear maximum: largest error that remains"
+    ),
+    "remainder": Variable(
+        ("pose", "quantity"), "quantity", "what an error may exceed linear_maximum by, proven"
     ),
     "second_order": Variable(
         _ALL,
@@ -79,7 +94,8 @@ def compensate(
     given = machine.condition if condition is None else condition
     table = requested_poses(machine, poses)
     sources = required_sources(machine, given)
-    rows = Rows(machine, SCHEMA, sizes(machine, len(table)))
+    kinds = quantities(machine.components)
+    rows = Rows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
     remainder = Remainder(machine)
     walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
     for block in walk:
@@ -93,7 +109,8 @@ def compensate(
         rows.append(block, values, usable)
     if rows.count == 0:
         raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
-    return assemble(machine, given, SCHEMA, rows, table, walk.left_out)
+    coords = quantity_coords(machine)
+    return assemble(machine, given, SCHEMA, rows, table, walk.left_out, coords=coords)
 
 
 def _correct(
@@ -111,12 +128,15 @@ def _correct(
     after, deviations, corrected = corrected_deviations(block, sources, nominal)
     spread = spread_of(machine, sources, deviations)
     middle, effects, at_middle = first_order(machine, after, spread)
+    kinds = list(quantities(machine.components).values())
     bounds = remainder.bound(after, spread, middle, effects)
     values = {
         "joint": after.joints,
         "joint_nominal": block.joints,
         "residual_middle": middle,
         "bound": np.maximum(*spread.domain.reach(effects)),
+        "linear_maximum": largest(middle, effects, spread.domain, kinds).length,
+        "remainder": bounds.norms,
         "second_order": bounds.components,
         "proven": bounds.proven,
     }

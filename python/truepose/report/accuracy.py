@@ -54,7 +54,7 @@ class Told:
         return colours.get(self.answer.answer or "", "none")
 
     def amount(self, value: float, side: int = 0) -> str:
-        """A size without its unit, rounded up for `side` 1, down for -1; a dash where there is none.
+        """A size without its unit, rounded up for `side` 1, down for -1; a dash: there is none.
 
         With so many decimals that it does not look like the target where it is not.
         """

@@ -303,7 +303,6 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
             ),
             each.asked,
             each.at(each.answer.told),
-            each.answer.rests_on,
         )
         for each in told(machine, found)
     ]
@@ -311,7 +310,7 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
     return Table(
         "answers",
         "Against the accuracy asked",
-        ("", "answer", *names, "asked", "at", "rests on"),
+        ("", "answer", *names, "asked", "at"),
         tuple(rows),
         words=2,
         note=" ".join([_SAMPLED if sampled else _NUMBERS, *gains(found)]),

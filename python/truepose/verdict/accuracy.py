@@ -26,7 +26,7 @@ from truepose.verdict import engine
 from truepose.verdict.answer import MET, NOT_MET, UNDECIDED, Answer, Number
 from truepose.verdict.coverage import coverage
 from truepose.verdict.search import farthest
-from truepose.verdict.states import STATES, Population, State
+from truepose.verdict.states import STATES, Blocks, Population, State
 from truepose.verdict.survey import Survey, survey
 from truepose.verdict.witness import Witness
 
@@ -111,7 +111,7 @@ def at_coverage(
         return Answer(kind, name, target, answer, none, none, none, _of_witness(witness), witness)
     sampled = coverage(
         population.machine,
-        ((state.block, state.spread) for state in population.states(name)),
+        Blocks(population, name),
         kind,
         probability,
         target,

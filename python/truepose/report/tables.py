@@ -296,7 +296,7 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
             *(
                 f"{each.amount(one.value, side)} {each.unit.label}"
                 for one, side in (
-                    (each.answer.witness, -1),
+                    (each.answer.witness, 0),
                     (each.answer.linear, 0),
                     (each.answer.bound, 1),
                 )

@@ -203,6 +203,29 @@ def test_the_worst_pose_is_that_of_the_largest_quantile(tmp_path: Path, parts: i
     assert 1 < found.sampled < 10
 
 
+def test_shifts_count_in_choosing_the_poses(tmp_path: Path) -> None:
+    """Heat alone differs from pose to pose: the band of the tool is the same everywhere."""
+    text = edited(
+        PLANAR,
+        SINGULAR[2],
+        QUIET[1],
+        ("force = { x = 1200, y = -1500 }\n", ""),
+        ("[workspace]", '[tolerance]\n"tool.x" = 0.02\n[workspace]'),
+    )
+    machine = load_text(tmp_path, text)
+    poses = np.stack([np.linspace(0.45, 0.36, 31), np.full(31, 0.2)], axis=1)
+    error = np.asarray(tp.budget(machine, poses).overall_error)
+    t = np.random.default_rng(1).uniform(-1.0, 1.0, 100_000)
+    aside = np.stack([0.02 * MM * t, np.zeros(len(t))], axis=1)
+    each = np.array([np.quantile(np.linalg.norm(one + aside, axis=1), P) for one in error])
+    found = coverage(machine, states(machine, poses), "position", P, 1.0)
+    assert found.pose == each.argmax()
+    assert found.estimate == pytest.approx(each.max(), rel=0.005)
+    assert 1 < found.sampled < 10
+    assert np.count_nonzero(each > 0.91 * each.max()) <= found.sampled
+    assert np.count_nonzero(each > 0.89 * each.max()) >= found.sampled
+
+
 def test_poses_are_chosen_by_other_machines_than_the_number_is_made_of(tmp_path: Path) -> None:
     """Else poses would be chosen that come out large by chance, and the interval hold less."""
     ((_, every),) = states(near_singular(tmp_path), np.array([[0.33, 0.2]]))

@@ -88,7 +88,7 @@ def test_two_independent_normal_ones_are_rayleigh(tmp_path: Path, p: float) -> N
         '"tool.x" = { standard_deviation = 0.1 }\n"tool.y" = { standard_deviation = 0.1 }',
     )
     assert between(number(machine, p), stats.rayleigh.ppf(p) * 0.1 * MM)
-    # The farthest point of the ellipse that holds a share p of one component lies elsewhere.
+    # The interval of one component by itself is another number.
     assert not between(number(machine, p), stats.norm.ppf(0.5 + 0.5 * p) * 0.1 * MM)
 
 

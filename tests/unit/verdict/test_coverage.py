@@ -244,6 +244,34 @@ def test_it_does_not_matter_how_the_poses_come(tmp_path: Path) -> None:
     assert whole.answer in ("met", "NOT met")
 
 
+def test_it_does_not_matter_how_much_is_worked_on_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine = load_text(tmp_path, PLANAR)
+    whole = coverage(machine, states(machine), "position", P)
+    monkeypatch.setattr(module, "TOGETHER", 1)
+    monkeypatch.setattr(screening, "AT_ONCE", 1)
+    assert coverage(machine, states(machine), "position", P) == whole
+
+
+def test_of_very_many_poses_few_are_screened_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine = near_singular(tmp_path)
+    poses = np.stack([np.linspace(0.34, 0.36, 41), np.full(41, 0.2)], axis=1)
+    run = states(machine, poses, parts=3)
+    every = coverage(machine, run, "position", P, 1.0)
+    monkeypatch.setattr(module, "MOST_POSES", 2)
+    monkeypatch.setattr(screening, "REFINED", 1)
+    few = coverage(machine, run, "position", P, 1.0)
+    assert (few.pose, few.estimate) == (every.pose, every.estimate)
+    assert (few.sampled, every.sampled) == (2, every.within)
+    # Those that are not looked at more closely may be the worst as well.
+    assert every.within <= few.within <= 41
+    # Fewer poses share the risk, and any of them may be the worst of those sampled.
+    assert every.lower <= few.lower <= few.upper <= every.upper
+
+
 def test_states_that_can_be_gone_through_but_once_are_refused(tmp_path: Path) -> None:
     machine = load_text(tmp_path, PLANAR)
     with pytest.raises(ValueError, match="but once"):

@@ -17,8 +17,8 @@ the part of second order is
 That of an arm
 by its angle t is `k x (k x base) t^2 / 2` with its axis k, and products with what moves its end; of
 a carriage by tilts a of its axis k `- s |a|^2 k / 2`, and a times what s changes by. All that is
-told with its sign, but for tilts of a crank's axis. Along itself a strut moves by what its length
-deviates, to first order: its closure says so.
+told with its sign. Along itself a strut moves by what its length deviates, to first order: its
+closure says so.
 """
 
 from __future__ import annotations
@@ -180,21 +180,61 @@ class Bases:
         for at, direction in zip(origin, np.eye(3), strict=True):
             slopes.append((int(at), direction[np.newaxis]))
         own = norm(motion.reach(motion.forms(point)))
-        size = norm(base)
         bent = majorants.turn_bent(reach) * norm(across) + majorants.turn(reach) * own
-        if tilt.reach.any():
-            # sin(angle) a x base + (1 - cos(angle)) [a (k . base) + k (a . base) + a (a . base)],
-            # a what is added to the axis k, less the part of it that is linear.
-            more, tilted = majorants.turn(reach), majorants.unit(tilt.reach, tilt.along)
-            swung = np.abs(sine[:, 0]) + more
-            raised = 1.0 - cosine[:, 0] + more
-            linear = (1.0 + tilt.along) * tilt.reach
-            whole = (swung + 2.0 * raised) * tilted + raised * tilted**2
-            bent = bent + whole * (size + own)
-            bent = bent - (np.abs(sine[:, 0]) + 2.0 * (1.0 - cosine[:, 0])) * linear * size
-        place = motion.values(origin) + arm
         signed = 0.5 * reach**2 * norm(across) + reach * own
+        if tilt.reach.any():
+            # Of what `_tilted_crank` says, with all that is added to angle, axis and base at once.
+            size, lean = norm(base), tilt.reach
+            swing, rise = np.abs(sine[:, 0]), 1.0 - cosine[:, 0]
+            more, tilted = majorants.turn(reach), majorants.unit(lean, tilt.along)
+            whole = (swing + 2.0 * rise + 3.0 * more) * tilted + (rise + more) * tilted**2
+            bent = bent + whole * (size + own)
+            bent = bent - (swing + 2.0 * rise) * (1.0 + tilt.along) * lean * size
+            signed = signed + (swing + 2.0 * rise) * lean * (0.5 * lean * size + own)
+            signed = signed + 3.0 * reach * lean * size + rise * lean**2 * size
+            second += self._tilted_crank(motion, tilt, tilts, (form, point), (base, sine, cosine))
+        place = motion.values(origin) + arm
         return _Base(place, slopes, bent, second, signed)
+
+    @staticmethod
+    def _tilted_crank(
+        motion: Motion,
+        tilt: Tilt,
+        tilts: Indices,
+        moving: tuple[Floats, Indices],
+        stands: tuple[Floats, Floats, Floats],
+    ) -> list[_Second]:
+        """What is of second order by a crank's axis k that tilts by a, with base b at angle t.
+
+        Of `sin t a x b + (1 - cos t) [a (k . b) + k (a . b) + a (a . b)]`, a itself beyond first
+        order being `- |a|^2 k / 2`; `moving` the angle's form and the parameters of b, `stands` b
+        and the sine and cosine of t.
+        """
+        (angle, point), (base, sine, cosine), axis = moving, stands, tilt.axis
+        rise = 1.0 - cosine
+
+        def dot(one: Floats, other: Floats) -> Floats:
+            return np.asarray((one * other).sum(axis=1, keepdims=True))
+
+        def raised(change: Floats, vector: Floats) -> Floats:
+            return np.asarray(change * dot(axis, vector) + axis * dot(change, vector))
+
+        leant = motion.forms(tilts)
+        back = -0.5 * np.square(tilt.tangents[:, 0]).sum(axis=1)[:, np.newaxis]
+        back = back * (sine * cross(axis, base) + 2.0 * rise * axis * dot(axis, base))
+        found: list[_Second] = []
+        for one in (0, 1):
+            change, lean = tilt.slopes[:, one], leant[:, one]
+            turned = cosine * cross(change, base) + sine * raised(change, base)
+            found += [(turned, angle, lean), (back, lean, lean)]
+            for other in (0, 1):
+                along = rise * change * dot(tilt.slopes[:, other], base)
+                found.append((along, lean, leant[:, other]))
+            for at, direction in zip(point, np.eye(3)[:, np.newaxis], strict=True):
+                vector = sine * cross(change, np.broadcast_to(direction, change.shape))
+                vector = vector + rise * raised(change, direction)
+                found.append((vector, lean, motion.forms([at])[:, 0]))
+        return found
 
 
 class Struts:

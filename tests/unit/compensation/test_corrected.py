@@ -99,10 +99,12 @@ def test_a_command_that_never_settles_is_left_out(plain: tp.Machine) -> None:
     offset = plain.parameters.index("drive.d1.offset")
     steep = MadeSource(
         "steep",
-        of_block=lambda block: Deviation.of([offset], wave(1000.0 * block.drive_joints[:, :1])),
+        of_block=lambda block: Deviation.of(
+            [offset], 9.0 * wave(1000.0 * block.drive_joints[:, :1])
+        ),
     )
     with pytest.raises(RequestError) as caught:
-        tp.compensate(with_sources(plain, steep), [[0.3, 0.2], [0.3, 0.21]])
+        tp.compensate(with_sources(plain, steep), [[0.3, 0.2012345], [0.3, 0.2123456]])
     (problem,) = caught.value.problems
     assert "2 correction not converged" in str(problem.found)
 

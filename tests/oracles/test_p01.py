@@ -141,9 +141,11 @@ def test_half_the_tolerance_range_remains() -> None:
     sensitivity = machine().sensitivity(machine().poses())
     lengths = [machine().parameters.index(f"strut.{n}.length") for n in (1, 2)]
     half_range = 0.3e-3 * np.abs(sensitivity[:, :, lengths]).sum(axis=-1)
-    assert np.abs(compensation().bound.values - half_range).max() < LENGTH
+    # Its slopes are those of the drawing; ours of the warm machine under load, 1/1000 others.
+    bound = compensation().bound.values
+    assert np.allclose(bound, half_range, rtol=1e-3, atol=0.0)
     for edge in ("lower", "upper"):
         residual = np.abs(compensation()[f"residual_{edge}"].values)
-        assert (residual <= half_range + compensation().second_order.values + LENGTH).all()
+        assert (residual <= bound + compensation().second_order.values + LENGTH).all()
     # The second-order term is small change: half a micrometre of the 380.
     assert compensation().second_order.values.max() < 1e-6

@@ -343,17 +343,11 @@ def sentence(machine: Machine, found: xr.Dataset) -> str:
 LACKING = {
     "monte_carlo": "sampled answer",
     "ellipses": "coverage ellipse",
-    "bounds": "guaranteed bound",
+    "bounds": "proven bound",
     "worst_case": "worst case",
     "shares": "shares",
 }
 """What is said not to be there, by the result that would have it."""
-
-
-def lacking(study: Study) -> list[str]:
-    """Sentences on what is not there, and why."""
-    said = {name: why for name, why in study.missing.items() if name in LACKING}
-    return [f"No {LACKING[name]}: {why}" for name, why in said.items()]
 
 
 def unproven_text(status: str) -> str:
@@ -380,7 +374,7 @@ def tables(study: Study) -> list[Table]:
     ):
         if result is not None:
             shown += of(study.machine, result)
-    if lacking(study):
-        rows = tuple((LACKING[name], why) for name, why in study.missing.items() if name in LACKING)
+    rows = tuple((LACKING[name], why) for name, why in study.missing.items() if name in LACKING)
+    if rows:
         shown.append(Table("lacking", "What could not be said, and why", ("", ""), rows, words=2))
     return shown

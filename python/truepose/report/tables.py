@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.budget.poses import reason_text
-from truepose.report.accuracy import gains, told
+from truepose.report.accuracy import told
 from truepose.report.display import (
     Array,
     column,
@@ -294,7 +294,7 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
             each.name,
             each.word,
             *(
-                f"{each.amount(one.value, side)} {each.unit.label}"
+                each.text(one.value, side)
                 for one, side in (
                     (each.answer.witness, -1),
                     (each.answer.linear, 0),
@@ -314,7 +314,7 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
         ("", "answer", *names, "asked", "at", "rests on"),
         tuple(rows),
         words=2,
-        note=" ".join([_SAMPLED if sampled else _NUMBERS, *gains(found)]),
+        note=_SAMPLED if sampled else _NUMBERS,
     )
 
 

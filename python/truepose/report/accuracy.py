@@ -85,7 +85,8 @@ class Told:
         if answer.answer == MET:
             return f"at most {self.text(answer.bound.value, 1)}"
         if answer.not_assembled:
-            return "a machine that cannot be assembled"
+            led = answer.example is None or answer.example.commanded
+            return "a machine that cannot be assembled" if led else "a command that leads nowhere"
         if answer.answer == UNDECIDED:
             return self._between(answer.witness.value, answer.bound.value)
         return self.text(answer.told.value)

@@ -288,7 +288,7 @@ def closure_forces(study: Study) -> Table:
 
 def answers(machine: Machine, found: Sequence[Answer]) -> Table:
     """What the machine can do against the accuracy asked: the three known numbers of each."""
-    sampled = any(answer.coverage is not None for answer in found)
+    shares = {each.coverage.probability for each in found if each.coverage is not None}
     rows = [
         (
             each.name,
@@ -306,14 +306,17 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
         )
         for each in told(machine, found)
     ]
-    names = ("at least", "quantile", "at most") if sampled else NUMBERS
+    names: Sequence[str] = NUMBERS
+    if shares:
+        quantile = f"{100.0 * shares.pop():.6g} % quantile"
+        names = ("confidence, lower end", quantile, "confidence, upper end")
     return Table(
         "answers",
         "Against the accuracy asked",
         ("", "answer", *names, "asked", "at"),
         tuple(rows),
         words=2,
-        note=_SAMPLED if sampled else _NUMBERS,
+        note=_NUMBERS if names is NUMBERS else _SAMPLED,
     )
 
 

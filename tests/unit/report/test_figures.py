@@ -80,10 +80,10 @@ def trace(figure: go.Figure, name: str, nth: int = 0) -> go.Scatter:
 
 def test_lines_are_the_errors_in_micrometres(study: Study) -> None:
     for nth in range(len(study.components)):
-        upper = trace(source_errors.figure(study), "tolerance, upper", nth)
+        upper = trace(source_errors.figure(study), "tolerance, all at upper ends", nth)
         expected = study.budget["error_upper"].sel(source="tolerance").values[:, nth] * 1e6
         np.testing.assert_allclose(upper.y, expected, rtol=1e-6)
-        lower = trace(overall_error.figure(study), "lower edges", nth)
+        lower = trace(overall_error.figure(study), "all at lower ends", nth)
         expected = study.budget["overall_error_lower"].values[:, nth] * 1e6
         np.testing.assert_allclose(lower.y, expected, rtol=1e-6)
 

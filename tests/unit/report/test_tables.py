@@ -10,7 +10,7 @@ import pytest
 from made_study import hexapod_study, planar_study
 from truepose.machine.shown_units import METRIC
 from truepose.report import how_far, inputs, tables
-from truepose.report.display import column, number, pose_text, where_highest
+from truepose.report.display import LOWER, UPPER, column, number, pose_text, where_highest
 from truepose.report.study import Study
 
 STUDIES = {"planar": planar_study(), "hexapod": hexapod_study(3)}
@@ -55,8 +55,8 @@ def test_the_ranking_is_by_rank_and_in_micrometres(study: Study) -> None:
 def test_a_source_with_a_band_has_two_rows_and_one_without_has_one(study: Study) -> None:
     table = tables.highest_absolute(study)
     assert [row[0] for row in table.rows] == [
-        "tolerance, lower", "tolerance, upper", "thermal", "elastic",
-        "overall, lower", "overall, upper",
+        f"tolerance, {LOWER}", f"tolerance, {UPPER}", "thermal", "elastic",
+        f"overall, {LOWER}", f"overall, {UPPER}",
     ]  # fmt: skip
     upper = study.budget["highest_upper"].sel(source="tolerance")
     for name, text in zip(study.components, table.rows[1][1:], strict=True):
@@ -68,7 +68,7 @@ def test_a_band_that_no_edge_shows_is_still_a_band() -> None:
     for edge in ("lower", "upper"):  # bands of coordinates alone leave the edges at the shift
         study.budget[f"error_{edge}"] = study.budget["error"].copy()
     labels = [row[0] for row in tables.highest_absolute(study).rows]
-    assert labels[:3] == ["tolerance, lower", "tolerance, upper", "thermal"]
+    assert labels[:3] == [f"tolerance, {LOWER}", f"tolerance, {UPPER}", "thermal"]
 
 
 def test_percentages_are_of_coordinates_only(study: Study) -> None:
@@ -79,10 +79,10 @@ def test_percentages_are_of_coordinates_only(study: Study) -> None:
 def test_the_compensation_has_before_and_after(study: Study) -> None:
     rows = {row[0]: row[1:] for row in tables.compensation(study).rows}
     residual = np.abs(study.compensated("residual_upper")).max(axis=0)
-    assert [cell(text) for text in rows["after, upper edges"][:-1]] == pytest.approx(
+    assert [cell(text) for text in rows["after, all at upper ends"][:-1]] == pytest.approx(
         residual * 1e6, abs=0.01
     )
-    assert {cell(text) for text in rows["after, shifts only"]} == {0.0}
+    assert {cell(text) for text in rows["after, known error"]} == {0.0}
 
 
 def test_all_sources_together_add_their_bands_and_not_their_shifts(study: Study) -> None:

@@ -78,7 +78,7 @@ def _at_home() -> list[Row]:
     if found.status.any():
         raise RuntimeError("the hexapod does not close at one of the corners")
     reached = found.most[0]
-    lower, upper, magnitudes, proven = bounds()
+    lower, upper, magnitudes, proven, _ = bounds()
     if proven != ["proven"]:
         raise RuntimeError(f"nothing is proven at home: {proven[0]}")
     bound = np.concatenate([upper[0], -np.array(lower[0]), magnitudes[0]])

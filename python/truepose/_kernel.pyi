@@ -178,13 +178,19 @@ class Machine:
         variables: Sequence[int],
         swing: ArrayLike,
         directions: Sequence[Sequence[int]] = ...,
-    ) -> tuple[list[list[float]], list[list[float]], list[list[float]], list[str]]:
-        """(lower, upper (n, n_component), magnitudes (n, n_quantity), status (n,)), proven bounds.
+        most_boxes: int = ...,
+        targets: ArrayLike | None = ...,
+    ) -> tuple[list[list[float]], list[list[float]], list[list[float]], list[str], list[int]]:
+        """(lower, upper (n, n_component), magnitudes (n, n_quantity), status, boxes): bounds.
 
         Over every variable in [-1, 1]: parameters `shifted` (k0,) are deviated by `shift`
         (n or 1, k0), and column c moves `parameters[c]` by `swing` (n or 1, k) times variable
-        `variables[c]`; the variables of one of `directions` are together a unit vector. Status:
-        proven, near_singular, box_too_wide.
+        `variables[c]`; the variables of one of `directions` are together a unit vector. Status
+        (n,): proven, near_singular, box_too_wide.
+
+        The box is divided into at most `most_boxes` parts, shown to be of one branch, where
+        nothing is proven over the whole of it, and where a magnitude lies above its `targets`
+        (n or 1, n_quantity), m and rad; NaN or inf: any bound will do. `boxes` (n,): looked at.
         """
 
     def bounds_over(

@@ -119,7 +119,6 @@ CATALOGUE: dict[str, str] = {
     "region-out-of-reach": "a region with poses that the machine cannot be commanded to",
     "bad-gap": "a gap that bounds cannot be closed to",
     "bad-truncation": "a number of standard deviations that a distribution cannot be cut at",
-    "no-finite-band": "bounds are wanted, but a deviation has no ends",
     "no-proof": "bounds are wanted where the method has no proof to give",
     "bad-sampling": "there is no such way of sampling",
     "bad-probability": "a coverage probability that is not between 0 and 1",

@@ -25,7 +25,7 @@ HALVINGS = 30
 
 OWN_REASONS = {
     "budget": {"band"},
-    "compensate": {"band", "no_bound"} | {f"correction_{name}" for name in _kernel.STATUS},
+    "compensate": {"band"} | {f"correction_{name}" for name in _kernel.STATUS},
     "worst_case": {"band"},
     "bounds": {"band"},
     "monte_carlo": {"band"},

@@ -141,6 +141,14 @@ def test_half_the_tolerance_range_remains() -> None:
     sensitivity = machine().sensitivity(machine().poses())
     lengths = [machine().parameters.index(f"strut.{n}.length") for n in (1, 2)]
     half_range = 0.3e-3 * np.abs(sensitivity[:, :, lengths]).sum(axis=-1)
+    assert np.allclose(compensation().bound.values, half_range, rtol=1e-3)
+    # Exactly, of the struts as long as they are, from the corrected carriages to the tool.
+    carriages = np.zeros((*compensation()["joint"].shape, 2))
+    carriages[:, 1, 0] = 0.6
+    carriages[:, :, 1] = compensation()["joint"].values
+    struts = machine().poses()[:, np.newaxis] - carriages
+    struts /= np.linalg.norm(struts, axis=2, keepdims=True)
+    half_range = 0.3e-3 * np.abs(np.linalg.inv(struts)).sum(axis=-1)
     assert np.abs(compensation().bound.values - half_range).max() < LENGTH
     for edge in ("lower", "upper"):
         residual = np.abs(compensation()[f"residual_{edge}"].values)

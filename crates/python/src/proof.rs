@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use truepose_kernel::batch::share_out;
 use truepose_kernel::machine::{chosen, parts};
 use truepose_kernel::proof::{
-    self, Affine, Deviating, Extent, PoseBound, Region, RegionBound, Unproven,
+    self, Affine, Deviating, Effort, Extent, PoseBound, Region, RegionBound, Unproven,
 };
 use truepose_kernel::spatial::Pose;
 
@@ -30,13 +30,19 @@ impl Machine {
     }
 
     /// Bounds of the error at n poses over every deviation in a box: (lower, upper (n, n_component),
-    /// magnitudes (n, n_quantity), status (n,) of "proven", "near_singular", "box_too_wide").
+    /// magnitudes (n, n_quantity), status (n,) of "proven", "near_singular", "box_too_wide", boxes looked
+    /// at (n,)).
     ///
     /// `shifted` (k0,) parameters and their `shift` (n or 1, k0); `parameters`, `variables` (k,) of the
     /// columns and their `swing` (n or 1, k), the variables in [-1, 1]; `directions`: variables that are
-    /// together a unit vector.
+    /// together a unit vector. At each pose the box is divided into at most `most_boxes` where it cannot be
+    /// proven as a whole, and where a magnitude lies above its `targets` (n or 1,
+    /// n_quantity), m and rad, NaN for none.
     #[allow(clippy::too_many_arguments)] // Python's signature
-    #[pyo3(signature = (joints, placements, shifted, shift, parameters, variables, swing, directions=vec![]))]
+    #[pyo3(signature = (
+        joints, placements, shifted, shift, parameters, variables, swing, directions=vec![],
+        most_boxes=1, targets=None,
+    ))]
     fn bounds_at<'py>(
         &self,
         py: Python<'py>,
@@ -48,6 +54,8 @@ impl Machine {
         variables: Vec<usize>,
         swing: &Bound<'py, PyAny>,
         directions: Vec<Vec<usize>>,
+        most_boxes: usize,
+        targets: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let shifted = self.columns(shifted)?;
         let parameters = self.columns(parameters)?;
@@ -68,7 +76,15 @@ impl Machine {
         if directions.iter().flatten().any(|&member| member >= number) {
             return Err(PyValueError::new_err("a direction of variables that are not there"));
         }
-        let mut found: Vec<Result<PoseBound, Unproven>> = vec![Err(Unproven::TooWide); count];
+        let quantities = parts(&machine.dof);
+        let targets =
+            targets.map(|given| Input::new(given, &[quantities.len()], "targets")).transpose()?;
+        let asked = targets
+            .as_ref()
+            .map(|given| Ok::<_, PyErr>(given.rows(0, given.serves(count, "targets")?)))
+            .transpose()?;
+        let mut found: Vec<(Result<PoseBound, Unproven>, usize)> =
+            vec![(Err(Unproven::TooWide), 0); count];
         py.detach(|| {
             share_out(&mut found, count, 1, |poses, found| {
                 for (i, found) in poses.zip(found) {
@@ -86,25 +102,32 @@ impl Machine {
                         shifted.iter().copied().zip(shifts.row(i).iter().copied()),
                         &deviating,
                     );
-                    *found = proof::bound_at_pose(&extent);
+                    let mut effort = Effort { most_boxes, ..Effort::WHOLE };
+                    if let Some(asked) = &asked {
+                        for (&part, &target) in quantities.iter().zip(asked.row(i)) {
+                            effort.targets[part] = target;
+                        }
+                    }
+                    *found = proof::bound_in_boxes(&extent, &effort);
                 }
             });
         });
         let components = chosen(&machine.dof);
-        let parts = parts(&machine.dof);
         let none =
             PoseBound { lower: [f64::NAN; 6], upper: [f64::NAN; 6], magnitudes: [f64::NAN; 2] };
-        let all: Vec<PoseBound> = found.iter().map(|found| found.unwrap_or(none)).collect();
+        let all: Vec<PoseBound> = found.iter().map(|found| found.0.unwrap_or(none)).collect();
         let rows =
             |of: &dyn Fn(&PoseBound) -> Vec<f64>| -> Vec<Vec<f64>> { all.iter().map(of).collect() };
         let lower = rows(&|bound| components.iter().map(|&k| bound.lower[k]).collect());
         let upper = rows(&|bound| components.iter().map(|&k| bound.upper[k]).collect());
-        let magnitudes = rows(&|bound| parts.iter().map(|&part| bound.magnitudes[part]).collect());
+        let magnitudes =
+            rows(&|bound| quantities.iter().map(|&part| bound.magnitudes[part]).collect());
         let status: Vec<&str> = found
             .iter()
-            .map(|found| found.as_ref().map_or_else(|&why| word(why), |_| "proven"))
+            .map(|found| found.0.as_ref().map_or_else(|&why| word(why), |_| "proven"))
             .collect();
-        (lower, upper, magnitudes, status).into_bound_py_any(py)
+        let boxes: Vec<usize> = found.iter().map(|found| found.1).collect();
+        (lower, upper, magnitudes, status, boxes).into_bound_py_any(py)
     }
 
     /// Bounds of the error over a region of commanded poses, as a dict: `lower`, `upper`, `reached_lower`,

@@ -1,26 +1,57 @@
-"""Where distributions without ends are taken to end, so that there is a box to bound over."""
+"""Distributions without ends, and where they are taken to end, so that there is a box.
+
+A normal or Student's variable has none. Like the worst case, bounds take it in its stated band of
+k standard deviations, or at as many standard deviations as are asked for; either is said.
+"""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from truepose.budget.spread import Spread
 from truepose.errors import Problem, RequestError
-from truepose.machine import Machine
+from truepose.sources import Distribution
 
-NAMED = 3
-"""Variables that a refusal names."""
+AS_STATED = "as stated"
+"""Each in its own band of k standard deviations."""
+
+NONE = "none"
+"""Nothing is without ends."""
+
+
+class Endless:
+    """Names of variables whose distribution has no ends, by the distribution in words."""
+
+    def __init__(self) -> None:
+        self._names: dict[str, dict[str, None]] = {}
+
+    def note(self, names: Iterable[str], distributions: Iterable[Distribution]) -> None:
+        """Add those of these variables that have no ends."""
+        for name, distribution in zip(names, distributions, strict=True):
+            if not distribution.bounded:
+                self._names.setdefault(str(distribution), {})[name] = None
+
+    def __bool__(self) -> bool:
+        return bool(self._names)
+
+    def __str__(self) -> str:
+        return "; ".join(f"{how}: {', '.join(of)}" for how, of in self._names.items()) or NONE
 
 
 @dataclass(frozen=True)
 class Ends:
-    """`sigmas`: standard deviations at which a normal or Student's distribution is cut, or None."""
+    """`sigmas`: standard deviations at which a normal or Student's variable ends; None: as stated.
+
+    `endless`: the variables met so far that have no ends.
+    """
 
     sigmas: float | None
+    endless: Endless = field(default_factory=Endless)
 
     @classmethod
     def of(cls, truncate: float | None) -> Ends:
@@ -42,34 +73,17 @@ class Ends:
     @property
     def attrs(self) -> dict[str, float | str]:
         """What the result says of it."""
-        return {"truncate": "none" if self.sigmas is None else self.sigmas}
+        cut = AS_STATED if self.sigmas is None else self.sigmas
+        return {"truncate": cut if self.endless else NONE, "unbounded": str(self.endless)}
 
-    def narrowed(self, machine: Machine, moves: Spread) -> Spread:
-        """The spread with every single variable in [-1, 1]: what has no ends is cut.
-
-        Raises `RequestError` (no-finite-band) where something has no ends and is not to be cut.
-        """
-        endless = [at for at, each in enumerate(moves.distributions) if not each.bounded]
-        if not endless:
-            return moves.centred()
+    def narrowed(self, moves: Spread) -> Spread:
+        """The spread with every single variable in [-1, 1], also what has no ends."""
+        self.endless.note(moves.names, moves.distributions)
         if self.sigmas is None:
-            named = ", ".join(
-                f"{moves.names[at]} ({moves.distributions[at]})" for at in endless[:NAMED]
-            )
-            more = f" and {len(endless) - NAMED} more" if len(endless) > NAMED else ""
-            raise RequestError(
-                Problem(
-                    "no-finite-band",
-                    "there is no bound where a deviation has no ends",
-                    file=machine.file,
-                    found=named + more,
-                    expected="bands with ends, as uniform, triangular or listed values have",
-                    hint="say where to cut: truncate=3 (--truncate 3) takes them to end at three "
-                    "standard deviations, which the result then says",
-                )
-            )
+            return moves.centred()
         factor = np.ones(len(moves.names))
-        for at in endless:
-            factor[at] = self.sigmas / moves.distributions[at].sigmas
+        for at, distribution in enumerate(moves.distributions):
+            if not distribution.bounded:
+                factor[at] = self.sigmas / distribution.sigmas
         cut = dataclasses.replace(moves, swing=moves.swing * factor[moves.variables])
         return cut.centred()

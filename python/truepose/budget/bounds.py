@@ -48,6 +48,14 @@ SCHEMA: Schema = {
 POSES = 16
 """Poses between two looks at Ctrl-C and progress."""
 
+PROVEN = "proven"
+
+MOST_BOXES = 100
+"""Parts that the bands are divided into where they cannot be proven as a whole,"""
+
+CLOSE = 1.01
+"""and until the sizes lie at most this above what is reached."""
+
 
 def bounds(
     machine: Machine,
@@ -65,17 +73,18 @@ def bounds(
     (from, to) in m and rad, a freedom not named staying at home: then the bounds hold at every pose
     of it, and lie at most the share `gap` above what is reached somewhere in it, unless the parts
     that the region may be divided into run out: `gap_reached` says how far they lie. A distribution
-    without ends (normal, Student's) has no bound: `truncate` says at how many standard deviations
-    it is taken to end. `progress` is called with (poses or boxes done, all or 0).
+    without ends (normal, Student's) is taken at its band of k standard deviations, or at `truncate`
+    standard deviations; the attributes `truncate` and `unbounded` say so. `progress` is called with
+    (poses or boxes done, all or 0).
 
     `status` is "proven", or says why nothing is: "near_singular", "box_too_wide" (the bands are too
-    wide for the method, or a part of the region could not be divided further). Bounds without a
-    proof are missing. A pose at which a machine inside the bands was met that cannot be assembled
-    is left out as `band`. The Dataset, SI, is described in docs/results.md.
+    wide for the method, at a pose divided into many parts, or a part of the region could not be
+    divided further). Bounds without a proof are missing. A pose at which a machine inside the bands
+    was met that cannot be assembled is left out as `band`. The Dataset, SI, is described in
+    docs/results.md.
 
-    Raises `RequestError`: no-finite-band, bad-truncation, bad-gap, bad-region, region-out-of-reach,
-    no-proof (a machine or a source that cannot be enclosed), bad-poses, no-workspace, no-source,
-    no-pose-left.
+    Raises `RequestError`: bad-truncation, bad-gap, bad-region, region-out-of-reach, no-proof (a
+    machine or a source that cannot be enclosed), bad-poses, no-workspace, no-source, no-pose-left.
     """
     given = machine.condition if condition is None else condition
     ends = Ends.of(truncate)
@@ -116,7 +125,7 @@ def _at_poses(
         every = spread(machine, block, sources)
         usable = walk.keep(block.indices, at_shifts(machine, block, every.alone, every.shift))
         done += int((~usable).sum())
-        block, every = block.select(usable), ends.narrowed(machine, every.select(usable))
+        block, every = block.select(usable), ends.narrowed(every.select(usable))
         for start in range(0, block.indices.size, POSES):
             chosen = np.zeros(block.indices.size, np.bool_)
             chosen[start : start + POSES] = True
@@ -140,6 +149,40 @@ def _at_poses(
     return found.assign_attrs(ends.attrs)
 
 
+def proven_bounds(
+    machine: Machine,
+    block: Block,
+    moves: Spread,
+    most_boxes: int = 1,
+    targets: ArrayLike | None = None,
+) -> dict[str, np.ndarray]:
+    """`lower`, `upper`, `magnitude` and `status` (`SCHEMA`) at the n poses of a block.
+
+    `moves` has every single variable in [-1, 1]. The box of variables is divided, into at most
+    `most_boxes` parts, where it cannot be proven as a whole, and where a magnitude lies above its
+    `targets` (n or 1, n_quantity), m and rad.
+    """
+    shifted, shift = moves.shift
+    lower, upper, magnitude, status, _ = machine.kernel.bounds_at(
+        block.joints,
+        block.placements,
+        shifted,
+        np.ascontiguousarray(shift),
+        moves.columns,
+        moves.variables.tolist(),
+        np.ascontiguousarray(moves.swing),
+        [members.tolist() for members in moves.directions],
+        most_boxes,
+        targets,
+    )
+    return {
+        "lower": np.asarray(lower),
+        "upper": np.asarray(upper),
+        "magnitude": np.asarray(magnitude),
+        "status": np.asarray(status, object),
+    }
+
+
 def _bounded(
     machine: Machine,
     block: Block,
@@ -152,22 +195,15 @@ def _bounded(
     kinds = list(quantities(machine.components).values())
     found = worst_vertices(Mover(machine, block, moves), value, effects, moves.domain, kinds)
     m = len(machine.components)
-    shifted, shift = moves.shift
-    lower, upper, magnitude, status = machine.kernel.bounds_at(
-        block.joints,
-        block.placements,
-        shifted,
-        np.ascontiguousarray(shift),
-        moves.columns,
-        moves.variables.tolist(),
-        np.ascontiguousarray(moves.swing),
-        [members.tolist() for members in moves.directions],
-    )
+    proven = proven_bounds(machine, block, moves)
+    hard = (proven["status"] != PROVEN) & of_band(found.status)
+    if hard.any():
+        asked = CLOSE * found.most[hard, 2 * m :]
+        divided = proven_bounds(machine, block.select(hard), moves.select(hard), MOST_BOXES, asked)
+        for name, value in divided.items():
+            proven[name][hard] = value
     values = {
-        "lower": np.asarray(lower),
-        "upper": np.asarray(upper),
-        "magnitude": np.asarray(magnitude),
-        "status": np.asarray(status, object),
+        **proven,
         "reached_lower": -found.most[:, m : 2 * m],
         "reached_upper": found.most[:, :m],
         "reached_magnitude": found.most[:, 2 * m :],

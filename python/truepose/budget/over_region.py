@@ -98,7 +98,7 @@ def bounds_over_region(
 ) -> xr.Dataset:
     """Proven bounds over every commanded pose of a region; see `truepose.budget.bounds.bounds`.
 
-    Raises `RequestError`: bad-region, region-out-of-reach, no-proof, no-finite-band, no-source.
+    Raises `RequestError`: bad-region, region-out-of-reach, no-proof, no-source.
     """
     if not machine.kernel.can_be_enclosed:
         raise no_proof(
@@ -116,7 +116,7 @@ def bounds_over_region(
         of = _known(machine, condition, source, block)
         (yielding if getattr(source, "over_region", None) == "wrench" else shifts).extend(of)
     every = spread(machine, block, sources)
-    moves = ends.narrowed(machine, every)
+    moves = ends.narrowed(every)
     shifts.extend(_middles(every))
     found = machine.kernel.bounds_over(
         sides,

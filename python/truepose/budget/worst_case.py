@@ -12,7 +12,7 @@ correlation does not narrow the worst case: every corner is taken to happen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, overload
 
 import numpy as np
@@ -20,6 +20,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.budget import comparison
+from truepose.budget.band_ends import Endless
 from truepose.budget.dataset import (
     QUANTITY_UNITS,
     Rows,
@@ -50,7 +51,6 @@ from truepose.budget.vertices import Found, worst_vertices
 from truepose.budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.sources import Distribution
 from truepose.sources._base import Floats, Indices
 from truepose.sources.domain import Domain
 
@@ -125,7 +125,7 @@ def _of_machine(
     sources = required_sources(machine, condition)
     kinds = comparison.quantities(machine.components)
     rows = Rows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
-    endless: dict[str, dict[str, None]] = {}
+    endless = Endless()
     walk = Walk(machine, table, condition, progress, path=poses is None and is_path(machine))
     for block in walk:
         moves = spread(machine, block, sources)
@@ -142,7 +142,7 @@ def _of_machine(
         block = block.select(usable)
         values = _values(found, value[usable], effects[usable], moves.domain, list(kinds.values()))
         rows.append(block, values, walk.keep(block.indices, of_band(found.status)))
-        _collect(endless, moves.names, moves.distributions)
+        endless.note(moves.names, moves.distributions)
     if rows.count == 0:
         raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
     coords = {
@@ -161,7 +161,7 @@ def _of_machine(
         over_all={"search": np.array(rows.arrays["search"], np.str_)},
         coords=coords,
     )
-    return result.assign_attrs(unbounded=_listed(endless))
+    return result.assign_attrs(unbounded=str(endless))
 
 
 def _only(
@@ -194,21 +194,6 @@ def _values(
     }
 
 
-def _collect(
-    endless: dict[str, dict[str, None]],
-    names: Iterable[str],
-    distributions: Iterable[Distribution],
-) -> None:
-    """Add the variables whose distribution has no ends, by the distribution in words."""
-    for name, distribution in zip(names, distributions, strict=True):
-        if not distribution.bounded:
-            endless.setdefault(str(distribution), {})[name] = None
-
-
-def _listed(endless: Mapping[str, Mapping[str, None]]) -> str:
-    return "; ".join(f"{how}: {', '.join(names)}" for how, names in endless.items()) or "none"
-
-
 def _of_function(function: Callable[..., Any], inputs: Any) -> xr.Dataset:
     model = FunctionModel(function, inputs)
     law = model.linear()
@@ -235,7 +220,7 @@ def _of_function(function: Callable[..., Any], inputs: Any) -> xr.Dataset:
         for name, each in SCHEMA.items()
         if "quantity" not in each.dims
     }
-    endless: dict[str, dict[str, None]] = {}
-    _collect(endless, model.names, model.distributions)
+    endless = Endless()
+    endless.note(model.names, model.distributions)
     result = function_dataset(schema, {name: values[name][0] for name in schema}, model)
-    return result.assign_attrs(unbounded=_listed(endless))
+    return result.assign_attrs(unbounded=str(endless))

@@ -38,7 +38,7 @@ from truepose.cli._options import (
         type=float,
         metavar="K",
         help="Take a distribution without ends, such as a normal one, to end at K standard "
-        "deviations.",
+        "deviations.  [default: its stated k sigma]",
     ),
     set_option,
     format_option,

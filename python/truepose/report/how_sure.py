@@ -228,8 +228,19 @@ def _bounds_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
         note=f"At {at_text(machine, found, pose)}, where the position's bound is highest. For "
         "every deviation inside the bands the tool is there and nowhere else, and its error "
         "between these ends, rounding included; the error that is reached shows how much of the "
-        "bound is used.",
+        "bound is used." + _taken_to_end(found),
     )
+
+
+def _taken_to_end(found: xr.Dataset) -> str:
+    """Where bounds take distributions without ends to end, as a sentence; nothing without any."""
+    where = found.attrs.get("truncate", "none")
+    if where == "none":
+        return ""
+    kinds = " and ".join(each.split(":")[0] for each in str(found.attrs["unbounded"]).split("; "))
+    if where == "as stated":
+        return f" Deviations without ends are taken at their stated k sigma: {kinds}."
+    return f" Deviations without ends ({kinds}) are taken to end at {where:g} standard deviations."
 
 
 def _unproven(machine: Machine, found: xr.Dataset) -> Table | None:
@@ -293,7 +304,7 @@ def _region(machine: Machine, found: xr.Dataset) -> Table:
         note=proof
         + open_
         + " Every pose in the region, not only those of a grid; the error's sign left "
-        "out.",
+        "out." + _taken_to_end(found),
     )
 
 

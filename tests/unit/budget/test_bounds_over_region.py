@@ -359,13 +359,16 @@ def test_an_overconstrained_machine_has_no_proof() -> None:
     assert refusal(machine, region={"x": (0.0, 0.01)}).problems[0].code == "no-proof"
 
 
-def test_no_finite_band() -> None:
+def test_a_distribution_without_ends() -> None:
     machine = load("planar_two_slider")
     from truepose.sources import normal
 
     deviation = Deviation.of([0], half=1e-4, distribution=normal(3.0))
     made = with_sources(machine, MadeSource("endless", deviation))
-    assert refusal(made, region=WHOLE).problems[0].code == "no-finite-band"
+    stated = tp.bounds(made, region=WHOLE, gap=0.3)
+    assert stated.attrs["truncate"] == "as stated"
+    assert stated.attrs["unbounded"].startswith("normal, 3 sigma: ")
     found = tp.bounds(made, region=WHOLE, gap=0.3, truncate=3)
     assert found.attrs["truncate"] == 3.0
+    assert (found.upper == stated.upper).all()
     assert str(found.status.values) == "proven"

@@ -159,7 +159,9 @@ def test_the_uncertainty_at_the_tool_is_that_of_the_posterior(
         budget = tp.budget(written, poses).sel(source="tolerance")
         slopes = written.sensitivity(poses) @ effects
         wanted = np.sqrt(np.einsum("pcv,vw,pcw->pc", slopes, covariance, slopes))
-        assert np.allclose(budget.uncertainty, wanted, rtol=1e-6, atol=0.0)
+        # Written as shifts, the slopes are those of the machine that they move.
+        close = 1e-4 if as_shifts else 1e-6
+        assert np.allclose(budget.uncertainty, wanted, rtol=close, atol=0.0)
         alone = np.sqrt(np.einsum("pcv,v->pc", slopes**2, np.diagonal(covariance)))
         if covariance is seen:
             assert (wanted < 0.1 * alone).all()

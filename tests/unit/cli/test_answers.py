@@ -16,7 +16,6 @@ import truepose
 from command_line import MACHINES, PLANAR, call
 from two_slider import LENGTH, carriages, tensions, tool
 
-
 ENDS = list(itertools.product((-3e-4, 3e-4), repeat=2))
 """The lengths of the two struts at the ends of their bands, m."""
 

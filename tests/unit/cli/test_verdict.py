@@ -1,4 +1,4 @@
-"""What the commands say of the accuracy asked beyond the worst case: witnesses, coverages, words."""
+"""What commands say of the accuracy asked beyond numbers: witnesses, coverages, words."""
 
 from __future__ import annotations
 

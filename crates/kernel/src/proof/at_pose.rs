@@ -5,17 +5,22 @@
 //! what remains is a smaller box, over which the enclosures are tighter, and so on. With all variables
 //! fixed the bound is the error at a vertex, but for rounding.
 
-use super::closures::{Placed, Six, derivatives};
-use super::root::{Inverse, Varying, prove};
-use super::targets::targets;
+use super::closures::{Placed, Six, Square, derivatives};
+use super::root::{Inverse, Root, Varying, prove};
+use super::targets::{Bounds, Closeness, TARGETS, targets};
 use super::{Deviating, Unproven, point};
 use crate::kinematics::{Sample, forward, limbs};
-use crate::linear::SIX;
+use crate::linear::{SIX, inverse_of};
 use crate::machine::Machine;
 use crate::scalar::{Interval, Scalar};
 use crate::spatial::{Pose, Quaternion, Vector, relative_quaternion, rotation_matrix};
 use crate::status::Status;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::rc::Rc;
 
+/// Magnitudes are refined until they lie at most this above the farthest reach.
+pub const FINE: f64 = 1.0003;
 /// Times that the box is made smaller.
 const ROUNDS: usize = 6;
 
@@ -49,10 +54,39 @@ pub struct PoseBound {
 
 /// The machine over a part of the box: where it is, and how far it moves per unit of each variable.
 pub struct Enclosed {
-    middle: Six,
-    whole: Six,
-    unique_in: Six,
+    /// Where it is at the part's middle, and to the last digit or so as plain numbers.
+    pub middle: Six,
+    pub pose: Pose<f64>,
+    /// Where all machines are, and where there is no other root of any of them.
+    pub whole: Six,
+    pub unique_in: Six,
     slopes: Vec<Six>,
+}
+
+/// A part of the box over which nothing is proven.
+pub struct Unenclosed {
+    pub why: Unproven,
+    /// Where the machine is at the part's middle; none if it cannot be there.
+    pub pose: Option<Pose<f64>>,
+    /// How far the machine goes from there with each variable, to first order.
+    pub effects: Vec<f64>,
+}
+
+/// A part of the box that is proven, with what is found out about smaller ones in it.
+pub struct Part<'a> {
+    extent: &'a Extent<'a>,
+    /// The variables' ends.
+    pub sides: Vec<Interval>,
+    pub first: Enclosed,
+    /// By the end at which each variable is held: -1, 1, or 0 for neither. None where nothing is proven.
+    narrowed: RefCell<HashMap<Vec<i8>, Option<Rc<Enclosed>>>>,
+}
+
+/// How far a part reaches along a direction, and what is left to find out.
+struct Reach {
+    bound: f64,
+    /// The variable whose slope is least certain, if one is.
+    loosest: Option<usize>,
 }
 
 /// The Cayley vector (rad) that turns `from` into `to`.
@@ -121,8 +155,13 @@ impl<'a> Extent<'a> {
         p
     }
 
-    /// Proves existence and uniqueness over the variables in a box, and encloses.
-    fn enclose(&self, variables: &[Interval]) -> Result<Enclosed, Unproven> {
+    /// Proves existence and uniqueness over the variables in a box, and encloses; the machine at its
+    /// middle is looked for from `start`.
+    pub fn enclose(
+        &self,
+        variables: &[Interval],
+        start: &Pose<f64>,
+    ) -> Result<Enclosed, Box<Unenclosed>> {
         let machine = self.machine;
         let middles: Vec<Interval> = variables.iter().map(|one| point(one.midpoint())).collect();
         let p = self.parameters(variables);
@@ -130,23 +169,36 @@ impl<'a> Extent<'a> {
         let nearly: Vec<f64> = p_middle.iter().map(|one| one.midpoint()).collect();
         let struts = limbs(machine, &nearly, self.joints);
         let sample = Sample { machine, p: &nearly, limbs: &struts };
-        let (found, status) = forward(&sample, self.joints, &self.pose);
+        let (found, status) = forward(&sample, self.joints, start);
         if status != Status::Ok {
-            return Err(Unproven::NearSingular);
+            let why = Unproven::NearSingular;
+            return Err(Box::new(Unenclosed { why, pose: None, effects: Vec::new() }));
         }
         let middle = displacement_numbers(machine, &self.pose, &found);
         let (q, at) = (&self.command.0, &self.command.1);
         let exact = derivatives(machine, &p_middle, q, at, &middle.map(point));
         let spread = derivatives(machine, &p, q, at, &middle.map(point));
-        let columns = self.columns(&spread);
         let away = variables.iter().zip(&middles).map(|(one, middle)| *one - *middle);
-        let varying: Vec<Varying> = columns.into_iter().zip(away).collect();
-        let root = prove(&middle, &exact.closures.residuals, &varying, |tried| {
+        let varying: Vec<Varying> = self.columns(&spread).into_iter().zip(away).collect();
+        let unproven = |why: Unproven| {
+            let effects = effects(&spread.to_displacement, &varying);
+            Box::new(Unenclosed { why, pose: Some(found), effects })
+        };
+        let residuals = &exact.closures.residuals;
+        let root = prove(&middle, residuals, &varying, &spread.to_displacement, |tried| {
             derivatives(machine, &p, q, at, tried).to_displacement
-        })?;
-        let over = derivatives(machine, &p, q, at, &root.enclosure);
-        let inverse = Inverse::of(&over.to_displacement).ok_or(Unproven::TooWide)?;
-        let off = inverse.times(&exact.closures.residuals);
+        })
+        .map_err(&unproven)?;
+        // From the plain numbers in the middle to any of the roots.
+        let mut between = root.enclosure;
+        for k in 0..SIX {
+            between[k] = between[k].hull(point(middle[k]));
+        }
+        let over = derivatives(machine, &p, q, at, &between);
+        let Some(inverse) = Inverse::of(&over.to_displacement) else {
+            return Err(unproven(Unproven::TooWide));
+        };
+        let off = inverse.times(residuals);
         let mut at_middle = middle.map(point);
         for k in 0..SIX {
             at_middle[k] = at_middle[k] - off[k];
@@ -156,7 +208,8 @@ impl<'a> Extent<'a> {
             .iter()
             .map(|column| inverse.times(column).map(|value| -value))
             .collect();
-        Ok(Enclosed { middle: at_middle, whole: root.enclosure, unique_in: root.unique_in, slopes })
+        let Root { enclosure, unique_in } = root;
+        Ok(Enclosed { middle: at_middle, pose: found, whole: enclosure, unique_in, slopes })
     }
 
     /// Derivatives of the closures to the variables.
@@ -173,46 +226,96 @@ impl<'a> Extent<'a> {
     }
 
     /// The machine over every variable in [-1, 1].
-    pub fn whole(&self) -> Result<Enclosed, Unproven> {
-        self.enclose(&vec![Interval::symmetric(1.0); self.deviating.count])
+    pub fn whole(&self) -> Result<Part<'_>, Box<Unenclosed>> {
+        self.part(vec![Interval::symmetric(1.0); self.deviating.count], &self.pose)
     }
 
-    /// The most that `direction . displacement` can be; `first` encloses the whole box.
-    pub fn most(&self, direction: &[f64; SIX], first: &Enclosed) -> f64 {
-        let whole = Interval::symmetric(1.0);
-        let mut variables = vec![whole; self.deviating.count];
-        let mut in_direction = vec![false; self.deviating.count];
-        for &member in self.deviating.directions.iter().flatten() {
+    /// The machine over a part of the box, looked for from `start`.
+    pub fn part(
+        &self,
+        sides: Vec<Interval>,
+        start: &Pose<f64>,
+    ) -> Result<Part<'_>, Box<Unenclosed>> {
+        let first = self.enclose(&sides, start)?;
+        Ok(Part { extent: self, sides, first, narrowed: RefCell::default() })
+    }
+}
+
+impl Part<'_> {
+    /// Where a variable is that is held at an end, or not held.
+    fn side(&self, variable: usize, end: i8) -> Interval {
+        let side = self.sides[variable];
+        match end {
+            0 => side,
+            1 => point(side.upper),
+            _ => point(side.lower),
+        }
+    }
+
+    /// The machine where some variables are held at an end; none where nothing is proven.
+    fn narrowed(&self, ends: &[i8]) -> Option<Rc<Enclosed>> {
+        if let Some(known) = self.narrowed.borrow().get(ends) {
+            return known.clone();
+        }
+        let sides: Vec<Interval> =
+            ends.iter().enumerate().map(|(variable, &end)| self.side(variable, end)).collect();
+        let found = self.extent.enclose(&sides, &self.first.pose).ok();
+        // The root over the smaller part is the one proved over the whole.
+        let found = found.filter(|one| lies_in(&one.middle, &self.first.unique_in)).map(Rc::new);
+        self.narrowed.borrow_mut().insert(ends.to_vec(), found.clone());
+        found
+    }
+
+    /// The most that `direction . displacement` can be.
+    pub fn most(&self, direction: &[f64; SIX]) -> f64 {
+        self.reach(direction).bound
+    }
+
+    /// The variable to divide for a lower bound along a direction; none where that is of no use.
+    pub fn loosest(&self, direction: &[f64; SIX]) -> Option<usize> {
+        self.reach(direction).loosest
+    }
+
+    fn reach(&self, direction: &[f64; SIX]) -> Reach {
+        let Deviating { directions, count, .. } = self.extent.deviating;
+        let mut in_direction = vec![false; *count];
+        for &member in directions.iter().flatten() {
             in_direction[member] = true;
         }
-        let mut own: Option<Enclosed> = None;
+        let mut ends = vec![0_i8; *count];
+        let mut own: Option<Rc<Enclosed>> = None;
         let mut best = f64::INFINITY;
+        let mut loosest = None;
         for _ in 0..ROUNDS {
-            let enclosed = own.as_ref().unwrap_or(first);
+            let enclosed = own.as_deref().unwrap_or(&self.first);
             let mut bound = along(direction, &enclosed.middle);
             let mut fixed = false;
-            let mut free = !self.deviating.directions.is_empty();
-            let before = variables.clone();
+            let mut free = !directions.is_empty();
+            let mut least_certain = 0.0;
+            loosest = None;
             for (variable, slope) in enclosed.slopes.iter().enumerate() {
-                if in_direction[variable] {
+                if in_direction[variable] || ends[variable] != 0 {
                     continue;
                 }
                 let slope = along(direction, slope);
-                let middle = point(before[variable].midpoint());
-                bound = bound + slope * (before[variable] - middle);
-                if before[variable] != whole {
+                let side = self.sides[variable];
+                bound = bound + slope * (side - point(side.midpoint()));
+                if side.lower == side.upper {
                     continue;
                 }
                 if slope.lower >= 0.0 || slope.upper <= 0.0 {
-                    let end = if slope.lower >= 0.0 { 1.0 } else { -1.0 };
-                    variables[variable] = point(end);
+                    ends[variable] = if slope.lower >= 0.0 { 1 } else { -1 };
                     fixed = true;
                 } else {
                     free = true;
                 }
+                let uncertain = (slope.upper - slope.lower) * side.radius();
+                if uncertain > least_certain {
+                    (least_certain, loosest) = (uncertain, Some(variable));
+                }
             }
             // Of a unit vector t, slopes . t is at most the length of the slopes (Cauchy and Schwarz).
-            for members in &self.deviating.directions {
+            for members in directions {
                 let squares = members
                     .iter()
                     .map(|&member| along(direction, &enclosed.slopes[member]).square())
@@ -223,36 +326,51 @@ impl<'a> Extent<'a> {
             if !fixed {
                 break;
             }
-            // A sub-box that cannot be enclosed leaves the bound as it is.
-            let Ok(next) = self.enclose(&variables) else { break };
-            // The root over the sub-box is the one proved over the whole.
-            if !next
-                .middle
-                .iter()
-                .zip(&first.unique_in)
-                .all(|(one, whole)| one.lower >= whole.lower && one.upper <= whole.upper)
-            {
-                break;
-            }
+            // A smaller part that cannot be enclosed leaves the bound as it is.
+            let Some(next) = self.narrowed(&ends) else { break };
             if !free {
                 best = best.min(along(direction, &next.middle).upper);
+                loosest = None;
                 break;
             }
             own = Some(next);
         }
-        best
+        Reach { bound: best, loosest }
+    }
+
+    /// Bounds over the part.
+    pub fn bounds(&self, closeness: &Closeness) -> Bounds {
+        targets(self.extent.machine, &self.first.whole, closeness, |u| self.most(u))
     }
 }
 
-/// Bounds of the error at one pose over every deviation in the box.
-pub fn bound_at_pose(extent: &Extent<'_>) -> Result<PoseBound, Unproven> {
-    let first = extent.whole()?;
-    let bounds = targets(extent.machine, &first.whole, |u| extent.most(u, &first));
-    let mut result = PoseBound { lower: [0.0; SIX], upper: [0.0; SIX], magnitudes: [0.0; 2] };
-    for k in 0..SIX {
-        result.upper[k] = bounds[k];
-        result.lower[k] = -bounds[SIX + k];
+/// Whether a place certainly lies in a box.
+pub fn lies_in(place: &Six, outer: &Six) -> bool {
+    place.iter().zip(outer).all(|(one, outer)| one.lower >= outer.lower && one.upper <= outer.upper)
+}
+
+/// How far the machine goes with each variable, to first order.
+fn effects(to_displacement: &Square, varying: &[Varying]) -> Vec<f64> {
+    let inverse = inverse_of(&to_displacement.map(|row| row.map(Interval::midpoint)));
+    let size = |(column, extent): &Varying| {
+        let step = |row: &[f64; SIX]| -> f64 {
+            row.iter().zip(column).map(|(entry, value)| entry * value.midpoint()).sum()
+        };
+        let total: f64 = inverse.iter().map(|row| step(row).abs()).sum();
+        if total.is_finite() { total * extent.magnitude() } else { extent.magnitude() }
+    };
+    varying.iter().map(size).collect()
+}
+
+impl PoseBound {
+    /// Of the bounds of all targets.
+    pub fn of(values: &[f64; TARGETS]) -> Self {
+        let mut result = PoseBound { lower: [0.0; SIX], upper: [0.0; SIX], magnitudes: [0.0; 2] };
+        for k in 0..SIX {
+            result.upper[k] = values[k];
+            result.lower[k] = -values[SIX + k];
+        }
+        result.magnitudes.copy_from_slice(&values[2 * SIX..]);
+        result
     }
-    result.magnitudes.copy_from_slice(&bounds[2 * SIX..]);
-    Ok(result)
 }

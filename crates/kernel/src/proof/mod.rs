@@ -7,6 +7,7 @@
 
 mod affine;
 mod at_pose;
+mod boxes;
 mod closures;
 mod directions;
 mod over_region;
@@ -15,7 +16,8 @@ mod root;
 mod targets;
 
 pub use affine::Affine;
-pub use at_pose::{Extent, PoseBound, bound_at_pose};
+pub use at_pose::{Extent, PoseBound};
+pub use boxes::{Effort, bound_in_boxes};
 pub use over_region::{Region, RegionBound, bound_over_region, can_be_enclosed};
 
 use crate::scalar::Interval;

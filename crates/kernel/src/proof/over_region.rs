@@ -7,7 +7,7 @@
 use super::affine::Affine;
 use super::at_pose::{Extent, along, displacement_numbers};
 use super::pose_box::{Over, reach, reach_more};
-use super::targets::{TARGETS, targets};
+use super::targets::{AS_LOW_AS_CAN_BE, Closeness, TARGETS, targets};
 use super::{Deviating, Unproven, point};
 use crate::batch::{displacement, share_out};
 use crate::kinematics::{Sample, commanded_pose, forward, inverse, limbs};
@@ -21,6 +21,8 @@ use crate::status::Status;
 const BATCH: usize = 32;
 /// A box of less than this share of the region along every axis is given up.
 const SMALLEST: f64 = 1e-4;
+/// Magnitudes are refined until they lie at most this above the farthest reach.
+const FINE: f64 = 1.01;
 /// A component below this share of its magnitude is closed to the gap of this share.
 const MINOR: f64 = 0.1;
 
@@ -105,8 +107,12 @@ impl Region<'_> {
                 .map(|(side, middle)| Interval::new(side[0], side[1]) - point(middle[0]))
                 .collect();
             let rates = self.rates(&command, &over)?;
-            let mut bound = targets(machine, &over.whole, |u| reach(u, &own, &rates, &halves));
-            let direct = targets(machine, &over.whole, |u| reach(u, &over, &[], &[]));
+            let bounds = |most: &dyn Fn(&[f64; SIX]) -> f64| {
+                let closeness = Closeness { fine: FINE, enough: AS_LOW_AS_CAN_BE };
+                targets(machine, &over.whole, &closeness, most).values
+            };
+            let mut bound = bounds(&|u| reach(u, &own, &rates, &halves));
+            let direct = bounds(&|u| reach(u, &over, &[], &[]));
             for (bound, direct) in bound.iter_mut().zip(direct) {
                 *bound = bound.min(direct);
             }
@@ -119,10 +125,10 @@ impl Region<'_> {
                     shift: own.shifts.clone(),
                     deviating: self.deviating,
                 };
-                let first = extent.whole()?;
-                let finer = targets(machine, &over.whole, |u| {
+                let part = extent.whole().map_err(|not| not.why)?;
+                let finer = bounds(&|u| {
                     let more = reach_more(u, &over, &rates, &halves);
-                    (point(extent.most(u, &first)) + point(more)).upper
+                    (point(part.most(u)) + point(more)).upper
                 });
                 for (bound, finer) in bound.iter_mut().zip(finer) {
                     *bound = bound.min(finer);

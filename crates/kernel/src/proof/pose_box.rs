@@ -134,7 +134,8 @@ impl Region<'_> {
             let extent = Interval::new(side[0], side[1]) - point(middle[0]);
             varying.push((pull(machine, &spread, &twist), extent));
         }
-        let root = prove(&middle, &exact, &varying, jacobian)?;
+        let first = unknowns(&spread);
+        let root = prove(&middle, &exact, &varying, &first, jacobian)?;
         let (moved, q) = split(&root.enclosure);
         let over = derivatives(machine, &p, &q, &at, &moved);
         let inverse = Inverse::of(&unknowns(&over)).ok_or(Unproven::TooWide)?;
@@ -233,10 +234,12 @@ impl Region<'_> {
             }
             (known, columns)
         };
-        let (known, columns) = moves(&derivatives(machine, &p, q, at, &still));
+        let spread = derivatives(machine, &p, q, at, &still);
+        let (known, columns) = moves(&spread);
         let varying: Vec<Varying> =
             columns.into_iter().map(|column| (column, Interval::symmetric(1.0))).collect();
-        let root = prove(&[0.0; SIX], &known, &varying, |tried| {
+        let first = &spread.to_displacement;
+        let root = prove(&[0.0; SIX], &known, &varying, first, |tried| {
             derivatives(machine, &p, q, at, tried).to_displacement
         })?;
         let whole = root.enclosure.map(|one| one.hull(point(0.0)));

@@ -10,6 +10,8 @@ use crate::scalar::Interval;
 const TRIALS: usize = 12;
 /// Times that a proven box is made tighter.
 const REFINEMENTS: usize = 3;
+/// A proven box is made tighter while one of its sides shrinks below this share of itself.
+const WORTH_IT: f64 = 0.99;
 /// A box grows by this share of itself between trials.
 const INFLATION: f64 = 0.1;
 /// Smallest half width of a box, m: far below anything and far above rounding.
@@ -179,16 +181,16 @@ pub struct Root {
 pub type Varying = (Six, Interval);
 
 /// Proves a root near `middle` for all that else varies: `value` are the residuals there where nothing does,
-/// `jacobian` encloses the derivatives over a box and all that else varies.
+/// `first` encloses the derivatives there for all that else varies, `jacobian` those over a box.
 pub fn prove(
     middle: &[f64; SIX],
     value: &Six,
     varying: &[Varying],
+    first: &Square,
     jacobian: impl Fn(&Six) -> Square,
 ) -> Result<Root, Unproven> {
     let at_middle = middle.map(point);
-    let first = jacobian(&at_middle);
-    let approximate = inverse_of(&middles(&first));
+    let approximate = inverse_of(&middles(first));
     if !approximate.iter().flatten().all(|entry| entry.is_finite()) {
         return Err(Unproven::NearSingular);
     }
@@ -202,7 +204,12 @@ pub fn prove(
         }
     }
     let krawczyk = |tried: &Six| {
-        let spread = distance(&approximate, &jacobian(tried));
+        // The mean value theorem is used between the middle and any point of the box.
+        let mut between = *tried;
+        for i in 0..SIX {
+            between[i] = between[i].hull(at_middle[i]);
+        }
+        let spread = distance(&approximate, &jacobian(&between));
         let mut found = *tried;
         for i in 0..SIX {
             let more =
@@ -225,8 +232,13 @@ pub fn prove(
             let mut enclosure = found;
             for _ in 0..REFINEMENTS {
                 let tighter = krawczyk(&enclosure);
+                let before = enclosure;
                 for i in 0..SIX {
                     enclosure[i] = enclosure[i].intersection(tighter[i]).unwrap_or(enclosure[i]);
+                }
+                let gained = |i: usize| enclosure[i].radius() < WORTH_IT * before[i].radius();
+                if !(0..SIX).any(gained) {
+                    break;
                 }
             }
             return Ok(Root { enclosure, unique_in: tried });

@@ -19,7 +19,7 @@ TITLE = "Overall error at each pose"
 
 LINES = (
     ("overall_error_upper", UPPER, BEFORE, "solid"),
-    ("overall_error", "with shifts only", OVERALL, "dot"),
+    ("overall_error", "known error", OVERALL, "dot"),
     ("overall_error_lower", LOWER, "#0072B2", "dash"),
 )
 
@@ -28,7 +28,7 @@ def caption(study: Study) -> str:
     """What the lines are."""
     drawn = drawn_poses(study.largest)
     return (
-        "Exact error with all sources acting together: every source at its known shift, and the "
+        "Exact error with all sources acting together: every source at its shift (the known error), and the "
         "toleranced lengths all at the lower and all at the upper ends of their bands. That is not "
         "the worst case: lengths at unlike ends may do more."
         + thinning_note(len(drawn), study.n_pose)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from truepose.machine.shown_units import Shown, ShownUnits
 from truepose.machine.workspace import Accuracy
 from truepose.report.study import Study
+from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, UNDECIDED, Answer, Number
 
 Array = NDArray[np.float64]
 SOURCES = ("tolerance", "thermal", "elastic")
@@ -185,6 +186,11 @@ def _study(machine: Any, poses: Array) -> Study:
         "rms": (("source", "quantity"), highest / 2, "m"),
         "share": (("source",), highest[:, 0] / highest[:, 0].sum(), "1"),
         "rank": (("source",), 1 + np.argsort(np.argsort(-highest[:, 0])), "1"),
+        "linear_maximum": (
+            ("pose", "quantity"),
+            _sizes(np.abs(shift.sum(axis=1)) + half.sum(axis=1)),
+            "m",
+        ),
         "verdict": (("source",), np.array(["dominant", "relevant", "negligible"]), "1"),
         "joint_nominal": (("pose", "joint"), machine.kernel.place(poses)[0], "m"),
         "force": (("pose", "closure"), machine.kernel.place(poses)[0] * 1e3, "N"),
@@ -242,16 +248,49 @@ def _study(machine: Any, poses: Array) -> Study:
         "residual_middle": (("pose", "component"), 0 * half.sum(axis=1), "m"),
         "bound": (("pose", "component"), half.sum(axis=1), "m"),
         "second_order": (("pose", "component"), 1e-3 * half.sum(axis=1), "m"),
+        "linear_maximum": (("pose", "quantity"), _sizes(half.sum(axis=1)), "m"),
     }
-    kept = {name: coords[name] for name in coords if name not in ("source", "quantity", "joint")}
+    kept = {name: coords[name] for name in coords if name not in ("source", "joint")}
     kept["joint_name"] = ("joint", list(machine.joints))
+    compensation = _dataset(remaining, kept, attrs)
     return Study(
         machine,
         budget,
-        _dataset(remaining, kept, attrs),
+        compensation,
+        (*_answers(machine, budget, BEFORE), *_answers(machine, compensation, AFTER)),
+        (*_answers(machine, budget, BEFORE, 0.4), *_answers(machine, compensation, AFTER, 0.4)),
         _over_time(machine, poses),
         _strain(coords, attrs),
     )
+
+
+def _sizes(errors: Array) -> Array:
+    """(n_pose, quantity) a little less than the lengths of vectors of worst components."""
+    parts = [errors[:, :3], errors[:, 3:]] if errors.shape[1] > 3 else [errors]
+    return np.stack([0.9 * np.linalg.norm(part, axis=1) for part in parts], axis=1)
+
+
+def _answers(machine: Any, found: xr.Dataset, state: str, share: float = 1.0) -> tuple[Answer, ...]:
+    """Answers at the pose of the largest linear maximum: a witness 1 % below, a bound 2 % above."""
+    poses = np.stack([found[f"pose_{name}"].values for name in machine.commanded], axis=-1)
+    answers = []
+    for at, quantity in enumerate(found["quantity"].values):
+        sizes = found["linear_maximum"].values[:, at]
+        worst = int(sizes.argmax())
+        witness, linear, bound = (
+            Number(share * factor * float(sizes[worst]), worst, poses[worst])
+            for factor in (0.99, 1.0, 1.02)
+        )
+        asked = machine.accuracy.target if quantity == "position" else None
+        answer = None
+        if asked is not None:
+            answer = (
+                NOT_MET if witness.value > asked else MET if bound.value <= asked else UNDECIDED
+            )
+        answers.append(
+            Answer(str(quantity), state, asked, answer, witness, linear, bound, "what is made up")
+        )
+    return tuple(answers)
 
 
 def _strain(coords: dict[str, Any], attrs: Any) -> xr.Dataset:

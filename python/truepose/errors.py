@@ -133,6 +133,7 @@ CATALOGUE: dict[str, str] = {
     "output-is-input": "the output would write over the machine file",
     "output-exists": "a new file is wanted where there is one already",
     "machine-file-changed": "a machine file that is not the one that was read",
+    "no-witness": "a witness is wanted where no machine exceeds the accuracy asked",
     "witness-not-written": "a witness that a machine file cannot say",
     "unknown-kind": "a kind of machine that is not in the library",
     # controllers

@@ -29,8 +29,8 @@ from truepose.report.figures import (
     calibration_correlation,
     calibration_unknowns,
     distribution,
+    how_far,
     machine_drawing,
-    three_answers,
     tornado,
 )
 
@@ -49,7 +49,7 @@ COLOURS = {
     "source_errors": list(_style.SOURCE_COLOURS[:3]),
     "overall_error": [_style.BEFORE, _style.OVERALL],
     "before_after": [_style.BEFORE, _style.AFTER],
-    "three_answers": [three_answers.COLOURS[kind] for kind in ("sampled", "farthest", "exact")],
+    "how_far": list(how_far.COLOURS.values()),
     "distribution": [distribution.WITHIN, distribution.OUTSIDE],
     "coverage_ellipses": [_style.SOURCE_COLOURS[0]],
     "tornado": [tornado.LOOKS["first"][1], tornado.LINEAR],

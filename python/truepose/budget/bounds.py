@@ -35,12 +35,12 @@ _EACH = ("pose", "component")
 _SIZE = ("pose", "quantity")
 
 SCHEMA: Schema = {
-    "lower": Variable(_EACH, "component", "proven lower bound of the error"),
-    "upper": Variable(_EACH, "component", "proven upper bound of the error"),
+    "lower": Variable(_EACH, "component", "proven bound: the error is never below"),
+    "upper": Variable(_EACH, "component", "proven bound: the error is never above"),
     "reached_lower": Variable(_EACH, "component", "lowest exact error found at a vertex"),
     "reached_upper": Variable(_EACH, "component", "highest exact error found at a vertex"),
-    "linear": Variable(_EACH, "component", "worst case of first order"),
-    "magnitude": Variable(_SIZE, "quantity", "proven upper bound of the size of the error"),
+    "linear": Variable(_EACH, "component", "worst case to first order"),
+    "magnitude": Variable(_SIZE, "quantity", "proven bound of the size of the error"),
     "reached_magnitude": Variable(_SIZE, "quantity", "largest exact error found at a vertex"),
     "status": Variable(("pose",), "1", "proven, or why there is no proof", object),
 }

@@ -44,24 +44,28 @@ _ALL = ("pose", "component")
 _OVER = ("source", "component")
 
 SCHEMA: Schema = {
-    "error": Variable(_EACH, "component", "error from the source alone, at its shift"),
+    "error": Variable(_EACH, "component", "known error of the source alone, at its shift"),
     "error_lower": Variable(
-        _EACH, "component", "error from the source alone, lengths and offsets at the lower edge"
+        _EACH, "component", "error of the source alone, all lengths at their bands' lower ends"
     ),
     "error_upper": Variable(
-        _EACH, "component", "error from the source alone, lengths and offsets at the upper edge"
+        _EACH, "component", "error of the source alone, all lengths at their bands' upper ends"
     ),
-    "worst": Variable(_EACH, "component", "most that the source alone can do"),
-    "reach": Variable(_EACH, "component", "how far the source's band reaches, the farther way"),
-    "uncertainty": Variable(_EACH, "component", "standard uncertainty from the source's band"),
+    "worst": Variable(_EACH, "component", "worst case of the source alone, of each component"),
+    "reach": Variable(
+        _EACH, "component", "how far the source's tolerance band reaches, the farther way"
+    ),
+    "uncertainty": Variable(
+        _EACH, "component", "standard uncertainty from the source's tolerance band"
+    ),
     "percent_lower": Variable(_EACH, "%", "error_lower in % of the coordinate"),
     "percent_upper": Variable(_EACH, "%", "error_upper in % of the coordinate"),
-    "overall_error": Variable(_ALL, "component", "error from all sources at their shifts"),
+    "overall_error": Variable(_ALL, "component", "known error of all sources, at their shifts"),
     "overall_error_lower": Variable(
-        _ALL, "component", "error from all sources, the tolerance at its lower edge"
+        _ALL, "component", "error of all sources, toleranced lengths all at their lower ends"
     ),
     "overall_error_upper": Variable(
-        _ALL, "component", "error from all sources, the tolerance at its upper edge"
+        _ALL, "component", "error of all sources, toleranced lengths all at their upper ends"
     ),
     "overall_percent_lower": Variable(
         _ALL, "%", "overall_error_lower in percent of the coordinate"

@@ -95,7 +95,11 @@ SCHEMA: Schema = {
 
 MACHINE: Schema = {
     "magnitude_mean": Variable(_SIZE, "quantity", "mean size of the error"),
-    "magnitude_upper": Variable(_SIZE, "quantity", "size that the probability asked is below"),
+    "magnitude_upper": Variable(
+        _SIZE,
+        "quantity",
+        "upper end of the coverage interval from zero: size that the probability asked is below",
+    ),
     "magnitude_maximum": Variable(_SIZE, "quantity", "largest size of the error of a sample"),
     "magnitude_quantile": Variable(
         (*_SIZE, "level"), "quantity", "size of the error that a share of samples is below"

@@ -38,13 +38,13 @@ _ALL = ("component",)
 _SIZE = ("quantity",)
 
 SCHEMA: Schema = {
-    "lower": Variable(_ALL, "component", "proven lower bound of the error over the region"),
-    "upper": Variable(_ALL, "component", "proven upper bound of the error over the region"),
+    "lower": Variable(_ALL, "component", "proven bound: the error is nowhere below"),
+    "upper": Variable(_ALL, "component", "proven bound: the error is nowhere above"),
     "reached_lower": Variable(_ALL, "component", "lowest exact error found in the region"),
     "reached_upper": Variable(_ALL, "component", "highest exact error found in the region"),
     "where_lower": Variable((*_ALL, "commanded"), "commanded", "pose of the lowest error found"),
     "where": Variable((*_ALL, "commanded"), "commanded", "pose of the highest error found"),
-    "magnitude": Variable(_SIZE, "quantity", "proven upper bound of the size of the error"),
+    "magnitude": Variable(_SIZE, "quantity", "proven bound of the size of the error"),
     "reached_magnitude": Variable(_SIZE, "quantity", "largest exact error found in the region"),
     "where_magnitude": Variable(
         (*_SIZE, "commanded"), "commanded", "pose of the largest error found"

@@ -6,7 +6,7 @@ directed search, which starts where the linear worst case lies and takes what si
 all patterns of the weakest ones, still gain; where it ends far from the linear worst case it also
 starts elsewhere. A direction that is not known has a sphere for its corners: it is turned to where
 a linear function through points about it is largest, again and again. It proves nothing: a
-guaranteed bound does.
+proven bound does.
 """
 
 from __future__ import annotations

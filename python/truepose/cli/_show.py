@@ -43,24 +43,27 @@ def _print(shown: Iterable[Any]) -> None:
     )
     for each in shown:
         console.print(each)
-    sys.stdout.write(text.getvalue())
+    sys.stdout.writelines(f"{line.rstrip(' ')}\n" for line in text.getvalue().splitlines())
 
 
 COLOURS = {"met": "green", "missed": "red", "open": "yellow", "none": "default"}
 """Of an answer's word."""
 
 
-def show_answers(answers: Iterable[Told]) -> None:
-    """Print the answers, a line each, before anything else."""
+def show_answers(answers: Iterable[Told], gains: Iterable[str] = ()) -> None:
+    """Print the answers, a line each, before anything else; then what compensation gains."""
+    from rich.table import Table as RichTable
     from rich.text import Text
 
-    lines = []
+    lines = RichTable.grid(padding=(0, 2))
     for each in answers:
-        lines.append(Text.assemble((each.word, f"bold {COLOURS[each.colour]}"), f"  {each.line}"))
+        lines.add_row(Text(each.word, f"bold {COLOURS[each.colour]}"), Text(each.line))
         if each.witness:
-            lines.append(Text(f"  witness: {each.witness}", style="dim"))
-    if lines:
-        _print([*lines, Text()])
+            lines.add_row("", Text(f"witness: {each.witness}", style="dim"))
+    for sentence in gains:
+        lines.add_row("", Text(sentence))
+    if lines.row_count:
+        _print([lines, Text()])
 
 
 def _rich(table: Table) -> RichTable:

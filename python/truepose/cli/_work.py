@@ -22,7 +22,7 @@ from truepose.errors import Problem, RequestError
 from truepose.machine.suggestion import counted
 from truepose.output import require_writable
 from truepose.report import formats
-from truepose.report.accuracy import told
+from truepose.report.accuracy import gains, told
 from truepose.report.display import nearest_middle, pose_text, where_highest
 from truepose.report.result import Result
 from truepose.report.study import Study, warnings_of
@@ -36,18 +36,23 @@ if TYPE_CHECKING:
     from truepose.machine import Machine
     from truepose.verdict.answer import Answer
 
+ASK = 'try it with --set accuracy.target="0.5 mm"'
+
 MOST_PROBLEMS = 20
 """Poses named one by one when `--strict` refuses them."""
 
 
 def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMATS)) -> Machine:
-    """Refuse an output that cannot be written, then read the machine file.
+    """Refuse files that cannot be written, then read the machine file.
 
     Raises `RequestError` (no-accuracy) where an accuracy is required that the file does not ask
-    for: a silent yes would let a machine pass that nobody judged.
+    for: a silent yes would let a machine pass that nobody judged; no-witness where one is wanted
+    of such a file.
     """
     if request.output is not None:
         require_writable(request.output, endings, [request.machine_file])
+    if request.witness is not None:
+        require_writable(request.witness, [witness_file.ENDING], [request.machine_file])
     machine = truepose.load(request.machine_file, settings=request.settings)
     if request.require_accuracy and not machine.accuracy.asks:
         raise RequestError(
@@ -58,9 +63,11 @@ def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMAT
                 path="accuracy",
                 found="nothing",
                 expected='[accuracy] with target = "0.5 mm", or angle_target',
-                hint='try it with --set accuracy.target="0.5 mm"',
+                hint=ASK,
             )
         )
+    if request.witness is not None and not machine.accuracy.asks:
+        raise _no_witness("no accuracy that is asked for", ASK)
     return machine
 
 
@@ -153,7 +160,7 @@ def deliver(
     if request.output is not None:
         formats.write(result, request.output)
     if request.format == "table":
-        show_answers(told(result.machine, answers))
+        show_answers(told(result.machine, answers), gains(answers))
         show_tables(table for table in tables if table is not None)
     else:
         sys.stdout.writelines(formats.text(result, f".{request.format}"))
@@ -175,13 +182,24 @@ def write_witness(request: Request, answers: Sequence[Answer], state: str) -> No
             witness_file.write_witness(example.machine, example, path, original=original)
             note_written(path)
             return
-    words = [f"{each.quantity}: {each.answer or 'nothing asked'}" for each in answers]
-    raise RequestError(
+    words = [
+        f"{each.quantity}: {each.answer or 'nothing asked'}"
+        for each in answers
+        if each.state == state
+    ]
+    sampled = any(each.coverage is not None for each in answers)
+    hint = "a coverage has no one machine: try --set accuracy.at=worst" if sampled else None
+    raise _no_witness(f"{state}, {', '.join(words)}", hint)
+
+
+def _no_witness(found: str, hint: str | None) -> RequestError:
+    return RequestError(
         Problem(
             "no-witness",
             "there is no witness to write",
-            found=f"{state}, " + ", ".join(dict.fromkeys(words)),
+            found=found,
             expected="an accuracy that is NOT met: the machine that exceeds it is the witness",
+            hint=hint,
         )
     )
 

@@ -42,7 +42,7 @@ def command(**options: Any) -> int:
     from truepose.cli import _work
     from truepose.output import replacing
     from truepose.report import inputs
-    from truepose.report.accuracy import told
+    from truepose.report.accuracy import gains, told
     from truepose.report.reach import reach
     from truepose.report.study import warnings_of
     from truepose.verdict.answer import AFTER, BEFORE, met
@@ -62,7 +62,7 @@ def command(**options: Any) -> int:
     if request.format == "table":
         from truepose.cli._show import show_answers, show_tables
 
-        show_answers(told(machine, answers))
+        show_answers(told(machine, answers), gains(answers))
         show_tables(_tables(machine, found, answers))
     else:
         click.echo(_text(request.format, machine, found, answers, warnings))

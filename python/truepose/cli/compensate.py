@@ -32,9 +32,10 @@ from truepose.cli._options import (
 def command(**options: Any) -> int:
     """Correct the command for what is known, and show what remains.
 
-    The corrected joint coordinates of every pose are driven through the machine at both edges
-    and at the middle of the bands. With --require-accuracy the exit code is 1 when it is not
-    certain that the machine keeps the accuracy asked with corrected commands.
+    The corrected joint coordinates of every pose are driven through the machine with all lengths
+    at the lower ends, in the middle and at the upper ends of their tolerance bands. With
+    --require-accuracy the exit code is 1 when it is not certain that the machine keeps the
+    accuracy asked with corrected commands.
     """
     from truepose.cli import _work
     from truepose.report import tables

@@ -51,7 +51,7 @@ def command(**options: Any) -> int:
     from truepose.cli._show import show_answers, show_tables
     from truepose.output import require_writable
     from truepose.report import how_far, how_sure, tables
-    from truepose.report.accuracy import told
+    from truepose.report.accuracy import gains, told
     from truepose.verdict.answer import AFTER, met
 
     if options["output"] is None:
@@ -68,7 +68,7 @@ def command(**options: Any) -> int:
     study = _work.with_calibration(study, measurements)
     text = request.machine_file.read_text(encoding="utf-8")
     page.write(study, request.output, text)
-    show_answers(told(machine, study.accuracy))
+    show_answers(told(machine, study.accuracy), gains(study.accuracy))
     shown = [
         tables.ranking(study),
         tables.highest_absolute(study),

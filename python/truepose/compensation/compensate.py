@@ -42,16 +42,16 @@ SCHEMA: Schema = {
     "joint": Variable(("pose", "joint"), "joint", "joint coordinate, corrected command"),
     "joint_nominal": Variable(("pose", "joint"), "joint", "joint coordinate, nominal command"),
     "residual_lower": Variable(
-        _ALL, "component", "error of the corrected command, lengths and offsets at the lower edges"
+        _ALL, "component", "error of the corrected command, all lengths at their lower ends"
     ),
     "residual_upper": Variable(
-        _ALL, "component", "error of the corrected command, lengths and offsets at the upper edges"
+        _ALL, "component", "error of the corrected command, all lengths at their upper ends"
     ),
     "residual_middle": Variable(
-        _ALL, "component", "error of the corrected command, every source at its shift"
+        _ALL, "component", "known error of the corrected command, every source at its shift"
     ),
     "bound": Variable(
-        _ALL, "component", "linear reach of the bands of all sources, at the corrected command"
+        _ALL, "component", "linear reach of all tolerance bands, at the corrected command"
     ),
     "linear_maximum": Variable(
         ("pose", "quantity"), "quantity", "linear maximum: largest error that remains"

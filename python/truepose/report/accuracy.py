@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from truepose.report.display import MISSING, number, pose_text
 from truepose.report.result import in_file_units, pose_in_file_units
 from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, UNDECIDED, Answer, Number
+from truepose.verdict.coverage import CONFIDENCE
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
@@ -22,7 +23,7 @@ MOST_DECIMALS = 6
 GAIN = 0.005
 """Part of an error below which compensation is said to gain nothing."""
 
-ANSWERED = {MET: "met", NOT_MET: "NOT met", UNDECIDED: "undecided", None: "no accuracy asked"}
+ANSWERED = {MET: "met", NOT_MET: "NOT met", UNDECIDED: "undecided", None: "not asked"}
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Told:
 
     @property
     def word(self) -> str:
-        """Met, NOT met, undecided, or that nothing is asked."""
+        """Met, NOT met, undecided, or not asked."""
         return ANSWERED[self.answer.answer]
 
     @property
@@ -54,12 +55,10 @@ class Told:
         return colours.get(self.answer.answer or "", "none")
 
     def amount(self, value: float, side: int = 0) -> str:
-        """A size without its unit, rounded up for `side` 1, down for -1; a dash: there is none.
+        """A size without its unit, rounded up for `side` 1, down for -1, else to nearest.
 
         With so many decimals that it does not look like the target where it is not.
         """
-        if not math.isfinite(value):
-            return MISSING
         shown, asked = value * self.unit.per_si, self.answer.asked
         decimals = self.unit.decimals
         while True:
@@ -71,26 +70,42 @@ class Told:
                 return text
             decimals += 1
 
+    def text(self, value: float, side: int = 0) -> str:
+        """The same with its unit."""
+        if not math.isfinite(value):
+            return MISSING
+        return f"{self.amount(value, side)} {self.unit.label}"
+
     @property
     def size(self) -> str:
         """The number that goes with the answer, with its unit, in words."""
-        answer, unit = self.answer, self.unit.label
-        at_most = f"at most {self.amount(answer.bound.value, 1)} {unit}"
+        answer = self.answer
         if answer.coverage is not None:
-            return f"{self.amount(answer.linear.value)} {unit}"
+            return self._share(answer.coverage.probability)
         if answer.answer == MET:
-            return at_most
+            return f"at most {self.text(answer.bound.value, 1)}"
         if answer.not_assembled:
             led = answer.example is None or answer.example.commanded
             return "a machine that cannot be assembled" if led else "a command that leads nowhere"
-        if answer.answer == NOT_MET:
-            return f"{self.amount(answer.witness.value)} {unit}"
         if answer.answer == UNDECIDED:
-            least = self.amount(answer.witness.value, -1)
-            if math.isinf(answer.bound.value):
-                return f"{least} {unit} or more"
-            return f"between {least} and {self.amount(answer.bound.value, 1)} {unit}"
-        return f"{self.amount(answer.linear.value)} {unit}"
+            return self._between(answer.witness.value, answer.bound.value)
+        return self.text(answer.told.value)
+
+    def _share(self, probability: float) -> str:
+        """What so many of all machines keep, and how sure that is."""
+        answer = self.answer
+        share = f"{100.0 * probability:.6g} %"
+        if not math.isfinite(answer.linear.value):
+            return f"fewer than {share} of all machines can be assembled"
+        between = self._between(answer.witness.value, answer.bound.value)
+        sure = f"{100.0 * CONFIDENCE:.6g} % confidence: {between}"
+        return f"{share} within {self.text(answer.linear.value)} ({sure})"
+
+    def _between(self, least: float, most: float) -> str:
+        """Two ends, each rounded away from the other."""
+        if math.isinf(most):
+            return f"{self.text(least, -1)} or more"
+        return f"between {self.amount(least, -1)} and {self.text(most, 1)}"
 
     @property
     def asked(self) -> str:
@@ -102,7 +117,8 @@ class Told:
         if said.rpartition(" ")[2].replace("u", "µ", 1) == self.unit.label:
             return said
         unit = self.unit
-        return f"{said} ({number(answer.asked * unit.per_si, unit.decimals)} {unit.label})"
+        same = number(answer.asked * unit.per_si, unit.decimals).rstrip("0").rstrip(".")
+        return f"{said} ({same} {unit.label})"
 
     def at(self, of: Number) -> str:
         """The pose of a number."""
@@ -120,11 +136,15 @@ class Told:
 
     @property
     def witness(self) -> str:
-        """Which machine the witness of a NOT met is, in words; empty where there is none."""
+        """Which machine the witness of a NOT met is, in words; empty where there is none.
+
+        In which state and at which pose it is, the answer's line says.
+        """
         answer = self.answer
         if answer.answer != NOT_MET or answer.example is None:
             return ""
-        return "; ".join(answer.example.words())
+        _, *causes = answer.example.words()
+        return "; ".join(causes)
 
 
 def told(machine: Machine, answers: Sequence[Answer]) -> tuple[Told, ...]:
@@ -149,20 +169,20 @@ def _gain(quantity: str, before: float, after: float) -> str:
         return f"{quantity}: what compensation does cannot be said."
     change = 1.0 - after / before
     if change >= GAIN:
-        return f"{quantity}: compensation reduces the largest error by {100.0 * change:.0f} %."
+        return f"{quantity}: reduced by {100.0 * change:.0f} % by compensation."
     if change > -GAIN:
         return f"{quantity}: nothing to gain by compensation: what is left is unknown."
     return (
-        f"{quantity}: compensation makes the largest error {-100.0 * change:.0f} % larger: it "
-        "corrects commanded freedoms by what is known, and what is not known or not commanded "
-        "stood against that."
+        f"{quantity}: made {-100.0 * change:.0f} % larger by compensation: it corrects commanded "
+        "freedoms by what is known, and what is not known or not commanded stood against that."
     )
 
 
 def as_data(machine: Machine, answer: Answer) -> dict[str, Any]:
     """An answer for programs, in the units of the machine's file.
 
-    Numbers that there are not are None: no bound, or a witness that cannot be assembled.
+    `pose`, `at`: of the number that goes with the answer (`Answer.told`). Numbers that there are
+    not are None: no bound, or a witness that cannot be assembled.
     """
     si = SI[answer.quantity]
 

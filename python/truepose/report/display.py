@@ -11,6 +11,9 @@ from truepose.machine.shown_units import ShownUnits
 
 POSITION = ("x", "y", "z")
 MISSING = "–"
+LOWER, UPPER = "all at lower ends", "all at upper ends"
+"""Where lengths and offsets stand in their tolerance bands: the paper's minimum and maximum."""
+
 ROUNDING = 1e-9
 """Values that differ relatively by less are equal where one of them has to be named."""
 

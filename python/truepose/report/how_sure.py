@@ -1,4 +1,4 @@
-"""Tables of how sure an error is: sampled, guaranteed, worst case, and whose share it is.
+"""Tables of how sure an error is: sampled, proven, worst case, and whose share it is.
 
 Each is made from one Dataset of `truepose.monte_carlo`, `bounds`, `worst_case` or `shares`, as
 the functions return it. In the units for people (`truepose.machine.shown_units`).
@@ -122,17 +122,17 @@ def _sampled_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
             "",
             "mean",
             "standard deviation",
-            "lower",
-            "upper",
-            "shortest, lower",
-            "upper",
-            "minimum",
-            "maximum",
+            f"{percent} from",
+            "to",
+            "shortest from",
+            "to",
+            "least sample",
+            "largest sample",
         ),
         tuple(rows),
         note=f"At {at_text(machine, found, pose)}, where the position is farthest off. "
-        f"{percent} of the samples lie between lower and upper, as many below as above; the "
-        "shortest interval with as many is beside it. Of a magnitude, as many lie below upper. "
+        f"{percent} of the samples lie in this coverage interval, as many below as above it; the "
+        "shortest interval with as many is beside it. Of a magnitude, as many lie below its end. "
         + _drawn(found, pose),
     )
 
@@ -222,7 +222,7 @@ def _bounds_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
         rows.append((_named(machine, name), *rounded(row, (0, 0, -1, 1, 0))))
     return Table(
         "bounds",
-        "Guaranteed bounds",
+        "Proven bounds",
         ("", "never below", "reached", "reached", "never above", "linear worst case"),
         tuple(rows),
         note=f"At {at_text(machine, found, pose)}, where the position's bound is highest. For "
@@ -297,7 +297,7 @@ def _region(machine: Machine, found: xr.Dataset) -> Table:
     )
     return Table(
         "region",
-        "Guaranteed bounds over a region",
+        "Proven bounds over a region",
         ("", "reached at", "nowhere more than", "reached", "gap, %"),
         tuple(rows),
         words=2,
@@ -354,17 +354,11 @@ def sentence(machine: Machine, found: xr.Dataset) -> str:
 LACKING = {
     "monte_carlo": "sampled answer",
     "ellipses": "coverage ellipse",
-    "bounds": "guaranteed bound",
+    "bounds": "proven bound",
     "worst_case": "worst case",
     "shares": "shares",
 }
 """What is said not to be there, by the result that would have it."""
-
-
-def lacking(study: Study) -> list[str]:
-    """Sentences on what is not there, and why."""
-    said = {name: why for name, why in study.missing.items() if name in LACKING}
-    return [f"No {LACKING[name]}: {why}" for name, why in said.items()]
 
 
 def unproven_text(status: str) -> str:
@@ -391,7 +385,7 @@ def tables(study: Study) -> list[Table]:
     ):
         if result is not None:
             shown += of(study.machine, result)
-    if lacking(study):
-        rows = tuple((LACKING[name], why) for name, why in study.missing.items() if name in LACKING)
+    rows = tuple((LACKING[name], why) for name, why in study.missing.items() if name in LACKING)
+    if rows:
         shown.append(Table("lacking", "What could not be said, and why", ("", ""), rows, words=2))
     return shown

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.budget.poses import reason_text
-from truepose.report.accuracy import gains, told
+from truepose.report.accuracy import told
 from truepose.report.display import (
+    LOWER,
+    UPPER,
     Array,
     column,
     decimals_for,
@@ -81,7 +83,7 @@ def ranking(study: Study) -> Table:
         tuple(header),
         tuple(zip(*columns, strict=True)),
         words=2,
-        note="Highest: the most this source alone can do at its worst pose.",
+        note="Highest: the worst case of this source alone (linear maximum), at its worst pose.",
     )
     return with_not_included(table, str(study.budget.attrs["not_included"]))
 
@@ -98,9 +100,10 @@ def highest_absolute(study: Study) -> Table:
         "highest_absolute",
         "Highest absolute error",
         ("source", *(f"{name}, {study.units.error(name).label}" for name in study.components)),
-        tuple(zip(_edge_labels(study), *cells, strict=True)),
-        note="Over all poses, per axis of the base frame. Lower, upper: lengths and offsets all at "
-        "that end of their bands, the rest at the shift; the ranking has the most a source can do.",
+        tuple(zip(_end_labels(study), *cells, strict=True)),
+        note="Over all poses, per axis of the base frame, exact. All at lower, all at upper ends: "
+        "lengths and offsets all at that end of their tolerance bands, the rest as known; the "
+        "worst case of a source is in the ranking.",
     )
 
 
@@ -113,7 +116,7 @@ def highest_percent(study: Study) -> Table:
         "highest_percent",
         "Highest error as a percentage of the coordinate",
         ("source", *(f"{study.components[index]}, %" for index in shown)),
-        tuple(zip(_edge_labels(study), *cells, strict=True)),
+        tuple(zip(_end_labels(study), *cells, strict=True)),
         note="Of the commanded coordinate at the same pose, where that is not near zero.",
     )
 
@@ -122,13 +125,13 @@ def compensation(study: Study) -> Table:
     """Highest absolute error per component and of the position, before and after."""
     components = study.components
     rows: list[tuple[str, Array, Array | None]] = [
-        ("before, lower edges", study.values("overall_error_lower"), None),
-        ("before, shifts only", study.values("overall_error"), None),
-        ("before, upper edges", study.values("overall_error_upper"), None),
+        (f"before, {LOWER}", study.values("overall_error_lower"), None),
+        ("before, known error", study.values("overall_error"), None),
+        (f"before, {UPPER}", study.values("overall_error_upper"), None),
         ("before, worst case", study.overall_worst, study.largest),
-        ("after, lower edges", study.compensated("residual_lower"), None),
-        ("after, shifts only", study.compensated("residual_middle"), None),
-        ("after, upper edges", study.compensated("residual_upper"), None),
+        (f"after, {LOWER}", study.compensated("residual_lower"), None),
+        ("after, known error", study.compensated("residual_middle"), None),
+        (f"after, {UPPER}", study.compensated("residual_upper"), None),
         ("after, worst case", study.compensated("bound"), study.remaining_largest),
     ]
     units, names = study.units, (*components, *(["position"] if study.positions else []))
@@ -153,9 +156,10 @@ def compensation(study: Study) -> Table:
             *(f"{name}, {units.error(name).label}" for name in names),
         ),
         tuple(zip([name for name, _, _ in rows], *cells, strict=True)),
-        note="After: the corrected command driven through the actual machine. Edges: lengths and "
-        "offsets all at that end of their bands. Worst case: of each component by itself, and of "
-        "the position what one machine can do (linear maximum); both of first order.",
+        note="After: the corrected command driven through the actual machine. Known error: of all "
+        "that is known. All at lower, all at upper ends: lengths and offsets all at that end of "
+        "their tolerance bands. Worst case: of each component by itself, and of the position what "
+        "one machine can do (linear maximum); both to first order.",
     )
 
 
@@ -288,13 +292,13 @@ def closure_forces(study: Study) -> Table:
 
 def answers(machine: Machine, found: Sequence[Answer]) -> Table:
     """What the machine can do against the accuracy asked: the three known numbers of each."""
-    sampled = any(answer.coverage is not None for answer in found)
+    shares = {each.coverage.probability for each in found if each.coverage is not None}
     rows = [
         (
             each.name,
             each.word,
             *(
-                f"{each.amount(one.value, side)} {each.unit.label}"
+                each.text(one.value, side)
                 for one, side in (
                     (each.answer.witness, 0),
                     (each.answer.linear, 0),
@@ -306,14 +310,17 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
         )
         for each in told(machine, found)
     ]
-    names = ("at least", "quantile", "at most") if sampled else NUMBERS
+    names: Sequence[str] = NUMBERS
+    if shares:
+        quantile = f"{100.0 * shares.pop():.6g} % quantile"
+        names = ("confidence, lower end", quantile, "confidence, upper end")
     return Table(
         "answers",
         "Against the accuracy asked",
         ("", "answer", *names, "asked", "at"),
         tuple(rows),
         words=2,
-        note=" ".join([_SAMPLED if sampled else _NUMBERS, *gains(found)]),
+        note=_NUMBERS if names is NUMBERS else _SAMPLED,
     )
 
 
@@ -359,16 +366,16 @@ def poses_left_out(study: Study) -> Table | None:
     )
 
 
-def _edge_labels(study: Study) -> list[str]:
-    """Rows of the paper's tables: both edges of a source with a band, one row otherwise."""
+def _end_labels(study: Study) -> list[str]:
+    """Rows of the paper's tables: both ends of a source with a band, one row otherwise."""
     labels = []
     for source, band in zip(study.sources, study.has_band, strict=True):
-        labels += [f"{source}, lower", f"{source}, upper"] if band else [source]
-    return [*labels, "overall, lower", "overall, upper"]
+        labels += [f"{source}, {LOWER}", f"{source}, {UPPER}"] if band else [source]
+    return [*labels, f"overall, {LOWER}", f"overall, {UPPER}"]
 
 
 def _highest(study: Study, of_source: str, overall: str) -> Array:
-    """(row, component) the values for `_edge_labels`, SI or percent."""
+    """(row, component) the values for `_end_labels`, SI or percent."""
     lower, upper = study.values(f"{of_source}_lower"), study.values(f"{of_source}_upper")
     rows: list[Array] = []
     for index, band in enumerate(study.has_band):

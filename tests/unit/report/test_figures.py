@@ -11,7 +11,8 @@ import pytest
 from made_how_sure import shares, sure_study
 from made_study import hexapod_study, planar_study
 from sweeps import sweep
-from truepose.report import blame, figures, how_sure
+from truepose.report import blame, figures
+from truepose.report import how_far as numbers
 from truepose.report.figures import (
     FIGURES,
     _style,
@@ -19,16 +20,17 @@ from truepose.report.figures import (
     distribution,
     draw,
     error_over_time,
+    how_far,
     internal_forces,
     machine_drawing,
     overall_error,
     ranking,
     source_errors,
-    three_answers,
     tornado,
     workspace_maps,
 )
 from truepose.report.study import Study
+from truepose.verdict.answer import Answer
 
 STUDIES = {
     "planar": sure_study(planar_study()),
@@ -78,10 +80,10 @@ def trace(figure: go.Figure, name: str, nth: int = 0) -> go.Scatter:
 
 def test_lines_are_the_errors_in_micrometres(study: Study) -> None:
     for nth in range(len(study.components)):
-        upper = trace(source_errors.figure(study), "tolerance, upper", nth)
+        upper = trace(source_errors.figure(study), "tolerance, all at upper ends", nth)
         expected = study.budget["error_upper"].sel(source="tolerance").values[:, nth] * 1e6
         np.testing.assert_allclose(upper.y, expected, rtol=1e-6)
-        lower = trace(overall_error.figure(study), "lower edges", nth)
+        lower = trace(overall_error.figure(study), "all at lower ends", nth)
         expected = study.budget["overall_error_lower"].values[:, nth] * 1e6
         np.testing.assert_allclose(lower.y, expected, rtol=1e-6)
 
@@ -119,9 +121,9 @@ def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: St
 
 def test_maps_share_one_colour_scale(study: Study) -> None:
     figure = workspace_maps.figure(study)
-    size = np.linalg.norm(study.overall_worst[:, study.positions], axis=1).max() * 1e6
+    sizes = [study.largest, study.position_norm(study.values("worst"))]
     assert figure.layout.coloraxis.cmin == 0
-    assert figure.layout.coloraxis.cmax == pytest.approx(size)
+    assert figure.layout.coloraxis.cmax == pytest.approx(max(map(np.max, sizes)) * 1e6)
     for each in figure.data:
         colours = each.coloraxis if each.type == "heatmap" else each.marker.coloraxis
         assert colours == "coloraxis"
@@ -132,7 +134,7 @@ def test_maps_share_one_colour_scale(study: Study) -> None:
 def test_a_heat_map_has_each_value_at_its_place() -> None:
     study = planar_study()
     first = workspace_maps.figure(study).data[0]
-    size = np.linalg.norm(study.overall_worst, axis=1) * 1e6
+    size = study.largest * 1e6
     for pose, expected in zip(study.poses, size, strict=True):
         column = int(np.argmin(np.abs(first.x - pose[0] * 1e3)))
         row = int(np.argmin(np.abs(first.y - pose[1] * 1e3)))
@@ -178,7 +180,7 @@ def test_the_drawing_of_a_body_has_its_platform_and_frame() -> None:
 def test_many_poses_are_thinned_and_the_largest_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_style, "MOST_DRAWN", 100)
     study = planar_study(32)
-    worst = int(np.argmax(np.linalg.norm(study.overall_worst, axis=1)))
+    worst = int(np.argmax(study.largest))
     line = trace(source_errors.figure(study), "thermal")
     assert len(line.x) <= 101
     assert worst in line.x
@@ -260,19 +262,34 @@ def test_the_distribution_is_dark_inside_its_coverage_interval(study: Study) -> 
     assert "4,000 samples" in distribution.caption(study)
 
 
-def test_answers_stand_side_by_side(study: Study) -> None:
-    found = how_sure.answers(study)
-    drawn = three_answers.figure(study)
-    for kind, title in how_sure.ANSWERS.items():
-        bars = trace(drawn, title.format(percent="95 %"))
-        at = [found.names.index(name.strip("|")) for name in bars.x]
-        np.testing.assert_allclose(bars.y, found.sizes[kind][at] * 1e6, rtol=1e-6)
-    assert "in 5 ways" in three_answers.caption(study)
-    without = replace(study, bounds=None, missing={"bounds": "no ends."})
-    assert {each.name for each in three_answers.figure(without).data}.isdisjoint(
-        {"guaranteed bound"}
-    )
-    assert three_answers.caption(without).endswith("No guaranteed bound: no ends.")
+def test_how_far_off_has_a_bar_for_each_number_and_state(study: Study) -> None:
+    drawn = how_far.figure(study)
+    rows = numbers.how_far(study)
+    kinds = list(dict.fromkeys(row.quantity for row in rows))
+    for key, title in numbers.NUMBERS.items():
+        for nth, kind in enumerate(kinds):
+            bars = trace(drawn, title, nth)
+            of_kind = [row for row in rows if row.quantity == kind]
+            assert list(bars.x) == [row.state for row in of_kind]
+            expected = [row.sizes[key] * 1e6 for row in of_kind]
+            np.testing.assert_allclose(bars.y, expected, rtol=1e-6)
+    (asked,) = [shape for shape in drawn.layout.shapes if shape.type == "line"]
+    assert asked.y0 == asked.y1 == pytest.approx(500.0), "no angle is asked for"
+    lines = [each.name for each in drawn.data if each.type == "scatter"]
+    assert lines == ["position asked, 0.5 mm"]
+
+
+def test_a_number_that_there_is_not_has_no_bar(study: Study) -> None:
+    def without_a_bound(answer: Answer) -> Answer:
+        return replace(answer, bound=replace(answer.bound, value=np.inf))
+
+    unbounded = tuple(without_a_bound(answer) for answer in study.accuracy)
+    names = {
+        each.name
+        for each in how_far.figure(replace(study, accuracy=unbounded, sampled=())).data
+        if each.type == "bar"
+    }
+    assert names == {"witness", "linear maximum"}
 
 
 def test_the_tornado_has_the_largest_on_top(study: Study) -> None:

@@ -10,7 +10,6 @@ import pytest
 
 import made_how_sure as made
 from made_study import hexapod_study, planar_study
-from sweeps import sweep
 from truepose.report import blame, how_sure, page, reading
 from truepose.report.study import Study
 
@@ -120,54 +119,16 @@ def test_a_region_without_a_proof_says_so(study: Study) -> None:
     assert table.note.startswith("Not proven: too near a singularity")
 
 
-def test_the_answers_side_by_side_are_of_one_pose(study: Study) -> None:
-    found = how_sure.answers(study)
-    pose = int(study.worst_case["magnitude_linear"].values[:, 0].argmax())
-    assert found.at == reading.at_text(study.machine, study.worst_case, pose)
-    count = len(study.components)
-    for kind, result, lower, upper in (
-        ("sampled", study.monte_carlo, "lower", "upper"),
-        ("farthest", study.monte_carlo, "minimum", "maximum"),
-        ("bound", study.bounds, "lower", "upper"),
-    ):
-        ends = np.abs([result[lower].values[pose], result[upper].values[pose]]).max(axis=0)
-        np.testing.assert_array_equal(found.sizes[kind][:count], ends)
-    order = ["sampled", "farthest", "exact", "bound"]
-    sizes = np.stack([found.sizes[kind][:count] for kind in order])
-    assert (np.diff(sizes, axis=0) >= 0).all()
-    table = rows(how_sure.three_answers(study))
-    assert table["x, µm"] == pytest.approx(
-        [found.sizes[kind][0] * 1e6 for kind in how_sure.ANSWERS], abs=0.06
-    )
-
-
-@sweep
 def test_what_is_missing_is_said_with_its_reason(study: Study) -> None:
     because = "a normal distribution has no ends (length of strut 1)."
     without = replace(study, bounds=None, missing={"bounds": because})
-    assert np.isnan(how_sure.answers(without).sizes["bound"]).all()
-    table = how_sure.three_answers(without)
-    assert table.note.endswith(f"No guaranteed bound: {because}")
-    assert all(row[-1] == "–" for row in table.rows)
     last = how_sure.tables(without)[-1]
-    assert last.rows == (("guaranteed bound", because),)
+    assert (last.name, last.rows) == ("lacking", (("proven bound", because),))
+    assert how_sure.in_short(without)[-1] == last
     text = page.render(without)
-    assert f"No guaranteed bound: {because}" in text
+    assert because in text
     assert 'id="table-bounds"' not in text
-
-
-def test_a_pose_without_a_proof_says_so_beside_the_other_answers(study: Study) -> None:
-    found = made.bounds(study.machine, study.poses[:1], status="box_too_wide")
-    worst = made.worst_case(study.machine, study.poses[:1])
-    without = replace(study, bounds=found, worst_case=worst)
-    said = "No guaranteed bound: the bands are too wide for a proof."
-    assert how_sure.three_answers(without).note.endswith(said)
-    assert page.render(without).count(said) == 2
-
-
-def test_an_answer_at_another_pose_is_not_put_beside_it(study: Study) -> None:
-    elsewhere = replace(study, bounds=made.bounds(study.machine, study.poses[1:2] + 0.01))
-    assert np.isnan(how_sure.answers(elsewhere).sizes["bound"]).all()
+    assert "lacking" not in [table.name for table in how_sure.tables(study)]
 
 
 @pytest.mark.parametrize("of", ["parameter", "source"])

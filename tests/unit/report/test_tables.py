@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from made_study import hexapod_study, planar_study
 from truepose.machine.shown_units import METRIC
-from truepose.report import accuracy, inputs, tables
-from truepose.report.display import column, number, pose_text, where_highest
+from truepose.report import how_far, inputs, tables
+from truepose.report.display import LOWER, UPPER, column, number, pose_text, where_highest
 from truepose.report.study import Study
 
 STUDIES = {"planar": planar_study(), "hexapod": hexapod_study(3)}
@@ -30,7 +32,8 @@ def test_every_table_is_rectangular(study: Study) -> None:
         tables.highest_percent(study),
         tables.compensation(study),
         tables.poses_left_out(study),
-        tables.answers(accuracy.answers(study)),
+        tables.answers(study.machine, study.accuracy),
+        how_far.table(study),
     ]
     for table in found:
         assert table is not None
@@ -52,8 +55,8 @@ def test_the_ranking_is_by_rank_and_in_micrometres(study: Study) -> None:
 def test_a_source_with_a_band_has_two_rows_and_one_without_has_one(study: Study) -> None:
     table = tables.highest_absolute(study)
     assert [row[0] for row in table.rows] == [
-        "tolerance, lower", "tolerance, upper", "thermal", "elastic",
-        "overall, lower", "overall, upper",
+        f"tolerance, {LOWER}", f"tolerance, {UPPER}", "thermal", "elastic",
+        f"overall, {LOWER}", f"overall, {UPPER}",
     ]  # fmt: skip
     upper = study.budget["highest_upper"].sel(source="tolerance")
     for name, text in zip(study.components, table.rows[1][1:], strict=True):
@@ -65,7 +68,7 @@ def test_a_band_that_no_edge_shows_is_still_a_band() -> None:
     for edge in ("lower", "upper"):  # bands of coordinates alone leave the edges at the shift
         study.budget[f"error_{edge}"] = study.budget["error"].copy()
     labels = [row[0] for row in tables.highest_absolute(study).rows]
-    assert labels[:3] == ["tolerance, lower", "tolerance, upper", "thermal"]
+    assert labels[:3] == [f"tolerance, {LOWER}", f"tolerance, {UPPER}", "thermal"]
 
 
 def test_percentages_are_of_coordinates_only(study: Study) -> None:
@@ -76,10 +79,10 @@ def test_percentages_are_of_coordinates_only(study: Study) -> None:
 def test_the_compensation_has_before_and_after(study: Study) -> None:
     rows = {row[0]: row[1:] for row in tables.compensation(study).rows}
     residual = np.abs(study.compensated("residual_upper")).max(axis=0)
-    assert [cell(text) for text in rows["after, upper edges"][:-1]] == pytest.approx(
+    assert [cell(text) for text in rows["after, all at upper ends"][:-1]] == pytest.approx(
         residual * 1e6, abs=0.01
     )
-    assert {cell(text) for text in rows["after, shifts only"]} == {0.0}
+    assert {cell(text) for text in rows["after, known error"]} == {0.0}
 
 
 def test_all_sources_together_add_their_bands_and_not_their_shifts(study: Study) -> None:
@@ -97,19 +100,17 @@ def test_an_exact_error_beyond_the_linear_sum_counts_before_compensation_as_afte
     np.testing.assert_array_equal(fresh.overall_worst, beyond)
 
 
-def test_answers(study: Study) -> None:
-    position, *_ = found = accuracy.answers(study)
-    size = np.linalg.norm(study.overall_worst[:, study.positions], axis=1)
-    assert position.highest == size.max()
-    assert position.met is False
-    assert position.at == pose_text(
-        study.poses[size.argmax()], study.machine.commanded, study.units
-    )
-    assert position.number == study.budget["pose"].values[size.argmax()]
-    assert accuracy.met(found, accuracy.BEFORE) is False
-    turning = [answer for answer in found if answer.quantity == "orientation"]
-    assert bool(turning) == bool(study.rotations)
-    assert all(answer.met is None for answer in turning), "no angle was asked for"
+def test_the_answers_have_the_three_known_numbers(study: Study) -> None:
+    table = tables.answers(study.machine, study.accuracy)
+    assert table.header[2:5] == ("witness", "linear maximum", "proven bound")
+    for row, answer in zip(table.rows, study.accuracy, strict=True):
+        assert row[0] == f"{answer.quantity} {answer.state}"
+        witness, linear, bound = (cell(text.split()[0]) * 1e-6 for text in row[2:5])
+        tenth = 1.0001e-7
+        assert answer.witness.value - tenth < witness <= answer.witness.value, "rounded down"
+        assert linear == pytest.approx(answer.linear.value, abs=tenth / 2)
+        assert answer.bound.value <= bound < answer.bound.value + tenth, "rounded up"
+        assert row[6] == pose_text(answer.told.pose, study.machine.commanded, study.units)
 
 
 def test_a_pose_that_cannot_be_compensated_is_missing_and_does_not_count() -> None:
@@ -118,10 +119,31 @@ def test_a_pose_that_cannot_be_compensated_is_missing_and_does_not_count() -> No
     short = Study(study.machine, study.budget, study.compensation.isel(pose=slice(3, None)))
     assert np.isnan(short.compensated("bound")[:3]).all()
     np.testing.assert_array_equal(short.compensated("bound")[3:], study.compensated("bound")[3:])
-    answer = next(a for a in accuracy.answers(short) if a.state == accuracy.AFTER)
-    most = study.compensated("bound") + study.compensated("second_order")
-    assert answer.highest == np.linalg.norm(most[3:], axis=1).max()
+    most = study.compensation["linear_maximum"].values[3:, 0].max()
+    rows = {row[0]: row[1:] for row in tables.compensation(short).rows}
+    assert cell(rows["after, worst case"][-1]) == pytest.approx(most * 1e6, abs=0.05)
     assert all("nan" not in text for row in tables.compensation(short).rows for text in row)
+
+
+def test_how_far_off_is_the_same_over_the_whole_workspace(study: Study) -> None:
+    table = how_far.table(study)
+    assert table.header[2:6] == ("95 %", "witness", "linear maximum", "proven bound")
+    assert [row[1] for row in table.rows] == [answer.state for answer in study.accuracy]
+    for row, worst, share in zip(table.rows, study.accuracy, study.sampled, strict=True):
+        numbers = (share.linear, worst.witness, worst.linear, worst.bound)
+        expected = [number.value * 1e6 for number in numbers]
+        assert [cell(text) for text in row[2:6]] == pytest.approx(expected, abs=0.06)
+        assert row[6] == ("µm" if worst.quantity == "position" else "µrad")
+
+
+def test_a_number_that_there_is_not_is_a_dash() -> None:
+    study = planar_study()
+    before, after = study.accuracy
+    unbounded = replace(before, bound=replace(before.bound, value=np.inf))
+    row, _ = how_far.table(replace(study, accuracy=(unbounded, after), sampled=())).rows
+    assert (row[2], row[5]) == ("–", "–")
+    row, _ = tables.answers(study.machine, (unbounded, after)).rows
+    assert row[4] == "–"
 
 
 def test_numbers() -> None:

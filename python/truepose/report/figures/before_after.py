@@ -25,9 +25,10 @@ def caption(study: Study) -> str:
         f" Freedoms that are not commanded ({', '.join(free)}) cannot be corrected." if free else ""
     )
     return (
-        "Bands: the error between both edges of the toleranced lengths, before compensation and "
-        "after, both by exact simulation of the actual machine. What is known is gone; what is "
-        "not known remains, centred on zero." + parasitic + thinning_note(len(drawn), study.n_pose)
+        "Bands: the error from all toleranced lengths at their lower ends to all at their upper "
+        "ends, before compensation and after, both by exact simulation of the actual machine; "
+        "lines: the known error. What is known is gone; what is not known remains, centred on "
+        "zero." + parasitic + thinning_note(len(drawn), study.n_pose)
     )
 
 
@@ -58,7 +59,7 @@ def figure(study: Study) -> go.Figure:
             figure.add_trace(
                 go.Scatter(
                     y=small(middle),
-                    name=f"{name}, middle",
+                    name=f"{name}, known error",
                     showlegend=component == 0,
                     mode="lines",
                     line={"color": colour, "width": 2.2},
@@ -83,8 +84,8 @@ def _add_band(
 ) -> None:
     """Two thin edges with colour between them. The edges need not be ordered."""
     for values, filled, edge in (
-        (np.minimum(lower, upper), None, "smaller edge"),
-        (np.maximum(lower, upper), "tonexty", "larger edge"),
+        (np.minimum(lower, upper), None, "smaller end"),
+        (np.maximum(lower, upper), "tonexty", "larger end"),
     ):
         figure.add_trace(
             go.Scatter(

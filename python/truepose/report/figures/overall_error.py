@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
+from truepose.report.display import LOWER, UPPER
 from truepose.report.figures._over_poses import (
     add_pose_labels,
     finish_panels,
@@ -17,9 +18,9 @@ from truepose.report.study import Study
 TITLE = "Overall error at each pose"
 
 LINES = (
-    ("overall_error_upper", "upper edges", BEFORE, "solid"),
-    ("overall_error", "with shifts only", OVERALL, "dot"),
-    ("overall_error_lower", "lower edges", "#0072B2", "dash"),
+    ("overall_error_upper", UPPER, BEFORE, "solid"),
+    ("overall_error", "known error", OVERALL, "dot"),
+    ("overall_error_lower", LOWER, "#0072B2", "dash"),
 )
 
 
@@ -27,14 +28,15 @@ def caption(study: Study) -> str:
     """What the lines are."""
     drawn = drawn_poses(study.largest)
     return (
-        "Exact error with all sources acting together: every source at its known shift, and the "
-        "toleranced lengths all at their lower and all at their upper edge."
+        "Exact error with all sources acting together: every source at its shift (the known error), and the "
+        "toleranced lengths all at the lower and all at the upper ends of their bands. That is not "
+        "the worst case: lengths at unlike ends may do more."
         + thinning_note(len(drawn), study.n_pose)
     )
 
 
 def figure(study: Study) -> go.Figure:
-    """One panel for each component: lower edge, shifts, upper edge."""
+    """One panel for each component: all at lower ends, known error, all at upper ends."""
     drawn = drawn_poses(study.largest)
     figure = panels(study)
     for variable, name, colour, dash in LINES:

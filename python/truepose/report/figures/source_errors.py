@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
+from truepose.report.display import LOWER, UPPER
 from truepose.report.figures._over_poses import (
     add_pose_labels,
     finish_panels,
@@ -14,6 +15,7 @@ from truepose.report.figures._over_poses import (
 from truepose.report.figures._style import drawn_poses, small, source_colour, thinning_note
 from truepose.report.study import Study
 
+WHERE = {"lower": LOWER, "upper": UPPER}
 TITLE = "Error of each source at each pose"
 
 
@@ -22,13 +24,14 @@ def caption(study: Study) -> str:
     drawn = drawn_poses(study.largest)
     return (
         "Exact error of each source alone, actual minus commanded, in the base frame. Where a "
-        "source has a band, the solid line has its lengths and offsets all at their upper edge, "
-        "the dashed line all at their lower edge." + thinning_note(len(drawn), study.n_pose)
+        "source has a tolerance band, the solid line has its lengths and offsets all at their "
+        "upper ends, the dashed line all at their lower ends."
+        + thinning_note(len(drawn), study.n_pose)
     )
 
 
 def figure(study: Study) -> go.Figure:
-    """One panel for each component, one line for each source and edge."""
+    """One panel for each component, one line for each source and end."""
     drawn = drawn_poses(study.largest)
     figure = panels(study)
     for index, source in enumerate(study.sources):
@@ -43,7 +46,7 @@ def figure(study: Study) -> go.Figure:
                     go.Scatter(
                         x=study.numbers[drawn],
                         y=small(errors[:, component]),
-                        name=f"{source}, {edge}" if edge else source,
+                        name=f"{source}, {WHERE[edge]}" if edge else source,
                         legendgroup=f"{source} {edge}",
                         showlegend=component == 0,
                         mode=line_mode(drawn),

@@ -15,6 +15,7 @@ BENCHMARKS = (
     Benchmark("start_up"),
     Benchmark("all_sources"),
     Benchmark("million_poses", cores=2),
+    Benchmark("largest_error", cores=2),
     Benchmark("over_time"),
     Benchmark("monte_carlo"),
     Benchmark("memory"),

@@ -92,7 +92,7 @@ def corrected_joints(
     if look is None:
         return joints, known, status
     travel = np.array([drive.travel[1] - drive.travel[0] for drive in machine.drives])
-    before = np.full(len(poses), np.inf)
+    before = np.full(len(poses), ROUNDING)
     for _ in range(MOST_ROUNDS):
         # Of a pose without joints the command is not looked at again: its status says why.
         reached = np.where(np.isfinite(joints), joints, block.joints)
@@ -101,8 +101,7 @@ def corrected_joints(
         step = np.nan_to_num(np.abs((again - joints) / travel).max(axis=1), nan=0.0)
         joints = again
         # Steps shrink by one factor: the next one is foretold from the last two.
-        with np.errstate(invalid="ignore"):
-            to_come = np.where(step > ROUNDING, step * np.minimum(step / before, 1.0), 0.0)
+        to_come = np.where(step > ROUNDING, step * np.minimum(step / before, 1.0), 0.0)
         if (to_come <= SETTLED).all():
             break
         before = np.maximum(step, ROUNDING)

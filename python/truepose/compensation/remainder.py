@@ -113,7 +113,10 @@ class Remainder:
         n, m = value.shape
         quantities = len({name.startswith("r") for name in self._machine.components})
         components, norms = np.full((n, m), np.nan), np.full((n, quantities), np.nan)
-        if self._known:
+        if not effects.shape[2]:
+            # Nothing is unknown: the value is the error.
+            components[:], norms[:] = 0.0, 0.0
+        elif self._known:
             for start in range(0, n, FEW):
                 poses = slice(start, start + FEW)
                 found = self._some(block, spread, (value, effects), poses)

@@ -106,7 +106,8 @@ class Rings:
         both = np.stack([across, rows[:, 2]], axis=1)[:, np.newaxis]
         coefficient = np.stack([0.5 / length, out[:, 0] / (2.0 * radius)], axis=1)[:, np.newaxis]
         return Closures(
-            sensitivity,
+            # A longer strut has a smaller residual.
+            -sensitivity,
             (Products(coefficient, both, both),),
             -turned_about(seen, unit)[:, np.newaxis],
             (skew(unit) @ moved)[:, np.newaxis],

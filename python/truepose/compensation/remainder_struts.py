@@ -15,9 +15,10 @@ the part of second order is
     |delta across u|^2 / (2 l) + u . (r x (r x arm)) / 2 + u . (r x w) - (that of u . A)
 
 That of an arm
-by its angle t is `k x (k x base) t^2 / 2` with its axis k; what else moves A beyond first order,
-tilts of axes and ways along them, is bounded with the rest. Along itself a strut moves by what its
-length deviates, to first order: its closure says so.
+by its angle t is `k x (k x base) t^2 / 2` with its axis k, and products with what moves its end; of
+a carriage by tilts a of its axis k `- s |a|^2 k / 2`, and a times what s changes by. All that is
+told with its sign. Along itself a strut moves by what its length deviates, to first order: its
+closure says so.
 """
 
 from __future__ import annotations
@@ -41,20 +42,24 @@ KINDS = ("slider", "crank", "telescopic")
 """Kinds of drive that are known here."""
 
 
-@dataclass
+_Second = tuple[Floats, Floats, Floats]
+"""A vector (n, 3), and the two forms (n or 1, v + m) that it is multiplied by."""
+
+
+@dataclass(frozen=True, eq=False)
 class _Base:
     """The base-side joint of one strut: where it is, and what moves it beyond first order.
 
     `place` (n, 3), and of each parameter that moves it by how much it does, (n or 1, 3) per unit.
-    `bent` (n,): the most of its motion that is not linear. Of an arm `angle` (n or 1, v), the form
-    of how far it turns, and `bend` (n, 3): k x (k x base); else None.
+    `bent` (n,): the most of its motion that is not linear. Of that `second` are products of two
+    forms (n or 1, v + m), each times a vector (n, 3), and `signed` (n,) is as much of `bent`.
     """
 
     place: Floats
     slopes: list[tuple[int, Floats]]
     bent: Floats
-    angle: Floats | None = None
-    bend: Floats | None = None
+    second: list[_Second]
+    signed: Floats
 
 
 class Bases:
@@ -82,7 +87,7 @@ class Bases:
             slopes = [
                 (int(at), axis[np.newaxis]) for at, axis in zip(point, np.eye(3), strict=True)
             ]
-            return _Base(base, slopes, zero)
+            return _Base(base, slopes, zero, [], zero)
         on = self._on_carriage if drive[1].kind == "slider" else self._on_crank
         return on(motion, *drive, point, base)
 
@@ -138,7 +143,12 @@ class Bases:
             ]
         bent = np.abs(way) * majorants.unit_bent(tilt.reach, tilt.along)
         bent = bent + reach * majorants.unit(tilt.reach, tilt.along)
-        return _Base(place, slopes, bent)
+        moved, leant = self._way(motion, joint, drive), motion.forms(tilts)
+        squared = -0.5 * (way * np.square(tilt.tangents[:, 0]).sum(axis=1))[:, np.newaxis]
+        second = [(squared * tilt.axis, leant[:, each], leant[:, each]) for each in (0, 1)]
+        second += [(tilt.slopes[:, each], moved, leant[:, each]) for each in (0, 1)]
+        signed = 0.5 * np.abs(way) * tilt.reach**2 + reach * tilt.reach
+        return _Base(place, slopes, bent, second, signed)
 
     def _on_crank(
         self, motion: Motion, joint: int, drive: Drive, point: Indices, base: Floats
@@ -161,26 +171,70 @@ class Bases:
             axial = change * (axis * base).sum(axis=1, keepdims=True)
             axial = axial + axis * (change * base).sum(axis=1, keepdims=True)
             slopes.append((int(at), sine * cross(change, base) + (1.0 - cosine) * axial))
+        form = self._way(motion, joint, drive)
+        second: list[_Second] = [(0.5 * cross(axis, across), form, form)]
         for at, direction in zip(point, np.eye(3), strict=True):
-            slopes.append((int(at), turned(np.broadcast_to(direction, axis.shape))))
+            moved = turned(np.broadcast_to(direction, axis.shape))
+            slopes.append((int(at), moved))
+            second.append((cross(axis, moved), form, motion.forms([at])[:, 0]))
         for at, direction in zip(origin, np.eye(3), strict=True):
             slopes.append((int(at), direction[np.newaxis]))
         own = norm(motion.reach(motion.forms(point)))
-        size = norm(base)
         bent = majorants.turn_bent(reach) * norm(across) + majorants.turn(reach) * own
+        signed = 0.5 * reach**2 * norm(across) + reach * own
         if tilt.reach.any():
-            # sin(angle) a x base + (1 - cos(angle)) [a (k . base) + k (a . base) + a (a . base)],
-            # a what is added to the axis k, less the part of it that is linear.
-            more, tilted = majorants.turn(reach), majorants.unit(tilt.reach, tilt.along)
-            swung = np.abs(sine[:, 0]) + more
-            raised = 1.0 - cosine[:, 0] + more
-            linear = (1.0 + tilt.along) * tilt.reach
-            whole = (swung + 2.0 * raised) * tilted + raised * tilted**2
+            # Of what `_tilted_crank` says, with all that is added to angle, axis and base at once.
+            size, lean = norm(base), tilt.reach
+            swing, rise = np.abs(sine[:, 0]), 1.0 - cosine[:, 0]
+            more, tilted = majorants.turn(reach), majorants.unit(lean, tilt.along)
+            whole = (swing + 2.0 * rise + 3.0 * more) * tilted + (rise + more) * tilted**2
             bent = bent + whole * (size + own)
-            bent = bent - (np.abs(sine[:, 0]) + 2.0 * (1.0 - cosine[:, 0])) * linear * size
+            bent = bent - (swing + 2.0 * rise) * (1.0 + tilt.along) * lean * size
+            signed = signed + (swing + 2.0 * rise) * lean * (0.5 * lean * size + own)
+            signed = signed + 3.0 * reach * lean * size + rise * lean**2 * size
+            second += self._tilted_crank(motion, tilt, tilts, (form, point), (base, sine, cosine))
         place = motion.values(origin) + arm
-        form = self._way(motion, joint, drive)
-        return _Base(place, slopes, bent, form, cross(axis, across))
+        return _Base(place, slopes, bent, second, signed)
+
+    @staticmethod
+    def _tilted_crank(
+        motion: Motion,
+        tilt: Tilt,
+        tilts: Indices,
+        moving: tuple[Floats, Indices],
+        stands: tuple[Floats, Floats, Floats],
+    ) -> list[_Second]:
+        """What is of second order by a crank's axis k that tilts by a, with base b at angle t.
+
+        Of `sin t a x b + (1 - cos t) [a (k . b) + k (a . b) + a (a . b)]`, a itself beyond first
+        order being `- |a|^2 k / 2`; `moving` the angle's form and the parameters of b, `stands` b
+        and the sine and cosine of t.
+        """
+        (angle, point), (base, sine, cosine), axis = moving, stands, tilt.axis
+        rise = 1.0 - cosine
+
+        def dot(one: Floats, other: Floats) -> Floats:
+            return np.asarray((one * other).sum(axis=1, keepdims=True))
+
+        def raised(change: Floats, vector: Floats) -> Floats:
+            return np.asarray(change * dot(axis, vector) + axis * dot(change, vector))
+
+        leant = motion.forms(tilts)
+        back = -0.5 * np.square(tilt.tangents[:, 0]).sum(axis=1)[:, np.newaxis]
+        back = back * (sine * cross(axis, base) + 2.0 * rise * axis * dot(axis, base))
+        found: list[_Second] = []
+        for one in (0, 1):
+            change, lean = tilt.slopes[:, one], leant[:, one]
+            turned = cosine * cross(change, base) + sine * raised(change, base)
+            found += [(turned, angle, lean), (back, lean, lean)]
+            for other in (0, 1):
+                along = rise * change * dot(tilt.slopes[:, other], base)
+                found.append((along, lean, leant[:, other]))
+            for at, direction in zip(point, np.eye(3)[:, np.newaxis], strict=True):
+                vector = sine * cross(change, np.broadcast_to(direction, change.shape))
+                vector = vector + rise * raised(change, direction)
+                found.append((vector, lean, motion.forms([at])[:, 0]))
+        return found
 
 
 class Struts:
@@ -220,23 +274,22 @@ class Struts:
         moved = norm(motion.reach(own))
         bent = np.stack([np.broadcast_to(each.bent, n) for each in bases], axis=1)
         half = np.repeat(0.5 / length[:, :, np.newaxis], 2, axis=2)
-        arms = _arms(motion, bases, unit)
+        second = _second(motion, bases, unit)
         size, turn = norm(arm), norm(motion.turn_reach)[:, np.newaxis]
-        arched = np.zeros_like(across)
-        if arms is not None:
-            arched = np.abs(arms.coefficient[:, :, 0]) * motion.reach(arms.one[:, :, 0]) ** 2
+        told = np.stack([np.broadcast_to(each.signed, n) for each in bases], axis=1)
 
         def rest(shift: Floats, further: Floats) -> Floats:
             whole, more = turn + further, shift + further * size
             carried = majorants.turn_bent(whole) * size + majorants.turn(whole) * moved + bent
             found = majorants.length_bent(length, across + more + carried, along + more + carried)
             signed = (across + more) ** 2 * half[:, :, 0]
-            signed = signed + 0.5 * whole**2 * size + whole * moved + arched
+            signed = signed + 0.5 * whole**2 * size + whole * moved + told
             return np.asarray(np.maximum(found + carried - signed, 0.0))
 
         found = Closures(
-            sensitivity,
-            (Products(half, rows, rows), *(() if arms is None else (arms,))),
+            # A longer strut has a smaller residual.
+            -sensitivity,
+            (Products(half, rows, rows), *second),
             turned_about(arm, unit),
             carried_about(motion, own, unit) if own.any() else None,
             rest,
@@ -278,18 +331,24 @@ def carried_about(motion: Motion, own: Floats, along: Floats) -> Floats:
     return found
 
 
-def _arms(motion: Motion, bases: list[_Base], unit: Floats) -> Products | None:
-    """Of struts on cranks: the part of second order by the angle alone."""
-    if all(each.angle is None for each in bases):
-        return None
-    n, count = unit.shape[:2]
-    coefficient = np.zeros((n, count, 1))
-    form = np.zeros((n, count, 1, motion.effects.shape[2]))
-    for at, each in enumerate(bases):
-        if each.angle is not None and each.bend is not None:
-            coefficient[:, at, 0] = -0.5 * (each.bend * unit[:, at]).sum(axis=1)
-            form[:, at, 0] = each.angle
-    return Products(coefficient, form, form)
+def _second(motion: Motion, bases: list[_Base], unit: Floats) -> list[Products]:
+    """What the base-side joints move along their struts in second order, as far as it is told."""
+    moving = [
+        [(vector, one, other) for vector, one, other in each.second if one.any() and other.any()]
+        for each in bases
+    ]
+    count = max(map(len, moving))
+    if not count:
+        return []
+    shape = (*unit.shape[:2], count)
+    coefficient = np.zeros(shape)
+    forms = [np.zeros((*shape, motion.effects.shape[2])) for _ in range(2)]
+    for at, products in enumerate(moving):
+        for number, (vector, *pair) in enumerate(products):
+            coefficient[:, at, number] = -(vector * unit[:, at]).sum(axis=1)
+            for form, given in zip(forms, pair, strict=True):
+                form[:, at, number] = given
+    return [Products(coefficient, *forms)]
 
 
 def across_of(unit: Floats) -> tuple[Floats, Floats]:

@@ -90,7 +90,10 @@ class FileType:
 
 @dataclass(frozen=True)
 class _Quantity(FileType):
+    """One number; `hint` is for who writes one of the wrong sign."""
+
     sign: Sign = "any"
+    hint: str | None = None
 
     def read(self, value: Any, units: UnitSystem) -> float:
         result = units.read(value, self.dimension)
@@ -102,6 +105,7 @@ class _Quantity(FileType):
                 f"expected {phrase} above {zero}, found {shown_value(value)}",
                 found=shown_value(value),
                 expected=f"{phrase} above {zero}",
+                hint=self.hint,
             )
         if self.sign == "not negative" and result < 0.0:
             raise QuantityError(
@@ -109,6 +113,7 @@ class _Quantity(FileType):
                 f"expected {phrase} of zero or more, found {shown_value(value)}",
                 found=shown_value(value),
                 expected=f"{phrase} of zero or more",
+                hint=self.hint,
             )
         return result
 
@@ -347,11 +352,15 @@ def quantity(dimension: str, *, sign: Sign = "any") -> Any:
     return Annotated[float, _Quantity(dimension, sign)]
 
 
+_NO_ERROR = "no machine is without error; leave the key away where nothing is asked"
+
 Length = Annotated[float, _Quantity("length")]
 PositiveLength = Annotated[float, _Quantity("length", "positive")]
+AllowedLength = Annotated[float, _Quantity("length", "positive", _NO_ERROR)]
 NonNegativeLength = Annotated[float, _Quantity("length", "not negative")]
 Angle = Annotated[float, _Quantity("angle")]
 PositiveAngle = Annotated[float, _Quantity("angle", "positive")]
+AllowedAngle = Annotated[float, _Quantity("angle", "positive", _NO_ERROR)]
 Force = Annotated[float, _Quantity("force")]
 Moment = Annotated[float, _Quantity("moment")]
 Temperature = Annotated[float, _Quantity("temperature", "positive")]

@@ -81,7 +81,8 @@ class Told:
         if answer.answer == MET:
             return at_most
         if answer.not_assembled:
-            return "a machine that cannot be assembled"
+            led = answer.example is None or answer.example.commanded
+            return "a machine that cannot be assembled" if led else "a command that leads nowhere"
         if answer.answer == NOT_MET:
             return f"{self.amount(answer.witness.value)} {unit}"
         if answer.answer == UNDECIDED:

@@ -296,14 +296,13 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
             *(
                 f"{each.amount(one.value, side)} {each.unit.label}"
                 for one, side in (
-                    (each.answer.witness, -1),
+                    (each.answer.witness, 0),
                     (each.answer.linear, 0),
                     (each.answer.bound, 1),
                 )
             ),
             each.asked,
             each.at(each.answer.told),
-            each.answer.rests_on,
         )
         for each in told(machine, found)
     ]
@@ -311,7 +310,7 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
     return Table(
         "answers",
         "Against the accuracy asked",
-        ("", "answer", *names, "asked", "at", "rests on"),
+        ("", "answer", *names, "asked", "at"),
         tuple(rows),
         words=2,
         note=" ".join([_SAMPLED if sampled else _NUMBERS, *gains(found)]),

@@ -27,12 +27,15 @@ from truepose.verdict import engine
 from truepose.verdict.answer import MET, NOT_MET, UNDECIDED, Answer, Number
 from truepose.verdict.coverage import coverage
 from truepose.verdict.search import farthest
-from truepose.verdict.states import STATES, Population, State
+from truepose.verdict.states import STATES, Blocks, Population, State
 from truepose.verdict.survey import Survey, survey
 from truepose.verdict.witness import Witness
 
 LOOKED_AT = 4
 """Poses at which a witness is searched for, of the worst by the linear maximum."""
+
+OPEN = 32
+"""Poses that no proof decides at which one is searched for after that."""
 
 EXACT = "one machine inside the bands, solved exactly"
 REMAINDER = "the linear maximum and its proven remainder"
@@ -94,7 +97,7 @@ def answers(population: Population, state: str) -> list[Answer]:
             for kind, target in zip(kinds, asked, strict=True)
         ]
     found = survey(population.states(state), list(kinds.values()))
-    seen = [
+    seen: list[Witness] = [
         _witnessed(population, state, found, at, columns)
         for at, columns in enumerate(kinds.values())
     ]
@@ -103,6 +106,13 @@ def answers(population: Population, state: str) -> list[Answer]:
         for witness, target in zip(seen, asked, strict=True)
     ]
     proof = _proved(population, state, found, asked, open_)
+    for at, (columns, target) in enumerate(zip(kinds.values(), asked, strict=True)):
+        if open_[at] and target is not None:
+            left = np.flatnonzero(proof.bound[:, at] > target)
+            # What no proof reaches may be because there is none.
+            worst = left[_largest(found.linear[left, at], OPEN)]
+            numbers = found.numbers[worst]
+            seen[at] = _farthest(population, state, numbers, at, columns, seen[at]) or seen[at]
     return [
         _answer(population, state, kind, at, asked[at], found, seen[at], proof)
         for at, kind in enumerate(kinds)
@@ -129,7 +139,7 @@ def at_coverage(
         return Answer(kind, name, target, answer, none, none, none, _of_witness(witness), witness)
     sampled = coverage(
         population.machine,
-        ((state.block, state.spread) for state in population.states(name)),
+        Blocks(population, name),
         kind,
         probability,
         target,
@@ -152,25 +162,33 @@ def _witnessed(
     population: Population, name: str, found: Survey, at: int, columns: Indices
 ) -> Witness:
     """The farthest machine at the poses where the linear one, or its first witness, is farthest."""
-    machine = population.machine
-    kind = list(quantities(machine.components))[at]
-    chosen = np.unique(
-        np.concatenate(
-            [
-                _largest(found.linear[:, at], LOOKED_AT),
-                _largest(found.witness[:, at], 1),
-                _largest(found.bound[:, at], 1),
-            ]
-        )
-    )
-    best: Witness | None = None
-    for state in population.at(name, found.numbers[chosen]):
+    chosen = [
+        _largest(found.linear[:, at], LOOKED_AT),
+        _largest(found.witness[:, at], 1),
+        _largest(found.bound[:, at], 1),
+    ]
+    numbers = found.numbers[np.unique(np.concatenate(chosen))]
+    best = _farthest(population, name, numbers, at, columns)
+    assert best is not None
+    return best
+
+
+def _farthest(
+    population: Population,
+    name: str,
+    numbers: Indices,
+    at: int,
+    columns: Indices,
+    known: Witness | None = None,
+) -> Witness | None:
+    """The farthest machine at some poses, or the one that is `known` already."""
+    kind = list(quantities(population.machine.components))[at]
+    best = known
+    for state in population.at(name, numbers):
         for pose in range(state.block.indices.size):
-            one = state.at(pose)
-            seen = _at_pose(one, kind, columns)
+            seen = _at_pose(state.at(pose), kind, columns)
             if best is None or seen.size > best.size:
                 best = seen
-    assert best is not None
     return best
 
 
@@ -201,6 +219,7 @@ def _at_pose(state: State, kind: str, columns: Indices) -> Witness:
         error=error,
         size=size,
         status=word,
+        commanded=bool(state.status[0] == OK),
     )
 
 
@@ -280,7 +299,10 @@ def _number(population: Population, found: Survey, values: Floats) -> Number:
 def _of_witness(witness: Witness) -> str:
     if witness.status == "ok":
         return EXACT
-    return f"{EXACT}: it cannot be assembled ({witness.status.replace('_', ' ')})"
+    why = witness.status.replace("_", " ")
+    if witness.commanded:
+        return f"one machine inside the bands that cannot be assembled ({why})"
+    return f"a command that the machine cannot follow ({why})"
 
 
 def _why_open(bound: Number, proof: _Proof) -> str:

@@ -155,4 +155,17 @@ class Population:
         return State(name, self.machine, commanded, moves, status)
 
 
-__all__ = ["AFTER", "BEFORE", "STATES", "Population", "State"]
+@dataclass(frozen=True)
+class Blocks:
+    """The blocks of a population in one state with their spreads; iterated as often as asked."""
+
+    population: Population
+    name: str
+
+    def __iter__(self) -> Iterator[tuple[Block, Spread]]:
+        """All of them."""
+        for state in self.population.states(self.name):
+            yield state.block, state.spread
+
+
+__all__ = ["AFTER", "BEFORE", "STATES", "Blocks", "Population", "State"]

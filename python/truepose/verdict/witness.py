@@ -69,7 +69,8 @@ class Witness:
     its `number` in the run; `joints` (n_joint,) as commanded there; `spread` the variables at this
     pose alone (`Spread.at`) and `t` (n_variable,) their values. `error` (n_component,), m and rad,
     is exact, its part `quantity` ("position" or "orientation") of length `size`. Of a machine that
-    cannot be assembled `error` is None, `size` is inf and `status` the kernel's word for why.
+    cannot be assembled `error` is None, `size` is inf and `status` the kernel's word for why; it is
+    not `commanded` where the machine at its shifts cannot follow the command.
     """
 
     state: str
@@ -83,6 +84,7 @@ class Witness:
     error: Floats | None
     size: float
     status: str = "ok"
+    commanded: bool = True
 
     @property
     def moved(self) -> Moved:

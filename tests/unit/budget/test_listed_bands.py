@@ -129,7 +129,8 @@ def test_what_is_answered_is_at_least_what_a_machine_of_the_list_reaches(
     tolerance = budget.sel(source="tolerance")
     slopes = np.abs(np.linalg.inv(directions(machine, machine.poses()))[:, :, 0])
     # From the mean, 0.1 mm, it is 0.9 mm to the one value and 0.1 to the other.
-    assert np.allclose(tolerance.reach, 0.9e-3 * slopes, rtol=1e-9)
+    # The slopes of the machine there are others by as much as that is of a strut, 1/5000.
+    assert np.allclose(tolerance.reach, 0.9e-3 * slopes, rtol=1e-3)
     answer = json.loads(call(capsys, "check", tmp_path / "machine.toml", "--format", "json").out)
     position = answer["answers"][0]
     reached = 1e3 * float(worst.magnitude_exact.sel(quantity="position").max())

@@ -132,7 +132,9 @@ def test_no_accuracy_asked_is_no_failure(
         outcome = call(capsys, command, file)
         assert outcome.code == 0
         assert "no accuracy asked" in outcome.out
-    outcome = call(capsys, "budget", "--require-accuracy", file)
-    assert outcome.code == 2
-    assert "no-accuracy" in outcome.err
-    assert outcome.out == ""
+    # To say of how many machines it is asked is not to ask.
+    for told in ([], ["--set", "accuracy.at=95 %"]):
+        outcome = call(capsys, "budget", "--require-accuracy", file, *told)
+        assert outcome.code == 2
+        assert "no-accuracy" in outcome.err
+        assert outcome.out == ""

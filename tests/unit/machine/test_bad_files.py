@@ -116,7 +116,9 @@ CASES = [
     bad("not-positive", "28 mm^2", "-28 mm^2", "-28", "an area above zero"),
     bad("not-positive", "210 GPa", "0 GPa", "0 GPa", "a stress above zero"),
     bad("not-positive", "temperature = 35", "temperature = -300", "-300", "above absolute zero"),
-    bad("not-positive", '"0.5 mm"', '"0 mm"', '"0 mm"', "accuracy.target"),
+    bad("not-positive", '"0.5 mm"', '"0 mm"', '"0 mm"', "accuracy.target",
+        "leave the key away where nothing is asked"),
+    bad("not-positive", *said("angle_target", '"0 deg"', ASKED), "0 deg", "without error"),
     bad("negative", "[-0.3, 0.3]", "-0.3", "length_tolerance", "a half band is zero or more"),
     bad("zero-direction", "axis = [0, 1, 0]", "axis = [0, 0, 0]", "axis = [0, 0", "not zero"),
     # structure

@@ -98,13 +98,10 @@ def test_an_inch_machine_is_answered_in_inches(
     """The budget's own numbers, SI, divided by 25.4 nm and by a thousandth of a degree."""
     text = call(capsys, "check", HEXAPOD).out
     found = tp.budget(tp.load(HEXAPOD))
-    worst = found["worst"] - abs(found["error"])
-    linear = (abs(found["overall_error"]) + worst.sum("source")).values
-    edges = [abs(found[f"overall_error_{edge}"].values) for edge in ("lower", "upper")]
-    sizes = np.maximum.reduce([linear, *edges])
-    position = np.linalg.norm(sizes[:, :3], axis=1).max() / 25.4e-9
-    turn = np.degrees(np.linalg.norm(sizes[:, 3:], axis=1).max()) * 1e3
-    (of_position, of_turn) = (line for line in text.splitlines() if "before compensation" in line)
+    position = found.linear_maximum.values[:, 0].max() / 25.4e-9
+    turn = np.degrees(found.linear_maximum.values[:, 1].max()) * 1e3
+    rows = (line.strip() for line in text.splitlines() if "before compensation" in line)
+    (of_position, of_turn) = (row for row in rows if ":" not in row)
     assert f"{position:.1f} µin" in of_position
     assert f"0.1 mm ({0.1e-3 / 25.4e-9:.1f} µin)" in of_position
     assert f"{turn:.3f} mdeg" in of_turn
@@ -157,7 +154,7 @@ def test_the_page_speaks_the_units_of_the_file(
     for word in ("µm", "µrad"):
         assert word not in text
     assert "lengths in in, errors in µin and mdeg" in text
-    assert "the 0.1 mm asked" in text
+    assert "asked 0.1 mm (3937.0 µin)" in text
     # Figures: the axes of their data, which plotly's own script does not name.
     titles = re.findall(r'"text":"([^"]*)"', page)
     said = [title.encode().decode("unicode_escape") for title in titles if title.isascii()]

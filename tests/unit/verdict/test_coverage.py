@@ -88,7 +88,7 @@ def test_two_independent_normal_ones_are_rayleigh(tmp_path: Path, p: float) -> N
         '"tool.x" = { standard_deviation = 0.1 }\n"tool.y" = { standard_deviation = 0.1 }',
     )
     assert between(number(machine, p), stats.rayleigh.ppf(p) * 0.1 * MM)
-    # The farthest point of the ellipse that holds a share p of one component lies elsewhere.
+    # The interval of one component by itself is another number.
     assert not between(number(machine, p), stats.norm.ppf(0.5 + 0.5 * p) * 0.1 * MM)
 
 
@@ -203,6 +203,29 @@ def test_the_worst_pose_is_that_of_the_largest_quantile(tmp_path: Path, parts: i
     assert 1 < found.sampled < 10
 
 
+def test_shifts_count_in_choosing_the_poses(tmp_path: Path) -> None:
+    """Heat alone differs from pose to pose: the band of the tool is the same everywhere."""
+    text = edited(
+        PLANAR,
+        SINGULAR[2],
+        QUIET[1],
+        ("force = { x = 1200, y = -1500 }\n", ""),
+        ("[workspace]", '[tolerance]\n"tool.x" = 0.02\n[workspace]'),
+    )
+    machine = load_text(tmp_path, text)
+    poses = np.stack([np.linspace(0.45, 0.36, 31), np.full(31, 0.2)], axis=1)
+    error = np.asarray(tp.budget(machine, poses).overall_error)
+    t = np.random.default_rng(1).uniform(-1.0, 1.0, 100_000)
+    aside = np.stack([0.02 * MM * t, np.zeros(len(t))], axis=1)
+    each = np.array([np.quantile(np.linalg.norm(one + aside, axis=1), P) for one in error])
+    found = coverage(machine, states(machine, poses), "position", P, 1.0)
+    assert found.pose == each.argmax()
+    assert found.estimate == pytest.approx(each.max(), rel=0.005)
+    assert 1 < found.sampled < 10
+    assert np.count_nonzero(each > 0.91 * each.max()) <= found.sampled
+    assert np.count_nonzero(each > 0.89 * each.max()) >= found.sampled
+
+
 def test_poses_are_chosen_by_other_machines_than_the_number_is_made_of(tmp_path: Path) -> None:
     """Else poses would be chosen that come out large by chance, and the interval hold less."""
     ((_, every),) = states(near_singular(tmp_path), np.array([[0.33, 0.2]]))
@@ -219,6 +242,34 @@ def test_it_does_not_matter_how_the_poses_come(tmp_path: Path) -> None:
     parts = coverage(machine, states(machine, parts=4), "position", P, target=0.5 * MM)
     assert parts == whole
     assert whole.answer in ("met", "NOT met")
+
+
+def test_it_does_not_matter_how_much_is_worked_on_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine = load_text(tmp_path, PLANAR)
+    whole = coverage(machine, states(machine), "position", P)
+    monkeypatch.setattr(module, "TOGETHER", 1)
+    monkeypatch.setattr(screening, "AT_ONCE", 1)
+    assert coverage(machine, states(machine), "position", P) == whole
+
+
+def test_of_very_many_poses_few_are_screened_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine = near_singular(tmp_path)
+    poses = np.stack([np.linspace(0.34, 0.36, 41), np.full(41, 0.2)], axis=1)
+    run = states(machine, poses, parts=3)
+    every = coverage(machine, run, "position", P, 1.0)
+    monkeypatch.setattr(module, "MOST_POSES", 2)
+    monkeypatch.setattr(screening, "REFINED", 1)
+    few = coverage(machine, run, "position", P, 1.0)
+    assert (few.pose, few.estimate) == (every.pose, every.estimate)
+    assert (few.sampled, every.sampled) == (2, every.within)
+    # Those that are not looked at more closely may be the worst as well.
+    assert every.within <= few.within <= 41
+    # Fewer poses share the risk, and any of them may be the worst of those sampled.
+    assert every.lower <= few.lower <= few.upper <= every.upper
 
 
 def test_states_that_can_be_gone_through_but_once_are_refused(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from pydantic import Field
 from pydantic.json_schema import JsonSchemaValue
 
 from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import FileType, PositiveAngle, PositiveLength
+from truepose.machine.quantity import AllowedAngle, AllowedLength, FileType
 from truepose.machine.suggestion import did_you_mean
 from truepose.machine.units import QuantityError, UnitSystem, shown_value, type_phrase
 from truepose.machine.workspace import WORST
@@ -72,8 +72,8 @@ def _hint(coverage: float, *, percent: bool) -> str:
 class AccuracyTable(FileTable):
     """The error that is allowed at the tool point."""
 
-    target: PositiveLength | None = Field(None, description="Largest position error allowed.")
-    angle_target: PositiveAngle | None = Field(
+    target: AllowedLength | None = Field(None, description="Largest position error allowed.")
+    angle_target: AllowedAngle | None = Field(
         None, description="Largest orientation error allowed, where the platform turns."
     )
     at: Annotated[float | None, _Coverage("ratio")] = Field(

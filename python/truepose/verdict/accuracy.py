@@ -244,7 +244,8 @@ def _proved(
     limits = np.array([np.inf if target is None else target for target in asked])
     above = np.asarray(open_) & (bound > limits)
     needed = np.flatnonzero(above.any(axis=1))
-    worst = np.where(above, bound / limits, 0.0).max(axis=1)[needed]
+    share = np.divide(bound, limits, out=np.zeros_like(bound), where=above)
+    worst = share.max(axis=1)[needed]
     # Where no remainder is proven the linear maximum says which pose is worst.
     worst = np.where(np.isfinite(worst), worst, (found.linear / limits).max(axis=1)[needed])
     in_order = engine.by_need(worst, needed)

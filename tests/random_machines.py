@@ -2,6 +2,8 @@
 
     from random_machines import DRAWN, TOPICS, DrawnMachine
 
+`MORE` are 100 besides, for laws that ask for 200.
+
 Every one of `DRAWN` is a `MachineUnderTest` (`.path`, `.kernel`, `.poses`, ...; `.three_poses` are
 enough for a law) that is drawn when it is first used, from a seed of its own: its name, such as
 `hexapod-3`. `DrawnMachine("hexapod", 17)` is one more. `tests/laws/conftest.py` has them as the
@@ -140,6 +142,9 @@ class DrawnMachine(MachineUnderTest):
 
 
 DRAWN = [DrawnMachine(path.stem, number) for path in machine_files() for number in range(EACH)]
+MORE = [
+    DrawnMachine(path.stem, number) for path in machine_files() for number in range(EACH, 2 * EACH)
+]
 
 
 @cache

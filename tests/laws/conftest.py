@@ -9,7 +9,7 @@ import pytest
 
 from build_machine import awkward_files, machine_files
 from machine_under_test import MachineUnderTest
-from random_machines import DRAWN, DrawnMachine
+from random_machines import DRAWN, MORE, DrawnMachine
 from sweeps import thinned
 
 SHIPPED = [MachineUnderTest(path) for path in machine_files()]
@@ -33,5 +33,14 @@ def shipped(request: pytest.FixtureRequest) -> MachineUnderTest:
 @pytest.fixture(params=thinned(DRAWN, DRAWN[::20]), ids=lambda machine: f"drawn-{machine.name}")
 def drawn(request: pytest.FixtureRequest) -> DrawnMachine:
     """One of the 100 random machines."""
+    found: DrawnMachine = request.param
+    return found
+
+
+@pytest.fixture(
+    params=thinned([*DRAWN, *MORE], DRAWN[::20]), ids=lambda machine: f"drawn-{machine.name}"
+)
+def drawn_of_200(request: pytest.FixtureRequest) -> DrawnMachine:
+    """One of 200 random machines."""
     found: DrawnMachine = request.param
     return found

@@ -10,6 +10,7 @@ below by climbing. One machine can do that; all worst components together are no
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -32,6 +33,11 @@ class Largest:
     length: Floats
     reached: Floats
     direction: Floats
+
+    @property
+    def opposite(self) -> Largest:
+        """The same with the opposite directions: what lies farthest there is the other end."""
+        return dataclasses.replace(self, direction=-self.direction)
 
     def maximiser(self, effects: Floats, domain: Domain, quantities: Sequence[Indices]) -> Floats:
         """(n, q, v) the variables at which each is reached, from the same arguments."""

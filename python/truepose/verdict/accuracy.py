@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from truepose import _kernel
 from truepose.budget.comparison import quantities
 from truepose.budget.poses import OK, Progress
+from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources._base import Floats, Indices
 from truepose.verdict import engine
@@ -56,13 +57,30 @@ def accuracy(
     default the file's workspace; `condition`, default the file's; `progress` is called with (poses
     done, poses in all).
 
-    Raises as `truepose.budget`.
+    Raises as `truepose.budget`, and `RequestError` (unknown-choice) for another state.
     """
+    asked = _required_states(states)
     population = Population.of(machine, poses, condition, progress)
     found: list[Answer] = []
-    for state in states:
+    for state in asked:
         found += answers(population, state)
     return tuple(found)
+
+
+def _required_states(states: Sequence[str]) -> tuple[str, ...]:
+    """Each state once. A word alone is refused too: its letters are no states."""
+    unknown = [states] if isinstance(states, str) else [s for s in states if s not in STATES]
+    if not unknown and states:
+        return tuple(dict.fromkeys(states))
+    raise RequestError(
+        Problem(
+            "unknown-choice",
+            "states: expected states of a machine",
+            found=", ".join(repr(each) for each in unknown) or "none",
+            expected="some of " + ", ".join(f'"{each}"' for each in STATES),
+            hint='a single one is a tuple too: states=("before compensation",)',
+        )
+    )
 
 
 def answers(population: Population, state: str) -> list[Answer]:
@@ -226,7 +244,8 @@ def _proved(
     limits = np.array([np.inf if target is None else target for target in asked])
     above = np.asarray(open_) & (bound > limits)
     needed = np.flatnonzero(above.any(axis=1))
-    worst = np.where(above, bound / limits, 0.0).max(axis=1)[needed]
+    share = np.divide(bound, limits, out=np.zeros_like(bound), where=above)
+    worst = share.max(axis=1)[needed]
     # Where no remainder is proven the linear maximum says which pose is worst.
     worst = np.where(np.isfinite(worst), worst, (found.linear / limits).max(axis=1)[needed])
     in_order = engine.by_need(worst, needed)

@@ -2,7 +2,8 @@
 
     linear maximum          the largest length of the set of errors, to first order
     + proven remainder  =   bound
-    the machine at which the linear one is largest, solved exactly  =  the first witness
+    the machine at which the linear one is largest, or the opposite one, solved exactly
+                        =  the first witness
 
 The linear maximum itself is of no machine: it may be a little above or below what there is.
 """
@@ -15,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.budget.first_order import Mover, first_order
-from truepose.budget.largest import largest
+from truepose.budget.largest import Largest, largest
 from truepose.budget.poses import OK
 from truepose.compensation.remainder import Remainder
 from truepose.sources._base import Floats, Indices
@@ -31,8 +32,9 @@ class Survey:
 
     `numbers` (n,) of the poses in the run; `linear` (n, q): linear maximum; `bound` (n, q): with
     the proven remainder, inf where there is none; `witness` (n, q): of the machine where the
-    linear maximum is reached, solved exactly: inf where it cannot be assembled. `status` (n,): the
-    kernel's of the state, ok where it can be commanded; the others are inf.
+    linear maximum is reached, or of the opposite one where that is farther off, solved exactly: inf
+    where it cannot be assembled. `status` (n,): the kernel's of the state, ok where it can be
+    commanded; the others are inf.
     """
 
     numbers: Indices
@@ -77,14 +79,26 @@ def _surveyed(state: State, quantities: Sequence[Indices]) -> Survey:
         linear[fine] = far.length
         beyond = Remainder(machine).bound(usable.block, usable.spread, value, effects)
         bound[fine] = np.where(beyond.proven[:, np.newaxis], far.length + beyond.norms, np.inf)
-        mover = Mover(machine, usable.block, usable.spread)
-        maximisers = far.maximiser(effects, spread.domain, quantities)
-        every = np.arange(int(fine.sum()))
-        for at, columns in enumerate(quantities):
-            reached, failed = mover(every, maximisers[:, at].copy())
-            sizes = np.sqrt(np.square(reached[:, columns]).sum(axis=1))
-            witness[fine, at] = np.where(failed == OK, sizes, np.inf)
+        # Both ends: to first order they are alike where nothing is known, and it is rounding that
+        # says which of them is the maximiser; exactly they are not alike.
+        witness[fine] = np.maximum(
+            _reached(usable, far, effects, quantities),
+            _reached(usable, far.opposite, effects, quantities),
+        )
     return Survey(block.indices, linear, bound, witness, status)
+
+
+def _reached(state: State, far: Largest, effects: Floats, quantities: Sequence[Indices]) -> Floats:
+    """(n, q) sizes of the machines that lie farthest along the directions; inf where none."""
+    mover = Mover(state.machine, state.block, state.spread)
+    maximisers = far.maximiser(effects, state.spread.domain, quantities)
+    sizes = np.empty(far.length.shape)
+    every = np.arange(len(sizes))
+    for at, columns in enumerate(quantities):
+        reached, failed = mover(every, maximisers[:, at].copy())
+        size = np.sqrt(np.square(reached[:, columns]).sum(axis=1))
+        sizes[:, at] = np.where(failed == OK, size, np.inf)
+    return sizes
 
 
 __all__ = ["Survey", "survey"]

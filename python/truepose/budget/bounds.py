@@ -200,8 +200,8 @@ def _bounded(
     if hard.any():
         asked = CLOSE * found.most[hard, 2 * m :]
         divided = proven_bounds(machine, block.select(hard), moves.select(hard), MOST_BOXES, asked)
-        for name, value in divided.items():
-            proven[name][hard] = value
+        for name, found_in_parts in divided.items():
+            proven[name][hard] = found_in_parts
     values = {
         **proven,
         "reached_lower": -found.most[:, m : 2 * m],

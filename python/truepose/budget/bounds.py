@@ -22,7 +22,15 @@ from truepose.budget.evaluate import required_sources
 from truepose.budget.exact import at_shifts
 from truepose.budget.first_order import Mover, first_order
 from truepose.budget.over_region import bounds_over_region, no_proof, required_gap
-from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, of_band, requested_poses
+from truepose.budget.poses import (
+    OK,
+    Progress,
+    Walk,
+    is_path,
+    no_pose_left,
+    of_band,
+    requested_poses,
+)
 from truepose.budget.spread import Spread, spread
 from truepose.budget.vertices import worst_vertices
 from truepose.budget.worst import worst
@@ -156,14 +164,14 @@ def proven_bounds(
     most_boxes: int = 1,
     targets: ArrayLike | None = None,
 ) -> dict[str, np.ndarray]:
-    """`lower`, `upper`, `magnitude` and `status` (`SCHEMA`) at the n poses of a block.
+    """`lower`, `upper`, `magnitude`, `status` (`SCHEMA`) and `boxes` at the n poses of a block.
 
     `moves` has every single variable in [-1, 1]. The box of variables is divided, into at most
     `most_boxes` parts, where it cannot be proven as a whole, and where a magnitude lies above its
-    `targets` (n or 1, n_quantity), m and rad.
+    `targets` (n or 1, n_quantity), m and rad; `boxes` (n,) says how many were looked at.
     """
     shifted, shift = moves.shift
-    lower, upper, magnitude, status, _ = machine.kernel.bounds_at(
+    lower, upper, magnitude, status, boxes = machine.kernel.bounds_at(
         block.joints,
         block.placements,
         shifted,
@@ -180,6 +188,7 @@ def proven_bounds(
         "upper": np.asarray(upper),
         "magnitude": np.asarray(magnitude),
         "status": np.asarray(status, object),
+        "boxes": np.asarray(boxes, np.intp),
     }
 
 
@@ -196,14 +205,14 @@ def _bounded(
     found = worst_vertices(Mover(machine, block, moves), value, effects, moves.domain, kinds)
     m = len(machine.components)
     proven = proven_bounds(machine, block, moves)
-    hard = (proven["status"] != PROVEN) & of_band(found.status)
+    hard = np.asarray((proven["status"] != PROVEN) & (found.status == OK), np.bool_)
     if hard.any():
         asked = CLOSE * found.most[hard, 2 * m :]
         divided = proven_bounds(machine, block.select(hard), moves.select(hard), MOST_BOXES, asked)
         for name, found_in_parts in divided.items():
             proven[name][hard] = found_in_parts
     values = {
-        **proven,
+        **{name: values for name, values in proven.items() if name in SCHEMA},
         "reached_lower": -found.most[:, m : 2 * m],
         "reached_upper": found.most[:, :m],
         "reached_magnitude": found.most[:, 2 * m :],

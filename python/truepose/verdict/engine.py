@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from truepose.budget.bounds import PROVEN, proven_bounds
 from truepose.budget.comparison import quantities
 from truepose.sources._base import Floats, Indices
 from truepose.verdict.states import State
@@ -19,8 +20,6 @@ EACH = 512
 AT_ONCE = 8
 """Poses that share what is left of the effort."""
 
-PROVEN = "proven"
-
 
 def bounds(state: State, targets: Sequence[float | None], boxes: int) -> tuple[Floats, int]:
     """Proven bounds (n, q) of all quantities at the poses of a state, and the boxes that it took.
@@ -33,22 +32,11 @@ def bounds(state: State, targets: Sequence[float | None], boxes: int) -> tuple[F
     nothing = np.full((block.indices.size, len(kinds)), np.inf)
     if machine.kernel.overconstrained or not len(state.spread.names):
         return nothing, 0
-    moves = state.spread.centred()
-    shifted, shift = moves.shift
-    _, _, magnitude, status, used = machine.kernel.bounds_at(
-        block.joints,
-        block.placements,
-        shifted,
-        np.ascontiguousarray(shift),
-        moves.columns,
-        moves.variables.tolist(),
-        np.ascontiguousarray(moves.swing),
-        [members.tolist() for members in moves.directions],
-        most_boxes=boxes,
-        targets=[np.inf if target is None else target for target in targets],
-    )
-    proven = np.asarray(status, object) == PROVEN
-    return np.where(proven[:, np.newaxis], magnitude, nothing), int(np.sum(used))
+    limits = np.array([[np.inf if target is None else target for target in targets]])
+    found = proven_bounds(machine, block, state.spread.centred(), boxes, limits)
+    proven = found["status"] == PROVEN
+    bound = np.where(proven[:, np.newaxis], found["magnitude"], nothing)
+    return bound, int(found["boxes"].sum())
 
 
 def refused(state: State) -> str:

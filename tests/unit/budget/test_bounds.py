@@ -193,7 +193,7 @@ def test_the_worst_vertices_are_inside_and_near(name: str) -> None:
     assert (found.reached_magnitude <= found.magnitude + slack).all()
     assert (found.upper <= 1.2 * found.reached_upper).all()
     assert (found.lower >= 1.2 * found.reached_lower).all()
-    assert (found.magnitude <= 1.25 * found.reached_magnitude).all()
+    assert (found.magnitude <= 1.2 * found.reached_magnitude).all()
 
 
 @pytest.mark.parametrize("name", [*MACHINES_BANDED, "hexapod_all_sources", "hexaglide", "3rpr"])
@@ -209,6 +209,8 @@ def test_the_sources_of_the_files(name: str) -> None:
     linear = tp.uncertainty(machine, poses)
     assert (found.upper >= linear.value).all()
     wide = found.upper - found.lower
+    assert (found.magnitude >= found.reached_magnitude).all()
+    assert (found.magnitude <= 1.001 * found.reached_magnitude).all()
     assert (found.upper - found.reached_upper <= 0.02 * wide).all()
     assert (found.reached_lower - found.lower <= 0.02 * wide).all()
 
@@ -227,7 +229,7 @@ def test_the_hexapod_of_500_mm_with_a_tenth_on_every_length() -> None:
         assert 1.001 * down <= float(found.lower[at]) <= down
     sizes = found.reached_magnitude.values
     assert (sizes <= found.magnitude).all()
-    assert (found.magnitude <= 1.03 * sizes).all()
+    assert (found.magnitude <= 1.001 * sizes).all()
     # Random machines stay far inside: that is no fault of the bound.
     largest = boxed.sampled("uniform", 10_000, 1).extremes[0, :6, 1]
     assert (largest < 0.7 * found.upper).all()
@@ -278,7 +280,7 @@ def test_two_lengths_in_closed_form(tmp_path: Path) -> None:
     assert (found.upper >= exact.exact_upper - 1e-15).all()
     assert np.allclose(found.upper, exact.exact_upper, rtol=1e-6)
     assert np.allclose(found.lower, exact.exact_lower, rtol=1e-6)
-    assert np.allclose(found.magnitude, exact.magnitude_exact, rtol=0.02)
+    assert np.allclose(found.magnitude, exact.magnitude_exact, rtol=3e-4)
 
 
 def bounds_or_nothing(machine: tp.Machine, poses: np.ndarray) -> xr.Dataset | None:

@@ -222,13 +222,17 @@ def test_a_region_of_one_pose_is_that_pose() -> None:
 
 
 def test_a_region_of_one_pose_is_bounded_as_the_pose_is() -> None:
-    """Nothing is lost by a region: the first box is bounded as well as can be, and not divided."""
+    """Nothing is lost by a region: the first box is bounded as well as can be, and not divided.
+
+    But that magnitudes are refined to 1 %, not as closely as at a pose.
+    """
     machine = load("linear_delta")
     region = tp.bounds(machine, region={"x": (0.0, 0.0), "y": (0.0, 0.0), "z": (0.1, 0.1)})
     pose = tp.bounds(machine, [0.0, 0.0, 0.1])
     assert int(region["boxes"]) == 1
-    for name in ("lower", "upper", "magnitude"):
-        assert np.allclose(region[name], pose[name][0], rtol=1e-6)
+    for name, share in (("lower", 1e-6), ("upper", 1e-6), ("magnitude", 0.01)):
+        assert np.allclose(region[name], pose[name][0], rtol=share)
+    assert (region.magnitude >= pose.reached_magnitude[0]).all()
 
 
 def test_the_schema_is_what_there_is() -> None:

@@ -18,7 +18,8 @@
 //!
 //! **Lower bounds.** A leaf whose magnitudes lie above what is asked for is halved across the variable with
 //! the least certain slope. Its halves are within it, so that their root is known to exist: a smaller
-//! enclosure is taken where it is of that root, its middle in U_L; elsewhere the leaf's own bound stays.
+//! enclosure is taken where it is of that root, its middle in U_L; elsewhere the leaf's own bound stays, and
+//! so do its bounds of what no target is given for.
 //!
 //! Variables that are together a unit vector are not divided: a proof is over the cube around their sphere,
 //! and m has their middle, 0, which is one point of that cube. Effort is counted in boxes, so that the result
@@ -202,7 +203,14 @@ impl<'a> Search<'a> {
                     raise(&mut closed, &bounds.values);
                     continue;
                 };
-                let mut own = half.bounds(&closeness(&floor));
+                // What nobody asks for stays as the outer box has it.
+                let mut near = closeness(&floor);
+                for target in
+                    (0..TARGETS).filter(|&k| k < 2 * SIX || !wanted.contains(&(k - 2 * SIX)))
+                {
+                    near.enough[target] = f64::INFINITY;
+                }
+                let mut own = half.bounds(&near);
                 for (own, outer) in own.values.iter_mut().zip(&bounds.values) {
                     *own = own.min(*outer);
                 }

@@ -10,7 +10,8 @@ import numpy as np
 
 from truepose.machine.suggestion import counted
 from truepose.report.accuracy import AFTER, BEFORE
-from truepose.report.display import MISSING, column, decimals_for
+from truepose.report.display import MISSING
+from truepose.report.how_sure import rounded
 from truepose.report.study import Study
 from truepose.report.tables import Table
 
@@ -73,9 +74,11 @@ def share_note(study: Study) -> str:
     found = [each.coverage for each in study.sampled if each.coverage is not None]
     if not found:
         return f"{said}."
-    draws, poses = (max(getattr(each, name) for each in found) for name in ("draws", "sampled"))
-    every = max(each.poses for each in found)
-    return f"{said}: {draws:,} machines at {poses:,} of {counted(every, 'pose')}."
+    draws = max(each.draws for each in found)
+    sampled = {each.sampled for each in found}
+    up_to = "up to " if len(sampled) > 1 else ""
+    poses = counted(found[0].poses, "pose")
+    return f"{said}: {draws:,} machines at {up_to}{max(sampled):,} of {poses}."
 
 
 def table(study: Study) -> Table:
@@ -83,8 +86,8 @@ def table(study: Study) -> Table:
     rows = []
     for row in how_far(study):
         unit = study.units.error(row.quantity)
-        sizes = [row.sizes[name] * unit.per_si for name in NUMBERS]
-        cells = column(sizes, decimals_for(sizes))
+        sizes = np.array([row.sizes[name] * unit.per_si for name in NUMBERS])
+        cells = rounded(sizes, [int(name == "bound") for name in NUMBERS])
         rows.append((row.quantity, row.state, *cells, unit.label))
     return Table(
         "how_far",

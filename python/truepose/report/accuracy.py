@@ -192,7 +192,7 @@ def _gain(quantity: str, before: float, after: float) -> str:
 def as_data(machine: Machine, answer: Answer) -> dict[str, Any]:
     """An answer for programs, in the units of the machine's file.
 
-    `pose`, `at`: of the number that goes with the answer (`Answer.told`). Numbers that there are
+    `pose`, `at`: of the number that goes with the answer (`Told.told`). Numbers that there are
     not are None: no bound, or a witness that cannot be assembled.
     """
     si = SI[answer.quantity]
@@ -202,7 +202,7 @@ def as_data(machine: Machine, answer: Answer) -> dict[str, Any]:
             return None
         return in_file_units(machine, value, si)[0]
 
-    pose = answer.told
+    pose = Told(machine, answer).told
     return {
         "quantity": answer.quantity,
         "state": answer.state,

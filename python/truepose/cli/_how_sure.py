@@ -39,6 +39,8 @@ SEED = 0
 
 COVERAGE = 0.95
 """At which the report says how far off the tool is over the workspace."""
+MOST_POSES, MOST_DRAWS = 3, 10_000
+"""For that: it is a number, no answer; `[accuracy] at` takes all poses and as many as decide."""
 
 UNITS = {"monte_carlo": "samples", "ellipses": "samples"}
 """What is counted in the progress of a result, where not poses."""
@@ -187,7 +189,7 @@ def with_how_sure(study: Study) -> Study:
             missing["ellipses"] = f"{found.pop('ellipses').attrs['not_assembled']}."
     return replace(
         study,
-        sampled=_at_95(machine),
+        sampled=_at_95(study),
         worst_case=found.get("worst_case"),
         monte_carlo=found.get("monte_carlo"),
         ellipses=found.get("ellipses"),
@@ -197,12 +199,26 @@ def with_how_sure(study: Study) -> Study:
     )
 
 
-def _at_95(machine: Machine) -> tuple[Answer, ...]:
-    """The errors that 95 % of all machines stay below, at the worst poses of the workspace."""
+def _at_95(study: Study) -> tuple[Answer, ...]:
+    """The errors that 95 % of all machines stay below, at the worst poses of the workspace.
+
+    The verdict's, where it is at that coverage.
+    """
+    machine = study.machine
+    if machine.accuracy.at == COVERAGE:
+        return study.accuracy
     with progress("coverage") as report:
         population = Population.of(machine, progress=report)
         return tuple(
-            at_coverage(population, state, kind, COVERAGE, None)
+            at_coverage(
+                population,
+                state,
+                kind,
+                COVERAGE,
+                None,
+                most_poses=MOST_POSES,
+                most_draws=MOST_DRAWS,
+            )
             for state in STATES
             for kind in quantities(machine.components)
         )

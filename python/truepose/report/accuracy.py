@@ -125,14 +125,17 @@ class Told:
         return pose_text(of.pose, list(self.machine.commanded), self.machine.shown)
 
     @property
+    def told(self) -> Number:
+        """The number whose pose is told: of what is undecided the bound, which stands open."""
+        return self.answer.bound if self.answer.answer == UNDECIDED else self.answer.told
+
+    @property
     def line(self) -> str:
         """Answer, number, target, pose and what it rests on, in one line."""
         answer = self.answer
         asked = "" if answer.asked is None else f", asked {self.asked}"
-        which = answer.told
-        if answer.answer == UNDECIDED:
-            which = answer.bound
-        return f"{self.name}: {self.size}{asked}, at {self.at(which)}; rests on {answer.rests_on}"
+        at = self.at(self.told)
+        return f"{self.name}: {self.size}{asked}, at {at}; rests on {answer.rests_on}"
 
     @property
     def witness(self) -> str:

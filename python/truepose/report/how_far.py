@@ -6,8 +6,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from truepose.machine.suggestion import counted
 from truepose.report.accuracy import AFTER, BEFORE
-from truepose.report.display import MISSING, column, decimals_for
+from truepose.report.display import MISSING
+from truepose.report.how_sure import rounded
 from truepose.report.study import Study
 from truepose.report.tables import Table
 
@@ -32,9 +36,11 @@ class HowFar:
 def how_far(study: Study) -> list[HowFar]:
     """Every quantity before and after compensation.
 
-    At a coverage the verdict's own numbers are of that; the worst case is then not asked.
+    At a coverage the verdict's own numbers are of that, and of the worst case the linear maximum is
+    known alone.
     """
     rows = []
+    worst_cases = _linear_maxima(study)
     sampled = {(each.state, each.quantity): each for each in study.sampled}
     for answer in study.accuracy:
         share = sampled.get((answer.state, answer.quantity))
@@ -42,7 +48,7 @@ def how_far(study: Study) -> list[HowFar]:
         sizes = {
             "sampled": math.nan if share is None else share.linear.value,
             "witness": answer.witness.value if worst else math.nan,
-            "linear": answer.linear.value if worst else math.nan,
+            "linear": answer.linear.value if worst else worst_cases[answer.state][answer.quantity],
             "bound": answer.bound.value if worst else math.nan,
         }
         finite = {name: size if math.isfinite(size) else math.nan for name, size in sizes.items()}
@@ -50,13 +56,38 @@ def how_far(study: Study) -> list[HowFar]:
     return rows
 
 
+def _linear_maxima(study: Study) -> Mapping[str, Mapping[str, float]]:
+    """By state and quantity, m and rad: the largest over all poses."""
+    return {
+        state: {
+            str(quantity): float(np.nanmax(found["linear_maximum"].values[:, at]))
+            for at, quantity in enumerate(found["quantity"].values)
+        }
+        for state, found in ((BEFORE, study.budget), (AFTER, study.compensation))
+        if found is not None
+    }
+
+
+def share_note(study: Study) -> str:
+    """What 95 % is, and how it was found."""
+    said = "95 %: so many of all machines stay below it at the worst pose, sampled, solved exactly"
+    found = [each.coverage for each in study.sampled if each.coverage is not None]
+    if not found:
+        return f"{said}."
+    draws = max(each.draws for each in found)
+    sampled = {each.sampled for each in found}
+    up_to = "up to " if len(sampled) > 1 else ""
+    poses = counted(found[0].poses, "pose")
+    return f"{said}: {draws:,} machines at {up_to}{max(sampled):,} of {poses}."
+
+
 def table(study: Study) -> Table:
     """The same as a table."""
     rows = []
     for row in how_far(study):
         unit = study.units.error(row.quantity)
-        sizes = [row.sizes[name] * unit.per_si for name in NUMBERS]
-        cells = column(sizes, decimals_for(sizes))
+        sizes = np.array([row.sizes[name] * unit.per_si for name in NUMBERS])
+        cells = rounded(sizes, [int(name == "bound") for name in NUMBERS])
         rows.append((row.quantity, row.state, *cells, unit.label))
     return Table(
         "how_far",
@@ -64,8 +95,7 @@ def table(study: Study) -> Table:
         ("", "", *NUMBERS.values(), ""),
         tuple(rows),
         words=2,
-        note="The largest over all poses. 95 %: at the worst pose so many of all machines inside "
-        f"the bands stay below it, sampled and solved exactly. {MISSING}: there is no such number.",
+        note=f"The largest over all poses. {share_note(study)} {MISSING}: there is no such number.",
     )
 
 

@@ -306,7 +306,7 @@ def answers(machine: Machine, found: Sequence[Answer]) -> Table:
                 )
             ),
             each.asked,
-            each.at(each.answer.told),
+            each.at(each.told),
         )
         for each in told(machine, found)
     ]

@@ -25,7 +25,7 @@ from truepose.machine import Condition, Machine
 from truepose.sources._base import Floats, Indices
 from truepose.verdict import engine
 from truepose.verdict.answer import MET, NOT_MET, UNDECIDED, Answer, Number
-from truepose.verdict.coverage import coverage
+from truepose.verdict.coverage import MOST_POSES, coverage
 from truepose.verdict.search import farthest
 from truepose.verdict.states import STATES, Blocks, Population, State
 from truepose.verdict.survey import Survey, survey
@@ -120,9 +120,18 @@ def answers(population: Population, state: str) -> list[Answer]:
 
 
 def at_coverage(
-    population: Population, name: str, kind: str, probability: float, target: float | None
+    population: Population,
+    name: str,
+    kind: str,
+    probability: float,
+    target: float | None,
+    *,
+    most_poses: int = MOST_POSES,
+    most_draws: int | None = None,
 ) -> Answer:
     """The answer of one quantity in one state at a coverage: the quantile at the worst pose.
+
+    `most_poses` and `most_draws`: effort, as of `coverage`.
 
     Where the machine cannot be commanded so at some pose, no share of all machines keeps anything.
     """
@@ -143,6 +152,8 @@ def at_coverage(
         kind,
         probability,
         target,
+        most_poses=most_poses,
+        most_draws=most_draws,
     )
     pose = population.table[sampled.pose]
     estimate, lower, upper = (

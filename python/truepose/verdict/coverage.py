@@ -108,6 +108,8 @@ def coverage(
     target: float | None = None,
     *,
     seed: int = 0,
+    most_poses: int = MOST_POSES,
+    most_draws: int | None = None,
     progress: Progress | None = None,
 ) -> CoverageAnswer:
     """The `probability` quantile of the length of the error at the worst pose, against a `target`.
@@ -117,6 +119,9 @@ def coverage(
     rad. At every pose that may be the worst 20,000 machines are drawn, and twice as many again, up
     to a million, where the interval at the pose holds the target. Without a target they are
     doubled up to 100,000 where a pose may be the worst and the interval is wider than 2 %.
+
+    `most_poses` are sampled at most, those of the largest first-order numbers, with at most
+    `most_draws` machines each, by default a million against a target and 100,000 without.
 
     Met: the whole interval is at most the target. NOT met: the whole interval is above it.
     Equal seeds give equal answers, whatever the number of threads. `progress` is called with
@@ -129,8 +134,9 @@ def coverage(
     kinds = quantities(machine.components)
     if quantity not in kinds:
         raise ValueError(f"no {quantity} of this machine's tool")
-    screened = Screen(machine, states, kinds[quantity], p, number).candidates(MOST_POSES)
-    found = _Sampled(screened.poses, p, target, progress)
+    screened = Screen(machine, states, kinds[quantity], p, number).candidates(most_poses)
+    most = most_draws or (MOST_UNASKED if target is None else MOST)
+    found = _Sampled(screened.poses, p, target, most, progress)
     found.run()
     worst = found.worst
     return CoverageAnswer(
@@ -158,6 +164,7 @@ class _Sampled:
     poses: Sequence[Pose]
     probability: float
     target: float | None
+    most: int
     progress: Progress | None
     estimate: Floats = field(init=False)
     lower: Floats = field(init=False)
@@ -188,7 +195,7 @@ class _Sampled:
 
     def run(self) -> None:
         """Draw at all poses, then twice as many where that may decide."""
-        looks = _looks(MOST if self.target is not None else MOST_UNASKED)
+        looks = _looks(self.most)
         risk = (1.0 - CONFIDENCE) / (len(self.poses) * len(looks))
         drawn = 0
         for count in looks:
@@ -232,7 +239,7 @@ class _Sampled:
 
 def _looks(most: int) -> list[int]:
     """Numbers of draws, each twice the one before it."""
-    counts = [DRAWS]
+    counts = [min(DRAWS, most)]
     while counts[-1] < most:
         counts.append(min(2 * counts[-1], most))
     return counts

@@ -107,7 +107,7 @@ def test_the_answers_have_the_three_known_numbers(study: Study) -> None:
         assert row[0] == f"{answer.quantity} {answer.state}"
         witness, linear, bound = (cell(text.split()[0]) * 1e-6 for text in row[2:5])
         tenth = 1.0001e-7
-        assert answer.witness.value - tenth < witness <= answer.witness.value, "rounded down"
+        assert witness == pytest.approx(answer.witness.value, abs=tenth / 2)
         assert linear == pytest.approx(answer.linear.value, abs=tenth / 2)
         assert answer.bound.value <= bound < answer.bound.value + tenth, "rounded up"
         assert row[6] == pose_text(answer.told.pose, study.machine.commanded, study.units)

@@ -8,7 +8,7 @@ from plotly.subplots import make_subplots
 
 from truepose.report.accuracy import SI
 from truepose.report.figures._style import INK, finish, small
-from truepose.report.how_far import NUMBERS, how_far
+from truepose.report.how_far import NUMBERS, how_far, share_note
 from truepose.report.study import Study
 
 TITLE = "How far off can the tool be?"
@@ -18,20 +18,27 @@ COLOURS = {
     "sampled": "#56B4E9",
     "witness": "#0072B2",
     "linear": "#E69F00",
-    "bound": "#1B2A41",
+    "bound": "#7F8AA3",
 }
 PANEL = 330
 
 
 def caption(study: Study) -> str:
     """What each number is."""
-    return (
-        "The largest error over all poses of the workspace, the length of the position's and of "
-        "the orientation's. 95 %: so many of all machines inside the bands stay below it at the "
-        "worst pose (sampled, solved exactly). Witness: the largest error found of one machine, "
-        "solved exactly. Linear maximum: of all machines inside the bands, to first order. Proven "
-        "bound: no machine inside the bands exceeds it. The more deviations there are that know "
-        "nothing of each other, the farther 95 % stay below the worst case."
+    shown = {name for row in how_far(study) for name, size in row.sizes.items() if size == size}
+    said = {
+        "sampled": share_note(study),
+        "witness": "Witness: the largest error found of one machine, solved exactly.",
+        "linear": "Linear maximum: of all machines inside the bands, to first order.",
+        "bound": "Proven bound: no machine inside the bands exceeds it.",
+    }
+    return " ".join(
+        [
+            "The largest error over all poses of the workspace.",
+            *(said[name] for name in NUMBERS if name in shown),
+            "The more deviations there are that know nothing of each other, the farther 95 % "
+            "stay below the worst case.",
+        ]
     )
 
 

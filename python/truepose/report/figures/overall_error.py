@@ -29,7 +29,7 @@ def caption(study: Study) -> str:
     drawn = drawn_poses(study.largest)
     return (
         "Exact error with all sources acting together: every source at its shift (the known "
-        "error), and the toleranced lengths all at the lower and all at the upper ends of their "
+        "error), and toleranced lengths all at the lower and all at the upper ends of their "
         "bands. That is not the worst case: lengths at unlike ends may do more."
         + thinning_note(len(drawn), study.n_pose)
     )

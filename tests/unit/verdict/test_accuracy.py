@@ -105,3 +105,22 @@ def test_of_a_wrist_no_position_is_asked(tmp_path: Path) -> None:
     (problem,) = caught.value.problems
     assert problem.code == "unknown-freedom"
     assert problem.path == "accuracy.target"
+
+
+# --- distributions without ends
+
+
+def test_where_normal_variables_are_taken_to_end_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "normal.toml"
+    banded = "length_tolerance = [-0.3, 0.3]"
+    normal = 'length_tolerance = { band = 0.3, distribution = "normal", sigmas = 2 }'
+    path.write_text(edited(PLANAR, (banded, normal)))
+    ends = "taken to end there: normal, 2 sigma"
+    for target, word in (("0.1 mm", "NOT met"), ("2 mm", "met")):
+        for answer in tp.accuracy(tp.load(path, settings=[f"accuracy.target={target}"])):
+            assert (answer.answer, answer.rests_on.partition("; ")[2]) == (word, ends)
+    assert ends in " ".join(call(capsys, "bounds", path).out.split())
+    for answer in tp.accuracy(load_text(tmp_path, PLANAR)):
+        assert ";" not in answer.rests_on

@@ -40,6 +40,7 @@ def command(**options: Any) -> int:
     asked; what compensation would leave is shown beside it.
     """
     from truepose.cli import _work
+    from truepose.errors import RequestError
     from truepose.output import replacing
     from truepose.report import inputs
     from truepose.report.accuracy import gains, told
@@ -57,8 +58,13 @@ def command(**options: Any) -> int:
     # Without a source the file may still be asked about its workspace, unless it asks for more.
     asked = machine.accuracy.target is not None or machine.accuracy.angle_target is not None
     if asked or any(inputs.acting(machine)):
-        warnings = warnings_of(_work.evaluate(request, machine))
         answers = _work.judge(machine)
+        try:
+            warnings = warnings_of(_work.evaluate(request, machine))
+        except RequestError as error:
+            # There are poses, as there are answers; only no budget of what bands leave of them.
+            if [problem.code for problem in error.problems] != ["no-pose-left"]:
+                raise
     if request.format == "table":
         from truepose.cli._show import show_answers, show_tables
 

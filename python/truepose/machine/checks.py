@@ -423,19 +423,28 @@ def _gradients(document: Document, validated: Validated) -> Iterator[Problem]:
             )
 
 
-def _angles_asked(document: Document, validated: Validated) -> Iterator[Problem]:
-    """An accuracy of the orientation is asked of a platform that turns."""
+_POSITION_ASKED = ("position is asked of a platform that only turns", "x or y or z")
+_ORIENTATION_ASKED = ("orientation is asked of a platform that cannot turn", "a or b or c")
+
+
+def _accuracy_asked(document: Document, validated: Validated) -> Iterator[Problem]:
+    """An accuracy is asked of a freedom that the platform has: what has none keeps any."""
     freedoms, accuracy = _freedoms(document), validated.table(AccuracyTable)
-    if freedoms is None or accuracy is None or accuracy.angle_target is None:
+    if freedoms is None or accuracy is None:
         return
-    if not any(FREEDOMS[freedom] == "angle" for freedom in freedoms[0]):
-        yield document.problem(
-            "unknown-freedom",
-            "an accuracy of the orientation is asked of a platform that cannot turn",
-            ("accuracy", "angle_target"),
-            found=f"a platform that moves in {' '.join(freedoms[0])}",
-            expected="no angle_target, or a or b or c in dof",
-        )
+    kinds = {FREEDOMS[freedom] for freedom in freedoms[0]}
+    for key, value, kind, what, names in (
+        ("target", accuracy.target, "length", *_POSITION_ASKED),
+        ("angle_target", accuracy.angle_target, "angle", *_ORIENTATION_ASKED),
+    ):
+        if value is not None and kind not in kinds:
+            yield document.problem(
+                "unknown-freedom",
+                f"an accuracy of the {what}",
+                ("accuracy", key),
+                found=f"a platform that moves in {' '.join(freedoms[0])}",
+                expected=f"no {key}, or {names} in dof",
+            )
 
 
 def _materials_and_outright(document: Document, validated: Validated) -> Iterator[Problem]:
@@ -466,6 +475,6 @@ _CHECKS: tuple[Check, ...] = (
     _pose_rows,
     _parts_with_temperatures,
     _gradients,
-    _angles_asked,
+    _accuracy_asked,
     _materials_and_outright,
 )

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from truepose import _kernel
 from truepose.budget.comparison import quantities
 from truepose.budget.poses import OK, Progress
+from truepose.budget.spread import Spread
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources._base import Floats, Indices
@@ -299,7 +300,14 @@ def _answer(
             rests_on = f"{REMAINDER}, {ENGINE} ({proof.boxes:,} boxes)" if by_engine else REMAINDER
         else:
             answer, rests_on = UNDECIDED, _why_open(bound, proof)
+    rests_on += _ends_taken(witness.spread)
     return Answer(kind, name, target, answer, seen, linear, bound, rests_on, witness)
+
+
+def _ends_taken(spread: Spread) -> str:
+    """Where distributions without ends are taken to end; empty where all have ends."""
+    endless = dict.fromkeys(str(each) for each in spread.distributions if not each.bounded)
+    return f"; taken to end there: {'; '.join(endless)}" if endless else ""
 
 
 def _number(population: Population, found: Survey, values: Floats) -> Number:

@@ -179,6 +179,11 @@ def _study(machine: Any, poses: Array) -> Study:
         "error_upper": (per_source, shift + half, "m"),
         "worst": (per_source, worst, "m"),
         "reach": (per_source, worst - np.abs(shift), "m"),
+        "largest": (
+            ("pose", "source", "quantity"),
+            np.stack(norms[: len(quantities)], axis=2),
+            "m",
+        ),
         "uncertainty": (per_source, half / np.sqrt(3), "m"),
         "percent_lower": (per_source, np.abs(shift - half) * inverse, "%"),
         "percent_upper": (per_source, np.abs(shift + half) * inverse, "%"),

@@ -165,13 +165,13 @@ def budget(
         for found, deviation in zip(distributions, deviations, strict=True):
             found.update((str(deviation.distribution[k]), None) for k in deviation.banded)
         room = rows.room(block.indices.size)
-        values, alone, shifted, edges = _evaluate(machine, block, sources, deviations, room)
+        values, shifted, edges = _evaluate(machine, block, sources, deviations, room)
         usable = walk.keep(block.indices, *shifted, *map(of_band, edges))
         rows.append(block, values, usable)
         if usable.any():
             for name, running in highest.items():
                 running.add(values[_HIGHEST[name]][usable])
-            statistics.add(alone[usable])
+            statistics.add(values["largest"][usable])
             guides.add(block, usable)
     if rows.count == 0:
         raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
@@ -228,21 +228,20 @@ def _evaluate(
     sources: Sequence[Source],
     deviations: Sequence[Deviation],
     room: dict[str, np.ndarray],
-) -> tuple[dict[str, np.ndarray], Floats, list[np.ndarray], list[np.ndarray]]:
+) -> tuple[dict[str, np.ndarray], list[np.ndarray], list[np.ndarray]]:
     """Every variable over poses for one block, and all statuses (n,) met on the way.
 
-    Besides, the largest lengths (n, n_source, n_quantity) of each source alone. Statuses are first
-    those at shifts, in the order of `exact.at_shifts`, then those at edges of the bands. Variables
-    of each source are written into `room`.
+    First those at shifts, in the order of `exact.at_shifts`, then those at edges of the bands.
+    Variables of each source are written into `room`.
     """
     coordinate, defined = percent.coordinates(machine, block.placements)
     per_error = percent.per_error(coordinate, defined)
-    values = {name: room[name] for name, variable in SCHEMA.items() if variable.dims == _EACH}
+    of_source = ("pose", "source")
+    values = {name: room[name] for name, each in SCHEMA.items() if each.dims[:2] == of_source}
     shifted: list[np.ndarray] = []
     at_edges: list[np.ndarray] = []
     nominal: list[np.ndarray] = []
     kinds = list(comparison.quantities(machine.components).values())
-    alone = np.empty((block.indices.size, len(sources), len(kinds)))
     for at, deviation in enumerate(deviations):
         edges = exact.source_edges(machine, block, deviation)
         band = _band(machine, block, deviation, edges.error, kinds)
@@ -252,7 +251,7 @@ def _evaluate(
         values["worst"][:, at] = worst.worst(edges.error, band.reach)
         values["reach"][:, at] = np.maximum(*band.reach)
         values["uncertainty"][:, at] = band.uncertainty
-        alone[:, at] = band.largest
+        values["largest"][:, at] = band.largest
         percent.percent(edges.lower, per_error, out=values["percent_lower"][:, at])
         percent.percent(edges.upper, per_error, out=values["percent_upper"][:, at])
         shifted.append(edges.status[0])
@@ -277,7 +276,7 @@ def _evaluate(
         "joint_nominal": block.joints,
         "force": block.forces,
     }
-    return values, alone, shifted, at_edges
+    return values, shifted, at_edges
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,12 @@ from truepose.verdict.witness import Witness
 LOOKED_AT = 4
 """Poses at which a witness is searched for, of the worst by the linear maximum."""
 
+ALIKE = 1e-9
+"""Of a number: what rounding may make of it. Which of two such poses is named is then the first."""
+
+UNASKED = 8
+"""Poses sampled of a quantity that nothing is asked of."""
+
 OPEN = 32
 """Poses that no proof decides at which one is searched for after that."""
 
@@ -94,7 +100,14 @@ def answers(population: Population, state: str) -> list[Answer]:
     ]
     if machine.accuracy.at is not None:
         return [
-            at_coverage(population, state, kind, machine.accuracy.at, target)
+            at_coverage(
+                population,
+                state,
+                kind,
+                machine.accuracy.at,
+                target,
+                most_poses=UNASKED if target is None else MOST_POSES,
+            )
             for kind, target in zip(kinds, asked, strict=True)
         ]
     found = survey(population.states(state), list(kinds.values()))
@@ -205,8 +218,15 @@ def _farthest(
 
 
 def _largest(values: Floats, count: int) -> Indices:
-    """Indices of the largest `values` (n,), the first of equal ones first."""
-    return np.argsort(-values, kind="stable")[:count]
+    """Indices of the largest `values` (n,), of those equal but for rounding the first ones."""
+    left = values.copy()
+    chosen = []
+    for _ in range(min(count, values.size)):
+        top = float(left.max())
+        least = top if np.isinf(top) else top - ALIKE * abs(top)
+        chosen.append(int(np.flatnonzero(left >= least)[0]))
+        left[chosen[-1]] = -np.inf
+    return np.array(chosen, np.intp)
 
 
 def _at_pose(state: State, kind: str, columns: Indices) -> Witness:
@@ -311,7 +331,7 @@ def _ends_taken(spread: Spread) -> str:
 
 
 def _number(population: Population, found: Survey, values: Floats) -> Number:
-    row = int(np.argmax(values))
+    row = int(_largest(values, 1)[0])
     number = int(found.numbers[row])
     return Number(float(values[row]), number, population.table[number])
 

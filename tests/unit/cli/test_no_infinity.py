@@ -120,7 +120,11 @@ def test_absurd_tolerances(value: str, tmp_path: Path, capsys: pytest.CaptureFix
     for command in COMMANDS:
         answers(path, command, capsys)
     outcome = call(capsys, "check", path)
+    if value in ("1e3", "1e49"):
+        # A band is no error of the file: some machine inside it is the witness of a no.
+        assert outcome.code == 1
+        lost = "NOT met  position before compensation: a machine that cannot be assembled"
+        assert outcome.out.startswith(lost)
+        return
     assert outcome.code == 2
-    expected = {"1e3": "no-pose-left", "1e49": "no-pose-left", "inf": "not-finite"}
-    problem = expected.get(value, "not-finite" if value == "nan" else "too-large")
-    assert outcome.codes[0] == problem
+    assert outcome.codes[0] == ("too-large" if value in ("1e60", "1e308") else "not-finite")

@@ -121,7 +121,7 @@ def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: St
 
 def test_maps_share_one_colour_scale(study: Study) -> None:
     figure = workspace_maps.figure(study)
-    sizes = [study.largest, study.position_norm(study.values("worst"))]
+    sizes = [study.largest, study.values("largest")[:, :, 0]]
     assert figure.layout.coloraxis.cmin == 0
     assert figure.layout.coloraxis.cmax == pytest.approx(max(map(np.max, sizes)) * 1e6)
     for each in figure.data:

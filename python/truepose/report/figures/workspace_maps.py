@@ -106,7 +106,7 @@ def _maps(study: Study, places: Places) -> list[Map]:
     if study.compensation is not None:
         remaining = study.remaining_largest
         maps.append(Map("after compensation", over_places(remaining)))
-    worst = study.position_norm(study.values("worst"))
+    worst = study.values("largest")[:, :, 0]
     maps += [Map(study.sources[index], over_places(worst[:, index])) for index in study.by_rank]
     return maps[:MOST_MAPS]
 

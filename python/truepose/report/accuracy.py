@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from truepose.report.display import MISSING, number, pose_text
+from truepose.report.display import MISSING, ROUNDING, number, pose_text
 from truepose.report.result import in_file_units, pose_in_file_units
 from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, UNDECIDED, Answer, Number
 from truepose.verdict.coverage import CONFIDENCE
@@ -57,16 +57,19 @@ class Told:
     def amount(self, value: float, side: int = 0) -> str:
         """A size without its unit, rounded up for `side` 1, down for -1, else to nearest.
 
-        With so many decimals that it does not look like the target where it is not.
+        With so many decimals that it does not look like the target where it is not, but for
+        `ROUNDING`.
         """
-        shown, asked = value * self.unit.per_si, self.answer.asked
-        decimals = self.unit.decimals
+        per_si, decimals = self.unit.per_si, self.unit.decimals
+        asked = self.answer.asked
+        if asked is not None and math.isclose(value, asked, rel_tol=ROUNDING):
+            return number(asked * per_si, decimals)
+        shown = value * per_si * (1.0 - side * 0.01 * ROUNDING)
         while True:
-            step = 10.0**-decimals
-            text = number(shown + side * 0.5 * step * (1.0 - 1e-9), decimals)
+            text = number(shown + side * 0.5 * 10.0**-decimals, decimals)
             if asked is None or decimals == MOST_DECIMALS:
                 return text
-            if text != number(asked * self.unit.per_si, decimals) or value == asked:
+            if text != number(asked * per_si, decimals):
                 return text
             decimals += 1
 
@@ -134,8 +137,13 @@ class Told:
         """Answer, number, target, pose and what it rests on, in one line."""
         answer = self.answer
         asked = "" if answer.asked is None else f", asked {self.asked}"
-        at = self.at(self.told)
-        return f"{self.name}: {self.size}{asked}, at {at}; rests on {answer.rests_on}"
+        return f"{self.name}: {self.size}{asked}, {self.basis}"
+
+    @property
+    def basis(self) -> str:
+        """At which pose the number is, and what the answer rests on."""
+        rests = "" if self.answer.answer == UNDECIDED else "rests on "
+        return f"at {self.at(self.told)}; {rests}{self.answer.rests_on}"
 
     @property
     def witness(self) -> str:
@@ -184,7 +192,7 @@ def _gain(quantity: str, before: float, after: float) -> str:
 def as_data(machine: Machine, answer: Answer) -> dict[str, Any]:
     """An answer for programs, in the units of the machine's file.
 
-    `pose`, `at`: of the number that goes with the answer (`Answer.told`). Numbers that there are
+    `pose`, `at`: of the number that goes with the answer (`Told.told`). Numbers that there are
     not are None: no bound, or a witness that cannot be assembled.
     """
     si = SI[answer.quantity]
@@ -194,7 +202,7 @@ def as_data(machine: Machine, answer: Answer) -> dict[str, Any]:
             return None
         return in_file_units(machine, value, si)[0]
 
-    pose = answer.told
+    pose = Told(machine, answer).told
     return {
         "quantity": answer.quantity,
         "state": answer.state,

@@ -84,7 +84,13 @@ def test_a_band_that_has_no_bound_is_no_yes(
     assert largest[~proven].min() >= np.quantile(largest, 0.9)
     outcome = call(capsys, "check", path, "--set", "accuracy.target=10 m", "--format", "json")
     after = next(a for a in json.loads(outcome.out)["answers"] if a["state"].startswith("after"))
-    assert (after["met"], after["highest"]) == (False, None)
+    assert (after["answer"], after["met"], after["bound"]) == ("undecided", False, None)
+    assert 0 < after["witness"] < 10_000
+    assert after["rests_on"].startswith("no proof within ")
+    first = call(capsys, "check", path, "--set", "accuracy.target=10 m").out.splitlines()[0]
+    assert first.startswith("undecided  position before compensation: ")
+    assert " µm or more, asked 10 m (10000000 µm), at " in first
+    assert "; no proof within " in first
 
 
 @pytest.mark.parametrize(

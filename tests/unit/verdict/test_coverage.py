@@ -261,9 +261,8 @@ def test_of_very_many_poses_few_are_screened_twice(
     poses = np.stack([np.linspace(0.34, 0.36, 41), np.full(41, 0.2)], axis=1)
     run = states(machine, poses, parts=3)
     every = coverage(machine, run, "position", P, 1.0)
-    monkeypatch.setattr(module, "MOST_POSES", 2)
     monkeypatch.setattr(screening, "REFINED", 1)
-    few = coverage(machine, run, "position", P, 1.0)
+    few = coverage(machine, run, "position", P, 1.0, most_poses=2)
     assert (few.pose, few.estimate) == (every.pose, every.estimate)
     assert (few.sampled, every.sampled) == (2, every.within)
     # Those that are not looked at more closely may be the worst as well.
@@ -280,15 +279,12 @@ def test_states_that_can_be_gone_through_but_once_are_refused(tmp_path: Path) ->
         coverage(machine, [], "position", P)
 
 
-def test_of_too_many_poses_the_largest_are_sampled_and_the_words_say_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_too_many_poses_the_largest_are_sampled_and_the_words_say_so(tmp_path: Path) -> None:
     machine = on_tool(tmp_path, '"tool.x" = 0.4')
     every = coverage(machine, states(machine), "position", P, target=1.0 * MM)
     assert (every.sampled, every.within, every.poses, every.pose) == (15, 15, 15, 0)
     assert "each of the 15 poses sampled" in every.rests_on
-    monkeypatch.setattr(module, "MOST_POSES", 4)
-    few = coverage(machine, states(machine), "position", P, target=1.0 * MM)
+    few = coverage(machine, states(machine), "position", P, target=1.0 * MM, most_poses=4)
     assert (few.sampled, few.within, few.poses) == (4, 15, 15)
     assert "4 of 15 poses sampled, the largest by first order of 15 that may be" in few.rests_on
 

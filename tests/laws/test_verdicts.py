@@ -18,8 +18,10 @@ from command_line import call
 from machine_texts import PLANAR, edited, load_text
 from machine_under_test import MachineUnderTest
 from one_number import Known, asking, asking_of, settings_of
+from random_machines import DrawnMachine
 from sweeps import thinned
 from truepose.machine import Machine
+from truepose.report.accuracy import gains
 from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, STATES, UNDECIDED, Answer
 
 Array = NDArray[np.float64]
@@ -187,6 +189,55 @@ def test_a_machine_that_is_farther_off_than_the_linear_one_is_found(tmp_path: Pa
     for pose, linear in zip(poses[farther], found.linear[farther, 0], strict=True):
         (answer,) = tp.accuracy(asking(machine, float(1.01 * linear)), pose, states=(BEFORE,))
         assert answer.answer == NOT_MET
+
+
+# --- where compensation makes the largest error larger
+
+
+def test_a_list_whose_mean_is_not_its_middle_may_grow_and_that_is_said(tmp_path: Path) -> None:
+    """Struts 0.3 mm short once in ten times, and 0.1485 mm longer by heat.
+
+    Before, lengths are off by -0.1515 to 0.1485 mm; after, the mean of both known, by -0.27 to
+    0.03 mm.
+    """
+    one_in_ten = '{ values = [-0.3, 0.0], probabilities = [0.1, 0.9], distribution = "discrete" }'
+    text = edited(
+        PLANAR,
+        ("force = { x = 1200, y = -1500 }\n", ""),
+        ("temperature = 35", "temperature = 47"),
+        ('section_area = "28 mm^2"\nmaterial = "steel"', 'expansion = "1.1e-5 1/K"'),
+        ("length_tolerance = [-0.3, 0.3]\n", ""),
+        ("[workspace]", f'[tolerance]\n"strut.*.length" = {one_in_ten}\n[workspace]'),
+        ("[[drive]]", '[frame]\nexpansion = "0 1/K"\n[each.drive]\nexpansion = "0 1/K"\n[[drive]]'),
+    )
+    machine = load_text(tmp_path, text)
+    answers = tp.accuracy(machine)
+    poses, found = machine.poses(), {}
+    for state, ends in ((BEFORE, (-0.1515e-3, 0.1485e-3)), (AFTER, (-0.27e-3, 0.03e-3))):
+        corners = np.array(list(itertools.product(ends, repeat=2)))
+        errors = [two_slider.displaced(machine, poses, lengths=corner) for corner in corners]
+        found[state] = np.linalg.norm(errors, axis=2).max()
+    for answer in answers:
+        assert answer.witness.value == pytest.approx(found[answer.state], rel=1e-3)
+    (sentence,) = gains(answers)
+    larger = round(100 * (answers[1].linear.value / answers[0].linear.value - 1))
+    assert larger > 30
+    assert f"{larger} % larger" in sentence
+
+
+@pytest.mark.parametrize("name", ["3prs-5", "3prs-7", "tricept-3"])
+def test_a_freedom_that_is_not_commanded_may_grow_and_that_is_said(name: str) -> None:
+    like, number = name.split("-")
+    answers = tp.accuracy(asking(DrawnMachine(like, int(number)).loaded))
+    grown = 0
+    for kind, sentence in zip(
+        dict.fromkeys(a.quantity for a in answers), gains(answers), strict=True
+    ):
+        before, after = (a.linear.value for a in answers if a.quantity == kind)
+        assert ("larger" in sentence) == (after > 1.005 * before)
+        assert ("reduced" in sentence) == (after < 0.995 * before)
+        grown += after > 1.005 * before
+    assert grown
 
 
 # --- the witness's file, made by a command

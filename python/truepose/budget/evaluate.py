@@ -55,6 +55,9 @@ SCHEMA: Schema = {
     "reach": Variable(
         _EACH, "component", "how far the source's tolerance band reaches, the farther way"
     ),
+    "largest": Variable(
+        ("pose", "source", "quantity"), "quantity", "linear maximum of the source alone"
+    ),
     "uncertainty": Variable(
         _EACH, "component", "standard uncertainty from the source's tolerance band"
     ),

@@ -220,7 +220,9 @@ def as_data(machine: Machine, answer: Answer) -> dict[str, Any]:
         "linear": of(answer.linear.value),
         "bound": of(answer.bound.value),
         "rests_on": answer.rests_on,
-        "example": None if answer.example is None else answer.example.as_data(),
+        "example": answer.example.as_data()
+        if answer.answer == NOT_MET and answer.example is not None
+        else None,
     }
 
 

@@ -333,7 +333,7 @@ def _ends_taken(spread: Spread) -> str:
 def _number(population: Population, found: Survey, values: Floats) -> Number:
     row = int(_largest(values, 1)[0])
     number = int(found.numbers[row])
-    return Number(float(values[row]), number, population.table[number])
+    return Number(float(values.max()), number, population.table[number])
 
 
 def _of_witness(witness: Witness) -> str:

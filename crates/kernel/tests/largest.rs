@@ -151,7 +151,8 @@ fn with_ellipsoids_it_is_that_of_brute_force() {
 #[test]
 fn a_ball_is_as_far_as_its_radius_within_the_stated_gap() {
     let axes = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let set = Set { axes, ellipsoids: vec![0..3], ..Set::default() };
+    let mut set = Set { axes, ..Set::default() };
+    set.ellipsoids.push(0..3);
     let found = Search::default().farthest::<f64>(&set);
     assert!(found.length >= 1.0 && found.length <= 1.0 + STATED, "{found:?}");
     assert!((found.reached - 1.0).abs() < 1e-12);

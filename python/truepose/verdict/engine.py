@@ -11,10 +11,10 @@ from truepose.budget.comparison import quantities
 from truepose.sources._base import Floats, Indices
 from truepose.verdict.states import State
 
-EFFORT = 4096
+EFFORT = 1024
 """Boxes in all, for one state."""
 
-EACH = 512
+EACH = 128
 """Boxes at one pose."""
 
 AT_ONCE = 8

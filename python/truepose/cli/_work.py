@@ -168,20 +168,25 @@ def deliver(
         note_written(request.output)
 
 
-def write_witness(request: Request, answers: Sequence[Answer], state: str) -> None:
-    """Write the witness of the first answer of a state that is NOT met, where it is asked for.
+def write_witness(request: Request, answers: Sequence[Answer], state: str) -> bool:
+    """Write the witness of the first answer of a state that is NOT met; whether there is one.
 
-    Raises `RequestError` (no-witness) where there is none.
+    True too where none is asked for.
     """
     path = request.witness
     if path is None:
-        return
+        return True
     for answer in answers:
         if answer.state == state and answer.answer == NOT_MET and answer.example is not None:
             example, original = answer.example, request.machine_file
             witness_file.write_witness(example.machine, example, path, original=original)
             note_written(path)
-            return
+            return True
+    return False
+
+
+def no_witness(answers: Sequence[Answer], state: str) -> RequestError:
+    """What is raised where a witness was asked for, and the answers of the state have none."""
     words = [
         f"{each.quantity}: {each.answer or 'nothing asked'}"
         for each in answers
@@ -189,7 +194,7 @@ def write_witness(request: Request, answers: Sequence[Answer], state: str) -> No
     ]
     sampled = any(each.coverage is not None for each in answers)
     hint = "a coverage has no one machine: try --set accuracy.at=worst" if sampled else None
-    raise _no_witness(f"{state}, {', '.join(words)}", hint)
+    return _no_witness(f"{state}, {', '.join(words)}", hint)
 
 
 def _no_witness(found: str, hint: str | None) -> RequestError:

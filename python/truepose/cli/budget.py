@@ -47,6 +47,7 @@ def command(**options: Any) -> int:
     machine = _work.read_machine(request)
     study = Study(machine, _work.evaluate(request, machine))
     answers = _work.judge(machine, BEFORE)
+    written = _work.write_witness(request, answers, BEFORE)
     _work.deliver(
         request,
         Result("budget", machine, study.budget),
@@ -59,5 +60,6 @@ def command(**options: Any) -> int:
         ],
         answers,
     )
-    _work.write_witness(request, answers, BEFORE)
+    if not written:
+        raise _work.no_witness(answers, BEFORE)
     return _work.exit_code(request, met(answers, BEFORE))

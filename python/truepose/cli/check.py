@@ -65,6 +65,8 @@ def command(**options: Any) -> int:
             # There are poses, as there are answers; only no budget of what bands leave of them.
             if [problem.code for problem in error.problems] != ["no-pose-left"]:
                 raise
+    kept = met(answers, BEFORE) is not False
+    written = _work.write_witness(request, answers, AFTER if kept else BEFORE)
     if request.format == "table":
         from truepose.cli._show import show_answers, show_tables
 
@@ -78,8 +80,8 @@ def command(**options: Any) -> int:
             text = _text(form, machine, found, answers, warnings)
             temporary.write_text(text + "\n", encoding="utf-8")
         _work.note_written(request.output)
-    kept = met(answers, BEFORE) is not False
-    _work.write_witness(request, answers, AFTER if kept else BEFORE)
+    if not written:
+        raise _work.no_witness(answers, AFTER if kept else BEFORE)
     return int(not kept)
 
 

@@ -46,6 +46,7 @@ def command(**options: Any) -> int:
     study = _work.study_of(request, _work.read_machine(request))
     assert study.compensation is not None
     answers = study.accuracy
+    written = _work.write_witness(request, answers, AFTER)
     _work.deliver(
         request,
         Result("compensate", study.machine, study.compensation),
@@ -56,5 +57,6 @@ def command(**options: Any) -> int:
         ],
         answers,
     )
-    _work.write_witness(request, answers, AFTER)
+    if not written:
+        raise _work.no_witness(answers, AFTER)
     return _work.exit_code(request, met(answers, AFTER))

@@ -119,9 +119,9 @@ class Told:
         said = self.machine.accuracy.said(answer.quantity)
         if said.rpartition(" ")[2].replace("u", "µ", 1) == self.unit.label:
             return said
-        unit = self.unit
-        same = number(answer.asked * unit.per_si, unit.decimals).rstrip("0").rstrip(".")
-        return f"{said} ({same} {unit.label})"
+        same = answer.asked * self.unit.per_si
+        shown = f"{round(same, self.unit.decimals):.12g}"
+        return f"{said} ({f'{same:.3g}' if shown == '0' else shown} {self.unit.label})"
 
     def at(self, of: Number) -> str:
         """The pose of a number."""

@@ -3,7 +3,9 @@
 //! The set is a point, plus segments (what one variable in [-1, 1] does), plus ellipsoids (what a unit vector
 //! does). Its support function, the most that e . u is over it,
 //!
-//!     h(u) = c . u + sum |s . u| + sum |B' u|
+//! ```text
+//! h(u) = c . u + sum |s . u| + sum |B' u|
+//! ```
 //!
 //! is convex, and the largest length is the largest h over unit directions u (Rockafellar, Convex Analysis,
 //! 1970, section 13). From below, climbing: the set's farthest point along u is longer than h(u), and

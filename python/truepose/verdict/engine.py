@@ -14,7 +14,7 @@ from truepose.verdict.states import State
 EFFORT = 1024
 """Boxes in all, for one state."""
 
-EACH = 128
+EACH = 512
 """Boxes at one pose."""
 
 AT_ONCE = 8

@@ -74,4 +74,5 @@ def test_results_are_written_in_place_block_by_block(hexapod: tp.Machine) -> Non
         sizes.append(found.nbytes)
     # More poses cost what their results take and next to nothing else, in a million as well.
     assert peaks[1] - peaks[0] < 1.1 * (sizes[1] - sizes[0])
-    assert (sizes[1] - sizes[0]) / 40_000 * 1e6 < 1.5 * 2**30
+    # Of these 1.5 GiB are 61 MiB the largest errors of each source and of all together.
+    assert (sizes[1] - sizes[0]) / 40_000 * 1e6 < 1.55 * 2**30

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -51,17 +50,6 @@ def settings_of(answer: Answer, target: float) -> str:
     if answer.quantity == "position":
         return f"accuracy.target={target!r} m"
     return f"accuracy.angle_target={target!r} rad"
-
-
-def without_targets(path: Path) -> str:
-    """A machine file's text without its table [accuracy]."""
-    lines, kept, inside = path.read_text(encoding="utf-8").splitlines(), [], False
-    for line in lines:
-        if line.startswith("["):
-            inside = line.startswith("[accuracy]")
-        if not inside:
-            kept.append(line)
-    return "\n".join([*kept, ""])
 
 
 class Known:
@@ -124,5 +112,4 @@ __all__ = [
     "drawn_inside",
     "has_ends",
     "settings_of",
-    "without_targets",
 ]

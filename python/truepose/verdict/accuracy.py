@@ -280,7 +280,7 @@ def _proved(
     worst = share.max(axis=1)[needed]
     # Where no remainder is proven the linear maximum says which pose is worst.
     worst = np.where(np.isfinite(worst), worst, (found.linear / limits).max(axis=1)[needed])
-    in_order = engine.by_need(worst, needed)
+    in_order = needed[np.argsort(-worst, kind="stable")]
     left, refused = engine.EFFORT, ""
     for start in range(0, in_order.size, engine.AT_ONCE):
         if left <= 0 or refused:

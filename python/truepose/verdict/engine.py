@@ -8,7 +8,7 @@ import numpy as np
 
 from truepose.budget.bounds import PROVEN, proven_bounds
 from truepose.budget.comparison import quantities
-from truepose.sources._base import Floats, Indices
+from truepose.sources._base import Floats
 from truepose.verdict.states import State
 
 EFFORT = 1024
@@ -42,8 +42,3 @@ def bounds(state: State, targets: Sequence[float | None], boxes: int) -> tuple[F
 def refused(state: State) -> str:
     """Why the engine has nothing to say of a machine; empty where it has."""
     return "more closures than freedoms" if state.machine.kernel.overconstrained else ""
-
-
-def by_need(bound: Floats, numbers: Indices) -> Indices:
-    """`numbers` (n,) of poses in the order of their `bound` (n,), the worst first."""
-    return numbers[np.argsort(-bound, kind="stable")]

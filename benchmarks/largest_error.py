@@ -12,11 +12,11 @@ import numpy as np
 import truepose
 from benchmarks.hexapod import load, workspace_poses
 from benchmarks.rows import Row
+from truepose.arrays import Floats, Indices
 from truepose.budget import evaluate
 from truepose.budget.largest import Largest
 from truepose.machine import Machine
 from truepose.sources import acting
-from truepose.sources._base import Floats, Indices
 
 COUNT = 1_000_000
 ASKED = 1.5

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property
 from truepose.calibration.result.bands import bands_of
 from truepose.calibration.result.file import Provenance
 from truepose.machine import Machine
-from truepose.sources._base import Floats, Indices
 
 PROVENANCE = Provenance("measurements.csv", "ab" * 32, "2026-03-04", 300, 41.25, 1.03125, 1.5)
 

@@ -151,9 +151,9 @@ def __getattr__(name: str) -> Any:
     elif name == "errors":
         value = import_module("truepose.errors")
     elif name == "__version__":
-        from importlib.metadata import version
+        from truepose.version import version
 
-        value = version("truepose")
+        value = version()
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

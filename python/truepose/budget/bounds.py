@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats
 from truepose.budget.band_ends import Ends
 from truepose.budget.comparison import quantities
 from truepose.budget.dataset import Rows, Schema, Variable, assemble, quantity_coords, sizes
@@ -37,7 +38,6 @@ from truepose.budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block
-from truepose.sources._base import Flags, Floats
 
 _EACH = ("pose", "component")
 _SIZE = ("pose", "quantity")

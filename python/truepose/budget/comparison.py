@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.budget.percent import POSITIONS
 from truepose.machine import Accuracy
-from truepose.sources._base import Floats, Indices
 
 NEGLIGIBLE = 0.05
 """Part of the accuracy asked (or of the total) below which a source may be ignored."""

@@ -17,8 +17,9 @@ from itertools import combinations
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.errors import Problem, RequestError
-from truepose.sources._base import Distribution, Floats, Indices
+from truepose.sources._base import Distribution
 from truepose.sources.joint_normal import normal_correlation
 from truepose.sources.quantiles import normal_cdf
 

@@ -8,18 +8,18 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.comparison import quantities
 from truepose.budget.percent import POSITIONS
 from truepose.budget.poses import LeftOut
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, not_included_text
-from truepose.sources._base import Flags, Floats, Indices
+from truepose.version import version
 
 if TYPE_CHECKING:
     from truepose.budget.model import FunctionModel
@@ -189,7 +189,7 @@ def function_dataset(
         if dim in used
     }
     attrs = {
-        "truepose_version": version("truepose"),
+        "truepose_version": version(),
         "function": getattr(model.function, "__name__", type(model.function).__name__),
         "inputs": json.dumps(
             {
@@ -306,7 +306,7 @@ def provenance(machine: Machine, condition: Condition) -> dict[str, str | int | 
     What every result says.
     """
     attrs: dict[str, str | int | float] = {
-        "truepose_version": version("truepose"),
+        "truepose_version": version(),
         "machine": machine.name,
         "machine_file": machine.file,
         "machine_hash": machine.file_hash,

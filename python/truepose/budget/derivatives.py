@@ -17,7 +17,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from truepose.sources._base import Floats
+from truepose.arrays import Floats
 
 Function = Callable[[np.ndarray], np.ndarray]
 """Outputs (s, m) at arguments (s, n), real or complex."""

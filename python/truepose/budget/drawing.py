@@ -17,8 +17,9 @@ from functools import cached_property
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.copula import NORMAL, Copula
-from truepose.sources._base import Distribution, Flags, Floats, Indices
+from truepose.sources._base import Distribution
 from truepose.sources.domain import unit
 
 STUDENT = "student-t"

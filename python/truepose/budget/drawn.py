@@ -10,14 +10,16 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.budget.copula import Copula
 from truepose.errors import Problem, RequestError
-from truepose.sources._base import Distribution, Floats, Indices
+from truepose.sources._base import Distribution
 from truepose.sources.domain import unit
 from truepose.sources.quantiles import normal_quantile
 
 if TYPE_CHECKING:
-    from truepose import _kernel
+    from truepose._kernel import Tallies
+    from truepose._kernel import Variables as KernelVariables
 
 BATCH = 10_000
 """Samples of a batch at least (JCGM 101:2008, 7.9.4 a)."""
@@ -68,7 +70,7 @@ class Variables(Protocol):
 class Draws(Protocol):
     """The variables of any sample, by its number."""
 
-    variables: _kernel.Variables
+    variables: KernelVariables
     seed: int
 
     def given(self, first: int, count: int) -> Floats | None:
@@ -84,7 +86,7 @@ class Random:
     """Random numbers of the kernel; correlated ones through a Gaussian copula."""
 
     def __init__(self, of: Variables, seed: int) -> None:
-        from truepose import _kernel
+        from truepose._kernel import Variables as KernelVariables
 
         self.seed = seed
         self.distributions = of.distributions
@@ -104,7 +106,7 @@ class Random:
                 described[k] |= {"kind": "normal", "sigmas": 1.0}
             linked = []
         factor = self.copula.factor if linked else np.empty((0, 0))
-        self.variables = _kernel.Variables(
+        self.variables = KernelVariables(
             described,
             linked,
             factor.ravel().tolist(),
@@ -229,7 +231,7 @@ class Adaptive(Enough):
         """A batch, or 0."""
         return 0 if done >= MOST or self._stable() else self.batch
 
-    def take(self, batch: _kernel.Tallies, columns: slice) -> None:
+    def take(self, batch: Tallies, columns: slice) -> None:
         """The figures of one batch."""
         m = np.asarray(batch.covariance).shape[1]
         variance = np.diagonal(np.asarray(batch.covariance), axis1=1, axis2=2)
@@ -257,7 +259,7 @@ class Adaptive(Enough):
 class Drawn:
     """Tallies of all samples, None where there are none; whether Ctrl-C ended it."""
 
-    tallies: _kernel.Tallies | None
+    tallies: Tallies | None
     interrupted: bool
 
 
@@ -267,15 +269,15 @@ class Sampler(ABC):
     n_pose: int
 
     @abstractmethod
-    def tallies(self) -> _kernel.Tallies:
+    def tallies(self) -> Tallies:
         """New ones for a pilot."""
 
     @abstractmethod
-    def begin(self, pilot: _kernel.Tallies) -> _kernel.Tallies:
+    def begin(self, pilot: Tallies) -> Tallies:
         """New ones, with what was learnt from the pilot."""
 
     @abstractmethod
-    def sample(self, draws: Draws, first: int, count: int, into: _kernel.Tallies) -> None:
+    def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
         """Evaluates the `count` samples from number `first` on into tallies."""
 
     @property
@@ -285,7 +287,7 @@ class Sampler(ABC):
 
     def run(self, draws: Draws, enough: Enough, account: Callable[[int], None]) -> Drawn:
         """Draws until there are enough; the first batch, drawn again, is the pilot."""
-        whole: _kernel.Tallies | None = None
+        whole: Tallies | None = None
         done = 0
         try:
             pilot = self.tallies()

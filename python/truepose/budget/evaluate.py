@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats, Indices
 from truepose.budget import comparison, exact, percent, propagation, worst
 from truepose.budget.dataset import (
     QUANTITY_UNITS,
@@ -37,7 +38,6 @@ from truepose.budget.spread import spread_of
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, Deviation, Source, acting
-from truepose.sources._base import Floats, Indices
 
 _EACH = ("pose", "source", "component")
 _ALL = ("pose", "component")

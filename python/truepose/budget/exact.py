@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.budget.poses import OK, finite_or
 from truepose.machine import Machine
 from truepose.sources import Block, Deviation
-from truepose.sources._base import Floats, Indices
 
 Moved = tuple[Indices, Floats]
 """Parameters (k,), each once, and their deviations (n or 1, k), SI."""

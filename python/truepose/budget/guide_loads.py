@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats
 from truepose.machine import Guide, Machine
 from truepose.sources import Block
-from truepose.sources._base import Flags, Floats
 from truepose.sources._play import NO_LOAD, all_that_acts
 
 CODE = "guide-taken-rigid"

@@ -15,10 +15,10 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine.suggestion import did_you_mean, one_of
 from truepose.sources import distributions
-from truepose.sources._base import Floats
 from truepose.sources.distributions import (
     ARCSINE,
     LEAST_DOF,

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose import _kernel
-from truepose.sources._base import Floats, Indices
+from truepose._kernel import largest as largest_lengths
+from truepose.arrays import Floats, Indices
 from truepose.sources.domain import Domain
 
 
@@ -56,7 +56,7 @@ def largest(
     `quantities`: components of each length, at most three. Missing (NaN) where a number of a pose
     is not finite.
     """
-    found = _kernel.largest(
+    found = largest_lengths(
         value,
         effects,
         domain.middle.tolist(),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from truepose.sources._base import Floats
+from truepose.arrays import Floats
 
 ROUNDING = 1e-9
 """Of the values: by which the law may miss them."""

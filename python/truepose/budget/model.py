@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget import derivatives
 from truepose.budget.dataset import (
     Rows,
@@ -34,7 +35,7 @@ from truepose.budget.spread import Spread, spread
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block
-from truepose.sources._base import Distribution, Flags, Floats, Indices
+from truepose.sources._base import Distribution
 
 PART = 8192
 """Samples that go to the kernel at once."""

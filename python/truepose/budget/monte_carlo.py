@@ -21,7 +21,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from truepose import _kernel
+from truepose._kernel import Study, Tallies
+from truepose.arrays import Floats
 from truepose.budget.asked import (
     required_digits,
     required_probability,
@@ -59,7 +60,6 @@ from truepose.budget.spread import Spread, spread
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block
-from truepose.sources._base import Floats
 
 if TYPE_CHECKING:
     from truepose.budget.inputs import Correlation, Input
@@ -333,9 +333,9 @@ class _MachineSampler(Sampler):
         self.n_pose = block.indices.size
         self._unwhitened = (self._origins()[0], self._widths())
 
-    def _studied(self, whitening: Floats | None) -> _kernel.Study:
+    def _studied(self, whitening: Floats | None) -> Study:
         shifted, shift = self.spread.shift
-        return _kernel.Study(
+        return Study(
             self.machine.kernel,
             self.block.joints,
             self.block.placements,
@@ -364,12 +364,12 @@ class _MachineSampler(Sampler):
         widths: Floats = np.maximum(every, 1e-15) / FINENESS
         return widths
 
-    def tallies(self) -> _kernel.Tallies:
+    def tallies(self) -> Tallies:
         """New ones, without the ellipse."""
         origins, widths = self._unwhitened
-        return _kernel.Tallies(origins, widths, origins.shape[1], len(self.machine.components))
+        return Tallies(origins, widths, origins.shape[1], len(self.machine.components))
 
-    def begin(self, pilot: _kernel.Tallies) -> _kernel.Tallies:
+    def begin(self, pilot: Tallies) -> Tallies:
         """Tallies with the ellipse, whose shape is the covariance of the pilot."""
         origins, widths = self._unwhitened
         if self._axes:
@@ -380,9 +380,9 @@ class _MachineSampler(Sampler):
             more = np.ones((self.n_pose, 1))
             origins = np.concatenate([origins, 0.0 * more], axis=1)
             widths = np.concatenate([widths, more / FINENESS], axis=1)
-        return _kernel.Tallies(origins, widths, origins.shape[1], len(self.machine.components))
+        return Tallies(origins, widths, origins.shape[1], len(self.machine.components))
 
-    def sample(self, draws: Draws, first: int, count: int, into: _kernel.Tallies) -> None:
+    def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
         """Evaluates the samples from number `first` on."""
         given = draws.given(first, count)
         if given is None:
@@ -395,7 +395,7 @@ class _MachineSampler(Sampler):
         """Columns whose figures are to be stable."""
         return slice(0, len(self.machine.components))
 
-    def values(self, tallies: _kernel.Tallies, probability: float) -> dict[str, np.ndarray]:
+    def values(self, tallies: Tallies, probability: float) -> dict[str, np.ndarray]:
         """All variables of the schema, over poses first."""
         m = len(self.machine.components)
         values = statistics(tallies, m, probability)
@@ -433,7 +433,7 @@ def _whitening(machine: Machine, centre: Floats, covariance: Floats) -> Floats:
     return rows
 
 
-def statistics(tallies: _kernel.Tallies, m: int, probability: float) -> dict[str, np.ndarray]:
+def statistics(tallies: Tallies, m: int, probability: float) -> dict[str, np.ndarray]:
     """The variables of `SCHEMA` of the first m columns, over poses first."""
     tail = 0.5 * (1.0 - probability)
     of_all = OfAll(tallies)
@@ -469,10 +469,10 @@ class _FunctionSampler(Sampler):
         self._origins, self._widths = np.zeros((1, m)), np.ones((1, m))
         self.failed = 0
 
-    def tallies(self) -> _kernel.Tallies:
+    def tallies(self) -> Tallies:
         """New ones."""
         m = self._origins.shape[1]
-        return _kernel.Tallies(self._origins, self._widths, m, m)
+        return Tallies(self._origins, self._widths, m, m)
 
     def prepare(self, draws: Draws) -> None:
         """Origins and widths from some first samples."""
@@ -485,11 +485,11 @@ class _FunctionSampler(Sampler):
         self._origins = middle[np.newaxis]
         self._widths = np.maximum(spread, tiny)[np.newaxis] / FINENESS
 
-    def begin(self, pilot: _kernel.Tallies) -> _kernel.Tallies:
+    def begin(self, pilot: Tallies) -> Tallies:
         """The same once more: nothing is learnt from the pilot."""
         return pilot.blank()
 
-    def sample(self, draws: Draws, first: int, count: int, into: _kernel.Tallies) -> None:
+    def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
         """Evaluates the samples from number `first` on."""
         values, fine = self.model.evaluate(draws.rows(first, count))
         into.add(np.ascontiguousarray(values[fine]))

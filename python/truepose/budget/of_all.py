@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.budget.poses import not_assembled_text
 from truepose.machine.suggestion import counted
-from truepose.sources._base import Floats
 
 if TYPE_CHECKING:
-    from truepose import _kernel
+    from truepose._kernel import Tallies
 
 ROUNDING = 1e-12
 """Of a share of the samples."""
@@ -32,7 +32,7 @@ class OfAll:
     All are (n_pose, n_column, ...), NaN where those that failed decide.
     """
 
-    def __init__(self, tallies: _kernel.Tallies) -> None:
+    def __init__(self, tallies: Tallies) -> None:
         self._tallies = tallies
         count, failed = np.asarray(tallies.count), np.asarray(tallies.failed)
         with np.errstate(divide="ignore"):

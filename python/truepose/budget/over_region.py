@@ -17,7 +17,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from truepose import _kernel
+from truepose._kernel import STATUS
+from truepose.arrays import Floats, Indices
 from truepose.budget.band_ends import Ends
 from truepose.budget.comparison import quantities
 from truepose.budget.dataset import Schema, Variable, region_dataset
@@ -29,7 +30,6 @@ from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.machine.suggestion import did_you_mean, one_of
 from truepose.sources import Block, Source
-from truepose.sources._base import Floats, Indices
 
 MOST_BOXES = 10_000
 """Parts of a region that are looked at before giving up."""
@@ -136,7 +136,7 @@ def bounds_over_region(
         _going_on(progress),
     )
     status = str(found["status"])
-    if status in _kernel.STATUS:
+    if status in STATUS:
         raise _out_of_reach(machine, np.array(found["where"]), status)
     proven = status == "proven"
     count, kinds = len(machine.components), len(quantities(machine.components))

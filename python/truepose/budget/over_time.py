@@ -8,13 +8,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.budget import exact
 from truepose.budget.dataset import Rows, Schema, Variable, assemble, label, sizes
 from truepose.budget.poses import BLOCK, OK, Progress, Walk, no_pose_left, requested_poses
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, Thermal
-from truepose.sources._base import Floats
 
 SCHEMA: Schema = {
     "error": Variable(

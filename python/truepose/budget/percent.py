@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats
 from truepose.machine import Machine
-from truepose.sources._base import Flags, Floats
 
 SMALLEST = 1e-6
 """Coordinate, in characteristic lengths of the machine, below which a percentage says nothing."""

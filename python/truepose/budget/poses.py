@@ -19,11 +19,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose import _kernel
+from truepose._kernel import STATUS
+from truepose.arrays import Flags, Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block
-from truepose.sources._base import Flags, Floats, Indices
 
 BLOCK = 8192
 """Poses in a block."""
@@ -37,8 +37,8 @@ STILL = 1e-12
 Progress = Callable[[int, int], None]
 """Called with (poses done, poses in all), between blocks."""
 
-OK = _kernel.STATUS.index("ok")
-NOT_CONVERGED = _kernel.STATUS.index("not_converged")
+OK = STATUS.index("ok")
+NOT_CONVERGED = STATUS.index("not_converged")
 
 BAND = "band"
 """Why a pose is left out at which some machines inside the bands cannot be assembled."""
@@ -46,7 +46,7 @@ BAND = "band"
 CORRECTION = "correction_"
 """Begins why a pose is left out whose corrected command the machine cannot follow."""
 
-REASONS = (*_kernel.STATUS, BAND, *(f"{CORRECTION}{name}" for name in _kernel.STATUS))
+REASONS = (*STATUS, BAND, *(f"{CORRECTION}{name}" for name in STATUS))
 """Why a pose may be left out: a kernel status, or what a command found that looked further."""
 
 
@@ -223,7 +223,7 @@ def broken(status: np.ndarray) -> Flags:
     inside the bands do, or the corrected command leads nowhere.
     """
     names = np.asarray(status, np.str_)
-    return np.asarray(~np.isin(names, _kernel.STATUS), np.bool_)
+    return np.asarray(~np.isin(names, STATUS), np.bool_)
 
 
 def reason_text(status: str) -> str:

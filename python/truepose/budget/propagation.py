@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.sources._base import Floats, Indices
+from truepose.arrays import Floats, Indices
 from truepose.sources.quantiles import normal_quantile, student_quantile
 
 

@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.budget.model import FunctionModel, Linear
-from truepose.sources._base import Floats
 
 Function = Callable[[Floats], Floats]
 """Outputs (s, m) of independent variables (s, n) in standard uncertainties."""

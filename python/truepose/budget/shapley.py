@@ -28,6 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.drawing import Drawing, generator
 from truepose.budget.sobol import (
     LEAST,
@@ -42,7 +43,6 @@ from truepose.budget.sobol import (
     parts,
     regression,
 )
-from truepose.sources._base import Flags, Floats, Indices
 
 SUBSETS = 12
 """Correlated variables up to which all subsets of them are summed over, not orders drawn."""

@@ -26,6 +26,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats, Indices
 from truepose.budget import shapley, sobol
 from truepose.budget.asked import required_probability, required_samples, required_seed
 from truepose.budget.comparison import quantities
@@ -36,7 +37,6 @@ from truepose.budget.of_all import lost_text
 from truepose.budget.poses import BAND, REASONS, Progress
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.sources._base import Floats, Indices
 
 if TYPE_CHECKING:
     from truepose.budget.inputs import Correlation, Input

@@ -29,8 +29,8 @@ from statistics import NormalDist
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.drawing import Drawing, generator
-from truepose.sources._base import Flags, Floats, Indices
 
 Evaluate = Callable[[Floats], tuple[Floats, Flags]]
 """Values (s, m) of the model's outputs at variables t (s, n_variable), and which are good (s,)."""

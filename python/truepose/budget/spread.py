@@ -16,10 +16,11 @@ from functools import cached_property
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.exact import Moved, together
 from truepose.machine import Machine
 from truepose.sources import REGISTRY, Block, Deviation, Source
-from truepose.sources._base import Distribution, Flags, Floats, Indices
+from truepose.sources._base import Distribution
 from truepose.sources.domain import Domain
 
 ROUNDING = 1e-14

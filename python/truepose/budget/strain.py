@@ -21,6 +21,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats
 from truepose.budget import worst
 from truepose.budget.comparison import Highest
 from truepose.budget.dataset import Rows, Schema, Variable, assemble, label, sizes
@@ -30,7 +31,6 @@ from truepose.budget.poses import Progress, Walk, is_path, no_pose_left, request
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, Clearance, Deviation, Elastic, Loads, Source
-from truepose.sources._base import Flags, Floats
 from truepose.sources.clearance import half_clearances
 
 FITS = 1e-9

@@ -19,6 +19,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats, Indices
 from truepose.budget.asked import required_digits, required_probability
 from truepose.budget.dataset import (
     Rows,
@@ -43,7 +44,7 @@ from truepose.budget.second_order_terms import second_order_uncertainty
 from truepose.budget.spread import spread
 from truepose.budget.validity import LinearAnswer, Sampled, compare
 from truepose.machine import Condition, Machine
-from truepose.sources._base import Distribution, Floats, Indices
+from truepose.sources._base import Distribution
 
 ROUNDING = 1e-12
 """Of the machine's characteristic length, or rad, or an output: what solving a pose leaves."""

@@ -15,7 +15,8 @@ from statistics import NormalDist
 
 import numpy as np
 
-from truepose.sources._base import Distribution, Flags, Floats
+from truepose.arrays import Flags, Floats
+from truepose.sources._base import Distribution
 
 DOMINANT = 0.5
 """Part of the variance from which one variable gives the sum its shape."""

@@ -17,8 +17,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.poses import OK
-from truepose.sources._base import Flags, Floats, Indices
 from truepose.sources.domain import Domain, unit
 
 EVERY_VERTEX = 12

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.budget.exact import together
 from truepose.machine import Machine
 from truepose.sources import Block, Deviation
-from truepose.sources._base import Floats, Indices
 
 EVERY = slice(None)
 """All poses of a block."""

@@ -19,6 +19,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats, Indices
 from truepose.budget import comparison
 from truepose.budget.band_ends import Endless
 from truepose.budget.dataset import (
@@ -51,7 +52,6 @@ from truepose.budget.vertices import Found, worst_vertices
 from truepose.budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.sources._base import Floats, Indices
 from truepose.sources.domain import Domain
 
 _EACH = ("pose", "component")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats
 from truepose.calibration.gate.verdict import MARGIN, Gate, HeldOut, judge
 from truepose.calibration.identification.considered import considered, with_considered
 from truepose.calibration.identification.fit import Fit, fit, placed
@@ -27,7 +28,6 @@ from truepose.calibration.measurements.reading import read_measurements
 from truepose.calibration.suspicions import Suspicion, suspicions
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
-from truepose.sources._base import Flags, Floats
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from truepose.arrays import Flags, Floats
 from truepose.budget.comparison import quantities
 from truepose.budget.dataset import (
     Schema,
@@ -28,7 +29,6 @@ from truepose.calibration.identification.fit import Equations
 from truepose.calibration.identification.problem import Prior
 from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
 from truepose.machine import Machine
-from truepose.sources._base import Flags, Floats
 
 if TYPE_CHECKING:
     from truepose.calibration.calibrate import Calibration

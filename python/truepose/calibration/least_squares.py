@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from truepose import _kernel
+from truepose._kernel import least_squares as solve_least_squares
+from truepose.arrays import Floats
 
-Floats = NDArray[np.float64]
 Residual = Callable[[Floats], Floats]
 Status = Literal["cost", "step", "gradient", "stalled", "exhausted"]
 
@@ -97,7 +97,7 @@ def least_squares(
         raise ValueError(f"the first radius is {first_radius}, expected a number above zero")
     values = np.array(start, np.float64).reshape(-1)
     with np.errstate(all="ignore"):  # a value out of reach is looked at, not warned of
-        found = _kernel.least_squares(
+        found = solve_least_squares(
             residual,
             jacobian,
             values,

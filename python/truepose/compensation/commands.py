@@ -21,18 +21,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from truepose import _kernel
+from truepose._kernel import STATUS
+from truepose.arrays import Codes, Flags, Floats
 from truepose.budget.exact import Moved, displacement, together
 from truepose.budget.poses import BLOCK, OK, requested_poses
 from truepose.compensation.corrected import corrected_joints
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, acting
-from truepose.sources._base import Flags, Floats
-
-Codes = NDArray[np.uint8]
 
 MOST_PASSES = 12
 """Passes after which the pose that is reached is taken for one that does not settle.
@@ -46,8 +44,8 @@ SETTLED = 1e-13
 TURNS = {"a": "rx", "b": "ry", "c": "rz"}
 """The component of an error that belongs to each angle of a pose."""
 
-_NOT_CONVERGED = _kernel.STATUS.index("not_converged")
-_WITH_JOINTS = tuple(_kernel.STATUS.index(name) for name in ("ok", "out_of_travel", "joint_limit"))
+_NOT_CONVERGED = STATUS.index("not_converged")
+_WITH_JOINTS = tuple(STATUS.index(name) for name in ("ok", "out_of_travel", "joint_limit"))
 """Statuses of poses whose joints are known, though some of them must not be commanded."""
 
 UNMOVED: Moved = (np.empty(0, np.intp), np.empty((1, 0)))

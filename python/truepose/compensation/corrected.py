@@ -18,12 +18,12 @@ from typing import TypeVar
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.budget.exact import Moved, together
 from truepose.budget.poses import NOT_CONVERGED, OK
 from truepose.budget.spread import Spread, spread_of
 from truepose.machine import Machine
 from truepose.sources import Block, Deviation, Source
-from truepose.sources._base import Floats
 
 Known = TypeVar("Known")
 """What is known of the machine at the poses of a block, in whatever form."""

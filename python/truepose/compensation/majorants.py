@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from truepose.sources._base import Floats
+from truepose.arrays import Floats
 
 
 def turn(angle: Floats) -> Floats:

@@ -12,12 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.budget.first_order import rows_of
 from truepose.budget.percent import POSITIONS
 from truepose.budget.spread import Spread
 from truepose.machine import Machine
 from truepose.sources import Block
-from truepose.sources._base import Floats, Indices
 from truepose.sources._block import rotations_of
 from truepose.sources.domain import Domain
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.compensation.motion import Motion
 from truepose.compensation.remainder_closures import Closures
-from truepose.sources._base import Floats
 
 AT_ONCE = 1 << 18
 """Numbers of the forms' matrices that are worked on at once: they stay in the cache."""

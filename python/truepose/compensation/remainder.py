@@ -42,6 +42,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats
 from truepose.budget.first_order import rows_of
 from truepose.budget.spread import Spread
 from truepose.compensation.motion import Motion, norm
@@ -52,7 +53,6 @@ from truepose.compensation.remainder_rings import Rings
 from truepose.compensation.remainder_struts import Struts
 from truepose.machine import Machine
 from truepose.sources import Block
-from truepose.sources._base import Flags, Floats
 
 FEW = 512
 """Poses at once: what is worked on stays in the cache."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.sources._base import Flags, Floats
+from truepose.arrays import Flags, Floats
 
 Rest = Callable[[Floats, Floats], Floats]
 """The rest (n, c) from how much further the platform moves than to first order: (n, 1) m, rad.

@@ -21,12 +21,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.compensation import majorants
 from truepose.compensation.motion import Motion, Names, Tilt, norm, skew
 from truepose.compensation.remainder_closures import Closures, Products, turned_about
 from truepose.compensation.remainder_struts import CLOSED, across_of, carried_about
 from truepose.machine import Guide, Machine
-from truepose.sources._base import Floats, Indices
 
 KINDS = ("plane", "line", "universal")
 """Kinds of guide that are known here."""

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from truepose import __version__
+from truepose.arrays import Flags, Floats
 from truepose.budget.poses import OK, Walk, no_pose_left, pose_in_words
 from truepose.calibration import Solution, least_squares
 from truepose.compensation.commands import ActualMachine, blocks
@@ -38,7 +38,7 @@ from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.machine.condition import STANDARD_GRAVITY
 from truepose.machine.suggestion import counted
-from truepose.sources._base import Flags, Floats
+from truepose.version import version
 
 MOST_FITTED = 2000
 """Poses that are fitted to, evenly spaced over the usable ones; all of them are judged."""
@@ -181,7 +181,7 @@ def heading(machine: Machine, fit: Fit, controller: str) -> tuple[str, ...]:
     changes = [f"{key} = {value}" for key, value in machine.settings.items()]
     changes += [f"{key} = {value!r} {units[key]}" for key, value in machine.replaced.items()]
     lines = (
-        f"{controller} parameters of {machine.name!r}, fitted by truepose {__version__}",
+        f"{controller} parameters of {machine.name!r}, fitted by truepose {version()}",
         f"machine file {machine.file}, SHA-256 {machine.file_hash}",
         *(f"changed: {change}" for change in changes),
         *fit.statement(machine),

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers._export import Option
 from truepose.controllers._small_model import in_file_units, quantities
 from truepose.errors import Problem, ReadingError, RequestError
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 END_OF_TRAVEL = "end of travel"
 

@@ -22,12 +22,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.controllers._delta import AROUND, LEAN, limbs, surrounded
 from truepose.controllers._export import cannot
 from truepose.controllers._homing import switches
 from truepose.controllers._small_model import INSTEAD, MM, Parameter, ascii_only, scales
 from truepose.machine import Machine
-from truepose.sources._base import Floats, Indices
 
 RADIUS, ANGLES, ARMS, HEIGHTS, TILT = (
     slice(0, 1),

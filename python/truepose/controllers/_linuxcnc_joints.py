@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Protocol
 
+from truepose.arrays import Floats
 from truepose.controllers._export import Export, Option
 from truepose.controllers._fit import fit, heading
 from truepose.controllers._small_model import (
@@ -18,7 +19,6 @@ from truepose.controllers._small_model import (
     stem,
 )
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 INCH = 0.0254
 

@@ -16,9 +16,9 @@ from typing import Protocol
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.machine import Machine
 from truepose.machine.units import UnitSystem, default_units
-from truepose.sources._base import Floats
 
 MM = 1e-3
 

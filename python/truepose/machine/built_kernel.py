@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from truepose import _kernel
+from truepose._kernel import KernelError
+from truepose._kernel import Machine as KernelMachine
 from truepose.errors import CATALOGUE, MachineFileError, Problem
 from truepose.machine.compliances import compliances
 from truepose.machine.document import Document
@@ -31,7 +32,7 @@ class Described:
     home: Mapping[str, float]
 
 
-def kernel(described: Described) -> _kernel.Machine:
+def kernel(described: Described) -> KernelMachine:
     """The kernel's machine. Raises `MachineFileError` for what it alone can refuse.
 
     Where there are more closures than freedoms, it knows how stiff the limbs are: at home, where a
@@ -48,7 +49,7 @@ def kernel(described: Described) -> _kernel.Machine:
     return _built(described.document, {**description, "parameter_compliance": given})
 
 
-def problems(described: Described, machine: _kernel.Machine) -> list[Problem]:
+def problems(described: Described, machine: KernelMachine) -> list[Problem]:
     """What is wrong with the machine as a whole: rigid limbs that strain, motions left free."""
     found = list(_rigid(described, machine)) if machine.overconstrained else []
     if described.guides and (free := _free_motions(machine)) is not None and len(free):
@@ -56,10 +57,10 @@ def problems(described: Described, machine: _kernel.Machine) -> list[Problem]:
     return found
 
 
-def _built(document: Document, description: dict[str, Any]) -> _kernel.Machine:
+def _built(document: Document, description: dict[str, Any]) -> KernelMachine:
     try:
-        return _kernel.Machine(description)
-    except _kernel.KernelError as error:
+        return KernelMachine(description)
+    except KernelError as error:
         code, message, where = error.args
         key = document.key(where) if where else ()
         value = document.value(key)
@@ -120,17 +121,17 @@ def _limits(strut: Strut) -> dict[str, Any]:
     return limits
 
 
-def _commanded_home(machine: _kernel.Machine) -> np.ndarray:
+def _commanded_home(machine: KernelMachine) -> np.ndarray:
     return machine.home[[machine.dof.index(freedom) for freedom in machine.commanded]]
 
 
-def _home_lengths(machine: _kernel.Machine) -> np.ndarray:
+def _home_lengths(machine: KernelMachine) -> np.ndarray:
     """(1, n_strut) lengths at home, m; not finite where home cannot be reached."""
     joints, placements, _ = machine.place(_commanded_home(machine)[np.newaxis, :])
     return machine.lengths_at(joints, placements)
 
 
-def _rigid(described: Described, machine: _kernel.Machine) -> Iterable[Problem]:
+def _rigid(described: Described, machine: KernelMachine) -> Iterable[Problem]:
     """Parts that do not give way, in a machine whose parts must share a misfit out."""
     lengths = np.ones((1, len(described.struts)))  # whether a part gives way, not by how much
     columns, values = compliances(machine, described.drives, described.struts, lengths)
@@ -173,11 +174,11 @@ def _rigid(described: Described, machine: _kernel.Machine) -> Iterable[Problem]:
         )
 
 
-def _free_motions(machine: _kernel.Machine) -> np.ndarray | None:
+def _free_motions(machine: KernelMachine) -> np.ndarray | None:
     return machine.free_motions(_commanded_home(machine))
 
 
-def _loose(described: Described, machine: _kernel.Machine, free: np.ndarray) -> Problem:
+def _loose(described: Described, machine: KernelMachine, free: np.ndarray) -> Problem:
     names = ", ".join(guide.name for guide in described.guides)
     units = described.validated.units
     motions = "; ".join(_motion(twist, machine.characteristic_length, units) for twist in free)

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats
 from truepose.errors import Problem
 from truepose.machine.data_file import Column, DataFiles
 from truepose.machine.dimensions import FREEDOMS
@@ -37,7 +37,6 @@ from truepose.machine.workspace import (
     steps,
 )
 
-Floats = NDArray[np.float64]
 Home = Mapping[str, float]
 
 

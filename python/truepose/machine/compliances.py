@@ -13,17 +13,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from truepose import _kernel
+from truepose._kernel import Machine as KernelMachine
+from truepose.arrays import Flags, Floats, Indices
 from truepose.machine.parts_of_machine import Drive, Strut
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 def compliances(
-    kernel: _kernel.Machine, drives: Sequence[Drive], struts: Sequence[Strut], lengths: Floats
+    kernel: KernelMachine, drives: Sequence[Drive], struts: Sequence[Strut], lengths: Floats
 ) -> tuple[Indices, Floats]:
     """Every parameter that may give way (k,), first the struts' lengths, and its compliance (n, k).
 
@@ -56,7 +53,7 @@ def compliances(
 
 
 def end_compliances(
-    kernel: _kernel.Machine, drives: Sequence[Drive], struts: Sequence[Strut]
+    kernel: KernelMachine, drives: Sequence[Drive], struts: Sequence[Strut]
 ) -> Floats:
     """(n_strut, 2) m/N of what gives way along each strut at its base and at its platform end.
 
@@ -76,7 +73,7 @@ def end_compliances(
     return ends
 
 
-def known(drives: Sequence[Drive], struts: Sequence[Strut]) -> NDArray[np.bool_]:
+def known(drives: Sequence[Drive], struts: Sequence[Strut]) -> Flags:
     """(n_strut,) whether something along each limb, drive to platform, has a stiffness.
 
     What of such a limb says none is rigid; a limb that says nothing at all is not known.

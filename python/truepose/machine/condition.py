@@ -10,15 +10,15 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine.parts_of_machine import Vector, is_body
 
 if TYPE_CHECKING:
     from truepose.machine.temperature_log import TemperatureLog
 
-Floats = NDArray[np.float64]
 
 ISO_1_REFERENCE_TEMPERATURE = 293.15
 """K: 20 degC, at which dimensions hold unless said otherwise (ISO 1)."""
@@ -172,7 +172,7 @@ class Condition:
         return tuple(part for part in named if part != DEFAULT_PART)
 
     @property
-    def wrench(self) -> NDArray[np.float64]:
+    def wrench(self) -> Floats:
         """(6,) force, then moment, on the tool."""
         return np.array([*self.force, *self.moment])
 

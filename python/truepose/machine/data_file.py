@@ -21,16 +21,14 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.errors import MachineFileError, Problem
 from truepose.machine.dimensions import DIMENSIONS
 from truepose.machine.document import Document, Key
 from truepose.machine.suggestion import counted, did_you_mean, nearest, one_of
 from truepose.machine.text_file import FileKind, read_text
 from truepose.machine.units import FileUnit, QuantityError, shown_value, unit_of
-
-Floats = NDArray[np.float64]
 
 MOST_PROBLEMS = 10
 """Problems of one kind in one column that are told one by one; the others are counted."""
@@ -71,7 +69,7 @@ class DataTable:
     columns: tuple[str, ...]
     numbers: Mapping[str, Floats]
     texts: Mapping[str, tuple[str, ...]]
-    lines: NDArray[np.intp]
+    lines: Indices
     units: Mapping[str, FileUnit]
     header_line: int = 1
 
@@ -115,7 +113,7 @@ class ReadTable:
     """
 
     table: DataTable | None
-    unreadable: Mapping[str, NDArray[np.bool_]]
+    unreadable: Mapping[str, Flags]
     problems: tuple[Problem, ...]
 
 
@@ -180,7 +178,7 @@ class _Reader:
         self.name = name
         self.columns = {column.name: column for column in columns}
         self.table: DataTable | None = None
-        self.unreadable: dict[str, NDArray[np.bool_]] = {}
+        self.unreadable: dict[str, Flags] = {}
         self._problems: list[Problem] = []
 
     def found(self) -> list[Problem]:
@@ -380,9 +378,7 @@ class _Reader:
         )
         return False
 
-    def _numbers(
-        self, column: Column, cells: list[str], lines: NDArray[np.intp], unit: FileUnit
-    ) -> Floats:
+    def _numbers(self, column: Column, cells: list[str], lines: Indices, unit: FileUnit) -> Floats:
         """(n_row,) SI; NaN where a cell may be empty and is, or is no number: that is a problem."""
         name, unreadable = column.name, self.unreadable[column.name]
         values = np.full(len(cells), np.nan)
@@ -439,7 +435,7 @@ class _Reader:
             expected="a finite number",
         )
 
-    def _words(self, column: Column, cells: list[str], lines: NDArray[np.intp]) -> tuple[str, ...]:
+    def _words(self, column: Column, cells: list[str], lines: Indices) -> tuple[str, ...]:
         unreadable = self.unreadable[column.name]
         for at, (cell, line) in enumerate(zip(cells, lines.tolist(), strict=True)):
             if column.blank and not cell:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from truepose import _kernel
+from truepose._kernel import toml_lines
 from truepose.errors import MachineFileError, Problem
 from truepose.machine.text_file import FileKind, read_text
 
@@ -188,7 +188,7 @@ def read(path: str | Path) -> Document:
 
 def _lines(text: str) -> dict[Key, int]:
     try:
-        return dict(_kernel.toml_lines(text))
+        return dict(toml_lines(text))
     except ValueError:
         # The two parsers differ in some corner of TOML. The file is still good, without lines.
         return {}

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, create_model
 
-from truepose import _kernel
+from truepose._kernel import elements
 from truepose.machine.file_table import FileTable
 from truepose.machine.quantity import (
     Angle,
@@ -114,7 +114,7 @@ def _fixed_at(one: Any, sets_length: bool) -> Any:
 def drive_kinds() -> dict[str, DriveKind]:
     """Every kind of drive, by the word that a file writes for it."""
     kinds = {}
-    for entry in _kernel.elements()["drive"]:
+    for entry in elements()["drive"]:
         coordinate: str = entry["coordinate"]
         one: Any = Angle if coordinate == "angle" else Length
         fields = _fields(entry, coordinate)
@@ -150,7 +150,7 @@ def drive_kinds() -> dict[str, DriveKind]:
 def guide_kinds() -> dict[str, GuideKind]:
     """Every kind of guide, by the word that a file writes for it."""
     kinds = {}
-    for entry in _kernel.elements()["guide"]:
+    for entry in elements()["guide"]:
         fields = _fields(entry, "length")
         model: type[FileTable] = create_model(
             f"{entry['kind'].title()}Guide", __base__=FileTable, __doc__=entry["doc"], **fields
@@ -173,7 +173,7 @@ def kinds_of(table: str) -> Mapping[str, ElementKind]:
 @cache
 def strut_geometry() -> type[FileTable]:
     """What the kernel knows of a strut."""
-    (entry,) = _kernel.elements()["strut"]
+    (entry,) = elements()["strut"]
     fields = _fields(entry, "length")
     # Whether a strut has a length of its own depends on its drive, which `checks.py` looks at.
     doc = "Distance of its joint centres; not for a strut whose length is its drive's coordinate."

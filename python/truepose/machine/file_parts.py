@@ -7,7 +7,7 @@ from typing import ClassVar, Protocol, TypeAlias, TypeVar
 
 from pydantic import BaseModel
 
-from truepose import _kernel
+from truepose._kernel import Machine as KernelMachine
 from truepose.errors import Problem, ReadingError
 from truepose.machine.condition import Condition
 from truepose.machine.data_file import Column, DataFiles, DataTable
@@ -48,7 +48,7 @@ class FileParts:
         self,
         document: Document,
         validated: Validated,
-        kernel: _kernel.Machine,
+        kernel: KernelMachine,
         *,
         drives: tuple[Drive, ...],
         struts: tuple[Strut, ...],

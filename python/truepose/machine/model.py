@@ -9,9 +9,11 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from truepose import _kernel
+from truepose._kernel import STATUS
+from truepose._kernel import Machine as KernelMachine
+from truepose.arrays import Codes, Flags, Floats, Indices
 from truepose.errors import PoseError, Problem, RequestError
 from truepose.machine.compliances import compliances, end_compliances, known
 from truepose.machine.condition import DEFAULT_PART, Condition
@@ -25,8 +27,7 @@ from truepose.machine.workspace import Accuracy, Workspace
 if TYPE_CHECKING:
     from truepose.machine.file_parts import ErrorSource
 
-Floats = NDArray[np.float64]
-WithStatus = tuple[Floats, NDArray[np.uint8]]
+WithStatus = tuple[Floats, Codes]
 
 _HANDED_THROUGH = (
     "forward",
@@ -68,7 +69,7 @@ class Machine:
       under the wrench (..., 6) on the tool at the tool point, base axes
     """
 
-    kernel: _kernel.Machine
+    kernel: KernelMachine
     name: str
     description: str
     origin: str
@@ -176,7 +177,7 @@ class Machine:
         return shown_units(self.file_units)
 
     @property
-    def stiffness_known(self) -> NDArray[np.bool_]:
+    def stiffness_known(self) -> Flags:
         """(n_strut,) whether the file says how stiff something is along each strut's limb."""
         return known(self.drives, self.struts)
 
@@ -226,7 +227,7 @@ class Machine:
             )
         return self.workspace.poses()
 
-    def compliances(self, lengths: ArrayLike) -> tuple[NDArray[np.intp], Floats]:
+    def compliances(self, lengths: ArrayLike) -> tuple[Indices, Floats]:
         """Parameters (k,) that may give way, and their compliance (n, k), m/N or rad/(N m).
 
         `lengths` (n, n_strut): present length of each strut, m. The first n_strut columns are the
@@ -283,7 +284,7 @@ class Machine:
         failed = np.flatnonzero(codes)
         if failed.size:
             first = int(failed[0])
-            name = _kernel.STATUS[codes[first]]
+            name = STATUS[codes[first]]
             # Placed, but not solved: a matrix of compliance that has no inverse.
             reason = _HELD if block == self.kernel.stiffness_at and not placed[first] else _NOT_HELD
             raise PoseError(int(failed.size), first, name, reason)

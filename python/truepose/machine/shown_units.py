@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truepose.arrays import Floats
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from truepose.machine.units import FileUnit
 
@@ -85,11 +87,11 @@ class ShownUnits:
     force: Shown = NEWTONS
     fahrenheit: bool = False
 
-    def errors(self, values: ArrayLike, names: Sequence[str]) -> NDArray[np.float64]:
+    def errors(self, values: ArrayLike, names: Sequence[str]) -> Floats:
         """Errors (..., n_name), SI, each component in its unit."""
         return np.asarray(values, np.float64) * [self.error(name).per_si for name in names]
 
-    def temperature(self, kelvin: ArrayLike) -> NDArray[np.float64]:
+    def temperature(self, kelvin: ArrayLike) -> Floats:
         """Temperatures, K, any shape, on the scale of the file: °C or °F."""
         celsius = np.asarray(kelvin, np.float64) - ICE_POINT
         return celsius * 1.8 + 32.0 if self.fahrenheit else celsius

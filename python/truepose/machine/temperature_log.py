@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine.condition import DEFAULT_PART
 from truepose.machine.data_file import Column, DataFiles, DataTable
 from truepose.machine.document import Document, Key
 from truepose.machine.units import FileUnit
-
-Floats = NDArray[np.float64]
 
 TIME = "time"
 """The column of times."""
@@ -70,11 +69,11 @@ class TemperatureLog:
         others = {name: values for name, values in self.temperatures.items() if name != part}
         return TemperatureLog(self.times, others, self.name) if others else None
 
-    def covers(self, times: ArrayLike) -> NDArray[np.bool_]:
+    def covers(self, times: ArrayLike) -> Flags:
         """Whether each time is within the log."""
         given = np.asarray(times, np.float64)
         first, last = self.span
-        inside: NDArray[np.bool_] = (given >= first) & (given <= last)
+        inside: Flags = (given >= first) & (given <= last)
         return inside
 
     def require(self, times: ArrayLike) -> None:

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.errors import ReadingError
 from truepose.machine.dimensions import DIMENSIONS, Dimension
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
 _NUMBER = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf))\s*(.*?)\s*\Z"
@@ -49,7 +50,7 @@ _EXACT_POWERS = 22
 """Powers of ten up to this one are doubles, so that dividing by them rounds once."""
 
 
-def meant(values: ArrayLike, offset: float = 0.0) -> NDArray[np.float64]:
+def meant(values: ArrayLike, offset: float = 0.0) -> Floats:
     """Numbers, any shape, without the rounding of a computation: 125 for 124.99999999999999.
 
     A number that differs relatively by at most `ROUNDED` from one of `FEW_DIGITS` significant
@@ -65,7 +66,7 @@ def meant(values: ArrayLike, offset: float = 0.0) -> NDArray[np.float64]:
     power = 10.0 ** np.where(usual, np.abs(places), 0)
     digits = np.rint(np.where(places >= 0, size * power, size / power))
     few = np.copysign(np.where(places >= 0, digits / power, digits * power), given)
-    found: NDArray[np.float64] = np.where(
+    found: Floats = np.where(
         usual & (np.abs(few - given) <= ROUNDED * np.maximum(size, abs(offset))), few, given
     )
     return found
@@ -79,21 +80,21 @@ class FileUnit:
     scale: float = 1.0
     offset: float = 0.0
 
-    def to_si(self, value: ArrayLike) -> NDArray[np.float64]:
+    def to_si(self, value: ArrayLike) -> Floats:
         """Values in this unit, any shape -> SI."""
         with np.errstate(over="ignore"):  # too large a number becomes infinite, which is refused
             return self._scaled(np.asarray(value, dtype=np.float64), self.scale) + self.offset
 
-    def to_file(self, value: ArrayLike) -> NDArray[np.float64]:
+    def to_file(self, value: ArrayLike) -> Floats:
         """SI values, any shape -> this unit, rounded to what is meant (`meant`)."""
         return meant(self.to_file_exactly(value), self.offset / self.scale)
 
-    def to_file_exactly(self, value: ArrayLike) -> NDArray[np.float64]:
+    def to_file_exactly(self, value: ArrayLike) -> Floats:
         """The same with the rounding of the computation in it."""
         return self._scaled(np.asarray(value, dtype=np.float64) - self.offset, 1.0 / self.scale)
 
     @staticmethod
-    def _scaled(value: NDArray[np.float64], factor: float) -> NDArray[np.float64]:
+    def _scaled(value: Floats, factor: float) -> Floats:
         # 0.3 mm is 0.3 / 1000 m: dividing by the whole number rounds once, multiplying by 0.001
         # rounds twice and shows as 0.30000000000000004 on the way back.
         inverse = 1.0 / factor

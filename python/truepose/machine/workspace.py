@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from truepose.arrays import Floats, Indices
 
 LARGEST_GRID = 10_000_000
 """More poses are refused before anything is allocated."""
@@ -16,8 +17,6 @@ MOST_STEPS = 1e15
 
 WORST = "worst"
 """What a machine file says where an accuracy is asked of every machine inside the bands."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ def disc_size(radius: float, step: float) -> float:
     return 1.0 + n_ring * (np.pi * (n_ring + 1.0) + 4.0)
 
 
-def along(waypoints: Floats, counts: NDArray[np.intp]) -> Floats:
+def along(waypoints: Floats, counts: Indices) -> Floats:
     """(1 + sum of counts, n_commanded) poses on the straight lines between `waypoints`.
 
     `counts` (n_waypoint - 1,): steps on each line; 0 where a waypoint repeats the one before it.

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.budget.shares import first_to_tighten
 from truepose.machine.suggestion import counted
-from truepose.report.display import Array, column, is_position, where_highest
+from truepose.report.display import column, is_position, where_highest
 from truepose.report.reading import at_text, components, position_of
 from truepose.report.tables import MOST_LISTED, Table
 
@@ -28,8 +29,8 @@ class Blame:
     """
 
     names: tuple[str, ...]
-    kinds: dict[str, Array]
-    confidence: dict[str, Array]
+    kinds: dict[str, Floats]
+    confidence: dict[str, Floats]
 
 
 def blame(found: xr.Dataset, pose: int, of: str = "parameter", part: str = "position") -> Blame:
@@ -46,7 +47,7 @@ def blame(found: xr.Dataset, pose: int, of: str = "parameter", part: str = "posi
     weight = variance / total if total > 0 else np.zeros_like(variance)
     before = "" if of == "parameter" else "source_"
 
-    def weighted(name: str) -> Array:
+    def weighted(name: str) -> Floats:
         values = np.asarray(found[before + name].values)[pose][:, among]
         return np.asarray(np.where(weight > 0, values, 0.0) @ weight)
 

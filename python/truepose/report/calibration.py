@@ -11,16 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.calibration.gate.words import listed, quantity, sentence
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.machine.shown_units import Shown, ShownUnits
-from truepose.report.display import (
-    MISSING,
-    Array,
-    decimals_for,
-    number,
-    where_highest,
-)
+from truepose.report.display import MISSING, decimals_for, number, where_highest
 from truepose.report.tables import MOST_LISTED, Table
 
 if TYPE_CHECKING:
@@ -346,7 +341,7 @@ def _plain(what: str) -> str:
     return what.split(".", 2)[2] if what.startswith("strut.") else what
 
 
-def rms(values: Array) -> float:
+def rms(values: Floats) -> float:
     """Root mean square of those that are there; NaN where none is."""
     there = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(there**2))) if there.size else float("nan")
@@ -385,7 +380,7 @@ def tool(found: xr.Dataset, units: ShownUnits) -> Table:
     )
 
 
-def _of_tool(before: Array, after: Array) -> tuple[str, ...]:
+def _of_tool(before: Floats, after: Floats) -> tuple[str, ...]:
     sizes = [_worst(before), _worst(after), _rms_or_open(before), _rms_or_open(after)]
     places = decimals_for([each for each in sizes if math.isfinite(each)], 4)
     ratio = sizes[1] / sizes[0] if sizes[0] > 0.0 and math.isfinite(sizes[1]) else float("nan")
@@ -395,7 +390,7 @@ def _of_tool(before: Array, after: Array) -> tuple[str, ...]:
     )
 
 
-def _worst(sizes: Array) -> float:
+def _worst(sizes: Floats) -> float:
     if np.isnan(sizes).all():
         return float("nan")
     return (
@@ -403,7 +398,7 @@ def _worst(sizes: Array) -> float:
     )
 
 
-def _rms_or_open(sizes: Array) -> float:
+def _rms_or_open(sizes: Floats) -> float:
     return float("inf") if np.isinf(sizes).any() else rms(sizes)
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats, Indices
 from truepose.machine.shown_units import ShownUnits
 
 POSITION = ("x", "y", "z")
@@ -16,8 +17,6 @@ LOWER, UPPER = "all at lower ends", "all at upper ends"
 
 ROUNDING = 1e-9
 """Values that differ relatively by less are equal where one of them has to be named."""
-
-Array = NDArray[np.float64]
 
 
 def is_position(component: str) -> bool:
@@ -80,7 +79,7 @@ def where_highest(sizes: ArrayLike) -> int:
     return int(np.flatnonzero(values >= highest - ROUNDING * abs(highest))[0])
 
 
-def nearest_middle(poses: Array) -> NDArray[np.intp]:
+def nearest_middle(poses: Floats) -> Indices:
     """Indices of poses (n, n_coordinate) from the middle outwards, each coordinate by its range."""
     if len(poses) == 0:
         return np.empty(0, dtype=np.intp)

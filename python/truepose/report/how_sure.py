@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.budget.poses import not_assembled_text
 from truepose.machine.suggestion import counted
 from truepose.report.blame import shares
 from truepose.report.display import (
     MISSING,
-    Array,
     column,
     decimals_for,
     nearest_middle,
@@ -46,7 +46,7 @@ UNPROVEN = {
 """What a status without a proof means."""
 
 
-def rounded(values: Array, senses: Sequence[int]) -> tuple[str, ...]:
+def rounded(values: Floats, senses: Sequence[int]) -> tuple[str, ...]:
     """Numbers of one row as `column` shows them, each rounded up (+1), down (-1) or to nearest (0).
 
     A proof that is rounded the wrong way is none.
@@ -57,7 +57,7 @@ def rounded(values: Array, senses: Sequence[int]) -> tuple[str, ...]:
     return column(whole / 10.0**places, places)
 
 
-def spread_over(poses: Array, axes: list[int]) -> list[int]:
+def spread_over(poses: Floats, axes: list[int]) -> list[int]:
     """Indices of at most 25 of `poses` (n, n_coordinate), spread over their middle planes.
 
     `axes` are the coordinates over which ellipses are drawn, at most three. Over two of them five
@@ -308,12 +308,12 @@ def _region(machine: Machine, found: xr.Dataset) -> Table:
     )
 
 
-def region_answers(found: xr.Dataset) -> list[tuple[str, float, float, Array]]:
+def region_answers(found: xr.Dataset) -> list[tuple[str, float, float, Floats]]:
     """Name, bound, what is reached and where (n_commanded,), of every component and quantity.
 
     Of a component's two ends the one that is farther from zero.
     """
-    answers: list[tuple[str, float, float, Array]] = []
+    answers: list[tuple[str, float, float, Floats]] = []
     for at, name in enumerate(quantities(found)):
         size, reached = (float(found[f"{k}magnitude"].values[at]) for k in ("", "reached_"))
         answers.append((name, size, reached, np.asarray(found["where_magnitude"].values[at])))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from truepose.arrays import Flags, Floats
 from truepose.budget.poses import OK
 from truepose.report.display import number, pose_text, where_highest
 from truepose.report.result import in_file_units, pose_in_file_units
@@ -61,21 +62,21 @@ class Reach:
     where no pose is usable.
     """
 
-    poses: NDArray[np.float64]
+    poses: Floats
     status: NDArray[np.str_]
     reasons: tuple[Reason, ...]
     worst_conditioning: float
-    worst_pose: NDArray[np.float64]
+    worst_pose: Floats
 
     @property
-    def usable(self) -> NDArray[np.bool_]:
+    def usable(self) -> Flags:
         """(n_pose,) whether a pose can be used."""
         return np.asarray(self.status == "ok")
 
 
 def reach(machine: Machine) -> Reach:
     """Try every pose of the machine's workspace."""
-    from truepose import _kernel
+    from truepose._kernel import STATUS
 
     poses = machine.poses()
     _, codes = machine.inverse(poses, status=True)
@@ -85,14 +86,14 @@ def reach(machine: Machine) -> Reach:
     worst = where_highest(-np.where(usable, conditioning, np.inf)) if usable.any() else 0
     return Reach(
         poses,
-        np.array(_kernel.STATUS)[codes],
+        np.array(STATUS)[codes],
         _reasons(machine, poses[~usable]),
         float(conditioning[worst]) if usable.any() else float("nan"),
         poses[worst],
     )
 
 
-def _reasons(machine: Machine, poses: NDArray[np.float64]) -> tuple[Reason, ...]:
+def _reasons(machine: Machine, poses: Floats) -> tuple[Reason, ...]:
     """Causes by part and side, the one that stops most poses first."""
     found: dict[tuple[str, str, str, bool], list[float]] = {}
     for pose in poses[:: max(1, -(-len(poses) // EXPLAINED))]:

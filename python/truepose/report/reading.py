@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truepose.report.display import Array, is_position, pose_text, where_highest
+from truepose.arrays import Floats
+from truepose.report.display import is_position, pose_text, where_highest
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +36,7 @@ def position_of(found: xr.Dataset) -> list[int]:
     return [at for at, name in enumerate(names) if is_position(name)] or list(range(len(names)))
 
 
-def poses_of(machine: Machine, found: xr.Dataset) -> Array:
+def poses_of(machine: Machine, found: xr.Dataset) -> Floats:
     """(n_pose, n_commanded) poses of a result, m and rad."""
     return np.stack([found[f"pose_{name}"].values for name in machine.commanded], axis=-1)
 

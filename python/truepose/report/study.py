@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats, Indices
 from truepose.report.display import is_position
 
 if TYPE_CHECKING:
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from truepose.machine import Machine
     from truepose.machine.shown_units import ShownUnits
     from truepose.verdict.answer import Answer
-
-Array = NDArray[np.float64]
 
 
 def warnings_of(dataset: xr.Dataset) -> list[dict[str, str]]:
@@ -113,17 +111,17 @@ class Study:
         return int(self.budget.sizes["pose"])
 
     @cached_property
-    def numbers(self) -> NDArray[np.intp]:
+    def numbers(self) -> Indices:
         """(n_pose,) number of each pose in the poses asked for, from 0, as files have it."""
         return np.asarray(self.budget["pose"].values, np.intp)
 
     @cached_property
-    def poses(self) -> Array:
+    def poses(self) -> Floats:
         """(n_pose, n_commanded) commanded poses, m and rad."""
         return self._stacked("pose_", self.machine.commanded)
 
     @cached_property
-    def left_out(self) -> Array:
+    def left_out(self) -> Floats:
         """(n_left_out, n_commanded) poses that cannot be used, m and rad."""
         return self._stacked("left_out_", self.machine.commanded)
 
@@ -137,18 +135,18 @@ class Study:
         """The units for people."""
         return self.machine.shown
 
-    def shown(self, errors: Array) -> Array:
+    def shown(self, errors: Floats) -> Floats:
         """Errors (..., component), SI, in the units for people."""
         return self.units.errors(errors, self.components)
 
-    def values(self, name: str) -> Array:
+    def values(self, name: str) -> Floats:
         """One variable of the budget as an array, in the axis order of the schema."""
         return np.asarray(self.budget[name].values)
 
-    def _stacked(self, prefix: str, names: tuple[str, ...]) -> Array:
+    def _stacked(self, prefix: str, names: tuple[str, ...]) -> Floats:
         return np.stack([self.values(prefix + name) for name in names], axis=-1)
 
-    def compensated(self, name: str) -> Array:
+    def compensated(self, name: str) -> Floats:
         """One variable of the compensation at the poses of the budget.
 
         Missing (NaN) at a pose whose corrected command the machine cannot follow.
@@ -163,16 +161,16 @@ class Study:
         aligned[at] = values[of]
         return aligned
 
-    def position_norm(self, errors: Array) -> Array:
+    def position_norm(self, errors: Floats) -> Floats:
         """Length of the position part of errors (..., component) -> (...), m."""
         return np.asarray(np.linalg.norm(errors[..., self.positions], axis=-1))
 
-    def rotation_norm(self, errors: Array) -> Array:
+    def rotation_norm(self, errors: Floats) -> Floats:
         """Angle of the rotation part of errors (..., component) -> (...), rad."""
         return np.asarray(np.linalg.norm(errors[..., self.rotations], axis=-1))
 
     @cached_property
-    def overall_worst(self) -> Array:
+    def overall_worst(self) -> Floats:
         """(n_pose, n_component) the most that all sources together can do to each component.
 
         |overall error with every source at its shift| + each source's linear band, the bands
@@ -184,11 +182,11 @@ class Study:
         return np.asarray(np.maximum.reduce([linear, *exact]))
 
     @cached_property
-    def largest(self) -> Array:
+    def largest(self) -> Floats:
         """(n_pose,) linear maximum of the position, of the orientation where nothing moves."""
         return np.asarray(self.values("linear_maximum")[:, 0])
 
     @cached_property
-    def remaining_largest(self) -> Array:
+    def remaining_largest(self) -> Floats:
         """(n_pose,) the same after compensation; missing where no corrected command leads."""
         return np.asarray(self.compensated("linear_maximum")[:, 0])

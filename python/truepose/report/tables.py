@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.budget.poses import reason_text
 from truepose.report.accuracy import told
 from truepose.report.display import (
     LOWER,
     UPPER,
-    Array,
     column,
     decimals_for,
     is_position,
@@ -124,7 +124,7 @@ def highest_percent(study: Study) -> Table:
 def compensation(study: Study) -> Table:
     """Highest absolute error per component and of the position, before and after."""
     components = study.components
-    rows: list[tuple[str, Array, Array | None]] = [
+    rows: list[tuple[str, Floats, Floats | None]] = [
         (f"before, {LOWER}", study.values("overall_error_lower"), None),
         ("before, known error", study.values("overall_error"), None),
         (f"before, {UPPER}", study.values("overall_error_upper"), None),
@@ -221,7 +221,7 @@ def internal_forces(study: Study) -> Table:
         closures.append(str(found["closure"].values[closure]))
         places.append(pose_text(poses[pose], commanded, units))
 
-    def highest(name: str) -> Array:
+    def highest(name: str) -> Floats:
         return np.asarray(np.abs(found[name].values[:, order]).max(axis=(0, 2)))
 
     columns = [
@@ -374,10 +374,10 @@ def _end_labels(study: Study) -> list[str]:
     return [*labels, f"overall, {LOWER}", f"overall, {UPPER}"]
 
 
-def _highest(study: Study, of_source: str, overall: str) -> Array:
+def _highest(study: Study, of_source: str, overall: str) -> Floats:
     """(row, component) the values for `_end_labels`, SI or percent."""
     lower, upper = study.values(f"{of_source}_lower"), study.values(f"{of_source}_upper")
-    rows: list[Array] = []
+    rows: list[Floats] = []
     for index, band in enumerate(study.has_band):
         rows += [lower[index], upper[index]] if band else [upper[index]]
     rows += [study.values(f"{overall}_lower"), study.values(f"{overall}_upper")]

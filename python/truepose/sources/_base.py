@@ -16,8 +16,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.sources.distributions import (
     ARCSINE,
     TRIANGULAR,
@@ -35,9 +36,6 @@ if TYPE_CHECKING:
     from truepose.machine import Condition, FileParts, Machine
     from truepose.sources._block import Block
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 
 OWN_GROUP = -1
 """Group of a column that moves by itself, correlated with no other."""
@@ -299,9 +297,6 @@ __all__ = [
     "UNIFORM",
     "Deviation",
     "Distribution",
-    "Flags",
-    "Floats",
-    "Indices",
     "Source",
     "normal",
     "refuse",

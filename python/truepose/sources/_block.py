@@ -9,14 +9,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from truepose.arrays import Codes, Flags, Floats, Indices
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Machine
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 
 Cause = Literal["tool", "own", "all"]
 """What loads come from: the wrench on the tool, weight and inertia of the machine, or both."""
@@ -152,7 +150,7 @@ class Block:
         return forces if forces.any() else None
 
     @cached_property
-    def balance(self) -> tuple[Floats, NDArray[np.uint8]]:
+    def balance(self) -> tuple[Floats, Codes]:
         """Tension (n, n_strut), N, under everything that acts, and the status (n,) of each pose."""
         kernel = self.machine.kernel
         wrench = self.tool_wrench + self.own_wrench

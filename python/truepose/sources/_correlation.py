@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
+from truepose.arrays import Floats
 from truepose.machine.file_table import FileTable
 from truepose.machine.suggestion import counted
-from truepose.sources._base import Deviation, Floats
+from truepose.sources._base import Deviation
 from truepose.sources.semidefinite import clash
 
 if TYPE_CHECKING:

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose.sources._block import Floats
+from truepose.arrays import Floats
 
 if TYPE_CHECKING:
-    from truepose import _kernel
+    from truepose._kernel import Machine as KernelMachine
     from truepose.machine import Drive
 
 
 def of_base_side(
-    kernel: _kernel.Machine,
+    kernel: KernelMachine,
     drive: Drive | None,
     joints: Floats,
     direction: ArrayLike,

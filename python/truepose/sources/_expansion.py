@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.errors import Problem
 from truepose.machine.parts_of_machine import Body, Drive, Guide, Strut, is_body
-from truepose.sources._block import Floats
 
 if TYPE_CHECKING:
-    from truepose import _kernel
+    from truepose._kernel import Machine as KernelMachine
     from truepose.machine import Condition, FileParts, Machine
 
 ASKED_BY = ("condition.temperature", "condition.gradient", "condition.temperature_log")
@@ -136,7 +136,7 @@ def located(parts: FileParts, problem: Problem) -> Problem:
 
 
 def twice(
-    kernel: _kernel.Machine, drives: Iterable[Drive], struts: Iterable[Strut]
+    kernel: KernelMachine, drives: Iterable[Drive], struts: Iterable[Strut]
 ) -> Iterator[Problem]:
     """A telescopic strut whose length is measured by a scale grows by the scale or as a strut."""
     carried = {strut.drive: strut for strut in struts}

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose.sources._block import Floats
+from truepose.arrays import Floats
 
 
 @dataclass(frozen=True)

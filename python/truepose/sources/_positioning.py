@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.errors import Problem
 from truepose.machine.data_file import Column, DataTable
-from truepose.sources._base import Floats
 from truepose.sources._coverage import uncovered
 
 if TYPE_CHECKING:

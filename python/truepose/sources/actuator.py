@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
+from truepose.arrays import Floats
 from truepose.machine.file_table import FileTable
 from truepose.machine.known import RatioWithin
 from truepose.machine.quantity import (
@@ -30,7 +31,7 @@ from truepose.machine.quantity import (
     refuse,
 )
 from truepose.machine.tolerance import Band
-from truepose.sources._base import ARCSINE, TWO_POINT, Deviation, Floats, normal
+from truepose.sources._base import ARCSINE, TWO_POINT, Deviation, normal
 from truepose.sources._block import Block
 from truepose.sources._columns import Columns
 from truepose.sources._positioning import COVERAGE, PositioningTable, read_positioning

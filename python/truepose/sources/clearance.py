@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from pydantic import Field
 
+from truepose.arrays import Floats
 from truepose.machine.file_table import FileTable
 from truepose.machine.quantity import quantity
 from truepose.sources._base import Deviation
-from truepose.sources._block import Block, Floats
+from truepose.sources._block import Block
 from truepose.sources._directions import of_base_side
 from truepose.sources._play import pressed
 

@@ -14,11 +14,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.sources.quantiles import normal_quantile, student_quantile
-
-Floats = NDArray[np.float64]
 
 _NORMAL = "normal"
 _STUDENT = "student-t"

@@ -19,13 +19,14 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
 
+from truepose.arrays import Floats
 from truepose.machine.data_file import Column
 from truepose.machine.file_table import FileTable
 from truepose.machine.known import SlopeWithin, one_or_limits
 from truepose.machine.parts_of_machine import Vector
 from truepose.machine.quantity import Direction, Length, PositiveLength, refuse
 from truepose.machine.tolerance import Band
-from truepose.sources._base import Deviation, Floats
+from truepose.sources._base import Deviation
 from truepose.sources._block import Block
 from truepose.sources._columns import Columns
 from truepose.sources._coverage import uncovered

@@ -20,8 +20,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
-from truepose.sources.distributions import TRIANGULAR, UNIFORM, Distribution, Floats
+from truepose.sources.distributions import TRIANGULAR, UNIFORM, Distribution
 from truepose.sources.quantiles import normal_cdf, normal_density, normal_quantile
 
 _NORMAL = "normal"

@@ -9,9 +9,9 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from truepose.arrays import Floats
 
 _MANY = 1000.0
 """Degrees of freedom from which Student's quantile is taken from its expansion about the normal's:

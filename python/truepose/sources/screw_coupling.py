@@ -19,15 +19,16 @@ import numpy as np
 from pydantic import BaseModel, Field
 
 from truepose._kernel import STATUS
+from truepose.arrays import Floats
 from truepose.errors import Problem, TrueposeError
 from truepose.machine.file_table import FileTable
 from truepose.machine.parts_of_machine import Vector
 from truepose.machine.quantity import Direction, Length
 from truepose.sources._base import Deviation, refuse
-from truepose.sources._block import Block, Floats, rotations_of
+from truepose.sources._block import Block, rotations_of
 
 if TYPE_CHECKING:
-    from truepose import _kernel
+    from truepose._kernel import Machine as KernelMachine
     from truepose.machine import Condition, FileParts, Machine
 
 PARALLEL = 1e-6
@@ -190,12 +191,12 @@ class ScrewCoupling:
         )
 
 
-def _driven(kernel: _kernel.Machine, strut: int) -> bool:
+def _driven(kernel: KernelMachine, strut: int) -> bool:
     """Whether the strut's length is the coordinate of its drive."""
     return kernel.parameters[int(kernel.length_parameters[strut])].endswith(".offset")
 
 
-def _home(kernel: _kernel.Machine) -> tuple[Floats, Floats] | None:
+def _home(kernel: KernelMachine) -> tuple[Floats, Floats] | None:
     """Rotation (1, 3, 3) and unit directions (1, n_strut, 3) of the struts at home, or None."""
     at = [kernel.dof.index(freedom) for freedom in kernel.commanded]
     joints, placements, status = kernel.place(kernel.home[at][np.newaxis, :])

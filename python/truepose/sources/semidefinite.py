@@ -11,8 +11,8 @@ from itertools import combinations
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.errors import Problem
-from truepose.sources._base import Floats
 
 ROUNDING = 1e-12
 """Of the number of variables: an eigenvalue so little below zero is zero."""

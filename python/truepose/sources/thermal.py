@@ -19,10 +19,11 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.errors import TrueposeError
 from truepose.machine.parts_of_machine import Body, Drive, Strut
 from truepose.sources._base import Deviation, refuse
-from truepose.sources._block import Block, Floats
+from truepose.sources._block import Block
 from truepose.sources._expansion import ASKED_BY, located, silent, twice
 from truepose.sources._growth import Growth, along_line
 

@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose import _kernel
+from truepose._kernel import STATUS
+from truepose.arrays import Floats, Indices
 from truepose.budget.comparison import quantities
 from truepose.budget.poses import OK, Progress
 from truepose.budget.spread import Spread
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.sources._base import Floats, Indices
 from truepose.verdict import engine
 from truepose.verdict.answer import MET, NOT_MET, UNDECIDED, Answer, Number
 from truepose.verdict.coverage import MOST_POSES, coverage
@@ -232,12 +232,12 @@ def _largest(values: Floats, count: int) -> Indices:
 def _at_pose(state: State, kind: str, columns: Indices) -> Witness:
     """The farthest machine of a state at one pose."""
     number = int(state.block.indices[0])
-    word = _kernel.STATUS[int(state.status[0])]
+    word = STATUS[int(state.status[0])]
     t, error, size = np.zeros(len(state.spread.names)), None, np.inf
     if state.status[0] == OK:
         reached = farthest(state, columns)
         t, size = reached.t, reached.size
-        word = _kernel.STATUS[reached.status]
+        word = STATUS[reached.status]
         error = reached.error if reached.status == OK else None
     return Witness(
         state=state.name,

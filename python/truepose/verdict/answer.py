@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from truepose.arrays import Floats
 from truepose.verdict.states import AFTER, BEFORE, STATES
 
 if TYPE_CHECKING:
-    from truepose.sources._base import Floats
     from truepose.verdict.coverage import CoverageAnswer
     from truepose.verdict.witness import Witness
 

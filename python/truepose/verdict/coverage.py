@@ -22,11 +22,11 @@ from typing import Literal
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.asked import required_probability, required_seed
 from truepose.budget.comparison import quantities
 from truepose.budget.poses import Progress
 from truepose.machine import Machine
-from truepose.sources._base import Flags, Floats, Indices
 from truepose.verdict.order_statistics import ranks
 from truepose.verdict.screening import WITHIN, Pose, Screen, State
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.budget.bounds import PROVEN, proven_bounds
 from truepose.budget.comparison import quantities
-from truepose.sources._base import Floats
 from truepose.verdict.states import State
 
 EFFORT = 1024

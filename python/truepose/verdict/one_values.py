@@ -15,13 +15,13 @@ from typing import Any
 import tomlkit
 from tomlkit.items import Comment, Item, Table, Whitespace
 
+from truepose.arrays import Floats
 from truepose.calibration.result.toml_edits import MachineText
 from truepose.machine import Machine
 from truepose.machine.dimensions import BY_UNIT, FREEDOMS
 from truepose.machine.document import ARRAY_TABLES
 from truepose.machine.each import EACH
 from truepose.machine.tables.workspace import WAYS
-from truepose.sources._base import Floats
 from truepose.sources.actuator import Actuator
 from truepose.sources.guideway import Guideway
 from truepose.sources.sensor import Sensor

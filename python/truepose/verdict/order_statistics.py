@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from truepose.sources._base import Floats
+from truepose.arrays import Floats
 
 _ROUNDING = 1e-12
 """Of p n, so that 0.95 of 20,000 is 19,000 and not one more."""

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.drawn import Random
 from truepose.budget.exact import displacement
 from truepose.budget.first_order import first_order
@@ -25,7 +26,6 @@ from truepose.budget.poses import OK
 from truepose.budget.spread import Spread
 from truepose.machine import Machine
 from truepose.sources import Block
-from truepose.sources._base import Flags, Floats, Indices
 from truepose.verdict.order_statistics import Ranks, ranks
 
 State = tuple[Block, Spread]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.budget.first_order import Mover, effects_at, first_order
 from truepose.budget.largest import largest
 from truepose.budget.poses import OK
-from truepose.sources._base import Floats, Indices
 from truepose.sources.domain import Domain, unit
 from truepose.verdict.states import State
 

@@ -15,6 +15,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.evaluate import required_sources
 from truepose.budget.exact import at_shifts
 from truepose.budget.poses import (
@@ -30,7 +31,6 @@ from truepose.budget.spread import Spread, spread
 from truepose.compensation.corrected import corrected
 from truepose.machine import Condition, Machine
 from truepose.sources import Block
-from truepose.sources._base import Flags, Floats, Indices
 
 BEFORE, AFTER = "before compensation", "after compensation"
 STATES = (BEFORE, AFTER)

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.budget.comparison import quantities
 from truepose.budget.exact import Moved
 from truepose.budget.first_order import first_order
@@ -25,7 +26,6 @@ from truepose.machine import Machine
 from truepose.machine.dimensions import BY_UNIT, FREEDOMS
 from truepose.machine.shown_units import Shown
 from truepose.sources import Block, acting
-from truepose.sources._base import Floats, Indices
 from truepose.verdict.states import AFTER, BEFORE
 
 NAMED = 4

@@ -14,13 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import tomlkit
 
 from truepose._kernel import STATUS
+from truepose.arrays import Floats
 from truepose.budget.exact import at_shifts, displacement, together
 from truepose.budget.poses import OK, REASONS, Walk, pose_in_words
 from truepose.calibration.result.toml_edits import MachineText
@@ -30,9 +30,9 @@ from truepose.machine.dimensions import BY_UNIT
 from truepose.machine.temperature_log import TemperatureLog
 from truepose.output import replacing, require_writable
 from truepose.sources import REGISTRY, acting
-from truepose.sources._base import Floats
 from truepose.verdict.one_values import OneValues
 from truepose.verdict.witness import Witness
+from truepose.version import version
 
 ENDING = ".toml"
 

@@ -10,13 +10,13 @@ import pytest
 
 import truepose as tp
 from made_measurements import made_measurements, nominal_values, poses_within
+from truepose.arrays import Floats
 from truepose.calibration.calibrate import Calibration, calibrate
 from truepose.calibration.identification.considered import considered
 from truepose.calibration.identification.tool_effects import workspace_poses
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.result.bands import known
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 MACHINES = Path(__file__).parents[3] / "machines"
 LENGTHS = ("strut.*.length",)

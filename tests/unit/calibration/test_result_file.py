@@ -14,6 +14,7 @@ import truepose as tp
 from machine_texts import PLANAR, edited, load_text
 from made_unknowns import PROVENANCE, MadeUnknowns, of_bands, posterior
 from sweeps import thinned
+from truepose.arrays import Floats
 from truepose.calibration.identification.properties import properties_of
 from truepose.calibration.result.bands import bands_of, known
 from truepose.calibration.result.directions import directions, tilted
@@ -21,7 +22,6 @@ from truepose.calibration.result.file import write_calibrated
 from truepose.errors import MachineFileError, RequestError
 from truepose.machine import Machine, load
 from truepose.sources import REGISTRY
-from truepose.sources._base import Floats
 
 MACHINES = Path(__file__).parents[3] / "machines"
 MM = 1e-3

@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats
 from truepose.calibration.gate import words
 from truepose.calibration.gate.at_tool import AtTool, Tool
 from truepose.calibration.gate.observability import (
@@ -31,7 +31,6 @@ from truepose.calibration.gate.observability import (
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
 
-Floats = NDArray[np.float64]
 
 POOR = 1e-3
 """Of the largest singular value: what is weak where nothing is there to compare with."""

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats
 from truepose.calibration.gate.observability import Spread, decomposed
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 POSITION = "xyz"
 ROTATION = "abc"

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from truepose.arrays import Flags, Floats
 
 RANK_TOLERANCE = 1e-9
 """Of the largest singular value of the columns scaled to length one, or of one if that is larger:

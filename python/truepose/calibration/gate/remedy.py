@@ -9,15 +9,14 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats
 from truepose.calibration.gate import words
 from truepose.calibration.gate.assessment import Case, Outcome
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
 
-Floats = NDArray[np.float64]
 
 CALIPER: Mapping[str, float] = {"m": 20e-6}
 """Standard uncertainty of measuring one unknown directly, by unit."""

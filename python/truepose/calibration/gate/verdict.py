@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.calibration.gate import words
 from truepose.calibration.gate.assessment import (
     Case,
@@ -34,7 +35,6 @@ from truepose.machine.shown_units import METRIC, ShownUnits
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
 
-Floats = NDArray[np.float64]
 
 MARGIN = 0.8
 """What is left of an uncertainty or error must be less than this of what it was."""

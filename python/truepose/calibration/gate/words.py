@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.machine.shown_units import METRIC, ShownUnits
-
-Floats = NDArray[np.float64]
 
 NAMED = 0.1
 """Of the largest part of a direction: smaller parts are not named."""

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.gate import words
 from truepose.calibration.gate.assessment import ROUNDING, Reason, both
 from truepose.calibration.gate.at_tool import AtTool, Tool
@@ -31,7 +32,6 @@ from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.machine.shown_units import METRIC, ShownUnits
-from truepose.sources._base import Floats, Indices
 
 SLIGHT = 1.05
 """An uncertainty that the considered tolerances make less than so much larger needs no warning."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.calibration.identification.frames import (
     FAR,
     TURNED,
@@ -28,7 +29,6 @@ from truepose.calibration.measurements import Measurements
 from truepose.errors import Problem as Refused
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 RANK = 1e-9
 """Singular values of the scaled equations below this share of the largest determine nothing."""

@@ -13,12 +13,12 @@ import itertools
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.instruments._base import Frame
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 from truepose.sources._block import rotations_of
 
 _NUMBER = {name: number for number, name in enumerate(OBSERVABLES)}

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose import _kernel
+from truepose._kernel import Identification
+from truepose.arrays import Floats, Indices
 from truepose.budget.exact import Moved, together
 from truepose.calibration.gate.observability import prior_rows
 from truepose.calibration.identification.unknowns import Unknowns
@@ -20,7 +21,6 @@ from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Condition, Machine
 from truepose.sources import Block, acting
-from truepose.sources._base import Floats, Indices
 from truepose.sources.tolerance import Tolerance
 
 TOLERANCES = (1e-16, 1e-10, 1e-13)
@@ -76,7 +76,7 @@ class Problem:
     def __init__(self, machine: Machine, measurements: Measurements, unknowns: Unknowns) -> None:
         """Raises `TrueposeError` where a row's condition asks for what the machine does not say."""
         self.machine, self.measurements, self.unknowns = machine, measurements, unknowns
-        self._kernel = _kernel.Identification(machine.kernel, self._description())
+        self._kernel = Identification(machine.kernel, self._description())
 
     def predict(self, values: ArrayLike) -> Floats:
         """(n_observation,) what would be read, SI; NaN where a pose cannot be solved."""

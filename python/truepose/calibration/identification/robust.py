@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.calibration.observables import OBSERVABLES, OF_STRUTS
-from truepose.sources._base import Floats
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.fit import Fit

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.budget.poses import OK, requested_poses
 from truepose.calibration.gate import Candidate
 from truepose.calibration.identification.fit import Fit
@@ -18,7 +19,6 @@ from truepose.calibration.observables import OBSERVABLES
 from truepose.errors import Problem as Refused
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
-from truepose.sources._base import Floats
 
 MOST_POSES = 300
 """Poses of the workspace at which the tool is looked at; more are thinned evenly."""

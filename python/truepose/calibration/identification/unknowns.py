@@ -16,6 +16,7 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property, properties_of
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.measurements import Measurements
@@ -26,7 +27,6 @@ from truepose.machine.shown_units import METRIC, ShownUnits
 from truepose.machine.suggestion import did_you_mean
 from truepose.machine.units import QuantityError, UnitSystem
 from truepose.sources import Deviation
-from truepose.sources._base import Floats, Indices
 from truepose.sources.tolerance import Tolerance
 
 SCREEN = 1e-9

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.identification.fit import Fit, fit
 from truepose.calibration.identification.problem import Problem
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.calibration.measurements import Measurements
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.sources._base import Flags, Floats, Indices
 
 FEW = 0.1
 """Share of the readings up to which those that do not fit are left out of what is counted."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.calibration.instruments import REGISTRY, Instrument
 from truepose.calibration.measurements.checked import (
     UNCERTAINTY,
@@ -17,7 +18,7 @@ from truepose.calibration.measurements.checked import (
     measurements_in,
     reading_columns,
 )
-from truepose.calibration.measurements.form import Floats, Measurements
+from truepose.calibration.measurements.form import Measurements
 from truepose.calibration.measurements.header import (
     expected_name,
     name_is_good,

@@ -13,17 +13,12 @@ from typing import Protocol
 
 import numpy as np
 
-from truepose import _kernel
+from truepose._kernel import STATUS
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.poses import faults_text
 from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
-from truepose.calibration.measurements.form import (
-    Flags,
-    Floats,
-    Indices,
-    Measurements,
-    cold_and_free,
-)
+from truepose.calibration.measurements.form import Measurements, cold_and_free
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Condition, Machine
 from truepose.machine.condition import DEFAULT_PART
@@ -193,7 +188,7 @@ def _placed(machine: Machine, rows: Rows, report: Report) -> tuple[Floats, Float
         joints[at], placements[at], status = machine.kernel.place(rows.commands[at])
         failed = np.flatnonzero(status)
         for number, (row, code) in enumerate(zip(at[failed], status[failed], strict=True)):
-            name = why = _kernel.STATUS[code]
+            name = why = STATUS[code]
             if number < MOST_PROBLEMS:  # the others are only counted
                 faults = machine.kernel.explain(rows.commands[row])
                 why = f"{name}: {faults_text(machine, faults)}" if faults else name
@@ -219,7 +214,7 @@ def _placed(machine: Machine, rows: Rows, report: Report) -> tuple[Floats, Float
                 "commanded-out-of-reach",
                 "the machine has no pose at these joints",
                 row=row,
-                found=_kernel.STATUS[code],
+                found=STATUS[code],
                 expected="joints at which the platform can be",
                 hint="are they joints of this machine, in the unit of the header?",
             )

@@ -12,15 +12,12 @@ import hashlib
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine.condition import Condition
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 
 
 def cold_and_free(condition: Condition) -> Condition:

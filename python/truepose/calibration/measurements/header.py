@@ -22,7 +22,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from truepose import _kernel
+from truepose._kernel import toml_lines
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument, Kind
 from truepose.calibration.instruments._base import Quaternion, Vector
 from truepose.calibration.observables import OBSERVABLES, UNITS
@@ -103,7 +103,7 @@ def read_header(head: str, file: str, name: str, reserved: frozenset[str]) -> He
     header = Header()
     try:
         data = tomllib.loads(head)
-        lines = dict(_kernel.toml_lines(head))
+        lines = dict(toml_lines(head))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         header.problems.append(_not_toml(error, head, file))
         return header

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.measurements.checked import (
     UNCERTAINTY,
@@ -27,7 +28,7 @@ from truepose.calibration.measurements.checked import (
     measurements_in,
     reading_columns,
 )
-from truepose.calibration.measurements.form import Floats, Indices, Measurements
+from truepose.calibration.measurements.form import Measurements
 from truepose.calibration.measurements.header import Header, read_header, reserved_names, separated
 from truepose.errors import MachineFileError, Problem, RequestError
 from truepose.machine import Machine

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument
 from truepose.calibration.measurements.checked import UNCERTAINTY, WRENCH, reading_columns
-from truepose.calibration.measurements.form import Floats, Measurements
+from truepose.calibration.measurements.form import Measurements
 from truepose.calibration.measurements.reading import CHECK, FIT, INSTRUMENT, SET
 from truepose.calibration.observables import OBSERVABLES, UNITS
 from truepose.errors import Problem, RequestError

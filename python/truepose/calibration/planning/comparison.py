@@ -9,16 +9,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.calibration.instruments import Instrument
 from truepose.calibration.planning import exchange
 from truepose.calibration.planning.exchange import Candidates, Progress
 from truepose.calibration.planning.plan import Field, counted_poses
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-
-Floats = NDArray[np.float64]
 
 FEW = 30
 """Up to so many readings a start matters; beyond, the greedy one serves."""

@@ -29,11 +29,9 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Flags = NDArray[np.bool_]
+from truepose.arrays import Flags, Floats, Indices
 
 Criterion = Literal["tool", "determinant"]
 CRITERIA: tuple[Criterion, ...] = get_args(Criterion)

@@ -15,9 +15,6 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from truepose.calibration.instruments import REGISTRY, Frame, Instrument
 from truepose.calibration.measurements.header import (
     expected_name,
@@ -35,8 +32,6 @@ from truepose.machine.dimensions import BY_UNIT
 from truepose.machine.suggestion import did_you_mean, one_of
 from truepose.machine.text_file import FileKind, read_text
 from truepose.machine.units import QuantityError, UnitSystem
-
-Floats = NDArray[np.float64]
 
 _WORD = re.compile(r"(?P<kind>[a-z-]+)(?::(?P<reads>[a-z.,]+))?=(?P<amounts>.+)\Z")
 _FILE = FileKind("a file of measurements (CSV), of which only the head is read", ".csv")

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.dataset import (
     commanded_units,
     joint_units,
@@ -45,10 +46,6 @@ from truepose.calibration.planning.readings import planned, whitened
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.machine.suggestion import one_of
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 
 DOMINATED = 0.5
 """An unknown of which the readings give less than this share of the information is called

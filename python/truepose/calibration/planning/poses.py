@@ -15,15 +15,12 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.poses import OK, LeftOut, no_pose_left, requested_poses
 from truepose.machine import Machine
 from truepose.machine.workspace import GridAxis, Workspace, grid
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Flags = NDArray[np.bool_]
 
 MOST_POSES = 1024
 """Poses of a workspace that are looked at, about: a finer grid betters a plan by little."""

@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.poses import OK, pose_in_words
 from truepose.calibration.instruments import Instrument
 from truepose.calibration.measurements.checked import UNCERTAINTY
@@ -25,9 +24,7 @@ from truepose.calibration.planning.readings import planned
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.machine.units import FileUnit
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from truepose.version import version
 
 FEED = 1.0 / 60.0
 """m/s: 1000 mm a minute."""
@@ -54,7 +51,7 @@ class Way:
     """
 
     stops: Floats
-    pose: NDArray[np.intp]
+    pose: Indices
 
     @property
     def by_home(self) -> int:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats
 from truepose.calibration.identification.problem import Problem as Fitted
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.instruments import REGISTRY, Instrument
@@ -17,8 +17,6 @@ from truepose.calibration.planning.poses import Placed
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.machine.suggestion import did_you_mean, one_of
-
-Floats = NDArray[np.float64]
 
 
 def observed(machine: Machine, instrument: Instrument) -> tuple[str, ...]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.machine import Machine
-from truepose.sources._base import Deviation, Floats, Indices
+from truepose.sources._base import Deviation
 from truepose.sources.tolerance import Tolerance
 
 

@@ -18,20 +18,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from importlib.metadata import version
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.budget.poses import LeftOut, Walk, no_pose_left, requested_poses
 from truepose.calibration.result.bands import known
 from truepose.calibration.result.directions import deviation_of, directions, tilted, turned
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.machine.shown_units import Shown, ShownUnits
-from truepose.sources._base import Floats
 from truepose.sources.quantiles import normal_quantile
+from truepose.version import version
 
 ALPHA = 0.05
 """Probability that a machine that did not change is said to have changed, at most."""
@@ -308,7 +308,7 @@ def _dataset(
         coordinates[f"left_out_{name}"] = ("left_out", requested[numbers, at], unit)
     dataset = xr.Dataset(made, coordinates)
     dataset.attrs = {
-        "truepose_version": version("truepose"),
+        "truepose_version": version(),
         **_provenance("old", old),
         **_provenance("new", new),
         "alpha": ALPHA,

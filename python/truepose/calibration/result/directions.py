@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from truepose.arrays import Floats
 from truepose.machine import Drive, Guide, Machine
-from truepose.sources._base import Floats
 
 _FIRST, _SECOND = ".u", ".v"
 

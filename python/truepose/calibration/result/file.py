@@ -13,13 +13,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import tomlkit
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property
 from truepose.calibration.result.bands import Banded, Known, banded, bands_of, known
 from truepose.calibration.result.directions import PartDirection, directions, tilted, turned
@@ -29,7 +29,8 @@ from truepose.machine import Machine, load
 from truepose.machine.workspace import Accuracy
 from truepose.output import replacing, require_writable
 from truepose.sources import REGISTRY
-from truepose.sources._base import Deviation, Floats, Indices
+from truepose.sources._base import Deviation
+from truepose.version import version
 
 DEFAULT_COVERAGE = 2.0
 """Half bands in standard deviations."""
@@ -325,7 +326,7 @@ def _write_provenance(
     table["machine"] = machine.file
     table["machine_hash"] = machine.file_hash
     table["date"] = provenance.date
-    table["version"] = version("truepose")
+    table["version"] = version()
     table["observations"] = int(provenance.observations)
     table["residual_rms_before"] = float(provenance.residual_rms_before)
     table["residual_rms_after"] = float(provenance.residual_rms_after)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.calibration.calibrate import Calibration
 from truepose.calibration.dataset import covariance_of, determined_covariance, verdict_of
 from truepose.calibration.gate import words
@@ -15,7 +16,6 @@ from truepose.calibration.identification.tool_effects import tool_effects, works
 from truepose.calibration.result.file import DEFAULT_COVERAGE, Provenance, write_calibrated
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 
 def save(

@@ -13,6 +13,7 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AoT, Array, InlineTable, Table
 
+from truepose.arrays import Floats
 from truepose.errors import RequestError
 from truepose.machine import Machine, validation
 from truepose.machine.dimensions import BY_UNIT, DIMENSIONS
@@ -23,7 +24,6 @@ from truepose.machine.tables import owners
 from truepose.machine.text_file import FileKind, read_text
 from truepose.machine.units import UnitSystem, meant
 from truepose.sources import REGISTRY
-from truepose.sources._base import Floats
 
 _NAMES_A_FILE = ("table", "data", "poses", "temperature_log")
 """Keys whose value may be the name of a CSV file."""

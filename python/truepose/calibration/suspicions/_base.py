@@ -13,8 +13,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.observables import OBSERVABLES, UNITS
 from truepose.calibration.suspicions.nominal import Geometry, Setup
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from truepose.calibration.measurements import Measurements
     from truepose.machine import Machine
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 ALLOWED = 3.0
 """Residuals, in what tolerances at their ends and noise give together, above which data are wrong.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import UNITS
 from truepose.calibration.suspicions.nominal import DIRECTION, LENGTH, A, Geometry, nominal_readings
@@ -12,8 +12,6 @@ from truepose.calibration.suspicions.setting import difference
 from truepose.machine import Machine
 from truepose.sources import Block, Deviation, acting
 from truepose.sources.tolerance import Tolerance
-
-Floats = NDArray[np.float64]
 
 MACHINES = 24
 """Machines that are drawn, each tolerance at one of its ends: the spread is known to a seventh."""

@@ -15,17 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.frames import rotation_matrix
 from truepose.calibration.instruments._base import Frame, Instrument
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Machine
 from truepose.sources._block import rotations_of
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 X, A, DISTANCE, LENGTH, DIRECTION, ANGLE = (
     OBSERVABLES.index(name) for name in ("x", "a", "distance", "length", "direction.x", "angle")

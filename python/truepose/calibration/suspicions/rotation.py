@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.suspicions._base import Column, Mend, OfMend, View
 from truepose.calibration.suspicions.nominal import angles_of
-
-Floats = NDArray[np.float64]
 
 OURS = "zyx"
 """R = Rz(c) Ry(b) Rx(a): extrinsic x y z, which is intrinsic z y x."""
@@ -55,7 +53,7 @@ def _angles(view: View) -> list[Column]:
     return columns if len(sizes) == 1 else []
 
 
-def _table(view: View, columns: list[Column]) -> NDArray[np.intp]:
+def _table(view: View, columns: list[Column]) -> Indices:
     """(m, 3) places of a b c among the observations, by row."""
     return np.stack([c.at[np.argsort(view.readings.row[c.at])] for c in columns], axis=1)
 

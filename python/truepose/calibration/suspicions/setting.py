@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.observables import UNITS
 from truepose.calibration.suspicions.nominal import (
@@ -26,9 +26,6 @@ from truepose.calibration.suspicions.nominal import (
     read,
     turned,
 )
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 ENOUGH = 2.0
 """Residuals, in what is allowed, below which no other start is tried."""

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats, Indices
 from truepose.calibration.suspicions._base import Column, Mend, OfMend, View, listed
 
 LENGTHS = ((10.0, "10"), (25.4, "25.4, the inch"), (100.0, "100"), (1000.0, "1000"))
@@ -50,7 +50,7 @@ def _measured(
             yield Mend(f"{listed(names)} {are} {word}", names, view.judge(value))
 
 
-def _unwrapped(view: View, at: NDArray[np.intp], factor: float) -> NDArray[np.float64]:
+def _unwrapped(view: View, at: Indices, factor: float) -> Floats:
     """Angles that were read a factor too large: how many turns were taken off them is not known.
 
     The number of turns that comes nearest to what is expected is put back.
@@ -58,7 +58,7 @@ def _unwrapped(view: View, at: NDArray[np.intp], factor: float) -> NDArray[np.fl
     value = view.readings.value[at]
     expected = value - view.as_given.residual[at]
     turns = np.round((factor * expected - value) / (2.0 * math.pi))
-    unwrapped: NDArray[np.float64] = value + 2.0 * math.pi * turns
+    unwrapped: Floats = value + 2.0 * math.pi * turns
     return unwrapped
 
 

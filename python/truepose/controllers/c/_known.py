@@ -19,6 +19,7 @@ from typing import cast
 
 import numpy as np
 
+from truepose.arrays import Floats, Indices
 from truepose.budget.exact import Moved, together
 from truepose.budget.length_law import law_of_length
 from truepose.budget.poses import Walk
@@ -28,7 +29,6 @@ from truepose.machine import Condition, Machine
 from truepose.machine.parts_of_machine import Body, Drive, Strut
 from truepose.machine.suggestion import did_you_mean, one_of
 from truepose.sources import Block, Source
-from truepose.sources._base import Floats, Indices
 from truepose.sources._stiffness import lacking
 
 POSES, SCATTERED = 150, 150

@@ -10,9 +10,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import truepose
 from truepose.controllers.c._known import Known, known_of
 from truepose.machine import Machine
+from truepose.version import version
 
 MOST_STEPS = 1000
 """Steps of a forward solution, before it gives up."""
@@ -172,7 +172,7 @@ class _Writer:
             "p": self.prefix,
             "P": self.prefix.upper(),
             "title": _plain(machine.name),
-            "version": truepose.__version__,
+            "version": version(),
             "file": _plain(Path(machine.file).name),
             "changed": "".join(
                 f",\n * with {_plain(f'{key} = {value}')}"

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 AXES = "XYZABCUVW"
 """Axes of a program, in the order of the columns of its points."""

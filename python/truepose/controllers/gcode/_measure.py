@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.budget.poses import OK
 from truepose.compensation.commands import ActualMachine, Known
-from truepose.sources._base import Floats
 
 
 class Measure:

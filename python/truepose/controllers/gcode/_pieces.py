@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.compensation.commands import Known
-from truepose.sources._base import Flags, Floats, Indices
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.arrays import Flags, Floats, Indices
 from truepose.budget.exact import displacement
 from truepose.budget.poses import OK
 from truepose.compensation.commands import UNMOVED, ActualMachine, blocks
-from truepose.sources._base import Flags, Floats, Indices
 
 SAME = 1e-6
 """Distance of two poses that are one, in characteristic lengths or rad: far above rounding."""

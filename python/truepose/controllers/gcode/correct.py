@@ -19,7 +19,7 @@ from typing import cast, get_args
 
 import numpy as np
 
-from truepose import _kernel
+from truepose._kernel import GcodeCorrector, GcodeError, GcodeMoves, GcodeReader, threads
 from truepose.budget.evaluate import required_sources
 from truepose.compensation.commands import ActualMachine
 from truepose.controllers.gcode import _refusals
@@ -93,9 +93,9 @@ class _Options:
         """What the division must hold."""
         return Limits(tolerance, min(LEAST_PIECE, tolerance), self.interpolation)
 
-    def corrector(self, program: Path, target: Path) -> _kernel.GcodeCorrector:
+    def corrector(self, program: Path, target: Path) -> GcodeCorrector:
         """What reads a program and writes it anew."""
-        return _kernel.GcodeCorrector(
+        return GcodeCorrector(
             program,
             target,
             units=self.units,
@@ -106,9 +106,9 @@ class _Options:
             digits=self.digits,
         )
 
-    def reader(self, program: Path) -> _kernel.GcodeReader:
+    def reader(self, program: Path) -> GcodeReader:
         """What reads a program as the same controller does."""
-        return _kernel.GcodeReader(
+        return GcodeReader(
             program,
             units=self.units,
             start=self.start,
@@ -178,7 +178,7 @@ def _tolerance(actual: ActualMachine, axes: Axes, program: Path, options: _Optio
 
     def batches() -> Iterator[Moves]:
         # What cannot be read is refused in the order of lines where the program is corrected.
-        with suppress(_kernel.GcodeError):
+        with suppress(GcodeError):
             left = LOOKED_THROUGH
             while left > 0 and (moves := _moves_of(reader.read(min(BATCH, left)))):
                 left -= len(moves.line)
@@ -220,7 +220,7 @@ class _Session:
                 stand = divided.stand
                 if task is not None:
                     task.result()
-                if _kernel.threads() > 1:
+                if threads() > 1:
                     task = aside.submit(self._writing.add, moves, divided)
                 else:
                     self._writing.add(moves, divided)
@@ -352,7 +352,7 @@ def _quick_turns() -> Iterator[None]:
         sys.setswitchinterval(interval)
 
 
-def _moves_of(found: _kernel.GcodeMoves) -> Moves | None:
+def _moves_of(found: GcodeMoves) -> Moves | None:
     """The moves as arrays, each made once; None behind the last."""
     if not len(found):
         return None
@@ -364,7 +364,7 @@ def _problems_of(program: Path) -> Iterator[None]:
     """The interpreter's refusals as problems of the program's file."""
     try:
         yield
-    except _kernel.GcodeError as refusal:
+    except GcodeError as refusal:
         raise RequestError(
             Problem(
                 refusal.code,

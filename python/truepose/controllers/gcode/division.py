@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truepose._kernel import STATUS
+from truepose.arrays import Codes, Flags, Floats, Indices
 from truepose.budget.exact import Moved
 from truepose.budget.poses import BLOCK, OK
 from truepose.compensation.commands import UNMOVED, ActualMachine, Known, blocks
@@ -31,7 +32,6 @@ from truepose.controllers.gcode._axes import MILLIMETRE, Axes
 from truepose.controllers.gcode._measure import Measure
 from truepose.controllers.gcode._pieces import Looked, Nodes, Pieces, joined, selected
 from truepose.controllers.gcode._way import STEP, crossings
-from truepose.sources._base import Flags, Floats, Indices
 
 RAPID = 0
 
@@ -75,7 +75,7 @@ class Moves:
     """
 
     line: NDArray[np.int64]
-    kind: NDArray[np.uint8]
+    kind: Codes
     start: Floats
     end: Floats
     length: Floats

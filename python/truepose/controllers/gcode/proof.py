@@ -18,10 +18,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers.gcode._measure import Measure
 from truepose.controllers.gcode.division import Divided, Division, Moves, Points
 from truepose.controllers.gcode.tolerance import UNFELT, Tolerance
-from truepose.sources._base import Floats
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers.gcode._axes import DEGREE, MILLIMETRE
 from truepose.controllers.gcode._measure import Measure
 from truepose.controllers.gcode.division import SPACING, Division, Moves
-from truepose.sources._base import Floats
 
 SHARE = 0.1
 """Of the error before: what may be left. The correction takes nine tenths or more away."""

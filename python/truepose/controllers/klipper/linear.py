@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers._delta import lowest_z, print_radius
 from truepose.controllers._linear_delta import (
     ANGLES,
@@ -32,7 +33,6 @@ from truepose.controllers._small_model import (
     more_decimals,
 )
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 LENGTH_DIGITS, ANGLE_DIGITS = 6, 7
 """Decimals that are written; of lengths more where the characteristic one is below `SMALL`, m."""

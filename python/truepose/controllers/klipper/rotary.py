@@ -20,6 +20,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers._delta import AROUND, LEAN, Limb, limbs, lowest_z, surrounded, wrapped
 from truepose.controllers._export import cannot
 from truepose.controllers._homing import switches
@@ -34,7 +35,6 @@ from truepose.controllers._small_model import (
     scales,
 )
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 LENGTH_DIGITS, ANGLE_DIGITS = 6, 7
 """Decimals that are written; of lengths more where the characteristic one is below `SMALL`, m."""

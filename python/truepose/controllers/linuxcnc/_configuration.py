@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from importlib.metadata import version
 
 import numpy as np
 
 from truepose.controllers.linuxcnc._description import DEGREE, MILLIMETRE, WRENCHES, Description
 from truepose.controllers.linuxcnc._safe_box import Box
 from truepose.controllers.linuxcnc._template import exact, filled, plain
+from truepose.version import version
 
 
 def ini_text(description: Description, box: Box, clamp: float) -> str:
@@ -21,7 +21,7 @@ def ini_text(description: Description, box: Box, clamp: float) -> str:
         "ini.in",
         {
             "title": description.title,
-            "version": version("truepose"),
+            "version": version(),
             "file": plain(machine.file.replace("\\", "/").rpartition("/")[2]),
             "module": description.module,
             "n_joint": str(len(machine.joints)),
@@ -87,7 +87,7 @@ def hal_text(description: Description, clamp: float, rate_limit: float) -> str:
         {
             "module": description.module,
             "title": description.title,
-            "version": version("truepose"),
+            "version": version(),
             "file": plain(description.machine.file.replace("\\", "/").rpartition("/")[2]),
             "temperatures": "\n".join(temperatures) or "# None: no part expands.",
             "wrench": "\n".join(wrench),

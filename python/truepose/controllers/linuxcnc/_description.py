@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from truepose import _kernel
+from truepose._kernel import STATUS
+from truepose.arrays import Codes, Flags, Floats
 from truepose.controllers._export import cannot
 from truepose.controllers.c import Program
 from truepose.controllers.linuxcnc._template import plain
 from truepose.machine import Drive, Guide, Machine, Strut
-
-Floats = NDArray[np.float64]
 
 FREEDOMS = ("x", "y", "z", "a", "b", "c")
 COMPONENTS = ("x", "y", "z", "rx", "ry", "rz")
@@ -170,7 +168,7 @@ def _columns(machine: Machine) -> list[int]:
     return [machine.dof.index(name) for name in machine.commanded]
 
 
-def status_ok(status: NDArray[np.uint8]) -> NDArray[np.bool_]:
+def status_ok(status: Codes) -> Flags:
     """Where a status is ok."""
-    ok: NDArray[np.bool_] = status == _kernel.STATUS.index("ok")
+    ok: Flags = status == STATUS.index("ok")
     return ok

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from importlib.metadata import version
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from truepose.controllers.linuxcnc._description import (
     Description,
 )
 from truepose.controllers.linuxcnc._template import exact, filled, plain
+from truepose.version import version
 
 PREFIX = "pkm"
 """Of the names of the machine's own C inside the module."""
@@ -39,7 +39,7 @@ def module_text(description: Description, machine_c: str, clamp: float, rate_lim
         {
             "module": description.module,
             "title": description.title,
-            "version": version("truepose"),
+            "version": version(),
             "file": plain(machine.file.replace("\\", "/").rpartition("/")[2]),
             "file_hash": machine.file_hash,
             "pin_table": "\n".join(_pin_table(description)),

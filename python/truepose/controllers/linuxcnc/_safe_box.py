@@ -9,14 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from truepose.arrays import Flags, Floats
 from truepose.controllers._export import cannot
 from truepose.controllers.linuxcnc._description import Description, status_ok
 from truepose.machine.workspace import GridAxis, grid
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 COUNTS = {1: 1001, 2: 151, 3: 25, 4: 11, 5: 7, 6: 7}
 """Poses along an axis of the dense grid, by the number of axes: 10^4 to 10^5 poses in all."""

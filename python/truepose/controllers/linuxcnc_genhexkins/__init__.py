@@ -14,6 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers._export import Export, Option, cannot
 from truepose.controllers._homing import switch_option, switches
 from truepose.controllers._linuxcnc_joints import (
@@ -34,7 +35,6 @@ from truepose.controllers._small_model import (
     vector,
 )
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 PINS = "genhexkins"
 STRUTS = 6

@@ -14,6 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers._delta import SWITCHES, TOWERS, tower_order, wrapped
 from truepose.controllers._export import Export, Option, cannot
 from truepose.controllers._linear_delta import (
@@ -35,7 +36,6 @@ from truepose.controllers._linuxcnc_joints import (
 )
 from truepose.controllers._small_model import INSTEAD, Parameter, Printed, fixed
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 PINS = "lineardeltakins"
 JOINT_TOWERS = [2, 0, 1]

@@ -20,6 +20,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers._delta import SWITCHES, TOWERS, tower_order, wrapped
 from truepose.controllers._export import Export, Option
 from truepose.controllers._linear_delta import (
@@ -44,7 +45,6 @@ from truepose.controllers._small_model import (
 )
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 LENGTH_DIGITS, ANGLE_DIGITS = 5, 6
 """Decimals that are written; of lengths more where the characteristic one is below `SMALL`, m."""

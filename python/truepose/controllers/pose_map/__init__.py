@@ -19,7 +19,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from truepose import _kernel
+from truepose._kernel import STATUS
+from truepose.arrays import Flags, Floats
 from truepose.budget.dataset import provenance
 from truepose.budget.poses import OK, pose_in_words
 from truepose.compensation.commands import corrected_poses, with_joints
@@ -31,7 +32,6 @@ from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.machine.suggestion import counted
 from truepose.machine.units import FileUnit, default_units
-from truepose.sources._base import Flags, Floats
 
 FINEST = 1e-10
 """m and rad to which corrections are written, and finer."""
@@ -284,7 +284,7 @@ def statement(found: NodeCorrections, judged: Judged) -> tuple[str, ...]:
         lines.append(f"compared with exact corrections at {points} between the nodes")
     names, counts = np.unique(found.status[found.status != OK], return_counts=True)
     for code, number in zip(names, counts, strict=True):
-        what = str(_kernel.STATUS[code]).replace("_", " ")
+        what = str(STATUS[code]).replace("_", " ")
         be, instead = ("is", "it has") if number == 1 else ("are", "they have")
         lines.append(f"{counted(number, 'node')} {be} {what}: {instead} {_instead(int(code))}")
     if judged.left_out:
@@ -367,7 +367,7 @@ def _csv(found: NodeCorrections, head: Mapping[str, object], lines: tuple[str, .
             "" if math.isnan(value) else fixed(value, places)
             for value, places in zip(added, found.digits, strict=True)
         ]
-        rows.writerow([*place, *numbers, _kernel.STATUS[code]])
+        rows.writerow([*place, *numbers, STATUS[code]])
     return out.getvalue()
 
 
@@ -389,7 +389,7 @@ def _json(found: NodeCorrections, judged: Judged, head: Mapping[str, object]) ->
         },
         "axes": axes,
         "corrections": columns,
-        "status": [_kernel.STATUS[code] for code in found.status],
+        "status": [STATUS[code] for code in found.status],
     }
     # One key a line: a column of numbers reads better, and shorter, along it.
     lines = [f"{json.dumps(k)}: {json.dumps(v, allow_nan=False)}" for k, v in document.items()]

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers._export import Option
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.machine.suggestion import did_you_mean, one_of
 from truepose.machine.workspace import GridAxis, grid
-from truepose.sources._base import Floats
 
 AS_FILE = "as the machine file"
 

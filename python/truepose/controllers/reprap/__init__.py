@@ -17,6 +17,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.controllers._delta import SWITCHES, TOWERS, print_radius, tower_order, wrapped
 from truepose.controllers._export import Export, Option
 from truepose.controllers._linear_delta import (
@@ -34,7 +35,6 @@ from truepose.controllers._linear_delta import (
 from truepose.controllers._one_file import in_one_file
 from truepose.controllers._small_model import MM, Printed, fixed, more_decimals
 from truepose.machine import Machine
-from truepose.sources._base import Floats
 
 PERCENT = 1e-2
 LENGTH_DIGITS, ANGLE_DIGITS, TILT_DIGITS = 5, 6, 6

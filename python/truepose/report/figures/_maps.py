@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats, Indices
 from truepose.machine.shown_units import ShownUnits
 from truepose.report.display import is_position
 from truepose.report.figures._style import small
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -27,11 +25,11 @@ class Places:
 
     axes: tuple[str, ...]
     units: tuple[str, ...]
-    points: Array
-    of_pose: NDArray[np.intp]
+    points: Floats
+    of_pose: Indices
 
 
-def places_of(given: Array, names: Sequence[str], units: ShownUnits) -> Places:
+def places_of(given: Floats, names: Sequence[str], units: ShownUnits) -> Places:
     """The coordinates that vary of poses (n, n_coordinate), m and rad.
 
     Positions first, at most three; at least two for a plane.
@@ -56,8 +54,8 @@ def places_of(given: Array, names: Sequence[str], units: ShownUnits) -> Places:
 
 def map_trace(
     places: Places,
-    drawn: NDArray[np.intp],
-    sizes: Array,
+    drawn: Indices,
+    sizes: Floats,
     unit: str,
     scale: str = "coloraxis",
 ) -> go.Scatter | go.Heatmap:

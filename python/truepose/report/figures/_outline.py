@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from truepose.arrays import Floats
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
 
-Array = NDArray[np.float64]
 PATH_POINTS = 33
 # A quarter turn either side: enough to see an arm's arc without hiding the machine behind circles.
 WIDEST_ARC = np.pi / 2
@@ -34,12 +34,12 @@ class Outline:
     `tool` (3,): tool point.
     """
 
-    struts: Array
-    paths: tuple[Array, ...]
-    arms: tuple[Array, ...]
-    frame: Array
-    platform: Array
-    tool: Array
+    struts: Floats
+    paths: tuple[Floats, ...]
+    arms: tuple[Floats, ...]
+    frame: Floats
+    platform: Floats
+    tool: Floats
 
 
 def is_planar(machine: Machine) -> bool:
@@ -47,7 +47,7 @@ def is_planar(machine: Machine) -> bool:
     return not {"z", "a", "b"} & set(machine.dof)
 
 
-def outline(machine: Machine, pose: Array) -> Outline:
+def outline(machine: Machine, pose: Floats) -> Outline:
     """The machine at one commanded pose (n_commanded,), m and rad."""
     joints, placements, _ = machine.kernel.place(np.atleast_2d(pose))
     centres = machine.kernel.joint_centres(joints, placements)[0]
@@ -56,8 +56,8 @@ def outline(machine: Machine, pose: Array) -> Outline:
     for index, strut in enumerate(machine.struts):
         if strut.drive is not None:
             carried.setdefault(strut.drive, []).append(index)
-    paths: list[Array] = []
-    arms: list[Array] = []
+    paths: list[Floats] = []
+    arms: list[Floats] = []
     for number, drive in enumerate(machine.drives):
         struts = carried.get(drive.name, [])
         if drive.drawing == "none" or not struts:
@@ -81,8 +81,8 @@ def outline(machine: Machine, pose: Array) -> Outline:
 
 
 def _path(
-    machine: Machine, joints: Array, placement: Array, number: int, struts: list[int]
-) -> Array:
+    machine: Machine, joints: Floats, placement: Floats, number: int, struts: list[int]
+) -> Floats:
     """(n, 3) where the middle of a drive's joint centres goes within its travel."""
     drive = machine.drives[number]
     low, high = drive.travel
@@ -94,7 +94,7 @@ def _path(
     return np.asarray(centres[:, struts, 0].mean(axis=1))
 
 
-def _centre_of_arc(path: Array) -> Array:
+def _centre_of_arc(path: Floats) -> Floats:
     """Centre (3,) of the circle through the ends and the middle of an arc."""
     first, middle, last = path[0], path[len(path) // 2], path[-1]
     along, across = middle - first, last - first
@@ -107,7 +107,7 @@ def _centre_of_arc(path: Array) -> Array:
     return np.asarray(first + offset / (2.0 * squared))
 
 
-def _around(points: Array, length: float) -> Array:
+def _around(points: Floats, length: float) -> Floats:
     """Points in order round their middle, closed; empty where they are one point or on a line."""
     if len(points) < 2:
         return np.empty((0, 3))

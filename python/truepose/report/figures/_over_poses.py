@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from truepose.arrays import Indices
 from truepose.report.display import pose_text
 from truepose.report.figures._style import finish
 from truepose.report.study import Study
@@ -58,12 +58,12 @@ def finish_panels(figure: go.Figure, study: Study) -> go.Figure:
     return figure
 
 
-def line_mode(drawn: NDArray[np.intp]) -> str:
+def line_mode(drawn: Indices) -> str:
     """Points are marked while they can be told apart."""
     return "lines+markers" if len(drawn) <= MOST_MARKED else "lines"
 
 
-def add_pose_labels(figure: go.Figure, study: Study, drawn: NDArray[np.intp]) -> None:
+def add_pose_labels(figure: go.Figure, study: Study, drawn: Indices) -> None:
     """Let the hover box of each panel say which pose the number stands for."""
     if len(drawn) > MOST_LABELLED:
         return  # the labels would weigh more than the lines

@@ -8,6 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 
+from truepose.arrays import Indices
+
 # Okabe and Ito's colours, told apart by colour-blind readers too (https://jfly.uni-koeln.de/color).
 SOURCE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31")
 OVERALL = "#1B2A41"
@@ -33,7 +35,7 @@ def small(values: ArrayLike) -> NDArray[np.float32]:
     return np.asarray(values, dtype=np.float32)
 
 
-def drawn_poses(size: ArrayLike) -> NDArray[np.intp]:
+def drawn_poses(size: ArrayLike) -> Indices:
     """Indices of the poses to draw, at most about `MOST_DRAWN`: every k-th and the largest.
 
     `size` (n_pose,) says how large the error at each pose is; the pose where it is largest is

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats
 from truepose.report.figures._over_poses import add_pose_labels, finish_panels, panels, place
 from truepose.report.figures._style import AFTER, BEFORE, drawn_poses, small, thinning_note
 from truepose.report.study import Study
@@ -75,8 +75,8 @@ def figure(study: Study) -> go.Figure:
 def _add_band(
     figure: go.Figure,
     at: dict[str, int],
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
+    lower: Floats,
+    upper: Floats,
     name: str,
     colour: str,
     fill: str,

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from truepose.report.display import Array
+from truepose.arrays import Floats
 from truepose.report.figures._maps import label_map_axes, map_trace, places_of
 from truepose.report.figures._style import COLOUR_SCALE, finish
 from truepose.report.study import Study
@@ -70,7 +70,7 @@ def figure(study: Study) -> go.Figure:
     return figure
 
 
-def _by_place(study: Study, values: Array, of_row: np.ndarray, count: int) -> Array:
+def _by_place(study: Study, values: Floats, of_row: np.ndarray, count: int) -> Floats:
     """(n_place,) root mean square of the residuals at each place; NaN where none was fitted."""
     rows = study.calibrated["observation_row"].values
     there = np.isfinite(values)
@@ -78,5 +78,5 @@ def _by_place(study: Study, values: Array, of_row: np.ndarray, count: int) -> Ar
     total = np.bincount(at, values[there] ** 2, minlength=count)
     number = np.bincount(at, minlength=count)
     with np.errstate(invalid="ignore"):
-        sizes: Array = np.sqrt(total / number)
+        sizes: Floats = np.sqrt(total / number)
     return sizes

@@ -6,9 +6,9 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from truepose.arrays import Floats
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.machine.shown_units import Shown
-from truepose.report.display import Array
 from truepose.report.figures._style import AFTER, BEFORE, OVERALL, finish, small
 from truepose.report.study import Study
 
@@ -124,7 +124,7 @@ def _labels(study: Study) -> np.ndarray:
 
 def _points(
     at: np.ndarray,
-    values: Array,
+    values: Floats,
     text: np.ndarray,
     name: str,
     colour: str,
@@ -144,7 +144,7 @@ def _points(
     )
 
 
-def _band(at: np.ndarray, sigma: Array) -> list[go.Scatter]:
+def _band(at: np.ndarray, sigma: Floats) -> list[go.Scatter]:
     """Twice the stated uncertainty either side, the largest at each row."""
     where = np.unique(at)
     half = COVERAGE * np.array([sigma[at == each].max() for each in where])

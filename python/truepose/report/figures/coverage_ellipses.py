@@ -10,8 +10,9 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from truepose.arrays import Floats
 from truepose.machine.shown_units import ShownUnits
-from truepose.report.display import Array, is_position
+from truepose.report.display import is_position
 from truepose.report.figures._style import INK, finish, small, source_colour
 from truepose.report.reading import percent_text
 from truepose.report.study import Study
@@ -41,7 +42,7 @@ class Panel:
 
     axes: tuple[int, int]
     poses: list[int]
-    places: Array
+    places: Floats
 
 
 def caption(study: Study) -> str:
@@ -115,14 +116,14 @@ def figure(study: Study) -> go.Figure:
     return figure
 
 
-def _ranges(points: Array, units: ShownUnits) -> list[list[float]]:
+def _ranges(points: Floats, units: ShownUnits) -> list[list[float]]:
     """Ends of both axes, for people, that leave some room about all points (n, 2), m."""
     low, high = (end(axis=0) * units.length.per_si for end in (points.min, points.max))
     room = 0.05 * float((high - low).max()) or 1.0
     return [[float(a - room), float(b + room)] for a, b in zip(low, high, strict=True)]
 
 
-def ellipse(found: xr.Dataset, pose: int, axes: tuple[int, int]) -> tuple[Array, Array]:
+def ellipse(found: xr.Dataset, pose: int, axes: tuple[int, int]) -> tuple[Floats, Floats]:
     """Centre (2,) and outline (n, 2) about it, m, of one pose's ellipse in the plane of two axes.
 
     The shadow of {e : (e - c)^T E^-1 (e - c) <= 1} on a plane has that part of E: points are
@@ -153,7 +154,7 @@ def _panels(study: Study) -> list[Panel]:
     return panels
 
 
-def _panel(pair: tuple[int, ...], places: Array, hidden: list[Array]) -> Panel:
+def _panel(pair: tuple[int, ...], places: Floats, hidden: list[Floats]) -> Panel:
     off = np.zeros(len(places))
     for values in hidden:
         span = np.ptp(values)
@@ -195,7 +196,7 @@ def _magnified(study: Study) -> float:
     return float(next(step for step in STEPS if step * power <= most) * power)
 
 
-def _gap(places: Array) -> float:
+def _gap(places: Floats) -> float:
     """Distance (m) between the two places that are nearest to each other."""
     if len(places) < 2:
         return 0.1
@@ -205,9 +206,9 @@ def _gap(places: Array) -> float:
 
 def _draw(
     figure: go.Figure,
-    place: Array,
-    centre: Array,
-    outline: Array,
+    place: Floats,
+    centre: Floats,
+    outline: Floats,
     times: float,
     column: int,
     units: ShownUnits,

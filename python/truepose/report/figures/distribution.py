@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from truepose.arrays import Flags, Floats
 from truepose.budget.poses import not_assembled_text
-from truepose.report.display import MISSING, ROUNDING, Array, number
+from truepose.report.display import MISSING, ROUNDING, number
 from truepose.report.figures._style import GRID, INK, OVERALL, finish, small, source_colour
 from truepose.report.reading import at_text, percent_text, quantities, worst_pose
 from truepose.report.study import Study
@@ -95,7 +95,7 @@ def _rows(study: Study) -> list[list[str]]:
     return rows
 
 
-def _of(study: Study, name: str, pose: int) -> tuple[Array, Array, float]:
+def _of(study: Study, name: str, pose: int) -> tuple[Floats, Floats, float]:
     """Quantiles (n_level,), both ends of the coverage interval and the mean, m or rad."""
     found = study.monte_carlo
     assert found is not None
@@ -111,7 +111,7 @@ def _of(study: Study, name: str, pose: int) -> tuple[Array, Array, float]:
     return values, np.array(ends), float(found["mean"].values[pose, at])
 
 
-def histogram(levels: Array, quantiles: Array, bars: int = BARS) -> tuple[Array, Array]:
+def histogram(levels: Floats, quantiles: Floats, bars: int = BARS) -> tuple[Floats, Floats]:
     """Edges (bars + 1,) and share of the samples (bars,) from quantiles (n_level,) at `levels`.
 
     Where the lowest level is not 0 or the highest not 1, the rest has no error and is in no bar.
@@ -128,9 +128,9 @@ def histogram(levels: Array, quantiles: Array, bars: int = BARS) -> tuple[Array,
 
 def _draw(
     figure: go.Figure,
-    levels: Array,
-    quantiles: Array,
-    interval: Array,
+    levels: Floats,
+    quantiles: Floats,
+    interval: Floats,
     mean: float,
     panel: dict[str, int],
 ) -> None:
@@ -170,8 +170,8 @@ def _draw(
         figure.add_vline(x=end, line={"color": INK, "width": 1, "dash": "dot"}, **panel)
 
 
-def _colours(middle: Array, interval: Array) -> list[str]:
-    inside: NDArray[np.bool_] = (middle >= interval[0]) & (middle <= interval[1])
+def _colours(middle: Floats, interval: Floats) -> list[str]:
+    inside: Flags = (middle >= interval[0]) & (middle <= interval[1])
     return [WITHIN if each else OUTSIDE for each in inside]
 
 

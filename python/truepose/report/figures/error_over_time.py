@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from truepose.arrays import Indices
 from truepose.report.display import pose_text
 from truepose.report.figures._style import MOST_DRAWN, finish, small, source_colour
 from truepose.report.study import Study
@@ -68,9 +69,7 @@ def figure(study: Study) -> go.Figure:
     return figure
 
 
-def _add_errors(
-    figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: NDArray[np.intp]
-) -> None:
+def _add_errors(figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: Indices) -> None:
     commanded = study.machine.commanded
     errors = np.asarray(study.time["error"].values)[drawn]
     errors = study.shown(errors)
@@ -105,7 +104,7 @@ def _add_errors(
 
 
 def _add_temperatures(
-    figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: NDArray[np.intp], row: int
+    figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: Indices, row: int
 ) -> None:
     parts = [str(part) for part in study.time["part"].values]
     temperatures = np.asarray(study.time["temperature"].values)[drawn]
@@ -133,7 +132,7 @@ def _add_temperatures(
     figure.update_yaxes(title_text=f"temperature, {study.units.degree}", row=row, col=1)
 
 
-def _drawn(study: Study) -> NDArray[np.intp]:
+def _drawn(study: Study) -> Indices:
     """Numbers of the times that are drawn, the last among them."""
     total = study.time["time"].size
     step = -(-total // MOST_DRAWN)

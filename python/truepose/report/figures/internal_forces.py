@@ -6,6 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from truepose.arrays import Floats
 from truepose.report.figures._style import (
     AFTER,
     BEFORE,
@@ -15,7 +16,7 @@ from truepose.report.figures._style import (
     source_colour,
     thinning_note,
 )
-from truepose.report.study import Array, Study
+from truepose.report.study import Study
 
 TITLE = "Internal forces"
 NEEDS = "strain"
@@ -85,10 +86,10 @@ def figure(study: Study) -> go.Figure:
     return figure
 
 
-def _overall(study: Study) -> Array:
+def _overall(study: Study) -> Floats:
     """(n_pose, n_closure) N."""
     return np.asarray(study.strained["overall_force"].values)
 
 
-def _drawn(force: Array) -> np.ndarray:
+def _drawn(force: Floats) -> np.ndarray:
     return drawn_poses(np.abs(force).max(axis=1))

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 
+from truepose.arrays import Floats
 from truepose.machine.shown_units import Shown
 from truepose.report.display import nearest_middle, pose_text
 from truepose.report.figures._outline import Outline, is_planar, outline
@@ -17,7 +17,6 @@ from truepose.report.study import Study
 
 TITLE = "The machine in its workspace"
 
-Array = NDArray[np.float64]
 GUIDEWAY, STRUT, PLATFORM, WORKSPACE = "#A8B1C0", "#0072B2", "#D55E00", "#009E73"
 
 
@@ -65,7 +64,7 @@ def _shown(study: Study) -> int:
     return int(nearest_middle(study.poses)[0])
 
 
-def _lines(shape: Outline, workspace: Array) -> Iterable[dict[str, Any]]:
+def _lines(shape: Outline, workspace: Floats) -> Iterable[dict[str, Any]]:
     """Every part of the drawing: its points, m, and how it looks, from back to front."""
     yield {
         "points": workspace,
@@ -121,13 +120,13 @@ def _lines(shape: Outline, workspace: Array) -> Iterable[dict[str, Any]]:
     }
 
 
-def _joined(polylines: Iterable[Array]) -> Array:
+def _joined(polylines: Iterable[Floats]) -> Floats:
     """Polylines (n, 3) in one array, a gap of NaN between them."""
     gap = np.full((1, 3), np.nan)
     return np.concatenate([part for line in polylines for part in (np.asarray(line), gap)])
 
 
-def _trace(planar: bool, unit: Shown, points: Array, **look: Any) -> go.Scatter | go.Scatter3d:
+def _trace(planar: bool, unit: Shown, points: Floats, **look: Any) -> go.Scatter | go.Scatter3d:
     x, y, z = small(points * unit.per_si).T
     places = 2 if unit.per_si > 100.0 else 4
     names = "xy" if planar else "xyz"

@@ -6,16 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
+from truepose.arrays import Floats, Indices
 from truepose.report.figures._maps import Places, label_map_axes, map_trace, places_of
 from truepose.report.figures._style import COLOUR_SCALE, drawn_poses, finish, thinning_note
 from truepose.report.study import Study
 
 TITLE = "Where in the workspace"
 
-Array = NDArray[np.float64]
 # A browser keeps 16 pictures in three dimensions alive; the drawing of the machine needs one too.
 MOST_MAPS = 6
 PER_ROW = 3
@@ -29,7 +28,7 @@ class Map:
     """One map: its title and the worst position error at each place (n_place,), for people."""
 
     title: str
-    worst: Array
+    worst: Floats
 
 
 def caption(study: Study) -> str:
@@ -97,7 +96,7 @@ def _maps(study: Study, places: Places) -> list[Map]:
     """All sources together, what remains, then the sources by rank, at most `MOST_MAPS`."""
     unit = study.units.small_length
 
-    def over_places(worst: Array) -> Array:
+    def over_places(worst: Floats) -> Floats:
         highest = np.zeros(len(places.points))
         np.fmax.at(highest, places.of_pose, worst * unit.per_si)
         return highest
@@ -111,6 +110,6 @@ def _maps(study: Study, places: Places) -> list[Map]:
     return maps[:MOST_MAPS]
 
 
-def _drawn(study: Study, places: Places) -> NDArray[np.intp]:
+def _drawn(study: Study, places: Places) -> Indices:
     """Indices of the places to draw."""
     return drawn_poses(_maps(study, places)[0].worst)

@@ -12,10 +12,10 @@ import truepose
 from benchmarks.hexapod import MACHINE, Array, geometry_columns, load
 from benchmarks.rows import Row
 from benchmarks.timing import best_seconds
-from truepose.budget.comparison import quantities
-from truepose.budget.vertices import worst_vertices
+from truepose.probability.domain import Domain
+from truepose.runs.quantities import quantities
 from truepose.sources import UNIFORM
-from truepose.sources.domain import Domain
+from truepose.uncertainty_analysis.corners import worst_vertices
 
 BAND = 1e-4  # m, of every parameter of the hexapod, to either side
 ROUNDS = 7

@@ -7,7 +7,7 @@ import time
 import truepose
 from benchmarks.hexapod import MACHINE
 from benchmarks.rows import Row
-from truepose.report.display import nearest_middle
+from truepose.reporting.display import nearest_middle
 
 MACHINES = ("planar_two_slider", "hexapod", "linear_delta", "3prs", "rotary_delta")
 SAMPLES = 10_000_000

@@ -13,8 +13,8 @@ import truepose
 from benchmarks.hexapod import load, workspace_poses
 from benchmarks.rows import Row
 from truepose.arrays import Floats, Indices
-from truepose.budget import evaluate
-from truepose.budget.largest import Largest
+from truepose.error_budget import evaluate
+from truepose.error_budget.largest import Largest
 from truepose.machine import Machine
 from truepose.sources import acting
 

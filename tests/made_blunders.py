@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from made_measurements import made_measurements, poses_within
+from truepose.calibration.data_checks.nominal import Geometry, Setup, nominal_readings, turned
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
-from truepose.calibration.suspicions.nominal import Geometry, Setup, nominal_readings, turned
 from truepose.machine import Machine
 from truepose.sources.tolerance import Tolerance
 

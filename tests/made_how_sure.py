@@ -14,8 +14,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from made_calibration import calibration
-from truepose.report.how_sure import spread_over
-from truepose.report.study import Study
+from truepose.reporting.study import Study
+from truepose.reporting.uncertainty_tables import spread_over
 
 Array = NDArray[np.float64]
 PROBABILITY = 0.95
@@ -223,7 +223,7 @@ def _dataset(
     coords: dict[str, Any] | None = None,
     attrs: dict[str, Any] | None = None,
 ) -> xr.Dataset:
-    """Units as `truepose.budget.dataset` writes them: "c", "q", "f" differ along a dim."""
+    """Units as `truepose.runs.dataset` writes them: "c", "q", "f" differ along a dim."""
     component = ["m" if name in ("x", "y", "z") else "rad" for name in machine.components]
     quantities = list(_groups(machine))
     quantity = ["m" if name == "position" else "rad" for name in quantities]

@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from truepose.machine.shown_units import Shown, ShownUnits
+from truepose.files.shown_units import Shown, ShownUnits
 from truepose.machine.workspace import Accuracy
-from truepose.report.study import Study
+from truepose.reporting.study import Study
 from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, UNDECIDED, Answer, Number
 
 Array = NDArray[np.float64]

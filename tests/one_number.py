@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from truepose.budget.comparison import quantities
-from truepose.budget.drawn import Random
-from truepose.budget.first_order import Mover
-from truepose.budget.poses import OK
 from truepose.machine import Machine
+from truepose.runs.first_order import Mover
+from truepose.runs.poses import OK
+from truepose.runs.quantities import quantities
+from truepose.uncertainty_analysis.sampler import Random
 from truepose.verdict.answer import Answer
 from truepose.verdict.states import STATES, Population, State
 from truepose.verdict.survey import Survey, survey

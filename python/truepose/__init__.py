@@ -23,36 +23,36 @@ if TYPE_CHECKING:
 
     from truepose import errors
     from truepose._kernel import threads
-    from truepose.budget.bounds import bounds
-    from truepose.budget.inputs import Input
-    from truepose.budget.monte_carlo import monte_carlo
-    from truepose.budget.poses import Progress
-    from truepose.budget.shares import shares
-    from truepose.budget.uncertainty import uncertainty
-    from truepose.budget.worst_case import worst_case
     from truepose.calibration.calibrate import calibrate
     from truepose.controllers import export
     from truepose.controllers.gcode import correct_program
     from truepose.machine import Condition, Machine
+    from truepose.runs.poses import Progress
+    from truepose.uncertainty_analysis.bounds import bounds
+    from truepose.uncertainty_analysis.functions.inputs import Input
+    from truepose.uncertainty_analysis.monte_carlo import monte_carlo
+    from truepose.uncertainty_analysis.shares import shares
+    from truepose.uncertainty_analysis.uncertainty import uncertainty
+    from truepose.uncertainty_analysis.worst_case import worst_case
     from truepose.verdict.accuracy import accuracy
 
     __version__: str
 
 _WHERE = {
     "Condition": "truepose.machine",
-    "Input": "truepose.budget.inputs",
+    "Input": "truepose.uncertainty_analysis.functions.inputs",
     "Machine": "truepose.machine",
     "accuracy": "truepose.verdict.accuracy",
-    "bounds": "truepose.budget.bounds",
+    "bounds": "truepose.uncertainty_analysis.bounds",
     "calibrate": "truepose.calibration.calibrate",
     "correct_program": "truepose.controllers.gcode",
     "export": "truepose.controllers",
-    "monte_carlo": "truepose.budget.monte_carlo",
+    "monte_carlo": "truepose.uncertainty_analysis.monte_carlo",
     "plan": "truepose.calibration.planning.plan",
-    "shares": "truepose.budget.shares",
+    "shares": "truepose.uncertainty_analysis.shares",
     "threads": "truepose._kernel",
-    "uncertainty": "truepose.budget.uncertainty",
-    "worst_case": "truepose.budget.worst_case",
+    "uncertainty": "truepose.uncertainty_analysis.uncertainty",
+    "worst_case": "truepose.uncertainty_analysis.worst_case",
 }
 
 __all__ = [
@@ -99,8 +99,8 @@ def budget(
     *,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The error budget over the workspace, or at `poses`; see `truepose.budget.evaluate.budget`."""
-    from truepose.budget.evaluate import budget as evaluate
+    """The error budget over the workspace, or at `poses`; see `error_budget.evaluate`."""
+    from truepose.error_budget.evaluate import budget as evaluate
 
     return evaluate(machine, poses, condition, progress=progress)
 
@@ -126,8 +126,8 @@ def over_time(
     *,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """The error at home, or at `poses`, over a temperature log; see `truepose.budget.over_time`."""
-    from truepose.budget.over_time import over_time as evaluate
+    """The error at home, or at `poses`, over a temperature log; see `error_budget.over_time`."""
+    from truepose.error_budget.over_time import over_time as evaluate
 
     return evaluate(machine, poses, condition, times, progress=progress)
 
@@ -139,8 +139,8 @@ def strain(
     *,
     progress: Progress | None = None,
 ) -> xr.Dataset:
-    """Internal forces of an over-constrained machine; see `truepose.budget.strain.strain`."""
-    from truepose.budget.strain import strain as evaluate
+    """Internal forces of an over-constrained machine; see `error_budget.strain`."""
+    from truepose.error_budget.strain import strain as evaluate
 
     return evaluate(machine, poses, condition, progress=progress)
 

@@ -8,14 +8,13 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from machine_under_test import OK, MachineUnderTest
-from truepose.budget.band_ends import Ends
-from truepose.budget.comparison import quantities
-from truepose.budget.evaluate import required_sources
-from truepose.budget.first_order import Mover
-from truepose.budget.poses import Walk
-from truepose.budget.spread import spread
 from truepose.errors import RequestError
 from truepose.machine import Machine
+from truepose.runs.first_order import Mover
+from truepose.runs.poses import Walk, required_sources
+from truepose.runs.quantities import quantities
+from truepose.runs.variables import spread
+from truepose.uncertainty_analysis.truncation import Ends
 
 Array = NDArray[np.float64]
 

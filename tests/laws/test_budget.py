@@ -139,7 +139,7 @@ def test_blocks_give_what_single_poses_give(
 ) -> None:
     sources = three_sources(machine)
     whole = tp.budget(with_sources(loaded(machine), *sources), machine.poses)
-    monkeypatch.setattr("truepose.budget.poses.BLOCK", 5)
+    monkeypatch.setattr("truepose.runs.poses.BLOCK", 5)
     parts = tp.budget(with_sources(loaded(machine), *sources), machine.poses)
     assert sources[0].asked == [37] + 7 * [5] + [2]
     for name, variable in whole.data_vars.items():

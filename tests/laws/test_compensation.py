@@ -12,8 +12,8 @@ from machine_under_test import OK, MachineUnderTest
 from made_source import MadeSource, random_deviation, sizes, with_sources
 from random_machines import DrawnMachine
 from sweeps import thinned
-from truepose.budget.exact import together
 from truepose.machine import Machine
+from truepose.runs.displacement import together
 from truepose.sources import Deviation
 
 ROUNDING = 1e-13

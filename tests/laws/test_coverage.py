@@ -16,11 +16,10 @@ import truepose as tp
 from build_machine import MACHINES
 from machine_texts import HEXAPOD, PLANAR, edited, load_text
 from reference_kinematics import rotation_of_quaternion, vector_of
-from truepose.budget.copula import Copula
-from truepose.budget.evaluate import required_sources
-from truepose.budget.poses import Walk
-from truepose.budget.spread import Spread, spread
 from truepose.machine import Machine
+from truepose.probability.copula import Copula
+from truepose.runs.poses import Walk, required_sources
+from truepose.runs.variables import Spread, spread
 
 Array = NDArray[np.float64]
 

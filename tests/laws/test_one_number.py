@@ -22,9 +22,9 @@ from machine_under_test import MachineUnderTest
 from one_number import ROUNDING, Known, asking, drawn_inside, has_ends
 from random_machines import DrawnMachine
 from truepose import _kernel
-from truepose.budget.first_order import first_order
-from truepose.budget.largest import largest
+from truepose.error_budget.largest import largest
 from truepose.machine import Machine
+from truepose.runs.first_order import first_order
 from truepose.verdict.search import farthest
 from truepose.verdict.states import AFTER, BEFORE, STATES
 

@@ -13,14 +13,14 @@ from machine_under_test import OK, MachineUnderTest
 from made_source import MadeSource, sizes, with_sources
 from random_machines import DrawnMachine
 from sweeps import thinned
-from truepose.budget.first_order import Mover, first_order
-from truepose.budget.poses import Walk
-from truepose.budget.spread import Spread, spread
-from truepose.budget.vertices import worst_vertices
 from truepose.compensation.corrected import corrected
 from truepose.compensation.remainder import Bounds, Remainder
 from truepose.machine import Machine
+from truepose.runs.first_order import Mover, first_order
+from truepose.runs.poses import Walk
+from truepose.runs.variables import Spread, spread
 from truepose.sources import Block, Deviation, acting
+from truepose.uncertainty_analysis.corners import worst_vertices
 
 Floats = NDArray[np.float64]
 ROUNDING = 1e-13

@@ -19,9 +19,9 @@ from machine_file_units import bare
 from machine_under_test import MachineUnderTest
 from random_machines import DrawnMachine
 from reversed_machine import reversed_file
-from truepose.budget import exact
-from truepose.budget.poses import Walk
 from truepose.machine import Machine
+from truepose.runs import displacement
+from truepose.runs.poses import Walk
 from truepose.sources import Block, Deviation
 
 Floats = NDArray[np.float64]
@@ -64,8 +64,8 @@ class BothWays:
         values = share * deviation.at_edge(side)
         total = 0.0
         for sign in (1.0, -1.0):
-            moved = exact.together([(deviation.parameters, sign * values)])
-            error, status = exact.displacement(
+            moved = displacement.together([(deviation.parameters, sign * values)])
+            error, status = displacement.displacement(
                 self.one, self.block.joints, self.block.placements, moved
             )
             assert not status.any()

@@ -21,7 +21,7 @@ from one_number import Known, asking, asking_of, settings_of
 from random_machines import DrawnMachine
 from sweeps import thinned
 from truepose.machine import Machine
-from truepose.report.accuracy import gains
+from truepose.reporting.accuracy import gains
 from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, STATES, UNDECIDED, Answer
 
 Array = NDArray[np.float64]

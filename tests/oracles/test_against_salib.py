@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import truepose as tp
 from build_machine import MACHINES
 from sweeps import sweep
-from truepose.budget.inputs import Input
+from truepose.uncertainty_analysis.functions.inputs import Input
 
 analyze = pytest.importorskip("SALib.analyze.sobol")
 sample = pytest.importorskip("SALib.sample.sobol")

@@ -17,10 +17,9 @@ from uncertainties import umath
 import truepose as tp
 from build_machine import MACHINES
 from machine_texts import PLANAR, edited, load_text
-from truepose.budget.evaluate import required_sources
-from truepose.budget.inputs import Input
-from truepose.budget.poses import Walk
 from truepose.machine import Machine
+from truepose.runs.poses import Walk, required_sources
+from truepose.uncertainty_analysis.functions.inputs import Input
 
 Array = NDArray[np.float64]
 SAME = 1e-12

@@ -25,8 +25,8 @@ from build_machine import machine_files
 from machine_under_test import OK, MachineUnderTest
 from reference_kinematics import rotation_of
 from sweeps import sweep
-from truepose.budget.poses import Walk
 from truepose.machine import Condition, Joint, Machine
+from truepose.runs.poses import Walk
 from truepose.sources import Source
 from truss_of_machine import COMPONENTS, Truss
 

@@ -16,11 +16,11 @@ import truepose as tp
 from build_machine import machine_files
 from made_measurements import made_measurements, poses_within
 from sweeps import thinned
-from truepose.budget.exact import displacement
 from truepose.calibration.calibrate import Calibration, calibrate
 from truepose.calibration.identification.problem import Problem
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.machine import Machine
+from truepose.runs.displacement import displacement
 
 FILES = {path.stem: path for path in machine_files()}
 MACHINES = 24

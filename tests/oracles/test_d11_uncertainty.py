@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from oracle_cases import case
-from truepose.budget.inputs import Input
+from truepose.uncertainty_analysis.functions.inputs import Input
 
 Array = NDArray[np.float64]
 CASE = case("d11_uncertainty")

@@ -24,7 +24,7 @@ from truepose.calibration.identification.fit import fit
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.instruments import Frame, Instrument
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.measurements.reading import read_measurements
+from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.errors import TrueposeError
 from truepose.machine import Machine

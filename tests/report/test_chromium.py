@@ -23,7 +23,7 @@ from sweeps import sweep, thinned
 from system_package import missing
 from truepose.calibration import write_measurements
 from truepose.cli import run
-from truepose.report.figures import (
+from truepose.reporting.figures import (
     FIGURES,
     _style,
     calibration_correlation,

@@ -17,7 +17,7 @@ RUN = """
 import hashlib, sys
 import numpy as np
 import truepose
-from truepose.budget.poses import Walk
+from truepose.runs.poses import Walk
 from truepose.sources import acting
 machine = truepose.load(sys.argv[1], ["frame.material=steel"])
 poses = machine.poses()[:16]

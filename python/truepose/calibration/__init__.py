@@ -6,8 +6,8 @@ from truepose.calibration.instruments import Frame, Instrument
 from truepose.calibration.least_squares import Solution, Tolerances, covariance, least_squares
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.arrays import joined, measurements_of
-from truepose.calibration.measurements.reading import read_measurements
-from truepose.calibration.measurements.writing import write_measurements
+from truepose.calibration.measurements.read_csv import read_measurements
+from truepose.calibration.measurements.write_csv import write_measurements
 
 __all__ = [
     "Frame",

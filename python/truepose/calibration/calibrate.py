@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.gate.verdict import MARGIN, Gate, HeldOut, judge
-from truepose.calibration.identification.considered import considered, with_considered
+from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, judge
+from truepose.calibration.data_checks import Suspicion, suspicions
+from truepose.calibration.identification.consider_covariance import considered, with_considered
 from truepose.calibration.identification.fit import Fit, fit, placed
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
@@ -24,8 +25,7 @@ from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.calibration.identification.validate import Validation, validate
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.measurements.reading import read_measurements
-from truepose.calibration.suspicions import Suspicion, suspicions
+from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 

@@ -14,8 +14,12 @@ import numpy as np
 import xarray as xr
 
 from truepose.arrays import Flags, Floats
-from truepose.budget.comparison import quantities
-from truepose.budget.dataset import (
+from truepose.calibration.acceptance import sentences
+from truepose.calibration.identification.fit import Equations
+from truepose.calibration.identification.problem import Prior
+from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.machine import Machine
+from truepose.runs.dataset import (
     Schema,
     Variable,
     component_units,
@@ -23,16 +27,11 @@ from truepose.budget.dataset import (
     provenance,
     quantity_coords,
 )
-from truepose.budget.percent import POSITIONS
-from truepose.calibration.gate import words
-from truepose.calibration.identification.fit import Equations
-from truepose.calibration.identification.problem import Prior
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
-from truepose.machine import Machine
+from truepose.runs.quantities import POSITIONS, quantities
 
 if TYPE_CHECKING:
+    from truepose.calibration.acceptance.tool_uncertainty import AtTool
     from truepose.calibration.calibrate import Calibration
-    from truepose.calibration.gate.at_tool import AtTool
     from truepose.calibration.measurements import Measurements
 
 SCHEMA: Schema = {
@@ -167,9 +166,9 @@ def answer_of(calibration: Calibration) -> str:
     if said != gate.words:
         return said
     for each in reversed(gate.warnings):
-        said = said.removesuffix(f" {words.sentence(each.sentence)}.")
+        said = said.removesuffix(f" {sentences.sentence(each.sentence)}.")
     if gate.remedy is not None:
-        said = said.removesuffix(f" {words.sentence(gate.remedy.sentence)}.")
+        said = said.removesuffix(f" {sentences.sentence(gate.remedy.sentence)}.")
     return said
 
 

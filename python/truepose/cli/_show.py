@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
-    from truepose.report.accuracy import Told
-    from truepose.report.tables import Table
+    from truepose.reporting.accuracy import Told
+    from truepose.reporting.tables import Table
 
 PIPED_WIDTH = 160
 """Columns where the output is no terminal, so that no table is squeezed."""

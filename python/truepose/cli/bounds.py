@@ -54,21 +54,21 @@ def command(region: str | None, gap: float | None, truncate: float | None, **opt
     proof it says so. With --require-accuracy the exit code is 1 when it is not proven that the
     accuracy asked is kept.
     """
-    from truepose.cli import _how_sure, _work
-    from truepose.report import how_sure
-    from truepose.report.result import Result
+    from truepose.cli import _steps, _uncertainty
+    from truepose.reporting import uncertainty_tables
+    from truepose.reporting.result import Result
     from truepose.verdict.answer import BEFORE, met
 
     request = Request(**options)
-    machine = _work.read_machine(request)
-    found = _how_sure.bound(request, machine, region, gap, truncate)
-    result, tables = Result("bounds", machine, found), how_sure.bounds(machine, found)
+    machine = _steps.read_machine(request)
+    found = _uncertainty.bound(request, machine, region, gap, truncate)
+    result, tables = Result("bounds", machine, found), uncertainty_tables.bounds(machine, found)
     if region is None and truncate is None:
-        answers = _work.judge(machine, BEFORE)
-        _work.deliver(request, result, tables, answers)
-        return _work.exit_code(request, met(answers, BEFORE))
+        answers = _steps.judge(machine, BEFORE)
+        _steps.deliver(request, result, tables, answers)
+        return _steps.exit_code(request, met(answers, BEFORE))
     # Another set of machines or of poses than the verdict is on: what is proven of that.
-    _work.deliver(request, result, tables)
+    _steps.deliver(request, result, tables)
     if region is not None and request.format == "table":
-        click.echo(how_sure.sentence(machine, found))
-    return _work.exit_code(request, _how_sure.keeps_accuracy(machine, found))
+        click.echo(uncertainty_tables.sentence(machine, found))
+    return _steps.exit_code(request, _uncertainty.keeps_accuracy(machine, found))

@@ -37,18 +37,18 @@ def command(**options: Any) -> int:
     exit code is 1 when it is not certain that the machine, commanded as it is, keeps the accuracy
     asked.
     """
-    from truepose.cli import _work
-    from truepose.report import tables
-    from truepose.report.result import Result
-    from truepose.report.study import Study
+    from truepose.cli import _steps
+    from truepose.reporting import tables
+    from truepose.reporting.result import Result
+    from truepose.reporting.study import Study
     from truepose.verdict.answer import BEFORE, met
 
     request = Request(**options)
-    machine = _work.read_machine(request)
-    study = Study(machine, _work.evaluate(request, machine))
-    answers = _work.judge(machine, BEFORE)
-    written = _work.write_witness(request, answers, BEFORE)
-    _work.deliver(
+    machine = _steps.read_machine(request)
+    study = Study(machine, _steps.evaluate(request, machine))
+    answers = _steps.judge(machine, BEFORE)
+    written = _steps.write_witness(request, answers, BEFORE)
+    _steps.deliver(
         request,
         Result("budget", machine, study.budget),
         [
@@ -61,5 +61,5 @@ def command(**options: Any) -> int:
         answers,
     )
     if not written:
-        raise _work.no_witness(answers, BEFORE)
-    return _work.exit_code(request, met(answers, BEFORE))
+        raise _steps.no_witness(answers, BEFORE)
+    return _steps.exit_code(request, met(answers, BEFORE))

@@ -21,7 +21,7 @@ from truepose.cli._options import (
 if TYPE_CHECKING:
     from truepose.calibration.calibrate import Calibration
     from truepose.machine import Machine
-    from truepose.report.result import Result
+    from truepose.reporting.result import Result
 
 _FILE = click.Path(path_type=Path)
 
@@ -118,22 +118,22 @@ def command(**options: Any) -> int:
     from dataclasses import replace
 
     from truepose.calibration.calibrate import calibrate
-    from truepose.cli import _work
+    from truepose.cli import _steps
     from truepose.cli._progress import waiting
     from truepose.errors import TrueposeError
-    from truepose.output import require_writable
-    from truepose.report.result import Result
+    from truepose.files.writing import require_writable
+    from truepose.reporting.result import Result
 
     request = asked.request
     if asked.page is not None:
-        _work.report_page()
+        _steps.report_page()
     inputs = [request.machine_file, asked.data]
     for path, endings in ((asked.machine_output, [".toml"]), (asked.page, [".html"])):
         if path is not None:
             require_writable(path, endings, inputs)
     if request.output is not None:
         require_writable(request.output, [".nc", ".json", ".csv"], inputs)
-    machine = _work.read_machine(request)
+    machine = _steps.read_machine(request)
     with waiting("calibration"):
         found = calibrate(
             machine,
@@ -154,11 +154,11 @@ def command(**options: Any) -> int:
         failure = error
     shown = []
     if request.format == "table":
-        from truepose.report.calibration import tables
+        from truepose.reporting.calibration import tables
 
         click.echo(_folded(dataset.attrs["answer"]) + "\n")
         shown = tables(dataset, result.machine.shown)
-    _work.deliver(replace(request, output=None), result, shown)
+    _steps.deliver(replace(request, output=None), result, shown)
     if failure is not None:
         raise failure
     return 0 if found.accepted or options["force"] else 1
@@ -204,8 +204,8 @@ def _folded(text: str) -> str:
 
 def _write_files(asked: _Asked, found: Calibration, result: Result) -> None:
     """All files that are asked for, before anything is printed: a reader may stop reading."""
-    from truepose.cli._work import note_written
-    from truepose.report import formats
+    from truepose.cli._steps import note_written
+    from truepose.reporting import formats
 
     if asked.request.output is not None:
         formats.write(result, asked.request.output)
@@ -220,7 +220,7 @@ def _write_machine(asked: _Asked, found: Calibration) -> None:
     """The calibrated file, unless the answer is no and nobody forces it."""
     from truepose.calibration.dataset import verdict_of
     from truepose.calibration.result.save import save
-    from truepose.cli._work import note_written
+    from truepose.cli._steps import note_written
 
     assert asked.machine_output is not None
     assert asked.date is not None
@@ -252,9 +252,9 @@ def _write_page(request: Request, machine: Machine, dataset: Any, page: Path) ->
     """The report of the machine as filed, with the calibration on top."""
     from dataclasses import replace
 
-    from truepose.cli import _work
+    from truepose.cli import _steps
 
-    study = replace(_work.study_of(request, machine), calibration=dataset)
+    study = replace(_steps.study_of(request, machine), calibration=dataset)
     text = request.machine_file.read_text(encoding="utf-8")
-    _work.report_page().write(study, page, text)
-    _work.note_written(page)
+    _steps.report_page().write(study, page, text)
+    _steps.note_written(page)

@@ -19,8 +19,8 @@ from truepose.cli._options import (
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
-    from truepose.report.reach import Reach
-    from truepose.report.tables import Table
+    from truepose.reporting.tables import Table
+    from truepose.reporting.workspace_check import Reach
     from truepose.verdict.answer import Answer
 
 
@@ -39,34 +39,34 @@ def command(**options: Any) -> int:
     Exit code 1 unless it is certain that the machine, commanded as it is, keeps the accuracy
     asked; what compensation would leave is shown beside it.
     """
-    from truepose.cli import _work
+    from truepose.cli import _steps
     from truepose.errors import RequestError
-    from truepose.output import replacing
-    from truepose.report import inputs
-    from truepose.report.accuracy import gains, told
-    from truepose.report.reach import reach
-    from truepose.report.study import warnings_of
+    from truepose.files.writing import replacing
+    from truepose.reporting import inputs
+    from truepose.reporting.accuracy import gains, told
+    from truepose.reporting.study import warnings_of
+    from truepose.reporting.workspace_check import reach
     from truepose.verdict.answer import AFTER, BEFORE, met
 
     request = Request(**options)
-    machine = _work.read_machine(request, [".json", ".csv"])
+    machine = _steps.read_machine(request, [".json", ".csv"])
     found = reach(machine)
     out = ~found.usable
-    _work.refuse_left_out(request, machine, out.nonzero()[0], found.poses[out], found.status[out])
+    _steps.refuse_left_out(request, machine, out.nonzero()[0], found.poses[out], found.status[out])
     answers: tuple[Answer, ...] = ()
     warnings: list[dict[str, str]] = []
     # Without a source the file may still be asked about its workspace, unless it asks for more.
     asked = machine.accuracy.target is not None or machine.accuracy.angle_target is not None
     if asked or any(inputs.acting(machine)):
-        answers = _work.judge(machine)
+        answers = _steps.judge(machine)
         try:
-            warnings = warnings_of(_work.evaluate(request, machine))
+            warnings = warnings_of(_steps.evaluate(request, machine))
         except RequestError as error:
             # There are poses, as there are answers; only no budget of what bands leave of them.
             if [problem.code for problem in error.problems] != ["no-pose-left"]:
                 raise
     kept = met(answers, BEFORE) is not False
-    written = _work.write_witness(request, answers, AFTER if kept else BEFORE)
+    written = _steps.write_witness(request, answers, AFTER if kept else BEFORE)
     if request.format == "table":
         from truepose.cli._show import show_answers, show_tables
 
@@ -79,14 +79,14 @@ def command(**options: Any) -> int:
         with replacing(request.output) as temporary:
             text = _text(form, machine, found, answers, warnings)
             temporary.write_text(text + "\n", encoding="utf-8")
-        _work.note_written(request.output)
+        _steps.note_written(request.output)
     if not written:
-        raise _work.no_witness(answers, AFTER if kept else BEFORE)
+        raise _steps.no_witness(answers, AFTER if kept else BEFORE)
     return int(not kept)
 
 
 def _tables(machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> list[Table]:
-    from truepose.report import calibrated_files, inputs, reach, tables
+    from truepose.reporting import calibrated_files, inputs, tables, workspace_check
     from truepose.sources import not_included_text
 
     left_out = not_included_text(machine, machine.condition)
@@ -97,7 +97,7 @@ def _tables(machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> list
         inputs.condition(machine),
         tables.with_not_included(inputs.sources(machine), left_out),
         inputs.deviations(machine),
-        reach.table(machine, found),
+        workspace_check.table(machine, found),
     ]
     return [*shown, tables.answers(machine, answers)] if answers else shown
 
@@ -114,9 +114,9 @@ def _text(
     import io
     import json
 
-    from truepose.report import inputs, reach
-    from truepose.report.accuracy import as_data
-    from truepose.report.result import in_file_units, pose_si
+    from truepose.reporting import inputs, workspace_check
+    from truepose.reporting.accuracy import as_data
+    from truepose.reporting.result import in_file_units, pose_si
     from truepose.sources import NO_MATERIAL, not_included, not_included_text
 
     rows = [as_data(machine, answer) for answer in answers]
@@ -147,7 +147,7 @@ def _text(
                 {"part": part, "why": NO_MATERIAL}
                 for part in not_included(machine, machine.condition)
             ],
-            "workspace": reach.as_data(machine, found),
+            "workspace": workspace_check.as_data(machine, found),
             "answers": rows,
             "warnings": warnings,
         },

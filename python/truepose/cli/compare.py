@@ -12,7 +12,7 @@ from truepose.cli._options import format_option, output_option_of, takes
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from truepose.report.result import Result
+    from truepose.reporting.result import Result
 
 _FILE = click.Path(path_type=Path)
 
@@ -32,9 +32,9 @@ def command(old_file: Path, new_file: Path, **options: Any) -> int:
     """
     import truepose
     from truepose.calibration.result.compare import compare
-    from truepose.cli import _work
-    from truepose.output import replacing, require_writable
-    from truepose.report.result import Result
+    from truepose.cli import _steps
+    from truepose.files.writing import replacing, require_writable
+    from truepose.reporting.result import Result
 
     form, output = options["format"], options["output"]
     if output is not None:
@@ -43,7 +43,7 @@ def command(old_file: Path, new_file: Path, **options: Any) -> int:
     result = Result("compare", old, compare(old, new))
     if form == "table":
         from truepose.cli._show import show_tables
-        from truepose.report import calibrated_files
+        from truepose.reporting import calibrated_files
 
         show_tables(calibrated_files.tables(result.dataset, old.shown))
         click.echo(result.dataset.attrs["verdict"])
@@ -53,13 +53,13 @@ def command(old_file: Path, new_file: Path, **options: Any) -> int:
         with replacing(output) as temporary:
             ending = output.suffix.lower().removeprefix(".")
             temporary.write_text("".join(_text(result, ending)), encoding="utf-8")
-        _work.note_written(output)
+        _steps.note_written(output)
     return int(result.dataset.attrs["changed"])
 
 
 def _text(result: Result, form: str) -> Iterator[str]:
     """The result as JSON, or its parameters as CSV."""
-    from truepose.report import calibrated_files
-    from truepose.report.formats import json_text
+    from truepose.reporting import calibrated_files
+    from truepose.reporting.formats import json_text
 
     return json_text.text(result) if form == "json" else calibrated_files.csv_text(result)

@@ -37,17 +37,17 @@ def command(**options: Any) -> int:
     --require-accuracy the exit code is 1 when it is not certain that the machine keeps the
     accuracy asked with corrected commands.
     """
-    from truepose.cli import _work
-    from truepose.report import tables
-    from truepose.report.result import Result
+    from truepose.cli import _steps
+    from truepose.reporting import tables
+    from truepose.reporting.result import Result
     from truepose.verdict.answer import AFTER, met
 
     request = Request(**options)
-    study = _work.study_of(request, _work.read_machine(request))
+    study = _steps.study_of(request, _steps.read_machine(request))
     assert study.compensation is not None
     answers = study.accuracy
-    written = _work.write_witness(request, answers, AFTER)
-    _work.deliver(
+    written = _steps.write_witness(request, answers, AFTER)
+    _steps.deliver(
         request,
         Result("compensate", study.machine, study.compensation),
         [
@@ -58,5 +58,5 @@ def command(**options: Any) -> int:
         answers,
     )
     if not written:
-        raise _work.no_witness(answers, AFTER)
-    return _work.exit_code(request, met(answers, AFTER))
+        raise _steps.no_witness(answers, AFTER)
+    return _steps.exit_code(request, met(answers, AFTER))

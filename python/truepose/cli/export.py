@@ -60,10 +60,10 @@ def command(
         raise click.UsageError("Give a CONTROLLER and a MACHINE.toml, or --list.")
     import truepose
     from truepose.cli._progress import progress
-    from truepose.cli._work import note_written
+    from truepose.cli._steps import note_written
     from truepose.controllers import controller as adapter_of
     from truepose.controllers import export
-    from truepose.output import replacing, require_folder
+    from truepose.files.writing import replacing, require_folder
 
     adapter_of(controller)
     if folder is not None:
@@ -93,7 +93,7 @@ def _show_controllers() -> None:
     from truepose.cli._show import show_tables
     from truepose.controllers import REGISTRY
     from truepose.controllers import controller as adapter_of
-    from truepose.report.tables import Table
+    from truepose.reporting.tables import Table
 
     header = ("controller", "what it is given", "options")
     rows = []

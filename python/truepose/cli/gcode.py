@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from truepose.controllers.gcode import Errors, Proof
+    from truepose.files.shown_units import Shown
     from truepose.machine import Machine
-    from truepose.machine.shown_units import Shown
-    from truepose.report.tables import Table
+    from truepose.reporting.tables import Table
 
 
 @click.command("gcode")
@@ -122,9 +122,9 @@ def command(
     import truepose
     from truepose.cli._problems import show_problems
     from truepose.cli._progress import progress
-    from truepose.cli._work import note_written
+    from truepose.cli._steps import note_written
     from truepose.controllers.gcode import NoBetter, correct_program
-    from truepose.output import require_writable
+    from truepose.files.writing import require_writable
 
     require_writable(output, [output.suffix.lower()], [machine_file])
     machine = truepose.load(machine_file, settings=settings)
@@ -167,7 +167,7 @@ class _Reading:
     """Reads quantities of options, bare numbers in the units of the machine file."""
 
     def __init__(self, machine: Machine) -> None:
-        from truepose.machine.units import UnitSystem
+        from truepose.files.units import UnitSystem
 
         self._units = UnitSystem(machine.file_units)
 
@@ -221,7 +221,7 @@ def _tables(machine: Machine, proof: Proof, said: str) -> Iterable[Table]:
     import numpy as np
 
     from truepose.controllers.gcode._axes import LINEAR, Axes
-    from truepose.report.tables import Table
+    from truepose.reporting.tables import Table
 
     axes = Axes(machine)
     rows = []

@@ -68,13 +68,13 @@ def command(
     exactly: mean, standard deviation and coverage interval of the error at every pose of the
     workspace. Ctrl-C stops the drawing and gives the result so far (exit code 130).
     """
-    from truepose.cli import _how_sure, _work
-    from truepose.report import how_sure
-    from truepose.report.result import Result
+    from truepose.cli import _steps, _uncertainty
+    from truepose.reporting import uncertainty_tables
+    from truepose.reporting.result import Result
 
     request = Request(**options)
-    machine = _work.read_machine(request)
-    found = _how_sure.sample(
+    machine = _steps.read_machine(request)
+    found = _uncertainty.sample(
         request,
         machine,
         samples=samples,
@@ -83,5 +83,7 @@ def command(
         seed=seed,
         sampling=sampling,
     )
-    _work.deliver(request, Result("montecarlo", machine, found), how_sure.sampled(machine, found))
+    _steps.deliver(
+        request, Result("montecarlo", machine, found), uncertainty_tables.sampled(machine, found)
+    )
     return INTERRUPTED if found.attrs["interrupted"] else 0

@@ -25,12 +25,12 @@ def command(**options: Any) -> int:
     The machine file names the log (`[condition] temperature_log`). Shows the tool's error at home
     at some moments; `--format csv` and `--output` have a row for every moment of the log.
     """
-    from truepose.cli import _work
-    from truepose.report import tables
-    from truepose.report.result import Result
+    from truepose.cli import _steps
+    from truepose.reporting import tables
+    from truepose.reporting.result import Result
 
     request = Request(**options)
-    machine = _work.read_machine(request)
-    found = _work.over_time(request, machine)
-    _work.deliver(request, Result("over-time", machine, found), [tables.over_time(machine, found)])
+    machine = _steps.read_machine(request)
+    found = _steps.over_time(request, machine)
+    _steps.deliver(request, Result("over-time", machine, found), [tables.over_time(machine, found)])
     return 0

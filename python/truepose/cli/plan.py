@@ -130,14 +130,14 @@ def command(
     from truepose.calibration.planning.plan import plan
     from truepose.calibration.planning.program import program as program_text
     from truepose.calibration.planning.program import template as template_text
-    from truepose.cli import _work
+    from truepose.cli import _steps
     from truepose.cli._progress import progress
-    from truepose.output import require_writable
-    from truepose.report import planning
-    from truepose.report.result import Result
+    from truepose.files.writing import require_writable
+    from truepose.reporting import planning
+    from truepose.reporting.result import Result
 
     request = Request(**options)
-    machine = _work.read_machine(request)
+    machine = _steps.read_machine(request)
     for path, endings in ((program, None), (template, [".csv"])):
         if path is not None:
             require_writable(path, endings or [path.suffix.lower()], [request.machine_file])
@@ -161,7 +161,7 @@ def command(
             machine, found.poses, instruments=found.instruments, dwell=seconds, feed=speed
         )
     form = template_text(machine, found.poses, found.instruments) if template is not None else None
-    _work.deliver(request, Result("plan", machine, found.dataset), planning.tables(found))
+    _steps.deliver(request, Result("plan", machine, found.dataset), planning.tables(found))
     if request.format == "table":
         for sentence in planning.sentences(found):
             click.echo(sentence)
@@ -201,8 +201,8 @@ def _instruments(machine: Machine, texts: tuple[str, ...]) -> tuple[Instrument, 
 
 
 def _write(path: Path | None, text: str | None) -> None:
-    from truepose.cli._work import note_written
-    from truepose.output import replacing
+    from truepose.cli._steps import note_written
+    from truepose.files.writing import replacing
 
     if path is None or text is None:
         return
@@ -227,7 +227,7 @@ def _speed(machine: Machine, text: str) -> float:
 
 def _quantity(machine: Machine, option: str, text: str, dimension: str, expected: str) -> float:
     from truepose.errors import ReadingError
-    from truepose.machine.units import UnitSystem
+    from truepose.files.units import UnitSystem
 
     try:
         value = UnitSystem(machine.file_units).read(text.strip(), dimension)

@@ -47,11 +47,11 @@ def command(**options: Any) -> int:
     --require-accuracy the exit code is 1 when it is not certain that the accuracy asked is kept
     after compensation.
     """
-    from truepose.cli import _how_sure, _work
+    from truepose.cli import _steps, _uncertainty
     from truepose.cli._show import show_answers, show_tables
-    from truepose.output import require_writable
-    from truepose.report import how_far, how_sure, tables
-    from truepose.report.accuracy import gains, told
+    from truepose.files.writing import require_writable
+    from truepose.reporting import how_far, tables, uncertainty_tables
+    from truepose.reporting.accuracy import gains, told
     from truepose.verdict.answer import AFTER, met
 
     if options["output"] is None:
@@ -59,13 +59,13 @@ def command(**options: Any) -> int:
     measurements: Path | None = options.pop("measurements")
     request = Request(**options)
     assert request.output is not None
-    page = _work.report_page()
+    page = _steps.report_page()
     if measurements is not None:
         require_writable(request.output, [".html"], [request.machine_file, measurements])
-    machine = _work.read_machine(request, [".html"])
-    study = _work.with_time(_work.study_of(request, machine))
-    study = _how_sure.with_how_sure(_work.with_strain(request, study))
-    study = _work.with_calibration(study, measurements)
+    machine = _steps.read_machine(request, [".html"])
+    study = _steps.with_time(_steps.study_of(request, machine))
+    study = _uncertainty.with_how_sure(_steps.with_strain(request, study))
+    study = _steps.with_calibration(study, measurements)
     text = request.machine_file.read_text(encoding="utf-8")
     page.write(study, request.output, text)
     show_answers(told(machine, study.accuracy), gains(study.accuracy))
@@ -76,10 +76,10 @@ def command(**options: Any) -> int:
         tables.compensation(study),
         *tables.strain(study),
         how_far.table(study),
-        *how_sure.in_short(study),
+        *uncertainty_tables.in_short(study),
         tables.answers(machine, study.accuracy),
         tables.poses_left_out(study),
     ]
     show_tables(table for table in shown if table is not None)
-    _work.note_written(request.output)
-    return _work.exit_code(request, met(study.accuracy, AFTER))
+    _steps.note_written(request.output)
+    return _steps.exit_code(request, met(study.accuracy, AFTER))

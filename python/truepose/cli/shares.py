@@ -41,12 +41,14 @@ def command(samples: int | None, seed: int, **options: Any) -> int:
     with their confidence, the linear shares beside them, and Shapley shares where parameters are
     correlated. The first row is the dimension to tighten first.
     """
-    from truepose.cli import _how_sure, _work
-    from truepose.report import blame
-    from truepose.report.result import Result
+    from truepose.cli import _steps, _uncertainty
+    from truepose.reporting import variance_shares
+    from truepose.reporting.result import Result
 
     request = Request(**options)
-    machine = _work.read_machine(request)
-    found = _how_sure.share(request, machine, samples=samples, seed=seed)
-    _work.deliver(request, Result("shares", machine, found), blame.shares(machine, found))
+    machine = _steps.read_machine(request)
+    found = _uncertainty.share(request, machine, samples=samples, seed=seed)
+    _steps.deliver(
+        request, Result("shares", machine, found), variance_shares.shares(machine, found)
+    )
     return 0

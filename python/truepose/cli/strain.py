@@ -26,16 +26,16 @@ def command(**options: Any) -> int:
     taken up by the joints' clearances, or strains the parts. Shows the internal forces from each
     source alone and from all together under load, with the clearances as dead zones.
     """
-    from truepose.cli import _work
-    from truepose.report import tables
-    from truepose.report.result import Result
-    from truepose.report.study import Study
+    from truepose.cli import _steps
+    from truepose.reporting import tables
+    from truepose.reporting.result import Result
+    from truepose.reporting.study import Study
 
     request = Request(**options)
-    machine = _work.read_machine(request)
-    found = _work.strain(request, machine)
+    machine = _steps.read_machine(request)
+    found = _steps.strain(request, machine)
     study = Study(machine, found, strain=found)  # of its first result only the poses are read
-    _work.deliver(
+    _steps.deliver(
         request,
         Result("strain", machine, found),
         [*tables.strain(study), tables.poses_left_out(study)],

@@ -25,11 +25,11 @@ from numpy.typing import ArrayLike
 
 from truepose._kernel import STATUS
 from truepose.arrays import Codes, Flags, Floats
-from truepose.budget.exact import Moved, displacement, together
-from truepose.budget.poses import BLOCK, OK, requested_poses
 from truepose.compensation.corrected import corrected_joints
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.displacement import Moved, displacement, together
+from truepose.runs.poses import BLOCK, OK, requested_poses
 from truepose.sources import Block, acting
 
 MOST_PASSES = 12

@@ -8,20 +8,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from truepose.budget.comparison import quantities
-from truepose.budget.dataset import (
-    Rows,
-    Schema,
-    Variable,
-    assemble,
-    quantity_coords,
-    sizes,
-)
-from truepose.budget.evaluate import required_sources
-from truepose.budget.exact import at_shifts, displacement, together
-from truepose.budget.first_order import first_order
-from truepose.budget.largest import largest
-from truepose.budget.poses import (
+from truepose.compensation.corrected import corrected_deviations
+from truepose.compensation.remainder import Remainder
+from truepose.error_budget.largest import largest
+from truepose.machine import Condition, Machine
+from truepose.runs.dataset import Rows, Schema, Variable, assemble, quantity_coords, sizes
+from truepose.runs.displacement import at_shifts, displacement, together
+from truepose.runs.first_order import first_order
+from truepose.runs.poses import (
     Progress,
     Walk,
     is_path,
@@ -29,11 +23,10 @@ from truepose.budget.poses import (
     of_band,
     of_correction,
     requested_poses,
+    required_sources,
 )
-from truepose.budget.spread import spread_of
-from truepose.compensation.corrected import corrected_deviations
-from truepose.compensation.remainder import Remainder
-from truepose.machine import Condition, Machine
+from truepose.runs.quantities import quantities
+from truepose.runs.variables import spread_of
 from truepose.sources import Block, Deviation, Source
 
 _ALL = ("pose", "component")

@@ -19,10 +19,10 @@ from typing import TypeVar
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.budget.exact import Moved, together
-from truepose.budget.poses import NOT_CONVERGED, OK
-from truepose.budget.spread import Spread, spread_of
 from truepose.machine import Machine
+from truepose.runs.displacement import Moved, together
+from truepose.runs.poses import NOT_CONVERGED, OK
+from truepose.runs.variables import Spread, spread_of
 from truepose.sources import Block, Deviation, Source
 
 Known = TypeVar("Known")

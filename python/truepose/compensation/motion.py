@@ -13,13 +13,13 @@ from functools import cached_property
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.budget.first_order import rows_of
-from truepose.budget.percent import POSITIONS
-from truepose.budget.spread import Spread
 from truepose.machine import Machine
+from truepose.probability.domain import Domain
+from truepose.runs.first_order import rows_of
+from truepose.runs.quantities import POSITIONS
+from truepose.runs.variables import Spread
 from truepose.sources import Block
-from truepose.sources._block import rotations_of
-from truepose.sources.domain import Domain
+from truepose.sources.pose_block import rotations_of
 
 ROTATIONS = ("rx", "ry", "rz")
 

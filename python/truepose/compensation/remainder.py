@@ -43,8 +43,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Flags, Floats
-from truepose.budget.first_order import rows_of
-from truepose.budget.spread import Spread
 from truepose.compensation.motion import Motion, norm
 from truepose.compensation.quadratic import quadratic
 from truepose.compensation.remainder_closures import Closures
@@ -52,6 +50,8 @@ from truepose.compensation.remainder_guides import Guides
 from truepose.compensation.remainder_rings import Rings
 from truepose.compensation.remainder_struts import Struts
 from truepose.machine import Machine
+from truepose.runs.first_order import rows_of
+from truepose.runs.variables import Spread
 from truepose.sources import Block
 
 FEW = 512
@@ -108,7 +108,7 @@ class Remainder:
     def bound(self, block: Block, spread: Spread, value: Floats, effects: Floats) -> Bounds:
         """At the poses of a block, with the value (n, m) and the effects (n, m, v) of its spread.
 
-        Those that `truepose.budget.first_order` has of the same block and spread.
+        Those that `truepose.runs.first_order` has of the same block and spread.
         """
         n, m = value.shape
         quantities = len({name.startswith("r") for name in self._machine.components})

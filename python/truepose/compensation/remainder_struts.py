@@ -33,7 +33,7 @@ from truepose.compensation import majorants
 from truepose.compensation.motion import Motion, Names, Tilt, cross, norm, skew
 from truepose.compensation.remainder_closures import Closures, Products, turned_about
 from truepose.machine import Machine
-from truepose.machine.parts_of_machine import Drive
+from truepose.machine.parts import Drive
 
 CLOSED = 1e-8
 """By how much of its length a strut may miss where the machine stands: rounding, and no more."""

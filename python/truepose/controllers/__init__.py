@@ -11,8 +11,8 @@ from importlib import import_module
 
 from truepose.controllers._export import Controller, Export, Option, options_of
 from truepose.errors import Problem, RequestError
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
-from truepose.machine.suggestion import did_you_mean, one_of
 
 REGISTRY: dict[str, str] = {
     "c": "truepose.controllers.c:C",

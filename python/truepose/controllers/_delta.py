@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.budget.poses import LeftOut, no_pose_left
 from truepose.compensation.commands import with_joints
 from truepose.controllers._export import cannot
 from truepose.controllers._homing import switch_option
 from truepose.controllers._small_model import INSTEAD, MM, value, vector
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.machine.parts_of_machine import Drive
+from truepose.machine.parts import Drive
+from truepose.runs.poses import LeftOut, no_pose_left
 
 LEAN = math.radians(5.0)
 """What a drive's axis may be off that of the controller's model: more is another machine."""

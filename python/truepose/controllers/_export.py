@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
 from truepose.errors import Problem, ReadingError, RequestError
+from truepose.files.units import UnitSystem
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
-from truepose.machine.suggestion import did_you_mean, one_of
-from truepose.machine.units import UnitSystem
 
 
 @dataclass(frozen=True)

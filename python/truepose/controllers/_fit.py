@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from truepose.arrays import Flags, Floats
-from truepose.budget.poses import OK, Walk, no_pose_left, pose_in_words
 from truepose.calibration import Solution, least_squares
 from truepose.compensation.commands import ActualMachine, blocks
 from truepose.controllers._homing import switch_words
@@ -35,9 +34,10 @@ from truepose.controllers._small_model import (
     scales,
 )
 from truepose.errors import Problem, RequestError
+from truepose.files.wording import counted
 from truepose.machine import Machine
 from truepose.machine.condition import STANDARD_GRAVITY
-from truepose.machine.suggestion import counted
+from truepose.runs.poses import OK, Walk, no_pose_left, pose_in_words
 from truepose.version import version
 
 MOST_FITTED = 2000

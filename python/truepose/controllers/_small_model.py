@@ -17,8 +17,8 @@ from typing import Protocol
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.files.units import UnitSystem, default_units
 from truepose.machine import Machine
-from truepose.machine.units import UnitSystem, default_units
 
 MM = 1e-3
 

@@ -6,13 +6,13 @@ nothing here imports them.
 
 from __future__ import annotations
 
+from truepose.files.tolerance import Band, Tolerance
+from truepose.files.units import FileUnit
 from truepose.machine.condition import Condition, Envelope
-from truepose.machine.file_parts import ErrorSource, FileParts, SourceType
 from truepose.machine.loader import load
 from truepose.machine.model import Machine
-from truepose.machine.parts_of_machine import Body, Drive, Guide, Joint, Strut
-from truepose.machine.tolerance import Band, Tolerance
-from truepose.machine.units import FileUnit
+from truepose.machine.parts import Body, Drive, Guide, Joint, Strut
+from truepose.machine.source_builder import ErrorSource, FileParts, SourceType
 from truepose.machine.workspace import Accuracy, GridAxis, Workspace
 
 __all__ = [

@@ -10,18 +10,18 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from truepose.errors import Problem
-from truepose.machine.built_workspace import too_large
+from truepose.files.dimensions import FREEDOMS
+from truepose.files.document import ARRAY_TABLES, Document, Key, named_rows
+from truepose.files.units import shown_value
+from truepose.files.wording import counted, did_you_mean, one_of
+from truepose.machine.build_workspace import too_large
 from truepose.machine.condition import DEFAULT_PART
-from truepose.machine.dimensions import FREEDOMS
-from truepose.machine.document import ARRAY_TABLES, Document, Key, named_rows
 from truepose.machine.elements import drive_kinds, guide_kinds
-from truepose.machine.parts_of_machine import BODIES, carriage_part, is_body
-from truepose.machine.suggestion import counted, did_you_mean, one_of
+from truepose.machine.parts import BODIES, carriage_part, is_body
 from truepose.machine.tables.accuracy import AccuracyTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.strut import StrutTable
 from truepose.machine.tables.workspace import Rows, WorkspaceTable
-from truepose.machine.units import shown_value
 from truepose.machine.validation import Validated
 
 Check = Callable[[Document, Validated], Iterator[Problem]]

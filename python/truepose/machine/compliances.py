@@ -16,7 +16,7 @@ import numpy as np
 
 from truepose._kernel import Machine as KernelMachine
 from truepose.arrays import Flags, Floats, Indices
-from truepose.machine.parts_of_machine import Drive, Strut
+from truepose.machine.parts import Drive, Strut
 
 
 def compliances(

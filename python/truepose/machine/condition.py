@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
-from truepose.machine.parts_of_machine import Vector, is_body
+from truepose.machine.parts import Vector, is_body
 
 if TYPE_CHECKING:
     from truepose.machine.temperature_log import TemperatureLog

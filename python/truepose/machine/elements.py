@@ -13,8 +13,8 @@ from typing import Annotated, Any
 from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, create_model
 
 from truepose._kernel import elements
-from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import (
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import (
     Angle,
     Direction,
     Length,
@@ -26,7 +26,7 @@ from truepose.machine.quantity import (
     list_of,
     refuse,
 )
-from truepose.machine.units import shown_value
+from truepose.files.units import shown_value
 
 
 @dataclass(frozen=True)

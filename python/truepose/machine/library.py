@@ -14,7 +14,7 @@ from importlib import resources
 from typing import Any
 
 from truepose.errors import Problem, RequestError
-from truepose.machine.suggestion import did_you_mean, one_of
+from truepose.files.wording import did_you_mean, one_of
 
 FOLDER = "machine_library"
 

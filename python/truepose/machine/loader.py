@@ -6,22 +6,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from truepose.errors import MachineFileError, Problem
-from truepose.machine import built_kernel, built_parts, built_workspace, checks, validation
+from truepose.files.data_file import DataFiles
+from truepose.files.document import Document, read
+from truepose.files.settings import apply
+from truepose.files.units import shown_value
+from truepose.machine import build_kernel, build_parts, build_workspace, checks, validation
 from truepose.machine.condition import Condition
-from truepose.machine.data_file import DataFiles
-from truepose.machine.document import Document, read
-from truepose.machine.each import share_each
-from truepose.machine.file_parts import ErrorSource, FileParts, SourceType
 from truepose.machine.model import Machine
-from truepose.machine.parts_of_machine import BODIES, Drive, Strut
-from truepose.machine.settings import apply
+from truepose.machine.parts import BODIES, Drive, Strut
+from truepose.machine.shared_keys import share_each
+from truepose.machine.source_builder import ErrorSource, FileParts, SourceType
 from truepose.machine.tables import SCHEMA, owners
 from truepose.machine.tables.accuracy import AccuracyTable
 from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.machine import MachineTable
 from truepose.machine.temperature_log import read_temperature_log
-from truepose.machine.units import shown_value
 from truepose.machine.validation import Validated
 from truepose.machine.workspace import Accuracy
 
@@ -95,16 +95,16 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
     assert machine is not None
     problems: list[Problem] = []
     data_files = DataFiles(document)
-    drives = built_parts.drives(validated)
-    struts = built_parts.struts(validated)
+    drives = build_parts.drives(validated)
+    struts = build_parts.struts(validated)
     condition = _condition(validated, data_files, drives, struts)
-    workspace, home = built_workspace.workspace(document, validated, data_files, problems)
+    workspace, home = build_workspace.workspace(document, validated, data_files, problems)
     _raise([*problems, *data_files.problems])
-    guides = built_parts.guides(validated)
-    described = built_kernel.Described(document, validated, drives, struts, guides, home)
-    kernel = built_kernel.kernel(described)
-    _raise(built_kernel.problems(described, kernel))
-    platform, frame, tool = built_parts.bodies(validated)
+    guides = build_parts.guides(validated)
+    described = build_kernel.Described(document, validated, drives, struts, guides, home)
+    kernel = build_kernel.kernel(described)
+    _raise(build_kernel.problems(described, kernel))
+    platform, frame, tool = build_parts.bodies(validated)
     parts = FileParts(
         document,
         validated,
@@ -139,7 +139,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         platform=platform,
         frame=frame,
         tool=tool,
-        mounting=built_parts.mounting(validated),
+        mounting=build_parts.mounting(validated),
         data_files=data_files.hashes,
         calibration=validated.table(CalibrationTable),
     )
@@ -175,7 +175,7 @@ def _condition(
 ) -> Condition:
     """The condition with its temperature log."""
     table = validated.table(ConditionTable)
-    found = built_parts.condition(table)
+    found = build_parts.condition(table)
     if table is None or table.temperature_log is None:
         return found
     carriages = [drive.carriage.part for drive in drives if drive.carriage is not None]

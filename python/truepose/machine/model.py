@@ -15,17 +15,17 @@ from truepose._kernel import STATUS
 from truepose._kernel import Machine as KernelMachine
 from truepose.arrays import Codes, Flags, Floats, Indices
 from truepose.errors import PoseError, Problem, RequestError
+from truepose.files.shown_units import ShownUnits, shown_units
+from truepose.files.units import FileUnit
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine.compliances import compliances, end_compliances, known
 from truepose.machine.condition import DEFAULT_PART, Condition
-from truepose.machine.parts_of_machine import BODIES, Body, Drive, Guide, Strut, Vector
-from truepose.machine.shown_units import ShownUnits, shown_units
-from truepose.machine.suggestion import did_you_mean, one_of
+from truepose.machine.parts import BODIES, Body, Drive, Guide, Strut, Vector
 from truepose.machine.tables.calibration import CalibrationTable
-from truepose.machine.units import FileUnit
 from truepose.machine.workspace import Accuracy, Workspace
 
 if TYPE_CHECKING:
-    from truepose.machine.file_parts import ErrorSource
+    from truepose.machine.source_builder import ErrorSource
 
 WithStatus = tuple[Floats, Codes]
 

@@ -12,14 +12,14 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from truepose.machine.dimensions import DIMENSIONS
-from truepose.machine.document import ARRAY_TABLES, SEVERAL
-from truepose.machine.each import EACH
+from truepose.files.dimensions import DIMENSIONS
+from truepose.files.document import ARRAY_TABLES, SEVERAL
+from truepose.files.tolerance_standards import STANDARDS, designations_of
 from truepose.machine.elements import kinds_of
-from truepose.machine.file_parts import SourceType
 from truepose.machine.materials import MATERIALS
+from truepose.machine.shared_keys import EACH
+from truepose.machine.source_builder import SourceType
 from truepose.machine.tables import REQUIRED, SCHEMA, owners, takes_every_key
-from truepose.machine.tolerance_standards import STANDARDS, designations_of
 
 Json = dict[str, Any]
 

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
 from truepose.errors import Problem, RequestError
+from truepose.files.data_file import Column, DataFiles, DataTable
+from truepose.files.document import Document, Key
+from truepose.files.units import FileUnit
 from truepose.machine.condition import DEFAULT_PART
-from truepose.machine.data_file import Column, DataFiles, DataTable
-from truepose.machine.document import Document, Key
-from truepose.machine.units import FileUnit
 
 TIME = "time"
 """The column of times."""

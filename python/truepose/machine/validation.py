@@ -9,14 +9,14 @@ from typing import Any, TypeVar, cast, get_args
 from pydantic import BaseModel, ValidationError
 
 from truepose.errors import CATALOGUE, Problem
-from truepose.machine import each
-from truepose.machine.document import SEVERAL, Document, Key
+from truepose.files.document import SEVERAL, Document, Key
+from truepose.files.file_table import FileTable
+from truepose.files.units import FileUnit, UnitSystem, shown_value, type_phrase
+from truepose.files.wording import did_you_mean, nearest, one_of
+from truepose.machine import shared_keys
 from truepose.machine.elements import DriveKind, kinds_of
-from truepose.machine.file_table import FileTable
-from truepose.machine.suggestion import did_you_mean, nearest, one_of
 from truepose.machine.tables import REQUIRED, Owners, takes_every_key
 from truepose.machine.tables.units import UnitsTable
-from truepose.machine.units import FileUnit, UnitSystem, shown_value, type_phrase
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -62,8 +62,8 @@ def validate(document: Document, owners: Owners) -> tuple[Validated, list[Proble
     for table in REQUIRED:
         if table not in data:
             problems.append(_missing_table(document, table))
-    known = {"schema", each.EACH, *owners.by_table}
-    problems += each.problems(document)
+    known = {"schema", shared_keys.EACH, *owners.by_table}
+    problems += shared_keys.problems(document)
     problems += [_unknown_key(document, (key,), known) for key in data if key not in known]
     units = _units(document, problems)
     validated = Validated(units)
@@ -260,7 +260,7 @@ def _without_misspelt(found: list[tuple[Key, Problem]]) -> list[tuple[Key, Probl
     meant = set()
     for where, problem in found:
         if problem.code == "unknown-key":
-            beside = [str(each[-1]) for each in missing if each[:-1] == where[:-1]]
+            beside = [str(key[-1]) for key in missing if key[:-1] == where[:-1]]
             meant.add((*where[:-1], nearest(str(where[-1]), beside)))
     return [
         (where, problem)
@@ -379,8 +379,8 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
     """The model that a type is, holds in a list, or takes among others."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    found = (_model_in(each) for each in get_args(annotation))
-    return next((each for each in found if each is not None), None)
+    models = (_model_in(member) for member in get_args(annotation))
+    return next((model for model in models if model is not None), None)
 
 
 def _unknown_key(document: Document, key: Key, known: Iterable[str]) -> Problem:

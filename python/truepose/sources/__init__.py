@@ -8,7 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from truepose.sources._base import (
+from truepose.probability.distributions import Listed, discrete, empirical, student_t
+from truepose.sources._expansion import NO_MATERIAL, not_included, not_included_text
+from truepose.sources.actuator import Actuator
+from truepose.sources.backlash import Backlash
+from truepose.sources.clearance import Clearance
+from truepose.sources.deviation import (
     ARCSINE,
     OWN_GROUP,
     TRIANGULAR,
@@ -19,15 +24,10 @@ from truepose.sources._base import (
     Source,
     normal,
 )
-from truepose.sources._block import Block
-from truepose.sources._expansion import NO_MATERIAL, not_included, not_included_text
-from truepose.sources.actuator import Actuator
-from truepose.sources.backlash import Backlash
-from truepose.sources.clearance import Clearance
-from truepose.sources.distributions import Listed, discrete, empirical, student_t
 from truepose.sources.elastic import Elastic
 from truepose.sources.guideway import Guideway
 from truepose.sources.loads import Loads
+from truepose.sources.pose_block import Block
 from truepose.sources.screw_coupling import ScrewCoupling
 from truepose.sources.sensor import Sensor
 from truepose.sources.thermal import Thermal

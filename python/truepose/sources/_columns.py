@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose.sources._base import OWN_GROUP, UNIFORM, Deviation, Distribution
+from truepose.sources.deviation import OWN_GROUP, UNIFORM, Deviation, Distribution
 
 
 @dataclass

@@ -15,10 +15,10 @@ import numpy as np
 from pydantic import Field
 
 from truepose.arrays import Floats
-from truepose.machine.file_table import FileTable
-from truepose.machine.suggestion import counted
-from truepose.sources._base import Deviation
-from truepose.sources.semidefinite import clash
+from truepose.files.file_table import FileTable
+from truepose.files.wording import counted
+from truepose.probability.semidefinite import clash
+from truepose.sources.deviation import Deviation
 
 if TYPE_CHECKING:
     from truepose.machine import FileParts

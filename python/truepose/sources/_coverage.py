@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.errors import Problem
-from truepose.machine.data_file import DataTable
+from truepose.files.data_file import DataTable
 
 if TYPE_CHECKING:
     from truepose.machine import Drive

@@ -15,7 +15,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.errors import Problem
-from truepose.machine.parts_of_machine import Body, Drive, Guide, Strut, is_body
+from truepose.machine.parts import Body, Drive, Guide, Strut, is_body
 
 if TYPE_CHECKING:
     from truepose._kernel import Machine as KernelMachine

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.sources._block import Block
+from truepose.sources.pose_block import Block
 
 NO_LOAD = 1e-9
 """Load, in all that acts on the machine, at or below which a part carries nothing but rounding."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.errors import Problem
-from truepose.machine.data_file import Column, DataTable
+from truepose.files.data_file import Column, DataTable
 from truepose.sources._coverage import uncovered
 
 if TYPE_CHECKING:

@@ -21,21 +21,21 @@ import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from truepose.arrays import Floats
-from truepose.machine.file_table import FileTable
-from truepose.machine.known import RatioWithin
-from truepose.machine.quantity import (
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import (
     Angle,
     Coordinate,
     NonNegativeCoordinate,
     PositiveCoordinate,
     refuse,
 )
-from truepose.machine.tolerance import Band
-from truepose.sources._base import ARCSINE, TWO_POINT, Deviation, normal
-from truepose.sources._block import Block
+from truepose.files.ratio import RatioWithin
+from truepose.files.tolerance import Band
 from truepose.sources._columns import Columns
 from truepose.sources._positioning import COVERAGE, PositioningTable, read_positioning
 from truepose.sources._scale_error import add_scale_error
+from truepose.sources.deviation import ARCSINE, TWO_POINT, Deviation, normal
+from truepose.sources.pose_block import Block
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Drive, FileParts, Machine

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from pydantic import BaseModel, Field
 
-from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import NonNegativeCoordinate, NonNegativeDriveLoad
-from truepose.sources._base import Deviation
-from truepose.sources._block import Block
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import NonNegativeCoordinate, NonNegativeDriveLoad
 from truepose.sources._play import pressed
+from truepose.sources.deviation import Deviation
+from truepose.sources.pose_block import Block
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Drive, FileParts, Machine

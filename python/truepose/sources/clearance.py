@@ -19,18 +19,18 @@ import numpy as np
 from pydantic import Field
 
 from truepose.arrays import Floats
-from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import quantity
-from truepose.sources._base import Deviation
-from truepose.sources._block import Block
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import quantity
 from truepose.sources._directions import of_base_side
 from truepose.sources._play import pressed
+from truepose.sources.deviation import Deviation
+from truepose.sources.pose_block import Block
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from truepose.machine import Condition, FileParts, Machine
-    from truepose.machine.parts_of_machine import Joint
+    from truepose.machine.parts import Joint
 
 _ENDS = ("base_joint", "platform_joint")
 

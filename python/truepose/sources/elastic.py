@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 
 from truepose.errors import TrueposeError
-from truepose.sources._base import Deviation, refuse
-from truepose.sources._block import Block
 from truepose.sources._stiffness import lacking
+from truepose.sources.deviation import Deviation, refuse
+from truepose.sources.pose_block import Block
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

@@ -20,16 +20,16 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
 
 from truepose.arrays import Floats
-from truepose.machine.data_file import Column
-from truepose.machine.file_table import FileTable
-from truepose.machine.known import SlopeWithin, one_or_limits
-from truepose.machine.parts_of_machine import Vector
-from truepose.machine.quantity import Direction, Length, PositiveLength, refuse
-from truepose.machine.tolerance import Band
-from truepose.sources._base import Deviation
-from truepose.sources._block import Block
+from truepose.files.data_file import Column
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import Direction, Length, PositiveLength, refuse
+from truepose.files.ratio import SlopeWithin, one_or_limits
+from truepose.files.tolerance import Band
+from truepose.machine.parts import Vector
 from truepose.sources._columns import Columns
 from truepose.sources._coverage import uncovered
+from truepose.sources.deviation import Deviation
+from truepose.sources.pose_block import Block
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Drive, FileParts, Machine

@@ -21,11 +21,11 @@ from pydantic import BaseModel, Field
 from truepose._kernel import STATUS
 from truepose.arrays import Floats
 from truepose.errors import Problem, TrueposeError
-from truepose.machine.file_table import FileTable
-from truepose.machine.parts_of_machine import Vector
-from truepose.machine.quantity import Direction, Length
-from truepose.sources._base import Deviation, refuse
-from truepose.sources._block import Block, rotations_of
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import Direction, Length
+from truepose.machine.parts import Vector
+from truepose.sources.deviation import Deviation, refuse
+from truepose.sources.pose_block import Block, rotations_of
 
 if TYPE_CHECKING:
     from truepose._kernel import Machine as KernelMachine

@@ -16,14 +16,14 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import BaseModel, Field, model_validator
 
-from truepose.machine.file_table import FileTable
-from truepose.machine.known import RatioWithin
-from truepose.machine.quantity import Coordinate, NonNegativeCoordinate, refuse
-from truepose.machine.tolerance import Band
-from truepose.sources._base import Deviation
-from truepose.sources._block import Block
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import Coordinate, NonNegativeCoordinate, refuse
+from truepose.files.ratio import RatioWithin
+from truepose.files.tolerance import Band
 from truepose.sources._columns import Columns
 from truepose.sources._scale_error import add_scale_error
+from truepose.sources.deviation import Deviation
+from truepose.sources.pose_block import Block
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, FileParts, Machine

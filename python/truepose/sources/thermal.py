@@ -21,11 +21,11 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.errors import TrueposeError
-from truepose.machine.parts_of_machine import Body, Drive, Strut
-from truepose.sources._base import Deviation, refuse
-from truepose.sources._block import Block
+from truepose.machine.parts import Body, Drive, Strut
 from truepose.sources._expansion import ASKED_BY, located, silent, twice
 from truepose.sources._growth import Growth, along_line
+from truepose.sources.deviation import Deviation, refuse
+from truepose.sources.pose_block import Block
 
 if TYPE_CHECKING:
     from pydantic import BaseModel

@@ -18,14 +18,11 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from truepose.machine.data_file import Column
-from truepose.machine.dimensions import BY_UNIT, DIMENSIONS
-from truepose.machine.quantity import LengthTolerance
-from truepose.machine.tolerance import LISTED, Band
-from truepose.sources._base import OWN_GROUP, Deviation
-from truepose.sources._block import Block
-from truepose.sources._correlation import CorrelationTable, read_correlation
-from truepose.sources.distributions import (
+from truepose.files.data_file import Column
+from truepose.files.dimensions import BY_UNIT, DIMENSIONS
+from truepose.files.quantity import LengthTolerance
+from truepose.files.tolerance import LISTED, Band
+from truepose.probability.distributions import (
     ARCSINE,
     TRIANGULAR,
     TWO_POINT,
@@ -37,10 +34,13 @@ from truepose.sources.distributions import (
     normal,
     student_t,
 )
+from truepose.sources._correlation import CorrelationTable, read_correlation
+from truepose.sources.deviation import OWN_GROUP, Deviation
+from truepose.sources.pose_block import Block
 
 if TYPE_CHECKING:
+    from truepose.files import tolerance as file_tolerance
     from truepose.machine import Condition, FileParts, Machine
-    from truepose.machine import tolerance as file_tolerance
 
 _EDGE_ENDINGS = (".length", ".offset")
 _WILDCARDS = frozenset("*?[")

@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike
 
 from truepose._kernel import STATUS
 from truepose.arrays import Floats, Indices
-from truepose.budget.comparison import quantities
-from truepose.budget.poses import OK, Progress
-from truepose.budget.spread import Spread
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.poses import OK, Progress
+from truepose.runs.quantities import quantities
+from truepose.runs.variables import Spread
 from truepose.verdict import engine
 from truepose.verdict.answer import MET, NOT_MET, UNDECIDED, Answer, Number
 from truepose.verdict.coverage import MOST_POSES, coverage

@@ -23,10 +23,10 @@ from typing import Literal
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.budget.asked import required_probability, required_seed
-from truepose.budget.comparison import quantities
-from truepose.budget.poses import Progress
 from truepose.machine import Machine
+from truepose.runs.poses import Progress
+from truepose.runs.quantities import quantities
+from truepose.uncertainty_analysis.arguments import required_probability, required_seed
 from truepose.verdict.order_statistics import ranks
 from truepose.verdict.screening import WITHIN, Pose, Screen, State
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.budget.bounds import PROVEN, proven_bounds
-from truepose.budget.comparison import quantities
+from truepose.runs.quantities import quantities
+from truepose.uncertainty_analysis.bounds import PROVEN, proven_bounds
 from truepose.verdict.states import State
 
 EFFORT = 1024

@@ -17,10 +17,10 @@ from tomlkit.items import Comment, Item, Table, Whitespace
 
 from truepose.arrays import Floats
 from truepose.calibration.result.toml_edits import MachineText
+from truepose.files.dimensions import BY_UNIT, FREEDOMS
+from truepose.files.document import ARRAY_TABLES
 from truepose.machine import Machine
-from truepose.machine.dimensions import BY_UNIT, FREEDOMS
-from truepose.machine.document import ARRAY_TABLES
-from truepose.machine.each import EACH
+from truepose.machine.shared_keys import EACH
 from truepose.machine.tables.workspace import WAYS
 from truepose.sources.actuator import Actuator
 from truepose.sources.guideway import Guideway

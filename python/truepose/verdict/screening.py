@@ -19,13 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.budget.drawn import Random
-from truepose.budget.exact import displacement
-from truepose.budget.first_order import first_order
-from truepose.budget.poses import OK
-from truepose.budget.spread import Spread
 from truepose.machine import Machine
+from truepose.runs.displacement import displacement
+from truepose.runs.first_order import first_order
+from truepose.runs.poses import OK
+from truepose.runs.variables import Spread
 from truepose.sources import Block
+from truepose.uncertainty_analysis.sampler import Random
 from truepose.verdict.order_statistics import Ranks, ranks
 
 State = tuple[Block, Spread]

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.budget.first_order import Mover, effects_at, first_order
-from truepose.budget.largest import largest
-from truepose.budget.poses import OK
-from truepose.sources.domain import Domain, unit
+from truepose.error_budget.largest import largest
+from truepose.probability.domain import Domain, unit
+from truepose.runs.first_order import Mover, effects_at, first_order
+from truepose.runs.poses import OK
 from truepose.verdict.states import State
 
 SAMPLES = 1024

@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.budget.evaluate import required_sources
-from truepose.budget.exact import at_shifts
-from truepose.budget.poses import (
+from truepose.compensation.corrected import corrected
+from truepose.machine import Condition, Machine
+from truepose.runs.displacement import at_shifts
+from truepose.runs.poses import (
     BLOCK,
     OK,
     Progress,
@@ -26,10 +27,9 @@ from truepose.budget.poses import (
     is_path,
     no_pose_left,
     requested_poses,
+    required_sources,
 )
-from truepose.budget.spread import Spread, spread
-from truepose.compensation.corrected import corrected
-from truepose.machine import Condition, Machine
+from truepose.runs.variables import Spread, spread
 from truepose.sources import Block
 
 BEFORE, AFTER = "before compensation", "after compensation"

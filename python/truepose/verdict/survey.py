@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.budget.first_order import Mover, first_order
-from truepose.budget.largest import Largest, largest
-from truepose.budget.poses import OK
 from truepose.compensation.remainder import Remainder
+from truepose.error_budget.largest import Largest, largest
+from truepose.runs.first_order import Mover, first_order
+from truepose.runs.poses import OK
 from truepose.verdict.states import State
 
 POSES = 1024

@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.budget.comparison import quantities
-from truepose.budget.exact import Moved
-from truepose.budget.first_order import first_order
-from truepose.budget.poses import pose_in_words
-from truepose.budget.spread import Spread
+from truepose.files.dimensions import BY_UNIT, FREEDOMS
+from truepose.files.shown_units import Shown
 from truepose.machine import Machine
-from truepose.machine.dimensions import BY_UNIT, FREEDOMS
-from truepose.machine.shown_units import Shown
+from truepose.runs.displacement import Moved
+from truepose.runs.first_order import first_order
+from truepose.runs.poses import pose_in_words
+from truepose.runs.quantities import quantities
+from truepose.runs.variables import Spread
 from truepose.sources import Block, acting
 from truepose.verdict.states import AFTER, BEFORE
 

@@ -21,14 +21,14 @@ import tomlkit
 
 from truepose._kernel import STATUS
 from truepose.arrays import Floats
-from truepose.budget.exact import at_shifts, displacement, together
-from truepose.budget.poses import OK, REASONS, Walk, pose_in_words
 from truepose.calibration.result.toml_edits import MachineText
 from truepose.errors import Problem, RequestError, TrueposeError
+from truepose.files.dimensions import BY_UNIT
+from truepose.files.writing import replacing, require_writable
 from truepose.machine import Machine, load
-from truepose.machine.dimensions import BY_UNIT
 from truepose.machine.temperature_log import TemperatureLog
-from truepose.output import replacing, require_writable
+from truepose.runs.displacement import at_shifts, displacement, together
+from truepose.runs.poses import OK, REASONS, Walk, pose_in_words
 from truepose.sources import REGISTRY, acting
 from truepose.verdict.one_values import OneValues
 from truepose.verdict.witness import Witness

@@ -16,11 +16,11 @@ import truepose as tp
 from build_machine import MACHINES
 from made_measurements import made_measurements, poses_within
 from truepose.calibration.calibrate import Calibration, calibrate
+from truepose.calibration.data_checks import Suspicion
 from truepose.calibration.dataset import SCHEMA, answer_of, covariance_of, dataset_of, verdict_of
 from truepose.calibration.identification.problem import Problem
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.result.save import save
-from truepose.calibration.suspicions import Suspicion
 from truepose.errors import RequestError
 
 ROOT = Path(__file__).parents[3]

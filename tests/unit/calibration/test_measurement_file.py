@@ -14,11 +14,11 @@ import truepose as tp
 from made_measurement_files import GOOD, HEAD, TABLE, problems, read, several
 from made_measurements import made_measurements, poses_within
 from truepose.calibration import read_measurements
-from truepose.calibration.measurements.writing import measurements_text
+from truepose.calibration.measurements.write_csv import measurements_text
 from truepose.calibration.observables import OBSERVABLES
 from truepose.errors import RequestError
+from truepose.files.data_file import MOST_PROBLEMS
 from truepose.machine import Condition, Machine
-from truepose.machine.data_file import MOST_PROBLEMS
 
 MACHINES = Path(__file__).parents[3] / "machines"
 

@@ -21,7 +21,7 @@ from made_measurements import made_measurements, poses_within
 from sweeps import thinned
 from truepose.calibration import Measurements, joined, read_measurements, write_measurements
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument
-from truepose.calibration.measurements.writing import measurements_text
+from truepose.calibration.measurements.write_csv import measurements_text
 from truepose.errors import CATALOGUE, RequestError, TrueposeError
 from truepose.machine import Condition, Machine
 

@@ -15,7 +15,7 @@ from made_measurements import made_measurements, nominal_values, poses_within
 from truepose.calibration import Frame, Instrument, Measurements, joined, measurements_of
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.instruments._base import of_readings
-from truepose.calibration.measurements.checked import within_a_turn
+from truepose.calibration.measurements.rows import within_a_turn
 from truepose.calibration.observables import OBSERVABLES
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine

@@ -15,7 +15,7 @@ from made_measurements import nominal_values
 from truepose import _kernel
 from truepose.calibration.instruments import Instrument
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.measurements.reading import read_measurements
+from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.calibration.planning import program as measuring_program
 from truepose.calibration.planning.instruments import (
     distinct,

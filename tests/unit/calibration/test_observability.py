@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from truepose.calibration.gate import observability as seen
+from truepose.calibration.acceptance import observability as seen
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import pytest
 import truepose as tp
 from build_machine import machine_files
 from made_measurements import made_measurements, nominal_values, poses_within
+from truepose.calibration.acceptance import Gate
 from truepose.calibration.calibrate import Calibration, calibrate
-from truepose.calibration.gate import Gate
 from truepose.calibration.identification.validate import fold_numbers
 from truepose.calibration.instruments import Frame
 from truepose.calibration.measurements import Measurements

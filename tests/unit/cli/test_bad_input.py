@@ -123,8 +123,8 @@ def test_a_folder_without_permission(
 def test_packages_that_are_not_installed(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delitem(sys.modules, "truepose.report.page", raising=False)
-    monkeypatch.delattr("truepose.report.page", raising=False)
+    monkeypatch.delitem(sys.modules, "truepose.reporting.page", raising=False)
+    monkeypatch.delattr("truepose.reporting.page", raising=False)
     monkeypatch.setitem(sys.modules, "jinja2", None)
     outcome = call(capsys, "report", PLANAR, "--output", tmp_path / "page.html")
     assert outcome.code == 2

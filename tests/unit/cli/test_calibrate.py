@@ -271,7 +271,7 @@ def test_files_are_written_before_anything_is_printed(
     def stopped(*found: object) -> None:
         raise RuntimeError
 
-    monkeypatch.setattr("truepose.report.calibration.tables", stopped)
+    monkeypatch.setattr("truepose.reporting.calibration.tables", stopped)
     paths = [tmp_path / name for name in ("machine.toml", "result.json")]
     asked = ("--machine-output", paths[0], "--date", "2026-01-31", "--output", paths[1])
     with suppress(RuntimeError, SystemExit):

@@ -18,7 +18,7 @@ import xarray as xr
 import made_how_sure as made
 import truepose
 from command_line import MACHINES, PLANAR, call
-from truepose.cli import _how_sure
+from truepose.cli import _uncertainty
 from truepose.errors import Problem, RequestError
 
 HEXAPOD = MACHINES / "hexapod.toml"  # in inches
@@ -172,7 +172,7 @@ def test_bounds_asks_for_what_the_options_say(
     ],
 )
 def test_a_region_is_in_the_units_of_the_file(file: Path, text: str, region: Any) -> None:
-    found = _how_sure.read_region(truepose.load(file), text)
+    found = _uncertainty.read_region(truepose.load(file), text)
     assert list(found) == list(region)
     for name, ends in region.items():
         assert found[name] == pytest.approx(ends)
@@ -341,7 +341,7 @@ def test_the_report_asks_at_the_middle_and_the_worst_pose(
     (two,) = poses
     np.testing.assert_allclose(two[0], [0.3, 0.2])
     assert len(two) == 2
-    assert asked["monte_carlo"].settings["samples"] == _how_sure.ELLIPSE_SAMPLES
+    assert asked["monte_carlo"].settings["samples"] == _uncertainty.ELLIPSE_SAMPLES
     assert "How far off can the tool be?" in outcome.out
     text = page.read_text("utf-8")
     assert "<td>proven bound</td><td>strut.1.length has no ends (normal).</td>" in text

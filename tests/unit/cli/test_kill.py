@@ -33,7 +33,7 @@ import importlib, os, sys, time
 from pathlib import Path
 from typing import Any
 from truepose.cli import main
-from truepose.report.formats import FORMATS
+from truepose.reporting.formats import FORMATS
 
 module = importlib.import_module(FORMATS[Path(sys.argv[-1]).suffix])
 whole = module.write

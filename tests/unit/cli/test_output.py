@@ -134,7 +134,7 @@ def test_netcdf_reads_back_as_the_dataset(
 def test_netcdf_without_its_packages(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("truepose.report.formats.netcdf.find_spec", lambda name: None)
+    monkeypatch.setattr("truepose.reporting.formats.netcdf.find_spec", lambda name: None)
     outcome = call(capsys, "budget", PLANAR, "--output", tmp_path / "result.nc")
     assert (outcome.code, outcome.codes) == (2, ["extra-missing"])
     assert "pip install 'truepose[netcdf]'" in outcome.err
@@ -164,7 +164,7 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(
         yield "{"
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("truepose.report.formats.json_text.text", full)
+    monkeypatch.setattr("truepose.reporting.formats.json_text.text", full)
     outcome = call(capsys, "budget", PLANAR, "--output", file)
     assert outcome.code == 2
     assert "output-not-writable" in outcome.codes
@@ -183,7 +183,7 @@ def test_ctrl_c_leaves_the_old_file(
         yield "{"
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("truepose.report.formats.json_text.text", interrupted)
+    monkeypatch.setattr("truepose.reporting.formats.json_text.text", interrupted)
     outcome = call(capsys, "budget", PLANAR, "--output", file)
     assert outcome.code == 130
     assert "Traceback" not in outcome.err

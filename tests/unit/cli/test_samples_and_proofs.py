@@ -162,7 +162,7 @@ import importlib, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 import truepose
 name = sys.argv.pop(1)
-whole = getattr(importlib.import_module(f"truepose.budget.{name}"), name)
+whole = getattr(importlib.import_module(f"truepose.uncertainty_analysis.{name}"), name)
 
 def told(*arguments, progress, **settings):
     said = []

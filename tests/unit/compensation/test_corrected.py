@@ -11,9 +11,9 @@ import pytest
 import truepose as tp
 from build_machine import MACHINES
 from made_source import MadeSource, with_sources
-from truepose.budget.exact import displacement
 from truepose.compensation.commands import actual_of_joints, corrected_poses
 from truepose.errors import RequestError
+from truepose.runs.displacement import displacement
 from truepose.sources import Block, Deviation
 
 AMPLITUDE, PITCH = 2e-6, 5e-3

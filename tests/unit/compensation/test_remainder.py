@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 import truepose as tp
 from build_machine import MACHINES
 from made_source import MadeSource, with_sources
-from truepose.budget.first_order import Mover, first_order
-from truepose.budget.poses import OK, Walk
 from truepose.compensation import majorants
 from truepose.compensation.corrected import corrected
 from truepose.compensation.remainder import TURNED, Bounds, Remainder
 from truepose.errors import RequestError
 from truepose.machine import Machine
+from truepose.runs.first_order import Mover, first_order
+from truepose.runs.poses import OK, Walk
 from truepose.sources import Deviation, acting
 
 Floats = NDArray[np.float64]

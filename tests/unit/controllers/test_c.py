@@ -17,11 +17,11 @@ from c_program import EXACT, FUSED, STRICT, Answers, compiled, compiler, driver
 from made_source import MadeSource, with_sources
 from sweeps import sweep, thinned
 from truepose import _kernel, controllers
-from truepose.budget.exact import together
-from truepose.budget.poses import Walk
 from truepose.controllers.c import Program, program_of
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.displacement import together
+from truepose.runs.poses import Walk
 from truepose.sources import Block, Deviation, acting
 
 MACHINE_FOLDER = Path("machines")

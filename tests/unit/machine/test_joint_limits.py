@@ -11,10 +11,10 @@ import truepose as tp
 from build_machine import MACHINES
 from machine_texts import PLANAR, edited, load_text
 from truepose import _kernel
-from truepose.budget.poses import faults_text
 from truepose.errors import PoseError, RequestError
 from truepose.machine import Machine
-from truepose.report.reach import reach
+from truepose.reporting.workspace_check import reach
+from truepose.runs.poses import faults_text
 
 LIMIT = _kernel.STATUS.index("joint_limit")
 OK = _kernel.STATUS.index("ok")

@@ -12,7 +12,7 @@ import pytest
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError, RequestError
 from truepose.machine import Joint
-from truepose.machine.parts_of_machine import in_series
+from truepose.machine.parts import in_series
 
 FULL = edited(
     PLANAR,

@@ -11,8 +11,8 @@ from types import ModuleType
 import pytest
 
 from build_machine import machine_files
+from truepose.files.tolerance_standards import designations
 from truepose.machine.reference import json_schema, page
-from truepose.machine.tolerance_standards import designations
 from truepose.sources import REGISTRY
 
 DOCS = Path(__file__).parents[3] / "docs"

@@ -12,9 +12,9 @@ import pytest
 import space_slider
 import truepose as tp
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
-from truepose.budget.poses import Walk
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
+from truepose.runs.poses import Walk
 from truepose.sources import ARCSINE, TWO_POINT, Deviation, normal
 from two_slider import Floats, displaced
 

@@ -12,9 +12,9 @@ import truepose as tp
 from build_machine import MACHINES
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from reference_kinematics import rotation_of, turned_about
-from truepose.budget.poses import Walk
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
+from truepose.runs.poses import Walk
 from truepose.sources import UNIFORM, Deviation
 from two_slider import Floats, directions, displaced, tensions
 

@@ -12,9 +12,9 @@ import truepose as tp
 from build_machine import MACHINES
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from reference_kinematics import Vector, rotation_of, turned_about, vector_of
-from truepose.budget.poses import Walk
 from truepose.errors import MachineFileError, TrueposeError
 from truepose.machine import Machine
+from truepose.runs.poses import Walk
 from truepose.sources import Deviation
 from truepose.sources.screw_coupling import PARALLEL
 

@@ -19,7 +19,7 @@ EXPANSION = "1.1e-5 1/K"
 
 def shifts(machine: Machine, condition: tp.Condition) -> tuple[np.ndarray, np.ndarray]:
     """Growth of the struts at the home pose by the source, and their lengths there, m."""
-    from truepose.budget.poses import Walk
+    from truepose.runs.poses import Walk
 
     at = [machine.dof.index(name) for name in machine.commanded]
     (block,) = Walk(machine, machine.home[at][np.newaxis, :], condition)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from machine_texts import PLANAR, edited, line_of, load_text
-from truepose.budget.poses import Walk
 from truepose.errors import MachineFileError, RequestError
 from truepose.machine import Machine
+from truepose.runs.poses import Walk
 from truepose.sources.thermal import Thermal
 from two_slider import LENGTH, RAILS, tool
 

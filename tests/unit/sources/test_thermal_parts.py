@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 def deviations(machine: Machine, condition: Condition, poses: ArrayLike) -> dict[str, Floats]:
     """Parameter -> its shift (n,) at poses (n, n_commanded)."""
-    from truepose.budget.poses import Walk
+    from truepose.runs.poses import Walk
 
     table = np.atleast_2d(np.asarray(poses, float))
     (block,) = Walk(machine, table, condition)

@@ -11,8 +11,8 @@ import truepose as tp
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
+from truepose.probability.distributions import discrete, empirical, student_t
 from truepose.sources import ARCSINE, TWO_POINT, Deviation, Distribution, normal
-from truepose.sources.distributions import discrete, empirical, student_t
 
 MM = 1e-3
 PAIR = '"strut.*.base.x" = 0.1'

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 import truepose as tp
 from machine_texts import edited, load_text
-from truepose.budget.poses import Walk
 from truepose.controllers.c._known import known_of
 from truepose.errors import RequestError
 from truepose.machine import Joint, Machine, Strut
+from truepose.runs.poses import Walk
 from truepose.sources import Block
 
 Vector = NDArray[np.float64]

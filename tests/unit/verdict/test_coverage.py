@@ -15,14 +15,13 @@ import truepose as tp
 from build_machine import MACHINES
 from command_line import call
 from machine_texts import PLANAR, edited, load_text
-from truepose.budget.drawn import Random
-from truepose.budget.evaluate import required_sources
-from truepose.budget.first_order import Mover, first_order
-from truepose.budget.poses import Walk
-from truepose.budget.spread import Spread, spread
 from truepose.errors import RequestError
 from truepose.machine import Envelope, Machine
+from truepose.runs.first_order import Mover, first_order
+from truepose.runs.poses import Walk, required_sources
+from truepose.runs.variables import Spread, spread
 from truepose.sources import Block
+from truepose.uncertainty_analysis.sampler import Random
 from truepose.verdict import coverage as module
 from truepose.verdict import screening
 from truepose.verdict.coverage import CoverageAnswer, coverage

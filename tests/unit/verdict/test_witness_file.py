@@ -16,11 +16,11 @@ from made_source import MadeSource, with_sources
 from random_machines import DRAWN, DrawnMachine
 from sweeps import thinned
 from truepose._kernel import STATUS
-from truepose.budget.exact import displacement
-from truepose.budget.poses import OK, Walk, is_path
-from truepose.budget.spread import spread
 from truepose.errors import RequestError
 from truepose.machine import Machine
+from truepose.runs.displacement import displacement
+from truepose.runs.poses import OK, Walk, is_path
+from truepose.runs.variables import spread
 from truepose.sources import Deviation, acting
 from truepose.verdict.witness import AFTER, BEFORE, Witness
 from truepose.verdict.witness_file import write_witness

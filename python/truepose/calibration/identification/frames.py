@@ -19,7 +19,7 @@ from truepose.calibration.instruments._base import Frame
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Machine
-from truepose.sources._block import rotations_of
+from truepose.sources.pose_block import rotations_of
 
 _NUMBER = {name: number for number, name in enumerate(OBSERVABLES)}
 _ORIGIN, _ROTATION = slice(0, 3), slice(3, 6)

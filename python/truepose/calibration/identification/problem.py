@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 
 from truepose._kernel import Identification
 from truepose.arrays import Floats, Indices
-from truepose.budget.exact import Moved, together
-from truepose.calibration.gate.observability import prior_rows
+from truepose.calibration.acceptance.observability import prior_rows
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Condition, Machine
+from truepose.runs.displacement import Moved, together
 from truepose.sources import Block, acting
 from truepose.sources.tolerance import Tolerance
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from truepose.machine import Machine
-from truepose.machine.parts_of_machine import Strut
+from truepose.machine.parts import Strut
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
-from truepose.budget.poses import OK, requested_poses
-from truepose.calibration.gate import Candidate
+from truepose.calibration.acceptance import Candidate
 from truepose.calibration.identification.fit import Fit
 from truepose.calibration.identification.problem import Problem, property_effects, row_shifts
 from truepose.calibration.identification.unknowns import Unknowns
@@ -19,6 +18,7 @@ from truepose.calibration.observables import OBSERVABLES
 from truepose.errors import Problem as Refused
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.poses import OK, requested_poses
 
 MOST_POSES = 300
 """Poses of the workspace at which the tool is looked at; more are thinned evenly."""

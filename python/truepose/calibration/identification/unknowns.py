@@ -22,10 +22,10 @@ from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
 from truepose.errors import Problem, RequestError
+from truepose.files.shown_units import METRIC, ShownUnits
+from truepose.files.units import QuantityError, UnitSystem
+from truepose.files.wording import did_you_mean
 from truepose.machine import Machine
-from truepose.machine.shown_units import METRIC, ShownUnits
-from truepose.machine.suggestion import did_you_mean
-from truepose.machine.units import QuantityError, UnitSystem
 from truepose.sources import Deviation
 from truepose.sources.tolerance import Tolerance
 

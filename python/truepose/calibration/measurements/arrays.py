@@ -11,23 +11,23 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.calibration.instruments import REGISTRY, Instrument
-from truepose.calibration.measurements.checked import (
+from truepose.calibration.measurements.declarations import (
+    expected_name,
+    name_is_good,
+    reserved_names,
+)
+from truepose.calibration.measurements.measurements import Measurements
+from truepose.calibration.measurements.rows import (
     UNCERTAINTY,
     Reading,
     Rows,
     measurements_in,
     reading_columns,
 )
-from truepose.calibration.measurements.form import Measurements
-from truepose.calibration.measurements.header import (
-    expected_name,
-    name_is_good,
-    reserved_names,
-)
 from truepose.errors import Problem, RequestError
+from truepose.files.data_file import cut_short
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
-from truepose.machine.data_file import cut_short
-from truepose.machine.suggestion import did_you_mean, one_of
 
 
 def measurements_of(

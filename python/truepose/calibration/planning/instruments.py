@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from truepose.calibration.instruments import REGISTRY, Frame, Instrument
-from truepose.calibration.measurements.header import (
+from truepose.calibration.measurements.declarations import (
     expected_name,
     name_is_good,
     read_header,
@@ -27,11 +27,11 @@ from truepose.calibration.observables import OBSERVABLES, UNITS
 from truepose.calibration.planning.poses import workspace_poses
 from truepose.calibration.planning.readings import observed
 from truepose.errors import MachineFileError, Problem, RequestError
+from truepose.files.dimensions import BY_UNIT
+from truepose.files.text_file import FileKind, read_text
+from truepose.files.units import QuantityError, UnitSystem
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
-from truepose.machine.dimensions import BY_UNIT
-from truepose.machine.suggestion import did_you_mean, one_of
-from truepose.machine.text_file import FileKind, read_text
-from truepose.machine.units import QuantityError, UnitSystem
 
 _WORD = re.compile(r"(?P<kind>[a-z-]+)(?::(?P<reads>[a-z.,]+))?=(?P<amounts>.+)\Z")
 _FILE = FileKind("a file of measurements (CSV), of which only the head is read", ".csv")

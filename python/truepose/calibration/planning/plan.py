@@ -19,16 +19,8 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.budget.dataset import (
-    commanded_units,
-    joint_units,
-    label,
-    provenance,
-    quantity_coords,
-)
-from truepose.budget.percent import POSITIONS
-from truepose.calibration.gate.at_tool import Tool
-from truepose.calibration.gate.observability import of_machine, spread
+from truepose.calibration.acceptance.observability import of_machine, spread
+from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.calibration.instruments import Instrument
@@ -44,8 +36,10 @@ from truepose.calibration.planning.exchange import (
 from truepose.calibration.planning.poses import Placed, short_way, workspace_poses
 from truepose.calibration.planning.readings import planned, whitened
 from truepose.errors import Problem, RequestError
+from truepose.files.wording import one_of
 from truepose.machine import Condition, Machine
-from truepose.machine.suggestion import one_of
+from truepose.runs.dataset import commanded_units, joint_units, label, provenance, quantity_coords
+from truepose.runs.quantities import POSITIONS
 
 DOMINATED = 0.5
 """An unknown of which the readings give less than this share of the information is called

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.budget.poses import OK, LeftOut, no_pose_left, requested_poses
 from truepose.machine import Machine
 from truepose.machine.workspace import GridAxis, Workspace, grid
+from truepose.runs.poses import OK, LeftOut, no_pose_left, requested_poses
 
 MOST_POSES = 1024
 """Poses of a workspace that are looked at, about: a finer grid betters a plan by little."""

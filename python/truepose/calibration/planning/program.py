@@ -14,16 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.budget.poses import OK, pose_in_words
 from truepose.calibration.instruments import Instrument
-from truepose.calibration.measurements.checked import UNCERTAINTY
-from truepose.calibration.measurements.reading import INSTRUMENT, SET
-from truepose.calibration.measurements.writing import measurements_text
+from truepose.calibration.measurements.read_csv import INSTRUMENT, SET
+from truepose.calibration.measurements.rows import UNCERTAINTY
+from truepose.calibration.measurements.write_csv import measurements_text
 from truepose.calibration.planning.poses import Placed, home_of
 from truepose.calibration.planning.readings import planned
 from truepose.errors import Problem, RequestError
+from truepose.files.units import FileUnit
 from truepose.machine import Machine
-from truepose.machine.units import FileUnit
+from truepose.runs.poses import OK, pose_in_words
 from truepose.version import version
 
 FEED = 1.0 / 60.0

@@ -11,12 +11,12 @@ from truepose.calibration.identification.problem import Problem as Fitted
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.instruments import REGISTRY, Instrument
 from truepose.calibration.instruments._base import moved
-from truepose.calibration.measurements.form import Measurements, cold_and_free
+from truepose.calibration.measurements.measurements import Measurements, cold_and_free
 from truepose.calibration.observables import OBSERVABLES, OF_STRUTS
 from truepose.calibration.planning.poses import Placed
 from truepose.errors import Problem, RequestError
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
-from truepose.machine.suggestion import did_you_mean, one_of
 
 
 def observed(machine: Machine, instrument: Instrument) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.machine import Machine
-from truepose.sources._base import Deviation
+from truepose.sources.deviation import Deviation
 from truepose.sources.tolerance import Tolerance
 
 

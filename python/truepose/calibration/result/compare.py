@@ -24,13 +24,13 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
-from truepose.budget.poses import LeftOut, Walk, no_pose_left, requested_poses
 from truepose.calibration.result.bands import known
 from truepose.calibration.result.directions import deviation_of, directions, tilted, turned
 from truepose.errors import Problem, RequestError
+from truepose.files.shown_units import Shown, ShownUnits
 from truepose.machine import Machine
-from truepose.machine.shown_units import Shown, ShownUnits
-from truepose.sources.quantiles import normal_quantile
+from truepose.probability.quantiles import normal_quantile
+from truepose.runs.poses import LeftOut, Walk, no_pose_left, requested_poses
 from truepose.version import version
 
 ALPHA = 0.05

@@ -25,11 +25,11 @@ from truepose.calibration.result.bands import Banded, Known, banded, bands_of, k
 from truepose.calibration.result.directions import PartDirection, directions, tilted, turned
 from truepose.calibration.result.toml_edits import MachineText, warning_comment
 from truepose.errors import MachineFileError, Problem, RequestError
+from truepose.files.writing import replacing, require_writable
 from truepose.machine import Machine, load
 from truepose.machine.workspace import Accuracy
-from truepose.output import replacing, require_writable
 from truepose.sources import REGISTRY
-from truepose.sources._base import Deviation
+from truepose.sources.deviation import Deviation
 from truepose.version import version
 
 DEFAULT_COVERAGE = 2.0

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.calibration.acceptance import sentences
+from truepose.calibration.acceptance.observability import prior_root, prior_rows
+from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.calibrate import Calibration
 from truepose.calibration.dataset import covariance_of, determined_covariance, verdict_of
-from truepose.calibration.gate import words
-from truepose.calibration.gate.at_tool import Tool
-from truepose.calibration.gate.observability import prior_root, prior_rows
 from truepose.calibration.identification.tool_effects import tool_effects, workspace_poses
 from truepose.calibration.result.file import DEFAULT_COVERAGE, Provenance, write_calibrated
 from truepose.errors import Problem, RequestError
@@ -119,8 +119,8 @@ def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
     whole, known = (
         Tool.of(each, components, None).uncertainty(root, none) for each in (effects, stated)
     )
-    names = words.listed(
-        words.collapsed(
+    names = sentences.listed(
+        sentences.collapsed(
             [unknowns.labels[at] for at in unknowns.properties],
             unknowns.labels[: unknowns.n_machine],
         )
@@ -133,9 +133,9 @@ def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
     return [
         f"the uncertainty of what was found of {names} is not in this file, which has no place for "
         f"it: by the rest of what was found the tool's {what} at the worst pose is known to "
-        f"{words.quantity(without, unit, units=machine.shown)}, with it, at this file's "
+        f"{sentences.quantity(without, unit, units=machine.shown)}, with it, at this file's "
         "temperatures and loads, to "
-        f"{words.quantity(with_them, unit, units=machine.shown)}"
+        f"{sentences.quantity(with_them, unit, units=machine.shown)}"
     ]
 
 

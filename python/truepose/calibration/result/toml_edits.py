@@ -15,14 +15,14 @@ from tomlkit.items import AoT, Array, InlineTable, Table
 
 from truepose.arrays import Floats
 from truepose.errors import RequestError
+from truepose.files.dimensions import BY_UNIT, DIMENSIONS
+from truepose.files.document import Document, read
+from truepose.files.settings import apply
+from truepose.files.text_file import FileKind, read_text
+from truepose.files.units import UnitSystem, meant
 from truepose.machine import Machine, validation
-from truepose.machine.dimensions import BY_UNIT, DIMENSIONS
-from truepose.machine.document import Document, read
-from truepose.machine.each import share_each
-from truepose.machine.settings import apply
+from truepose.machine.shared_keys import share_each
 from truepose.machine.tables import owners
-from truepose.machine.text_file import FileKind, read_text
-from truepose.machine.units import UnitSystem, meant
 from truepose.sources import REGISTRY
 
 _NAMES_A_FILE = ("table", "data", "poses", "temperature_log")

@@ -20,16 +20,16 @@ from typing import cast
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.budget.exact import Moved, together
-from truepose.budget.length_law import law_of_length
-from truepose.budget.poses import Walk
 from truepose.controllers._export import cannot
 from truepose.errors import Problem, RequestError
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
-from truepose.machine.parts_of_machine import Body, Drive, Strut
-from truepose.machine.suggestion import did_you_mean, one_of
+from truepose.machine.parts import Body, Drive, Strut
+from truepose.runs.displacement import Moved, together
+from truepose.runs.poses import Walk
 from truepose.sources import Block, Source
 from truepose.sources._stiffness import lacking
+from truepose.uncertainty_analysis.length_law import law_of_length
 
 POSES, SCATTERED = 150, 150
 """Poses of the workspace, and about it, at which the sources are asked."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.budget.poses import OK
 from truepose.compensation.commands import ActualMachine, Known
+from truepose.runs.poses import OK
 
 
 class Measure:

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from truepose.budget.poses import faults_text
 from truepose.controllers.gcode._axes import AXES, Axes
 from truepose.controllers.gcode.division import TOO_SHORT, CannotCorrect, Limits, Moves
 from truepose.controllers.gcode.proof import Proof, sizes
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
+from truepose.runs.poses import faults_text
 
 _EXPECTED = "a pose that the machine can be commanded to, all along the move"
 

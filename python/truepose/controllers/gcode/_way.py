@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.budget.exact import displacement
-from truepose.budget.poses import OK
 from truepose.compensation.commands import UNMOVED, ActualMachine, blocks
+from truepose.runs.displacement import displacement
+from truepose.runs.poses import OK
 
 SAME = 1e-6
 """Distance of two poses that are one, in characteristic lengths or rad: far above rounding."""

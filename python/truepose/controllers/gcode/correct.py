@@ -20,7 +20,6 @@ from typing import cast, get_args
 import numpy as np
 
 from truepose._kernel import GcodeCorrector, GcodeError, GcodeMoves, GcodeReader, threads
-from truepose.budget.evaluate import required_sources
 from truepose.compensation.commands import ActualMachine
 from truepose.controllers.gcode import _refusals
 from truepose.controllers.gcode._axes import AXES, Axes, scale_of
@@ -36,9 +35,10 @@ from truepose.controllers.gcode.division import (
 from truepose.controllers.gcode.proof import Proof, Proving, improves
 from truepose.controllers.gcode.tolerance import MOST, Tolerance, least_of, tolerance_for
 from truepose.errors import Problem, RequestError
+from truepose.files.wording import one_of
+from truepose.files.writing import replacing, require_writable
 from truepose.machine import Condition, Machine
-from truepose.machine.suggestion import one_of
-from truepose.output import replacing, require_writable
+from truepose.runs.poses import required_sources
 
 BATCH = 8192
 """Moves worked on at a time."""

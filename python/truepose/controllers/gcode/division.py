@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 
 from truepose._kernel import STATUS
 from truepose.arrays import Codes, Flags, Floats, Indices
-from truepose.budget.exact import Moved
-from truepose.budget.poses import BLOCK, OK
 from truepose.compensation.commands import UNMOVED, ActualMachine, Known, blocks
 from truepose.controllers.gcode._axes import MILLIMETRE, Axes
 from truepose.controllers.gcode._measure import Measure
 from truepose.controllers.gcode._pieces import Looked, Nodes, Pieces, joined, selected
 from truepose.controllers.gcode._way import STEP, crossings
+from truepose.runs.displacement import Moved
+from truepose.runs.poses import BLOCK, OK
 
 RAPID = 0
 

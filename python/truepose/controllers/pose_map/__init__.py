@@ -21,17 +21,17 @@ import numpy as np
 
 from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats
-from truepose.budget.dataset import provenance
-from truepose.budget.poses import OK, pose_in_words
 from truepose.compensation.commands import corrected_poses, with_joints
 from truepose.controllers._export import Export, Option
 from truepose.controllers._fit import Extent, angle_between, extent
 from truepose.controllers._small_model import ascii_only, fixed, stem
 from truepose.controllers.pose_map.grid import COUNT, Grid, grid_of
 from truepose.errors import Problem, RequestError
+from truepose.files.units import FileUnit, default_units
+from truepose.files.wording import counted
 from truepose.machine import Machine
-from truepose.machine.suggestion import counted
-from truepose.machine.units import FileUnit, default_units
+from truepose.runs.dataset import provenance
+from truepose.runs.poses import OK, pose_in_words
 
 FINEST = 1e-10
 """m and rad to which corrections are written, and finer."""

@@ -10,8 +10,8 @@ import numpy as np
 from truepose.arrays import Floats
 from truepose.controllers._export import Option
 from truepose.errors import Problem, RequestError
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
-from truepose.machine.suggestion import did_you_mean, one_of
 from truepose.machine.workspace import GridAxis, grid
 
 AS_FILE = "as the machine file"

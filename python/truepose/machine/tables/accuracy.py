@@ -9,10 +9,10 @@ from typing import Annotated, Any
 from pydantic import Field
 from pydantic.json_schema import JsonSchemaValue
 
-from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import AllowedAngle, AllowedLength, FileType
-from truepose.machine.suggestion import did_you_mean
-from truepose.machine.units import QuantityError, UnitSystem, shown_value, type_phrase
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import AllowedAngle, AllowedLength, FileType
+from truepose.files.units import QuantityError, UnitSystem, shown_value, type_phrase
+from truepose.files.wording import did_you_mean
 from truepose.machine.workspace import WORST
 
 _PERCENTAGE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(%|percent)?\s*\Z")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import Expansion, Mass, Point
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import Expansion, Mass, Point
 from truepose.machine.tables.material import MaterialName
 
 _ORIGIN = (0.0, 0.0, 0.0)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from truepose.machine.file_table import FileTable, Name
-from truepose.machine.quantity import refuse
-from truepose.machine.units import shown_value
+from truepose.files.file_table import FileTable, Name
+from truepose.files.quantity import refuse
+from truepose.files.units import shown_value
 
 _HASH = re.compile(r"[0-9a-f]{64}")
 

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import (
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import (
     GradientValue,
     NonNegativeAcceleration,
     Temperature,

@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from truepose.machine.file_table import FileTable, PartName
-from truepose.machine.quantity import Expansion, Mass
+from truepose.files.file_table import FileTable, PartName
+from truepose.files.quantity import Expansion, Mass
 from truepose.machine.tables.body import CarriageTable
 from truepose.machine.tables.material import MaterialName
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from truepose.machine.file_table import FileTable, PartName
+from truepose.files.file_table import FileTable, PartName
 
 
 class GuideTable(FileTable):

@@ -6,14 +6,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import (
-    Direction,
-    NonNegativeLength,
-    PositiveAngle,
-    Stiffness,
-    refuse,
-)
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import Direction, NonNegativeLength, PositiveAngle, Stiffness, refuse
 
 
 class JointTable(FileTable):

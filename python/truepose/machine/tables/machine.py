@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from truepose.machine.file_table import FileTable, Freedoms, Name
-from truepose.machine.quantity import Point, PositiveLength
+from truepose.files.file_table import FileTable, Freedoms, Name
+from truepose.files.quantity import Point, PositiveLength
 
 
 class MachineTable(FileTable):

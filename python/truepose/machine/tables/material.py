@@ -6,10 +6,10 @@ from typing import Annotated
 
 from pydantic import AfterValidator, WithJsonSchema
 
+from truepose.files.quantity import refuse
+from truepose.files.units import shown_value
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine.materials import MATERIALS
-from truepose.machine.quantity import refuse
-from truepose.machine.suggestion import did_you_mean, one_of
-from truepose.machine.units import shown_value
 
 
 def _known_material(value: str) -> str:

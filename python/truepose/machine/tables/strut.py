@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from truepose.machine.file_table import FileTable, PartName
-from truepose.machine.quantity import (
+from truepose.files.file_table import FileTable, PartName
+from truepose.files.quantity import (
     Area,
     AxisStiffness,
     Expansion,

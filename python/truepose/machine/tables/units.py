@@ -10,10 +10,10 @@ from pydantic import Field, GetJsonSchemaHandler, create_model
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
-from truepose.machine.dimensions import DIMENSIONS
-from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import refuse
-from truepose.machine.units import FileUnit, QuantityError, shown_value, type_phrase, unit_of
+from truepose.files.dimensions import DIMENSIONS
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import refuse
+from truepose.files.units import FileUnit, QuantityError, shown_value, type_phrase, unit_of
 
 
 @dataclass(frozen=True)

@@ -17,17 +17,10 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
-from truepose.machine.dimensions import FREEDOMS
-from truepose.machine.file_table import FileTable
-from truepose.machine.quantity import (
-    Angle,
-    Length,
-    PositiveAngle,
-    PositiveLength,
-    list_of,
-    refuse,
-)
-from truepose.machine.units import shown_value, type_phrase
+from truepose.files.dimensions import FREEDOMS
+from truepose.files.file_table import FileTable
+from truepose.files.quantity import Angle, Length, PositiveAngle, PositiveLength, list_of, refuse
+from truepose.files.units import shown_value, type_phrase
 
 
 def _range(value: Any, read: ValidatorFunctionWrapHandler) -> tuple[float, float, int]:

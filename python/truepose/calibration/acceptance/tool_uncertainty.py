@@ -1,0 +1,207 @@
+"""What the machine's unknowns do at the tool over the workspace, and how well it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from truepose.arrays import Flags, Floats
+from truepose.calibration.acceptance.observability import Spread, decomposed
+
+POSITION = "xyz"
+ROTATION = "abc"
+SLIGHT = 1e-3
+"""Of the largest effect at the tool of any unknown, by columns of length one: smaller is none."""
+
+
+@dataclass(frozen=True, eq=False)
+class AtTool:
+    """Standard uncertainty of the tool, base frame, m and rad, inf where it is not determined.
+
+    `standard` (n_pose, n_component); `position` and `rotation` (n_pose,): square roots of the sums
+    of the squares of their components.
+    """
+
+    components: tuple[str, ...]
+    standard: Floats
+    position: Floats
+    rotation: Floats
+
+    @property
+    def position_max(self) -> float:
+        """At the worst pose, m."""
+        return float(self.position.max(initial=0.0))
+
+    @property
+    def rotation_max(self) -> float:
+        """At the worst pose, rad."""
+        return float(self.rotation.max(initial=0.0))
+
+    @property
+    def position_rms(self) -> float:
+        """Root mean square over the poses, m."""
+        return _rms(self.position)
+
+
+@dataclass(frozen=True, eq=False)
+class Sorted:
+    """Directions (k, n) that rows do not see, by what they do at the tool.
+
+    `moving`: the tool moves. `gauge`: it moves as a rigid body over the whole workspace, together
+    with an instrument's unknown frame: the machine stands elsewhere, but is the same machine.
+    `harmless`: it does not move.
+    """
+
+    moving: Floats
+    gauge: Floats
+    harmless: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Tool:
+    """`effects` (n_pose, n_component, n): d(error of the tool)/d(unknown), base frame.
+
+    `positions` (n_pose, 3), m, or None. `length`: what a rotation is multiplied with to be compared
+    with a displacement, the root mean square distance of the positions from their middle.
+    """
+
+    components: tuple[str, ...]
+    effects: Floats
+    positions: Floats | None
+    length: float
+
+    @classmethod
+    def of(cls, effects: ArrayLike, components: Sequence[str], positions: ArrayLike | None) -> Tool:
+        """Raises `ValueError` for shapes that do not fit."""
+        found = np.asarray(effects, np.float64)
+        if found.ndim != 3 or found.shape[1] != len(components):
+            raise ValueError(
+                f"the tool's sensitivity has shape {found.shape}, "
+                f"expected (n_pose, {len(components)}, n_machine)"
+            )
+        where = None if positions is None else np.asarray(positions, np.float64)
+        if where is not None and where.shape != (found.shape[0], 3):
+            raise ValueError(
+                f"the positions have shape {where.shape}, expected ({found.shape[0]}, 3)"
+            )
+        length = 1.0
+        if where is not None and where.size:
+            length = _rms(np.linalg.norm(where - where.mean(axis=0), axis=1)) or 1.0
+        return cls(tuple(components), found, where, length)
+
+    @cached_property
+    def moved(self) -> Flags:
+        """(n,): unknowns that move the tool at all."""
+        found: Flags = np.any(self.effects != 0.0, axis=(0, 1))
+        return found
+
+    def uncertainty(self, root: Floats, open_directions: Floats) -> AtTool:
+        """Of a covariance root root^T, `root` (n, r), without limit in `open_directions` (k, n)."""
+        # As one product of matrices, which is many times faster than one for each pose.
+        n_pose, n_component, n = self.effects.shape
+        moved = self.effects.reshape(-1, n) @ root
+        standard: Floats = np.sqrt(np.einsum("ij,ij->i", moved, moved))
+        standard = standard.reshape(n_pose, n_component)
+        if len(open_directions):
+            effect = np.abs(self.effects @ open_directions.T)
+            largest = effect.max(axis=(0, 1), initial=0.0)
+            standard = np.where((effect > SLIGHT * largest).any(axis=2), np.inf, standard)
+        return AtTool(
+            self.components,
+            standard,
+            self._size(standard, POSITION),
+            self._size(standard, ROTATION),
+        )
+
+    def size_of(self, direction: Floats) -> float:
+        """Largest displacement (m) over the workspace that a direction (n,) makes."""
+        return float(self._size(self.effects @ direction, POSITION).max(initial=0.0))
+
+    def moves(self, direction: Floats, lengths: Floats) -> bool:
+        """Whether a direction (n,) does more than a slight part of what unknowns do.
+
+        `lengths` (n,): of the unknowns' columns.
+        """
+        effect = float(np.linalg.norm(self._flat @ direction))
+        return effect > SLIGHT * self._largest(lengths) * float(np.linalg.norm(direction * lengths))
+
+    def sort(self, open_directions: Spread, *, with_gauge: bool) -> Sorted:
+        """The null directions by what they do; `with_gauge`: there are unknowns of instruments."""
+        null = open_directions.null
+        flat = self._flat
+        none = np.zeros((0, flat.shape[1]))
+        if len(null) == 0:
+            return Sorted(none, none, none)
+        slight = SLIGHT * self._largest(open_directions.lengths)
+        harmless, rest = _split(flat @ null.T, null, slight)
+        if not with_gauge or self.positions is None or len(rest) == 0:
+            return Sorted(rest, none, harmless)
+        fields = self._rigid_fields()
+        effect = flat @ rest.T
+        gauge, moving = _split(effect - fields @ (fields.T @ effect), rest, slight)
+        return Sorted(moving, gauge, harmless)
+
+    def relative(self, gauge: Floats) -> Tool:
+        """The same without what the `gauge` directions (k, n) do."""
+        if len(gauge) == 0:
+            return self
+        flat = self._flat
+        basis, found, _ = np.linalg.svd(flat @ gauge.T, full_matrices=False)
+        basis = basis[:, found > SLIGHT * found.max(initial=0.0)]
+        left = flat - basis @ (basis.T @ flat)
+        effects = left.reshape(self.effects.shape) / self._weights()[:, np.newaxis]
+        return Tool(self.components, effects, self.positions, self.length)
+
+    def _weights(self) -> Floats:
+        return np.array([1.0 if each in POSITION else self.length for each in self.components])
+
+    @cached_property
+    def _flat(self) -> Floats:
+        """(n_pose n_component, n), rotations as lengths."""
+        weighted = self.effects * self._weights()[:, np.newaxis]
+        return weighted.reshape(-1, self.effects.shape[2])
+
+    @cached_property
+    def _sizes(self) -> Floats:
+        sizes: Floats = np.sqrt(np.einsum("ij,ij->j", self._flat, self._flat))
+        return sizes
+
+    def _largest(self, lengths: Floats) -> float:
+        return float((self._sizes / lengths).max(initial=0.0))
+
+    def _rigid_fields(self) -> Floats:
+        """Orthonormal basis of what moves of the whole machine do at the tool."""
+        assert self.positions is not None
+        n_pose = len(self.positions)
+        fields = np.zeros((n_pose, len(self.components), 6))
+        arms = self.positions - self.positions.mean(axis=0)
+        turns = np.cross(np.eye(3)[np.newaxis], arms[:, np.newaxis, :])  # (n_pose, axis, xyz)
+        for index, component in enumerate(self.components):
+            if component in POSITION:
+                axis = POSITION.index(component)
+                fields[:, index, axis] = 1.0
+                fields[:, index, 3:] = turns[:, :, axis]
+            else:
+                fields[:, index, 3 + ROTATION.index(component)] = self.length
+        basis, found, _ = np.linalg.svd(fields.reshape(-1, 6), full_matrices=False)
+        return np.asarray(basis[:, found > SLIGHT * found.max(initial=0.0)], np.float64)
+
+    def _size(self, values: Floats, components: str) -> Floats:
+        chosen = [index for index, each in enumerate(self.components) if each in components]
+        size: Floats = np.sqrt((values[:, chosen] ** 2).sum(axis=1))
+        return size
+
+
+def _split(effect: Floats, directions: Floats, slight: float) -> tuple[Floats, Floats]:
+    """`directions` (k, n) as those whose `effect` (N, k) is slight, and the others."""
+    sizes, right = decomposed(effect)
+    turned = right @ directions
+    return turned[sizes <= slight], turned[sizes > slight]
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else 0.0

@@ -1,0 +1,304 @@
+"""The form of a suspicion, and of the two ways in which one arises.
+
+A *mend* is a supposition: "if x and y were exchanged". It is made on a copy, judged, and never
+kept. A *look* reads a suspicion off the data without a supposition: "row 7 is there twice".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truepose.arrays import Floats, Indices
+from truepose.calibration.data_checks.nominal import Geometry, Setup
+from truepose.calibration.data_checks.placement import Free, Readings, settle
+from truepose.calibration.instruments._base import Instrument
+from truepose.calibration.observables import OBSERVABLES, UNITS
+
+if TYPE_CHECKING:
+    from truepose.calibration.measurements import Measurements
+    from truepose.machine import Machine
+
+
+ALLOWED = 3.0
+"""Residuals, in what tolerances at their ends and noise give together, above which data are wrong.
+
+Root mean square over an instrument. Tolerances at their ends are 1.7 standard deviations of a
+uniform band, so this is about five of them."""
+
+LESS = 5.0
+"""How many times smaller a mend must make the residual."""
+
+TRIMMED = 0.1
+"""Share of the largest residuals that does not count, before and after: outliers are not blunders
+of the whole set, and a few must not hide one."""
+
+REDUNDANT = 3
+"""Observations beyond the fitted unknowns below which no supposition is made. With fewer, data are
+called far off where they are twice as far off as others may be."""
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """What is suspected of the measurements. Nothing is repaired.
+
+    `code`: its kind; `sentence`: for people; `instrument`: its name, "" for all; `where`: columns;
+    `rows`: indices of the measurements' rows, and their `lines` in the file, where not all are
+    meant. `before`, `after`: rms of what was read less what the nominal machine would show, SI
+    `unit`, as the data are and as they would be with the supposition; `factor` = before / after
+    (nan, where there is no supposition). `refuses`: whether a calibration from these data must not
+    be offered before someone has looked.
+    """
+
+    code: str
+    sentence: str
+    instrument: str = ""
+    where: tuple[str, ...] = ()
+    rows: tuple[int, ...] = ()
+    lines: tuple[int, ...] = ()
+    before: float = float("nan")
+    after: float = float("nan")
+    factor: float = float("nan")
+    unit: str = "m"
+    refuses: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """How far readings are from a machine.
+
+    `residual` (k,) SI; `quotients` (k,) residual over what is allowed; `column` (k,) number of the
+    column of each; `reach`: how far the machine moves what is read, in what is allowed.
+    """
+
+    residual: Floats
+    quotients: Floats
+    column: Indices
+    reach: float
+    setup: Setup
+    redundancy: int
+
+    def size(self, trimmed: bool = True) -> float:
+        """Root mean square of the quotients of the worst column, corrected for what was fitted.
+
+        NaN where nothing is redundant. One column alone tells: a wrong sign of one angle must not
+        drown in five good columns.
+        """
+        if self.redundancy < 1:
+            return float("nan")
+        worst = max(
+            _rms(self.quotients[self.column == each], trimmed) for each in np.unique(self.column)
+        )
+        return worst * math.sqrt(self.quotients.size / self.redundancy)
+
+
+def _rms(values: Floats, trimmed: bool) -> float:
+    count = values.size - (int(TRIMMED * values.size) if trimmed else 0)
+    return float(np.sqrt(np.mean(np.sort(np.abs(values))[:count] ** 2)))
+
+
+@dataclass(frozen=True, eq=False)
+class Mend:
+    """A supposition and how far the data are off under it.
+
+    `words`: what is supposed, "the readings x and y are exchanged"; `where`: the columns;
+    `kept`: the observations that take part, None: all; `trimmed`: whether outliers are left out;
+    `of_command`: whether it is what was commanded that would be wrong.
+    """
+
+    words: str
+    where: tuple[str, ...]
+    judged: Judged
+    kept: Indices | None = None
+    trimmed: bool = True
+    rows: tuple[int, ...] = ()
+    of_command: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """One measured column of an instrument: `at` (m,) its places among the observations."""
+
+    name: str
+    observable: int
+    strut: int
+    at: Indices
+
+    @property
+    def unit(self) -> str:
+        """Its SI unit."""
+        return UNITS[self.observable]
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One instrument's part of the measurements, against the nominal machine.
+
+    `at` (k,): its observations among the measurements'; `geometry`: of all rows; `readings`: what
+    it read, with `scale` (k,) what tolerances and noise allow.
+    """
+
+    machine: Machine
+    measurements: Measurements
+    instrument: Instrument
+    at: Indices
+    geometry: Geometry
+    readings: Readings
+
+    @cached_property
+    def as_given(self) -> Judged:
+        """How far the data are off as they are."""
+        return self.judge()
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """The measured columns, in the order of the observables."""
+        key = self.readings.observable * 100_000 + self.readings.strut
+        found = []
+        for each in np.unique(key):
+            at = np.flatnonzero(key == each)
+            observable = int(self.readings.observable[at[0]])
+            strut = int(self.readings.strut[at[0]])
+            found.append(Column(self._name(observable, strut), observable, strut, at))
+        return tuple(found)
+
+    def _name(self, observable: int, strut: int) -> str:
+        name = OBSERVABLES[observable]
+        return name if strut < 0 else f"strut.{self.machine.struts[strut].name}.{name}"
+
+    def column(self, observable: str) -> Column | None:
+        """The column of an observable that is of no strut."""
+        return next((each for each in self.columns if each.name == observable), None)
+
+    @cached_property
+    def rows(self) -> Indices:
+        """(m,) rows of the measurements in which it read something, in their order."""
+        return np.unique(self.readings.row)
+
+    @cached_property
+    def table(self) -> Indices | None:
+        """(m, n_column) places among the observations; None where rows differ in columns."""
+        counts = [column.at.size for column in self.columns]
+        if set(counts) != {self.rows.size}:
+            return None
+        by_row = [column.at[np.argsort(self.readings.row[column.at])] for column in self.columns]
+        return np.stack(by_row, axis=1)
+
+    def judge(
+        self,
+        value: Floats | None = None,
+        geometry: Geometry | None = None,
+        kept: Indices | None = None,
+        free: Free | None = None,
+    ) -> Judged:
+        """How far other values, other poses, a part of the data or a freer instrument are off."""
+        readings = self.readings
+        if value is not None:
+            readings = Readings(
+                readings.row, readings.observable, readings.strut, value, readings.scale
+            )
+        if kept is not None:
+            readings = readings.kept(kept)
+        place = self.geometry if geometry is None else geometry
+        supposed = value is not None or geometry is not None
+        setup, residual, fitted = settle(
+            place,
+            self.instrument,
+            readings,
+            free or Free.stated(self.instrument),
+            roughly=supposed,
+        )
+        column = readings.observable * 100_000 + readings.strut
+        shown = (readings.value - residual) / readings.scale
+        reach = math.sqrt(sum(float(np.var(shown[column == each])) for each in np.unique(column)))
+        redundancy = residual.size - fitted
+        return Judged(residual, residual / readings.scale, column, reach, setup, redundancy)
+
+    def rms(self, judged: Judged, mend: Mend, unit: str) -> float:
+        """Of the residuals of one SI unit, of those observations that a mend keeps."""
+        observable = self.readings.observable
+        residual = judged.residual
+        if mend.kept is not None:
+            observable = observable[mend.kept]
+            if residual.size != observable.size:
+                residual = residual[mend.kept]
+        mine = residual[np.isin(observable, [i for i, u in enumerate(UNITS) if u == unit])]
+        return _rms(mine, mend.trimmed) if mine.size else 0.0
+
+    def moved(self, joints: Floats) -> Geometry | None:
+        """Where the nominal machine would be at other joints (n_row, n_joint); None: nowhere."""
+        kernel = self.machine.kernel
+        poses, _ = kernel.forward(joints, status=True)
+        if not np.isfinite(poses).all():
+            return None
+        placements = kernel.placement_of(poses)
+        return Geometry.of(self.machine, joints, placements)
+
+    def commanded(self, poses: Floats) -> Geometry | None:
+        """Where it would be at other commanded poses (n_row, n_commanded); None: not reached."""
+        joints, placements, status = self.machine.kernel.place(poses)
+        if (status > 1).any():  # out of travel is a place, though not a good one
+            return None
+        return Geometry.of(self.machine, joints, placements)
+
+    @cached_property
+    def poses(self) -> Floats:
+        """(n_row, n_commanded) the commanded poses, as the nominal machine has them."""
+        at = [self.machine.dof.index(freedom) for freedom in self.machine.commanded]
+        poses: Floats = self.machine.kernel.pose_of(self.measurements.placements)[:, at]
+        return poses
+
+    def lines(self, rows: Iterable[int]) -> tuple[int, ...]:
+        """Their lines in the file; empty where there is none."""
+        lines = tuple(int(self.measurements.lines[row]) for row in rows)
+        return lines if all(lines) else ()
+
+    def named_rows(self, rows: Iterable[int]) -> str:
+        """Rows for people, "rows 3 and 7", from 1, or their lines where there is a file."""
+        given = [int(row) for row in rows]
+        lines = self.lines(given)
+        word = "line" if lines else "row"
+        numbers = [str(each) for each in (lines or [row + 1 for row in given])]
+        shown = numbers[:6] + ([f"{len(numbers) - 6} more"] if len(numbers) > 6 else [])
+        return f"{word}{'s' if len(numbers) > 1 else ''} {listed(shown)}"
+
+    def amount(self, value: float, unit: str) -> str:
+        """For people, in the machine file's unit: "0.12 mm"."""
+        if unit == "1":
+            return f"{value:.3g}"
+        declared = self.machine.file_units["length" if unit == "m" else "angle"]
+        return f"{float(declared.to_file(value)):.3g} {declared.label}"
+
+
+def listed(words: Iterable[str]) -> str:
+    """Words in a row: "a, b and c"."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+@dataclass(frozen=True)
+class OfMend:
+    """A registry's line: a kind of blunder that a supposition shows.
+
+    `suppose(view)` yields what to try; `free`: it has numbers of its own to fit, and is asked only
+    where none of those without explains the data.
+    """
+
+    code: str
+    doc: str
+    suppose: Callable[[View], Iterator[Mend]]
+    free: bool = False
+
+
+@dataclass(frozen=True)
+class OfLook:
+    """A registry's line: a kind of fault that shows in the data as such."""
+
+    code: str
+    doc: str
+    look: Callable[[View], Iterator[Suspicion]]

@@ -1,0 +1,152 @@
+"""How far readings may be from the nominal machine's: by tolerances, other sources and noise."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from truepose.arrays import Floats
+from truepose.calibration.data_checks.nominal import (
+    DIRECTION,
+    LENGTH,
+    A,
+    Geometry,
+    nominal_readings,
+)
+from truepose.calibration.data_checks.placement import difference
+from truepose.calibration.measurements import Measurements
+from truepose.calibration.observables import UNITS
+from truepose.machine import Machine
+from truepose.sources import Block, Deviation, acting
+from truepose.sources.tolerance import Tolerance
+
+MACHINES = 24
+"""Machines that are drawn, each tolerance at one of its ends: the spread is known to a seventh."""
+
+TAKEN = 5e-3
+"""Where a file states no tolerance: this share of the machine's size, and this angle in rad."""
+
+
+def allowance(machine: Machine, measurements: Measurements, geometry: Geometry) -> Floats:
+    """(n_observation,) SI: root of the sum of squares of what each cause may do to a reading.
+
+    Tolerances by machines drawn at the ends of their bands and solved, so that a reading of a strut
+    counts with its own length. Coordinates of one row share one number, and so do angles and
+    directions, because an unknown frame may turn one into another.
+    """
+    spread = _by_tolerance(machine, measurements, geometry)
+    linear, angular, own = _by_others(machine, measurements)
+    row, observable = measurements.row, measurements.observable
+    size = _size(machine, geometry)
+    others = np.select(
+        [observable == LENGTH, np.array([unit == "m" for unit in UNITS])[observable]],
+        [np.hypot(linear, own)[row], linear[row]],
+        np.hypot(angular, linear / size)[row],
+    )
+    allowed: Floats = np.sqrt(spread**2 + others**2 + measurements.uncertainty**2)
+    return allowed
+
+
+def _size(machine: Machine, geometry: Geometry) -> float:
+    """Of the machine, m: its longest strut and the reach of its tool, whichever is more."""
+    along = geometry.centres[:, :, 1] - geometry.centres[:, :, 0]
+    reach = np.ptp(geometry.points, axis=0)
+    return float(max(np.linalg.norm(along, axis=2).max(), np.linalg.norm(reach)))
+
+
+def _bands(machine: Machine) -> Deviation | None:
+    found = [source for source in machine.sources if isinstance(source, Tolerance)]
+    return found[0].bands if found else None
+
+
+def _by_tolerance(machine: Machine, measurements: Measurements, geometry: Geometry) -> Floats:
+    bands = _bands(machine)
+    unit = np.array(UNITS)[measurements.observable]
+    taken = np.where(unit == "m", TAKEN * _size(machine, geometry), TAKEN)
+    if bands is None:
+        return taken
+    nominal = nominal_readings(machine, measurements, geometry=geometry)
+    ends = np.random.default_rng(0).choice([-1.0, 1.0], (MACHINES, bands.n_variable))
+    start = machine.kernel.pose_of(measurements.placements)
+    squares = []
+    for signs in ends:
+        moved = np.zeros(len(machine.parameters))
+        np.add.at(
+            moved, bands.parameters, (bands.shift + bands.signed_half * signs[bands.variables])[0]
+        )
+        columns = np.unique(bands.parameters)
+        values = machine.nominal + moved
+        kernel = machine.kernel.replace(
+            {machine.parameters[column]: float(values[column]) for column in columns}
+        )
+        poses, _ = kernel.forward(measurements.joints, start, status=True)
+        placements = kernel.placement_of(poses)
+        centres = kernel.joint_centres(measurements.joints, placements)
+        drawn = Geometry.of(machine, measurements.joints, placements)
+        drawn = Geometry(drawn.points, drawn.rotations, centres)
+        gap = nominal_readings(machine, measurements, geometry=drawn)
+        squares.append(difference(measurements.observable, gap, nominal) ** 2)
+    found = np.stack(squares)
+    solved = np.isfinite(found)
+    # Where no drawn machine could be solved, as near a singularity: as if no tolerance were given.
+    mean = np.where(solved, found, 0.0).sum(axis=0) / np.maximum(solved.sum(axis=0), 1)
+    return _shared(measurements, np.where(solved.any(axis=0), mean, taken**2))
+
+
+def _shared(measurements: Measurements, squares: Floats) -> Floats:
+    """(n_observation,) roots, with one mean for the coordinates, angles, directions of a row."""
+    observable = measurements.observable
+    family = np.select(
+        [
+            observable < A,
+            observable < A + 3,
+            (observable >= DIRECTION) & (observable < DIRECTION + 3),
+        ],
+        [0, 1, 2],
+        3 + np.arange(observable.size),
+    )
+    key = np.stack([measurements.row, family, measurements.strut], axis=1)
+    _, which = np.unique(key, axis=0, return_inverse=True)
+    which = which.ravel()
+    mean = np.bincount(which, squares) / np.bincount(which)
+    roots: Floats = np.sqrt(mean[which])
+    return roots
+
+
+def _by_others(machine: Machine, measurements: Measurements) -> tuple[Floats, Floats, Floats]:
+    """What sources other than tolerances do: (n_row,) m and rad at the tool, m to struts' lengths.
+
+    What they know of the rows' temperatures and loads, and the half bands of what they do not; to a
+    length in itself as much as to any parameter of that unit.
+    """
+    linear, angular, own = np.zeros((3, measurements.n_row))
+    at = [machine.dof.index(freedom) for freedom in machine.commanded]
+    poses = machine.kernel.pose_of(measurements.placements)[:, at]
+    moves = np.array([component in "xyz" for component in machine.components])
+    metres = np.array([unit == "m" for unit in machine.units])
+    number = {id(condition): condition for condition in measurements.conditions}
+    which = np.array([id(condition) for condition in measurements.conditions])
+    for key, condition in number.items():
+        rows = np.flatnonzero(which == key)
+        joints, placements = measurements.joints[rows], measurements.placements[rows]
+        block = Block(machine, condition, poses[rows], np.arange(rows.size), joints, placements)
+        known = np.zeros((rows.size, moves.size))
+        squares = np.zeros((rows.size, moves.size))
+        for source in acting(machine, condition):
+            if isinstance(source, Tolerance):
+                continue
+            moved = source.deviation(machine, condition, block)
+            if not moved.parameters.size:
+                continue
+            slope, _ = machine.kernel.sensitivity_at(joints, placements, moved.parameters)
+            slope = np.nan_to_num(slope)
+            shift = np.broadcast_to(moved.shift, (rows.size, moved.parameters.size))
+            half = np.broadcast_to(moved.half, shift.shape)
+            known += np.einsum("nik,nk->ni", slope, shift)
+            squares += np.einsum("nik,nk->ni", slope**2, half**2)
+            lengths = metres[moved.parameters]
+            if lengths.any():
+                own[rows] += (np.abs(shift) + half)[:, lengths].max(axis=1)
+        total = known**2 + squares
+        linear[rows] = np.sqrt(total[:, moves].sum(axis=1))
+        angular[rows] = np.sqrt(total[:, ~moves].sum(axis=1))
+    return linear, angular, own

@@ -1,0 +1,27 @@
+"""An axis that points the other way: coordinates of a left-handed frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from truepose.calibration.data_checks._base import Mend, OfMend, View
+
+_COORDINATES = ("x", "y", "z", "direction.x", "direction.y", "direction.z")
+
+
+def suppose(view: View) -> Iterator[Mend]:
+    """One coordinate, in all its columns, of the other sign."""
+    for observable in _COORDINATES:
+        columns = [
+            c for c in view.columns if c.name == observable or c.name.endswith(f".{observable}")
+        ]
+        if not columns:
+            continue
+        value = view.readings.value.copy()
+        for column in columns:
+            value[column.at] *= -1.0
+        words = f"the {observable[-1]} axis points the other way (a left-handed frame)"
+        yield Mend(words, tuple(column.name for column in columns), view.judge(value))
+
+
+KIND = OfMend("flipped-axis", "one axis points the other way", suppose)

@@ -1,0 +1,173 @@
+"""What the instruments would read of the machine as its file has it, in closed form.
+
+The commanded joints give the platform's pose (already solved in `Measurements.placements`) and the
+joint centres; everything an instrument reads follows from those and from its frame and target:
+
+    P = p + R t,  y = F^T (P - o),  A = F^T R
+
+with the tool point p and rotation R of the platform, the target t in its axes, the frame's origin
+o and rotation F (frame axes to base axes).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.arrays import Floats, Indices
+from truepose.calibration.identification.frames import rotation_matrix
+from truepose.calibration.instruments._base import Frame, Instrument
+from truepose.calibration.measurements import Measurements
+from truepose.calibration.observables import OBSERVABLES
+from truepose.machine import Machine
+from truepose.sources.pose_block import rotations_of
+
+X, A, DISTANCE, LENGTH, DIRECTION, ANGLE = (
+    OBSERVABLES.index(name) for name in ("x", "a", "distance", "length", "direction.x", "angle")
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Where platform and struts are, row by row, base frame.
+
+    `points` (n, 3) tool point, m; `rotations` (n, 3, 3) platform axes to base axes; `centres`
+    (n, n_strut, 2, 3) base-side and platform-side joint centres, m.
+    """
+
+    points: Floats
+    rotations: Floats
+    centres: Floats
+
+    @classmethod
+    def of(cls, machine: Machine, joints: Floats, placements: Floats) -> Geometry:
+        """Of joints (n, n_joint) and the placements (n, 7) that they lead to."""
+        centres = machine.kernel.joint_centres(joints, placements)
+        return cls(placements[:, :3], rotations_of(placements), centres)
+
+    def rows(self, rows: Indices) -> Geometry:
+        """These rows only."""
+        return Geometry(self.points[rows], self.rotations[rows], self.centres[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """Where an instrument stands: frame `origin` (3,), m, `rotation` (3, 3), `target` (3,), m."""
+
+    origin: Floats
+    rotation: Floats
+    target: Floats
+
+    @classmethod
+    def stated(cls, instrument: Instrument) -> Setup:
+        """As the measurements declare it; where something is unknown, where its search starts."""
+        frame: Frame = instrument.frame
+        rotation = rotation_matrix(frame.rotation)
+        return cls(np.array(frame.origin), rotation, np.array(instrument.target))
+
+
+def read(
+    geometry: Geometry,
+    instrument: Instrument,
+    setup: Setup,
+    row: Indices,
+    observable: Indices,
+    strut: Indices,
+) -> Floats:
+    """(k,) what one instrument reads: observation k is of row `row[k]` of the geometry; SI."""
+    value: Floats = np.empty(row.size)
+    turned = geometry.rotations
+    from_origin = geometry.points + turned @ setup.target - setup.origin
+    of_point = (observable < A) | (observable == DISTANCE)
+    if of_point.any():
+        seen = from_origin @ setup.rotation
+        table = np.column_stack([seen, np.linalg.norm(seen, axis=1)])
+        column = np.where(observable == DISTANCE, 3, observable)
+        value[of_point] = table[row[of_point], column[of_point]]
+    of_angle = (observable >= A) & (observable < DISTANCE)
+    if of_angle.any():
+        angles = angles_of(setup.rotation.T @ turned)
+        value[of_angle] = angles[row[of_angle], observable[of_angle] - A]
+    of_strut = observable >= LENGTH
+    if of_strut.any():
+        value[of_strut] = _of_struts(
+            geometry, instrument, setup, row[of_strut], observable[of_strut], strut[of_strut]
+        )
+    return value
+
+
+def _of_struts(
+    geometry: Geometry,
+    instrument: Instrument,
+    setup: Setup,
+    row: Indices,
+    observable: Indices,
+    strut: Indices,
+) -> Floats:
+    ends = geometry.centres[row, strut]
+    along = ends[:, 1] - ends[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    value: Floats = length.copy()
+    direction = along / length[:, np.newaxis]
+    framed = direction @ setup.rotation
+    of_direction = (observable >= DIRECTION) & (observable < ANGLE)
+    value[of_direction] = framed[of_direction, observable[of_direction] - DIRECTION]
+    of_turn = observable == ANGLE
+    if of_turn.any():
+        # Seen from the platform, a direction turns back with it: R^T d.
+        own = np.einsum("kji,kj->ki", geometry.rotations[row], direction)
+        seen = (own if instrument.end == "platform" else framed)[of_turn]
+        zero = np.array(instrument.zero)
+        across = np.cross(np.array(instrument.axis), zero)
+        value[of_turn] = np.arctan2(seen @ across, seen @ zero)
+    return value
+
+
+def nominal_readings(
+    machine: Machine,
+    measurements: Measurements,
+    setups: Sequence[Setup] | None = None,
+    geometry: Geometry | None = None,
+) -> Floats:
+    """(n_observation,) what the instruments read of the nominal machine, SI, at the joints given.
+
+    Each instrument stands where it is stated to, or as in `setups`; what is unknown of it counts as
+    its start. Biases count as zero. Raises nothing: a row that is not placed gives NaN.
+    """
+    if geometry is None:
+        geometry = Geometry.of(machine, measurements.joints, measurements.placements)
+    value = np.empty(measurements.n_observation)
+    of = measurements.instrument[measurements.row]
+    for index, instrument in enumerate(measurements.instruments):
+        mine = np.flatnonzero(of == index)
+        setup = Setup.stated(instrument) if setups is None else setups[index]
+        value[mine] = read(
+            geometry,
+            instrument,
+            setup,
+            measurements.row[mine],
+            measurements.observable[mine],
+            measurements.strut[mine],
+        )
+    return value
+
+
+def angles_of(rotations: Floats) -> Floats:
+    """(n, 3) angles a b c of rotations (n, 3, 3), R = Rz(c) Ry(b) Rx(a), |b| at most pi/2."""
+    a = np.arctan2(rotations[:, 2, 1], rotations[:, 2, 2])
+    b = np.arctan2(-rotations[:, 2, 0], np.hypot(rotations[:, 0, 0], rotations[:, 1, 0]))
+    c = np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0])
+    return np.column_stack([a, b, c])
+
+
+def turned(vector: Floats) -> Floats:
+    """(3, 3) rotation of a rotation vector (3,), rad (Rodrigues)."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    rotation: Floats = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
+    return rotation

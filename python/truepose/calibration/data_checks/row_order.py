@@ -1,0 +1,51 @@
+"""Readings that belong to other rows: all one row too early or too late, or some exchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from truepose.calibration.data_checks._base import Mend, OfMend, View
+
+
+def suppose_shifted(view: View) -> Iterator[Mend]:
+    """Every reading one row later or earlier than it stands; the row without one is left out."""
+    table = view.table
+    if table is None or len(table) < 4:
+        return
+    for early, words in ((0, "one row too late"), (1, "one row too early")):
+        # Reading of row i + 1 belongs to row i, or the reverse.
+        into, out = (table[:-1], table[1:]) if early == 0 else (table[1:], table[:-1])
+        value = view.readings.value.copy()
+        value[into] = view.readings.value[out]
+        kept = np.sort(into.ravel())
+        said = f"the readings stand {words} beside what was commanded"
+        yield Mend(said, tuple(c.name for c in view.columns), view.judge(value, kept=kept), kept)
+
+
+def suppose_exchanged(view: View) -> Iterator[Mend]:
+    """Each row given the readings that lie nearest to what it should show, if none is given twice.
+
+    An outlier has no row of its own that it would fit better, so that it is no exchange.
+    """
+    table = view.table
+    if table is None or len(table) < 4:
+        return
+    expected = (view.readings.value - view.as_given.residual)[table]
+    scale, value = view.readings.scale[table], view.readings.value[table]
+    gaps = (value[np.newaxis] - expected[:, np.newaxis]) / scale[:, np.newaxis]
+    nearest = (gaps**2).sum(axis=2).argmin(axis=1)
+    moved = np.flatnonzero(nearest != np.arange(len(table)))
+    if not moved.size or np.unique(nearest).size != len(table):
+        return
+    mended = view.readings.value.copy()
+    mended[table] = value[nearest]
+    rows = tuple(view.rows[moved].tolist())
+    words = f"the readings of {view.named_rows(rows)} stand in each other's place"
+    where = tuple(column.name for column in view.columns)
+    yield Mend(words, where, view.judge(mended), trimmed=False, rows=rows)
+
+
+SHIFTED = OfMend("shifted-rows", "readings stand one row beside their commands", suppose_shifted)
+EXCHANGED = OfMend("exchanged-rows", "readings stand in other rows", suppose_exchanged)

@@ -1,0 +1,79 @@
+"""Columns in each other's place: x for y, one strut for another, one joint for another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations, permutations
+
+import numpy as np
+
+from truepose.calibration.data_checks._base import Column, Mend, OfMend, View, listed
+
+FAMILIES = (("x", "y", "z"), ("a", "b", "c"))
+"""Columns whose exchange is no wonder; those of struts go by what they measure."""
+
+
+def suppose(view: View) -> Iterator[Mend]:
+    """Measured columns of one family in another order; two joints; two commanded freedoms."""
+    for family in FAMILIES:
+        yield from _reordered(view, [c for c in view.columns if c.name in family])
+    of_strut: dict[int, list[Column]] = {}
+    for column in view.columns:
+        if column.strut >= 0:
+            of_strut.setdefault(column.strut, []).append(column)
+    for one, other in combinations(of_strut.values(), 2):
+        if [c.observable for c in one] == [c.observable for c in other]:
+            count = len(one)
+            order = [*range(count, 2 * count), *range(count)]
+            yield from _exchanged(view, [*one, *other], order)
+    yield from _joints(view)
+    yield from _commands(view)
+
+
+def _reordered(view: View, columns: Sequence[Column]) -> Iterator[Mend]:
+    for order in permutations(range(len(columns))):
+        if order != tuple(range(len(columns))):
+            yield from _exchanged(view, columns, order)
+
+
+def _exchanged(view: View, columns: Sequence[Column], order: Sequence[int]) -> Iterator[Mend]:
+    moved = [(a, columns[order[k]]) for k, a in enumerate(columns) if order[k] != k]
+    if len({column.at.size for pair in moved for column in pair}) != 1:
+        return
+    value = view.readings.value.copy()
+    for into, out in moved:
+        at = into.at[np.argsort(view.readings.row[into.at])]
+        of = out.at[np.argsort(view.readings.row[out.at])]
+        value[at] = view.readings.value[of]
+    names = tuple(column.name for column, _ in moved)
+    words = f"the readings {listed(names)} stand in each other's place"
+    yield Mend(words, names, view.judge(value))
+
+
+def _joints(view: View) -> Iterator[Mend]:
+    names = view.machine.joints
+    for i, j in combinations(range(len(names)), 2):
+        joints = view.measurements.joints.copy()
+        joints[:, [i, j]] = joints[:, [j, i]]
+        geometry = view.moved(joints)
+        if geometry is not None:
+            where = (f"joint.{names[i]}", f"joint.{names[j]}")
+            words = f"the joints {names[i]} and {names[j]} stand in each other's place"
+            yield Mend(words, where, view.judge(geometry=geometry), of_command=True)
+
+
+def _commands(view: View) -> Iterator[Mend]:
+    freedoms = view.machine.commanded
+    for i, j in combinations(range(len(freedoms)), 2):
+        if (freedoms[i] in "xyz") != (freedoms[j] in "xyz"):
+            continue
+        poses = view.poses.copy()
+        poses[:, [i, j]] = poses[:, [j, i]]
+        geometry = view.commanded(poses)
+        if geometry is not None:
+            where = (f"command.{freedoms[i]}", f"command.{freedoms[j]}")
+            words = f"the commands {freedoms[i]} and {freedoms[j]} stand in each other's place"
+            yield Mend(words, where, view.judge(geometry=geometry), of_command=True)
+
+
+KIND = OfMend("swapped-columns", "two or three columns stand in each other's place", suppose)

@@ -1,0 +1,96 @@
+"""A wrong unit: lengths by a power of ten or by the inch, angles in degrees for radians."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from truepose.arrays import Floats, Indices
+from truepose.calibration.data_checks._base import Column, Mend, OfMend, View, listed
+
+LENGTHS = ((10.0, "10"), (25.4, "25.4, the inch"), (100.0, "100"), (1000.0, "1000"))
+ANGLES = ((180.0 / math.pi, "180/pi"),)
+
+
+def suppose_length(view: View) -> Iterator[Mend]:
+    """All lengths, or one column, too large or too small by a factor; so the commands."""
+    yield from _measured(view, [c for c in view.columns if c.unit == "m"], LENGTHS)
+    yield from _commanded(view, "m", LENGTHS)
+
+
+def suppose_angle(view: View) -> Iterator[Mend]:
+    """Degrees declared as radians, or radians as degrees, in angles read or commanded."""
+    yield from _measured(view, [c for c in view.columns if c.unit == "rad"], ANGLES)
+    yield from _commanded(view, "rad", ANGLES)
+
+
+def _factors(factors: Sequence[tuple[float, str]]) -> Iterator[tuple[float, str]]:
+    for factor, word in factors:
+        yield factor, f"too large by a factor {word}"
+        yield 1.0 / factor, f"too small by a factor {word}"
+
+
+def _measured(
+    view: View, columns: Sequence[Column], factors: Sequence[tuple[float, str]]
+) -> Iterator[Mend]:
+    if not columns:
+        return
+    sets = [columns, *([column] for column in columns if len(columns) > 1)]
+    for chosen in sets:
+        names = tuple(column.name for column in chosen)
+        at = np.concatenate([column.at for column in chosen])
+        for factor, word in _factors(factors):
+            value = view.readings.value.copy()
+            if factor > 1.0 and chosen[0].unit == "rad":
+                value[at] = _unwrapped(view, at, factor)
+            value[at] /= factor
+            are = "are" if len(names) > 1 else "is"
+            yield Mend(f"{listed(names)} {are} {word}", names, view.judge(value))
+
+
+def _unwrapped(view: View, at: Indices, factor: float) -> Floats:
+    """Angles that were read a factor too large: how many turns were taken off them is not known.
+
+    The number of turns that comes nearest to what is expected is put back.
+    """
+    value = view.readings.value[at]
+    expected = value - view.as_given.residual[at]
+    turns = np.round((factor * expected - value) / (2.0 * math.pi))
+    unwrapped: Floats = value + 2.0 * math.pi * turns
+    return unwrapped
+
+
+def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> Iterator[Mend]:
+    machine, joints = view.machine, view.measurements.joints
+    parameters = machine.parameters
+    # A drive's coordinate has the unit of its offset.
+    mine = [
+        k
+        for k, name in enumerate(machine.joints)
+        if machine.units[parameters.index(f"drive.{name}.offset")] == unit
+    ]
+    freedoms = [k for k, name in enumerate(machine.commanded) if (name in "xyz") == (unit == "m")]
+    for factor, word in _factors(factors):
+        if mine:
+            moved = joints.copy()
+            moved[:, mine] /= factor
+            geometry = view.moved(moved)
+            if geometry is not None:
+                where = tuple(f"joint.{machine.joints[k]}" for k in mine)
+                yield Mend(
+                    f"the joints are {word}", where, view.judge(geometry=geometry), of_command=True
+                )
+        if freedoms:
+            poses = view.poses.copy()
+            poses[:, freedoms] /= factor
+            geometry = view.commanded(poses)
+            if geometry is not None:
+                where = tuple(f"command.{machine.commanded[k]}" for k in freedoms)
+                words = f"the commands {listed(machine.commanded[k] for k in freedoms)} are {word}"
+                yield Mend(words, where, view.judge(geometry=geometry), of_command=True)
+
+
+LENGTH = OfMend("wrong-unit", "lengths in another unit than declared", suppose_length)
+ANGLE = OfMend("degrees-radians", "degrees for radians, or the reverse", suppose_angle)

@@ -1,0 +1,400 @@
+"""A file of measurements -> `Measurements`; `docs/measurements.md` describes the form for users.
+
+#: [instrument.tracker]
+#: kind = "position"
+#: frame = "unknown"
+#: uncertainty = "10 um"
+command.x (mm), command.y (mm), x (mm),   y (mm)
+0,              200,            1310.252, 640.108
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from truepose.arrays import Floats, Indices
+from truepose.calibration.instruments import REGISTRY
+from truepose.calibration.measurements.declarations import (
+    Header,
+    read_header,
+    reserved_names,
+    separated,
+)
+from truepose.calibration.measurements.measurements import Measurements
+from truepose.calibration.measurements.rows import (
+    UNCERTAINTY,
+    WRENCH,
+    Rows,
+    measurements_in,
+    reading_columns,
+)
+from truepose.errors import MachineFileError, Problem, RequestError
+from truepose.files.data_file import Column, DataTable, ReadTable, cut_short, read_table
+from truepose.files.dimensions import FREEDOMS
+from truepose.files.text_file import FileKind, read_text
+from truepose.files.wording import did_you_mean, one_of
+from truepose.machine import Machine
+from truepose.machine.condition import DEFAULT_PART
+
+INSTRUMENT, SET, ID = "instrument", "set", "id"
+FIT, CHECK = "fit", "check"
+
+_KIND = FileKind("a file of measurements (CSV)", ".csv")
+
+_OF_MACHINE = {
+    "joint.": "joints",
+    "command.": "freedoms that can be commanded",
+    "strut.": "struts",
+}
+"""Beginnings of columns that name something of the machine, and what."""
+
+
+def read_measurements(path: str | Path, machine: Machine) -> Measurements:
+    """The measurements in a file, of this machine.
+
+    Raises `RequestError` with every problem of the file, each with its line: what is no table, what
+    is not declared, a reading that the machine or the instrument cannot have.
+    """
+    file = str(path)
+    try:
+        content, text = read_text(Path(path), _KIND)
+    except MachineFileError as error:
+        raise RequestError(*error.problems) from None
+    head, csv_text = separated(text)
+    header = read_header(head, file, Path(path).name, reserved_names(machine))
+    read = read_table(file, Path(path).name, csv_text, _columns(machine))
+    reading = _Reading(machine, header, read, file)
+    measurements = reading.measurements()
+    problems = cut_short(dict.fromkeys(reading.problems))
+    if problems:
+        problems.sort(key=lambda problem: (problem.line is None, problem.line or 0))
+        raise RequestError(*problems)
+    assert measurements is not None
+    return dataclasses.replace(
+        measurements, file=Path(path).name, file_hash=hashlib.sha256(content).hexdigest()
+    )
+
+
+def _columns(machine: Machine) -> list[Column]:
+    """Every column that a file of measurements of the machine may have."""
+
+    def may(name: str, dimension: str | None, words: tuple[str, ...] = ()) -> Column:
+        return Column(name, dimension, required=False, words=words, blank=True)
+
+    columns = [Column(INSTRUMENT, None, required=False)]
+    columns += [
+        Column(f"command.{each}", FREEDOMS[each], required=False) for each in machine.commanded
+    ]
+    columns += [
+        Column(f"joint.{drive.name}", drive.coordinate, required=False) for drive in machine.drives
+    ]
+    for name, reading in reading_columns(machine).items():
+        columns += [may(name, reading.dimension), may(name + UNCERTAINTY, reading.dimension)]
+    columns += [may(f"temperature.{part}", "temperature") for part in _parts(machine)]
+    columns += [may(name, dimension) for name, dimension in WRENCH.items()]
+    return [*columns, may(SET, None, (FIT, CHECK)), may(ID, None)]
+
+
+def _parts(machine: Machine) -> tuple[str, ...]:
+    return (DEFAULT_PART, *machine.parts)
+
+
+@dataclass
+class _Reading:
+    """One file on its way to measurements; every problem of it is collected."""
+
+    machine: Machine
+    header: Header
+    read: ReadTable
+    file: str
+    problems: list[Problem] = field(default_factory=list)
+
+    def measurements(self) -> Measurements | None:
+        """The measurements, as far as problems let them be made."""
+        self.problems += self.header.problems
+        self.problems += self._of_this_machine(self.read.problems)
+        self._check_machine()
+        self._check_declared()
+        table = self.read.table
+        if table is None:
+            return None
+        self._check_columns(table)
+        codes = {problem.code for problem in self.problems}
+        if not table.n_row or "nothing-measured" in codes:
+            return None
+        commands = self._stacked(table, "command.", self.machine.commanded)
+        joints = self._stacked(table, "joint.", self.machine.joints)
+        readings = reading_columns(self.machine)
+        rows = Rows(
+            instrument=self._instruments(table),
+            readings={name: table.numbers[name] for name in table.columns if name in readings},
+            uncertainties={
+                name: values for name, values in table.numbers.items() if name.endswith(UNCERTAINTY)
+            },
+            held_out=np.array([w == CHECK for w in table.texts.get(SET, ("",) * table.n_row)]),
+            lines=table.lines,
+            commands=commands if joints is None else None,
+            joints=joints,
+            temperatures={
+                part: table.numbers[f"temperature.{part}"]
+                for part in _parts(self.machine)
+                if f"temperature.{part}" in table.numbers
+            },
+            wrench={name: table.numbers[name] for name in WRENCH if name in table.numbers},
+            unreadable=self.read.unreadable,
+            whole=self.header.whole,
+        )
+        misnamed = not codes.isdisjoint(("unknown-column", "doubled-column", "other-machine"))
+        report = _Report(table, self.problems, misnamed)
+        return measurements_in(self.machine, self.header.instruments, rows, report)
+
+    def _of_this_machine(self, problems: Iterable[Problem]) -> Iterator[Problem]:
+        """Columns that name what the machine does not have are not misspelt: they are another's."""
+        strange: dict[str, list[Problem]] = {}
+        for problem in problems:
+            word = problem.path or ""
+            beginning = next((each for each in _OF_MACHINE if word.startswith(each)), None)
+            if problem.code != "unknown-column":
+                yield problem
+            elif beginning is not None and not self._knows(word):
+                strange.setdefault(beginning, []).append(problem)
+            elif word.startswith("temperature."):
+                part = word.removeprefix("temperature.")
+                yield replace(
+                    problem,
+                    code="unknown-part",
+                    message=f'{word}: the machine has no part "{part}"',
+                    expected=one_of(_parts(self.machine)),
+                    hint=did_you_mean(part, _parts(self.machine)),
+                )
+            else:
+                known = self._words_beside(word)
+                yield replace(problem, expected=one_of(known, limit=40))
+        for beginning, same in strange.items():
+            names = dict.fromkeys(_second(problem.path or "") for problem in same)
+            own = self._own(beginning)
+            near = next((hint for hint in (did_you_mean(n, own) for n in names) if hint), None)
+            yield Problem(
+                "other-machine",
+                f"the file is of a machine with other {_OF_MACHINE[beginning]}",
+                self.file,
+                same[0].line,
+                same[0].path,
+                found=", ".join(beginning + name for name in names),
+                expected=f"{', '.join(beginning + name for name in own)} of {self.machine.name}",
+                hint=near if len(names) == 1 else None,
+            )
+
+    def _own(self, beginning: str) -> tuple[str, ...]:
+        if beginning == "joint.":
+            return self.machine.joints
+        if beginning == "command.":
+            return self.machine.commanded
+        return tuple(strut.name for strut in self.machine.struts)
+
+    def _knows(self, column: str) -> bool:
+        """Whether the machine has the strut that a column names: then its end is misspelt."""
+        strut = column.partition(".")[2]
+        return column.startswith("strut.") and any(
+            strut.startswith(f"{each.name}.") for each in self.machine.struts
+        )
+
+    def _words_beside(self, column: str) -> list[str]:
+        """The columns that one that is not known may have been meant to be, in short."""
+        if column.startswith("strut."):
+            name = next(
+                (s.name for s in self.machine.struts if column.startswith(f"strut.{s.name}.")), "1"
+            )
+            return [each for each in reading_columns(self.machine) if f".{name}." in each]
+        return [
+            INSTRUMENT,
+            *(f"command.{each}" for each in self.machine.commanded),
+            *(f"joint.{each}" for each in self.machine.joints),
+            *(name for name, each in reading_columns(self.machine).items() if each.strut < 1),
+            "temperature.default",
+            *WRENCH,
+            SET,
+            ID,
+        ]
+
+    def _check_machine(self) -> None:
+        written = self.header.machine
+        if written is None or written == self.machine.name:
+            return
+        self.problems.append(
+            Problem(
+                "other-machine",
+                "the file is of another machine",
+                self.file,
+                self.header.machine_line,
+                "machine",
+                found=f'machine = "{written}"',
+                expected=f'machine = "{self.machine.name}", or no such line',
+            )
+        )
+
+    def _check_declared(self) -> None:
+        if self.header.declared or any(p.code == "not-toml" for p in self.header.problems):
+            return
+        if any(problem.path == "instrument" for problem in self.header.problems):
+            return
+        self.problems.append(
+            Problem(
+                "missing-key",
+                "the file declares no instrument",
+                self.file,
+                path="instrument",
+                found="no line #: [instrument.NAME]",
+                expected="kind, frame and uncertainty of an instrument in lines that begin with #:",
+                hint='such as "#: [instrument.tracker]", "#: kind = ...", "#: frame = ..."',
+            )
+        )
+
+    def _check_columns(self, table: DataTable) -> None:
+        """Whether there are columns of commands or joints, and of readings."""
+        strange = {p.path for p in self.problems if p.code == "other-machine"}
+        unknown = any(p.code in ("unknown-column", "unknown-part") for p in self.problems)
+        columns = table.columns
+        given = [
+            beginning
+            for beginning in ("command.", "joint.")
+            if any(each.startswith(beginning) for each in columns)
+            or any(each and each.startswith(beginning) for each in strange)
+        ]
+        if len(given) > 1:
+            self._tell(
+                "excluding-columns",
+                "the file has both joints and commanded poses",
+                found=", ".join(e for e in columns if e.startswith(("command.", "joint."))),
+                expected="either columns command.* or columns joint.*",
+                hint="what the controller was sent counts",
+            )
+        commands = ", ".join(f"command.{each}" for each in self.machine.commanded)
+        joints = ", ".join(f"joint.{each}" for each in self.machine.joints)
+        if not given and not unknown:
+            self._tell(
+                "missing-column",
+                "nothing says where the machine was commanded to",
+                found=", ".join(columns) or "no column",
+                expected=f"{commands}; or {joints}",
+            )
+        for beginning in given if len(given) == 1 else ():
+            of_machine = [beginning + each for each in self._own(beginning)]
+            lacking = [each for each in of_machine if each not in columns]
+            if lacking and not any(each and each.startswith(beginning) for each in strange):
+                self._tell(
+                    "missing-column",
+                    f"there is no column {', '.join(lacking)}",
+                    found=", ".join(e for e in columns if e.startswith(beginning)),
+                    expected=", ".join(of_machine),
+                )
+        kinds = [REGISTRY[each.kind] for each in self.header.instruments]
+        readings = [each for each in columns if each in reading_columns(self.machine)]
+        silent = any(kind.optional or kind.fixed for kind in kinds)
+        wrong = unknown or any(each and each.startswith("strut.") for each in strange)
+        if not readings and not silent and not wrong:
+            self._tell(
+                "nothing-measured",
+                "no column holds what was measured",
+                found=", ".join(columns) or "no column",
+                expected="x, y, z, a, b, c, distance, strut.*.length, strut.*.direction.x or "
+                "strut.*.angle",
+            )
+        elif readings and not self.header.declared:
+            return
+        if INSTRUMENT not in columns and len(self.header.declared) > 1:
+            self._tell(
+                "missing-column",
+                "there is no column instrument, but more than one instrument",
+                found=", ".join(self.header.declared),
+                expected="a column instrument with the name of one in each row",
+            )
+
+    def _tell(
+        self, code: str, message: str, *, found: str, expected: str, hint: str | None = None
+    ) -> None:
+        """A problem of the header of the table."""
+        line = None if self.read.table is None else self.read.table.header_line
+        self.problems.append(
+            Problem(code, message, self.file, line, found=found, expected=expected, hint=hint)
+        )
+
+    def _stacked(self, table: DataTable, beginning: str, names: tuple[str, ...]) -> Floats | None:
+        """(n_row, n) of columns that are all there, else None."""
+        columns = [table.numbers.get(beginning + name) for name in names]
+        found = [column for column in columns if column is not None]
+        return np.stack(found, axis=1) if len(found) == len(names) else None
+
+    def _instruments(self, table: DataTable) -> Indices:
+        """(n_row,) the instrument of each row, -1 where there is none that is good."""
+        numbers = {each.name: at for at, each in enumerate(self.header.instruments)}
+        words = table.texts.get(INSTRUMENT)
+        declared = self.header.declared
+        if words is None:
+            only = numbers.get(declared[0], -1) if len(declared) == 1 else -1
+            return np.full(table.n_row, only, np.intp)
+        for row, word in enumerate(words):
+            if word and declared and word not in declared:
+                self.problems.append(
+                    table.problem(
+                        "unknown-instrument",
+                        "the instrument is not declared",
+                        row=row,
+                        column=INSTRUMENT,
+                        found=word,
+                        expected=one_of(declared),
+                        hint=did_you_mean(word, declared)
+                        or f'declare it above: "#: [instrument.{word[:40]}]"',
+                    )
+                )
+        return np.array([numbers.get(word, -1) for word in words], np.intp)
+
+
+def _second(column: str) -> str:
+    """`d1` of `joint.d1`, `9` of `strut.9.length`."""
+    return column.split(".")[1]
+
+
+@dataclass
+class _Report:
+    """Problems of rows, at their line of the file.
+
+    `misnamed`: a column has a wrong name, so that one that is missing may be that one.
+    """
+
+    table: DataTable
+    problems: list[Problem]
+    misnamed: bool
+
+    def __call__(
+        self,
+        code: str,
+        message: str,
+        *,
+        row: int | None = None,
+        column: str | None = None,
+        found: str | None = None,
+        expected: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        if code == "missing-column" and self.misnamed:
+            return
+        problem = self.table.problem(
+            code, message, row=row, column=column, found=found, expected=expected, hint=hint
+        )
+        if row is None:
+            problem = replace(problem, line=self.table.header_line)
+        self.problems.append(problem)
+
+    def shown(self, column: str, row: int) -> str:
+        """A number as the file has it, with its unit."""
+        if math.isnan(self.table.numbers[column][row]):
+            return "nothing"
+        return self.table.shown(column, row)

@@ -1,0 +1,554 @@
+"""What was measured, by columns -> `Measurements`: every row checked, every reading in its place.
+
+The reader of files and the maker from arrays both end here, so that both refuse the same.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from truepose._kernel import STATUS
+from truepose.arrays import Flags, Floats, Indices
+from truepose.calibration.instruments import REGISTRY, Instrument, Kind
+from truepose.calibration.instruments._base import moved
+from truepose.calibration.measurements.measurements import Measurements, cold_and_free
+from truepose.calibration.observables import OBSERVABLES
+from truepose.files.data_file import MOST_PROBLEMS
+from truepose.files.wording import counted, one_of
+from truepose.machine import Condition, Machine
+from truepose.machine.condition import DEFAULT_PART
+from truepose.runs.poses import faults_text
+
+UNCERTAINTY = ".uncertainty"
+"""How the column of standard uncertainties of another column ends."""
+
+UNIT_LENGTH = 0.01
+"""How far a direction's length may be from 1: more than noise does, less than a slip."""
+
+SINGLE = {"x": "length", "y": "length", "z": "length"} | dict.fromkeys("abc", "angle")
+SINGLE["distance"] = "length"
+"""Dimension of the columns that are not of one strut."""
+
+OF_A_STRUT = {"length": "length"} | {f"direction.{axis}": "ratio" for axis in "xyz"}
+OF_A_STRUT["angle"] = "angle"
+"""Dimension of a strut's columns, by the end of their name."""
+
+WRENCH = {f"force.{axis}": "force" for axis in "xyz"} | {
+    f"moment.{axis}": "moment" for axis in "xyz"
+}
+"""Dimension of the columns of what acts on the tool."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A column of readings: what a kind calls it (`length`), its dimension, and which strut."""
+
+    word: str
+    dimension: str
+    strut: int = -1
+
+
+def reading_columns(machine: Machine) -> dict[str, Reading]:
+    """Every column that readings of a machine can have, in the order of a file."""
+    columns = {word: Reading(word, dimension) for word, dimension in SINGLE.items()}
+    for at, strut in enumerate(machine.struts):
+        for word, dimension in OF_A_STRUT.items():
+            columns[f"strut.{strut.name}.{word}"] = Reading(word, dimension, at)
+    return columns
+
+
+@dataclass
+class Rows:
+    """What was given, by columns (n_row,), SI, a blank cell NaN, before anything of it is checked.
+
+    Either `commands` (n_row, n_commanded) or `joints` (n_row, n_joint). `instrument`: which, or -1
+    where that is not known. `temperatures` by part, `wrench` by `force.x`, ... `unreadable`: cells
+    with a problem already. `whole`: names of instruments whose frame is wholly to be found.
+    """
+
+    instrument: Indices
+    readings: Mapping[str, Floats]
+    uncertainties: Mapping[str, Floats]
+    held_out: Flags
+    lines: Indices
+    commands: Floats | None = None
+    joints: Floats | None = None
+    temperatures: Mapping[str, Floats] = field(default_factory=dict)
+    wrench: Mapping[str, Floats] = field(default_factory=dict)
+    unreadable: Mapping[str, Flags] = field(default_factory=dict)
+    whole: frozenset[str] = frozenset()
+
+    @property
+    def n_row(self) -> int:
+        """How many rows there are."""
+        return len(self.instrument)
+
+    def spoilt(self, column: str) -> Flags:
+        """(n_row,) whether a cell of a column has a problem already."""
+        return self.unreadable.get(column, np.zeros(self.n_row, np.bool_))
+
+    def filled(self, column: str) -> Flags:
+        """(n_row,) whether something stands in a column of readings, be it readable or not."""
+        values = self.readings.get(column)
+        if values is None:
+            return np.zeros(self.n_row, np.bool_)
+        return ~np.isnan(values) | self.spoilt(column)
+
+
+class Report(Protocol):
+    """Where problems go, with their place as the source of the rows knows it."""
+
+    def __call__(
+        self,
+        code: str,
+        message: str,
+        *,
+        row: int | None = None,
+        column: str | None = None,
+        found: str | None = None,
+        expected: str | None = None,
+        hint: str | None = None,
+    ) -> None:
+        """Note a problem of a row (from 0), a column, or the whole."""
+
+    def shown(self, column: str, row: int) -> str:
+        """A number as it was given, with its unit."""
+
+
+def measurements_in(
+    machine: Machine, instruments: Sequence[Instrument], rows: Rows, report: Report
+) -> Measurements:
+    """Measurements from rows; of no use where something was reported on the way."""
+    placed = _placed(machine, rows, report)
+    conditions = _conditions(machine, rows, report)
+    columns = reading_columns(machine)
+    observed = _Observations(machine, instruments, rows, report, columns)
+    for number in range(len(instruments)):
+        observed.of_instrument(number)
+    table = observed.table()
+    found = [
+        _with_frame(machine, instrument, number, rows, table)
+        for number, instrument in enumerate(instruments)
+    ]
+    return Measurements(
+        instruments=tuple(found),
+        joints=placed[0],
+        placements=placed[1],
+        instrument=rows.instrument,
+        conditions=conditions,
+        held_out=rows.held_out,
+        row=table.row,
+        observable=table.observable,
+        strut=table.strut,
+        value=table.value,
+        uncertainty=table.uncertainty,
+        lines=rows.lines,
+    )
+
+
+@dataclass
+class _Table:
+    """Observations, sorted by row, strut and observable; all (n_observation,)."""
+
+    row: Indices
+    observable: Indices
+    strut: Indices
+    value: Floats
+    uncertainty: Floats
+
+
+def _with_frame(
+    machine: Machine, instrument: Instrument, number: int, rows: Rows, table: _Table
+) -> Instrument:
+    """The instrument with what is to be found of its frame, if that is what it reads of one."""
+    rule = REGISTRY[instrument.kind].frame
+    if instrument.name not in rows.whole or rule is None:
+        return instrument
+    mine = rows.instrument[table.row] == number
+    read = [OBSERVABLES[each] for each in np.unique(table.observable[mine]).tolist()]
+    frame = dataclasses.replace(instrument.frame, unknown=rule(read, machine.components))
+    return dataclasses.replace(instrument, frame=frame)
+
+
+def _placed(machine: Machine, rows: Rows, report: Report) -> tuple[Floats, Floats]:
+    """Joints (n_row, n_joint) and placements (n_row, 7) of the nominal machine."""
+    joints = np.full((rows.n_row, len(machine.joints)), math.nan)
+    placements = np.full((rows.n_row, 7), math.nan)
+    if rows.commands is not None:
+        good = np.isfinite(rows.commands).all(axis=1)
+        for column in (f"command.{each}" for each in machine.commanded):
+            good &= ~rows.spoilt(column)
+        at = np.flatnonzero(good)
+        joints[at], placements[at], status = machine.kernel.place(rows.commands[at])
+        failed = np.flatnonzero(status)
+        for number, (row, code) in enumerate(zip(at[failed], status[failed], strict=True)):
+            name = why = STATUS[code]
+            if number < MOST_PROBLEMS:  # the others are only counted
+                faults = machine.kernel.explain(rows.commands[row])
+                why = f"{name}: {faults_text(machine, faults)}" if faults else name
+            report(
+                "commanded-out-of-reach",
+                "the machine cannot be commanded to this pose",
+                row=int(row),
+                found=why,
+                expected="a pose within the travel of every drive",
+                hint="is it a pose of this machine, in the unit of the header?",
+            )
+    if rows.joints is not None:
+        good = np.asarray(np.isfinite(rows.joints).all(axis=1), np.bool_)
+        for column in (f"joint.{each}" for each in machine.joints):
+            good &= ~rows.spoilt(column)
+        at = np.flatnonzero(good & _within_travel(machine, rows, good, report))
+        joints[at] = rows.joints[at]
+        poses, status = machine.kernel.forward(rows.joints[at], status=True)
+        solved = status == 0
+        placements[at[solved]] = machine.kernel.placement_of(poses[solved])
+        for row, code in zip(at[~solved].tolist(), status[~solved].tolist(), strict=True):
+            report(
+                "commanded-out-of-reach",
+                "the machine has no pose at these joints",
+                row=row,
+                found=STATUS[code],
+                expected="joints at which the platform can be",
+                hint="are they joints of this machine, in the unit of the header?",
+            )
+    return joints, placements
+
+
+def _within_travel(machine: Machine, rows: Rows, good: Flags, report: Report) -> Flags:
+    assert rows.joints is not None
+    within = np.ones(rows.n_row, np.bool_)
+    for at, drive in enumerate(machine.drives):
+        first, last = drive.travel
+        value = rows.joints[:, at]
+        slack = 1e-9 * (last - first) if math.isfinite(last - first) else 0.0
+        outside = good & ((value < first - slack) | (value > last + slack))
+        within &= ~outside
+        unit = machine.file_units[drive.coordinate]
+        ends = [f"{float(unit.to_file(end)):.10g}" for end in (first, last)]
+        for row in np.flatnonzero(outside).tolist():
+            column = f"joint.{drive.name}"
+            report(
+                "commanded-out-of-reach",
+                "the joint is out of its travel",
+                row=row,
+                column=column,
+                found=report.shown(column, row),
+                expected=f"a joint from {ends[0]} to {ends[1]} {unit.label}",
+            )
+    return within
+
+
+def _conditions(machine: Machine, rows: Rows, report: Report) -> tuple[Condition, ...]:
+    """(n_row,) the condition of each row; equal ones are the same object."""
+    cold = cold_and_free(machine.condition)
+    for part, values in rows.temperatures.items():
+        column = f"temperature.{part}"
+        for row in np.flatnonzero((values <= 0.0) & ~rows.spoilt(column)).tolist():
+            report(
+                "not-positive",
+                "a temperature is above absolute zero",
+                row=row,
+                column=column,
+                found=report.shown(column, row),
+                expected="a temperature above absolute zero",
+            )
+    names = [*rows.temperatures, *WRENCH]
+    blank = np.full(rows.n_row, math.nan)
+    columns = [*rows.temperatures.values(), *(rows.wrench.get(name, blank) for name in WRENCH)]
+    table: list[list[float]] = np.stack(columns, axis=1).tolist()
+    known: dict[tuple[tuple[str, float], ...], Condition] = {}
+    result = []
+    for values_of_row in table:
+        told = {
+            name: value
+            for name, value in zip(names, values_of_row, strict=True)
+            if math.isfinite(value) and (value > 0.0 if name not in WRENCH else value != 0.0)
+        }
+        if told.get(DEFAULT_PART) == cold.reference_temperature:
+            del told[DEFAULT_PART]  # as where a row says nothing
+        key = tuple(told.items())
+        if key not in known:
+            known[key] = _condition(cold, told)
+        result.append(known[key])
+    return tuple(result)
+
+
+def _condition(cold: Condition, told: Mapping[str, float]) -> Condition:
+    if not told:
+        return cold
+    loads = [told.get(name, 0.0) for name in WRENCH]
+    temperatures = {part: value for part, value in told.items() if part not in WRENCH}
+    return cold.replace(temperature=temperatures, force=loads[:3], moment=loads[3:])
+
+
+class _Observations:
+    """Readings of one instrument after the other, checked, as observations."""
+
+    def __init__(
+        self,
+        machine: Machine,
+        instruments: Sequence[Instrument],
+        rows: Rows,
+        report: Report,
+        columns: Mapping[str, Reading],
+    ) -> None:
+        self.machine = machine
+        self.instruments = instruments
+        self.rows = rows
+        self.report = report
+        self.columns = columns
+        self._found: list[tuple[Indices, int, int, Floats, Floats]] = []
+
+    def table(self) -> _Table:
+        """Everything that was found."""
+        if not self._found:
+            none = np.empty(0, np.intp)
+            return _Table(none, none, none, np.empty(0), np.empty(0))
+        row = np.concatenate([rows for rows, *_ in self._found])
+        observable = np.concatenate([np.full(len(r), o, np.intp) for r, o, *_ in self._found])
+        strut = np.concatenate([np.full(len(r), s, np.intp) for r, _, s, *_ in self._found])
+        value = np.concatenate([values for *_, values, _ in self._found])
+        stated = np.concatenate([stated for *_, stated in self._found])
+        order = np.lexsort((observable, strut, row))
+        return _Table(row[order], observable[order], strut[order], value[order], stated[order])
+
+    def of_instrument(self, number: int) -> None:
+        """Look at the rows of one instrument."""
+        instrument = self.instruments[number]
+        kind = REGISTRY[instrument.kind]
+        mine = self.rows.instrument == number
+        if not mine.any():
+            if (self.rows.instrument >= 0).all():  # else a row that is nobody's may be its
+                self.report(
+                    "no-rows",
+                    f"no row is of the instrument {instrument.name}",
+                    found="nothing",
+                    expected=f'a row with "{instrument.name}" in the column instrument',
+                )
+            return
+        self._refuse_unwanted(instrument, kind, mine)
+        own = {name: each for name, each in self.columns.items() if each.word in kind.reads}
+        self._require(instrument, kind, mine, own)
+        self._check_signs(kind, mine, own)
+        if any(word.startswith("direction") for word in kind.reads):
+            self._check_directions(mine)
+        for name, reading in own.items():
+            filled = mine & self.rows.filled(name)
+            values = self.rows.readings.get(name, np.zeros(self.rows.n_row))
+            if kind.optional:
+                filled, values = mine, np.where(self.rows.filled(name), values, 0.0)
+            observable = kind.reads[reading.word]
+            self._add(instrument, name, observable, reading.strut, filled, values)
+        for observable in kind.fixed:
+            if moved(observable, self.machine.components):
+                zero = np.zeros(self.rows.n_row)
+                self._add(instrument, observable, observable, -1, mine, zero)
+
+    def _add(
+        self,
+        instrument: Instrument,
+        column: str,
+        observable: str,
+        strut: int,
+        filled: Flags,
+        values: Floats,
+    ) -> None:
+        at = np.flatnonzero(filled)
+        if not at.size:
+            return
+        if observable in ("a", "b", "c", "angle"):
+            values = within_a_turn(values)
+        stated = self._stated(instrument, column, observable, filled)
+        number = OBSERVABLES.index(observable)
+        self._found.append((at, number, strut, values[at], stated[at]))
+
+    def _stated(
+        self, instrument: Instrument, column: str, observable: str, filled: Flags
+    ) -> Floats:
+        """(n_row,) standard uncertainties: the row's own, else the instrument's."""
+        name = column + UNCERTAINTY
+        given = self.rows.uncertainties.get(name, np.full(self.rows.n_row, math.nan))
+        spoilt = self.rows.spoilt(name)
+        for row in np.flatnonzero(filled & (given <= 0.0) & ~spoilt).tolist():
+            self.report(
+                "not-positive",
+                "a standard uncertainty is above zero",
+                row=row,
+                column=name,
+                found=self.report.shown(name, row),
+                expected="a standard uncertainty above zero",
+                hint="a reading without uncertainty would outweigh all others",
+            )
+        stated = instrument.uncertainty_of(observable)
+        if stated is not None:
+            return np.where(np.isnan(given), stated, given)
+        lacking = np.flatnonzero(filled & np.isnan(given) & ~spoilt)
+        if lacking.size:
+            self.report(
+                "no-uncertainty",
+                f"nothing says how uncertain {column} of {instrument.name} is, "
+                f"in {counted(lacking.size, 'row')}",
+                row=int(lacking[0]),
+                column=column,
+                found="no standard uncertainty",
+                expected=f"an uncertainty of the instrument, or a column {name}",
+            )
+        return given
+
+    def _refuse_unwanted(self, instrument: Instrument, kind: Kind, mine: Flags) -> None:
+        words = one_of(kind.reads) if kind.reads else "no column of readings"
+        for name in self.rows.readings:
+            reading = self.columns[name]
+            if reading.word in kind.reads:
+                continue
+            for row in np.flatnonzero(mine & self.rows.filled(name)).tolist():
+                self.report(
+                    "unwanted-value",
+                    f"the instrument of this row, {instrument.name}, does not read this",
+                    row=row,
+                    column=name,
+                    found=self._shown(name, row),
+                    expected=f"an empty cell; the kind {kind.name} reads {words}",
+                )
+        for name, values in self.rows.uncertainties.items():
+            column = name.removesuffix(UNCERTAINTY)
+            read = mine & self.rows.filled(column)
+            if kind.optional and self.columns[column].word in kind.reads:
+                read = mine
+            if column in kind.fixed and moved(column, self.machine.components):
+                read = mine
+            for row in np.flatnonzero(mine & ~read & ~np.isnan(values)).tolist():
+                self.report(
+                    "unwanted-value",
+                    "an uncertainty of what the row does not have",
+                    row=row,
+                    column=name,
+                    found=self.report.shown(name, row),
+                    expected=f"an empty cell, or a value in the column {column}",
+                )
+
+    def _shown(self, column: str, row: int) -> str:
+        if self.rows.spoilt(column)[row]:
+            return "something"
+        return self.report.shown(column, row)
+
+    def _require(
+        self, instrument: Instrument, kind: Kind, mine: Flags, own: Mapping[str, Reading]
+    ) -> None:
+        """Whether every row of the instrument has the readings that its kind must have."""
+        if kind.least == 0 or kind.optional:
+            return
+        if kind.least is None:
+            for name, reading in own.items():
+                if moved(kind.reads[reading.word], self.machine.components):
+                    self._require_column(instrument, name, mine)
+            return
+        used = [name for name in own if (mine & self.rows.filled(name)).any()]
+        if not used:
+            some = one_of(own, limit=8)
+            self.report(
+                "missing-column",
+                f"nothing is read by the instrument {instrument.name}, of kind {kind.name}",
+                row=int(np.flatnonzero(mine)[0]),
+                found="no value in its rows",
+                expected=f"a column of readings: {some}",
+            )
+            return
+        if kind.most is not None and len(used) > kind.most:
+            self.report(
+                "unwanted-value",
+                f"the instrument {instrument.name} reads {len(used)} columns",
+                row=int(np.flatnonzero(mine & self.rows.filled(used[kind.most]))[0]),
+                column=used[kind.most],
+                found=", ".join(used),
+                expected=f"at most {kind.most} of {', '.join(kind.reads)} of kind {kind.name}",
+                hint='an instrument that reads x, y and z is of kind "position"',
+            )
+        empty = mine & ~np.any([self.rows.filled(name) for name in used], axis=0)
+        for row in np.flatnonzero(empty).tolist():
+            self.report(
+                "empty-cell",
+                f"the row has no reading of the instrument {instrument.name}",
+                row=row,
+                found="nothing",
+                expected=f"a value in a column of {', '.join(used[:8])}",
+            )
+
+    def _require_column(self, instrument: Instrument, name: str, mine: Flags) -> None:
+        if name not in self.rows.readings:
+            self.report(
+                "missing-column",
+                f"there is no column {name}, which the instrument {instrument.name} "
+                f"of kind {instrument.kind} needs",
+                found="no such column",
+                expected=f"{name}, as the platform moves in it",
+            )
+            return
+        for row in np.flatnonzero(mine & ~self.rows.filled(name)).tolist():
+            self.report(
+                "empty-cell",
+                f"the instrument of this row, {instrument.name}, needs a value",
+                row=row,
+                column=name,
+                found="nothing",
+                expected="a number",
+            )
+
+    def _check_signs(self, kind: Kind, mine: Flags, own: Mapping[str, Reading]) -> None:
+        for name, reading in own.items():
+            values = self.rows.readings.get(name)
+            if values is None or kind.reads[reading.word] not in ("length", "distance"):
+                continue
+            for row in np.flatnonzero(mine & (values <= 0.0) & ~self.rows.spoilt(name)).tolist():
+                self.report(
+                    "not-positive",
+                    "a length is above zero",
+                    row=row,
+                    column=name,
+                    found=self.report.shown(name, row),
+                    expected="a length above zero",
+                )
+
+    def _check_directions(self, mine: Flags) -> None:
+        """The three components of a strut's direction: all or none, and of length one."""
+        for strut in self.machine.struts:
+            names = [f"strut.{strut.name}.direction.{axis}" for axis in "xyz"]
+            filled = np.array([mine & self.rows.filled(name) for name in names])
+            for at, name in enumerate(names):
+                for row in np.flatnonzero(filled.any(axis=0) & ~filled[at]).tolist():
+                    self.report(
+                        "empty-cell" if name in self.rows.readings else "missing-column",
+                        "a direction has three components",
+                        row=row,
+                        column=name,
+                        found="nothing",
+                        expected="a number",
+                    )
+            good = filled.all(axis=0) & ~np.any([self.rows.spoilt(name) for name in names], axis=0)
+            if not good.any():
+                continue
+            vectors = np.stack([self.rows.readings[name] for name in names], axis=1)
+            length = np.linalg.norm(vectors, axis=1)
+            for row in np.flatnonzero(good & (np.abs(length - 1.0) > UNIT_LENGTH)).tolist():
+                self.report(
+                    "not-a-direction",
+                    f"the direction of strut {strut.name} is no unit vector",
+                    row=row,
+                    column=names[0].removesuffix(".x"),
+                    found=f"a vector of length {length[row]:.6g}",
+                    expected=f"a length of 1, within {UNIT_LENGTH:g}",
+                )
+
+
+def within_a_turn(angles: Floats) -> Floats:
+    """Angles in rad, any shape, from -pi to pi, where the kernel has them; others unchanged."""
+    with np.errstate(invalid="ignore"):
+        turned = angles - 2.0 * math.pi * np.round(angles / (2.0 * math.pi))
+    return np.where(np.abs(angles) > math.pi, turned, angles)

@@ -1,0 +1,293 @@
+"""The steps that commands share: read the machine, evaluate, hand the result over."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import click
+import numpy as np
+from numpy.typing import ArrayLike
+
+import truepose
+from truepose.cli._options import Request
+from truepose.cli._progress import progress, waiting
+from truepose.cli._show import show_answers, show_tables
+from truepose.errors import Problem, RequestError
+from truepose.files.wording import counted
+from truepose.files.writing import require_writable
+from truepose.reporting import formats
+from truepose.reporting.accuracy import gains, told
+from truepose.reporting.display import nearest_middle, pose_text, where_highest
+from truepose.reporting.result import Result
+from truepose.reporting.study import Study, warnings_of
+from truepose.reporting.tables import Table
+from truepose.runs.poses import faults_text, reason_text
+from truepose.verdict import witness_file
+from truepose.verdict.answer import NOT_MET, STATES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+    from truepose.verdict.answer import Answer
+
+ASK = 'try it with --set accuracy.target="0.5 mm"'
+
+MOST_PROBLEMS = 20
+"""Poses named one by one when `--strict` refuses them."""
+
+
+def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMATS)) -> Machine:
+    """Refuse files that cannot be written, then read the machine file.
+
+    Raises `RequestError` (no-accuracy) where an accuracy is required that the file does not ask
+    for: a silent yes would let a machine pass that nobody judged; no-witness where one is wanted
+    of such a file.
+    """
+    if request.output is not None:
+        require_writable(request.output, endings, [request.machine_file])
+    if request.witness is not None:
+        require_writable(request.witness, [witness_file.ENDING], [request.machine_file])
+    machine = truepose.load(request.machine_file, settings=request.settings)
+    if request.require_accuracy and not machine.accuracy.asks:
+        raise RequestError(
+            Problem(
+                "no-accuracy",
+                "--require-accuracy needs an accuracy to judge by",
+                file=str(request.machine_file),
+                path="accuracy",
+                found="nothing",
+                expected='[accuracy] with target = "0.5 mm", or angle_target',
+                hint=ASK,
+            )
+        )
+    if request.witness is not None and not machine.accuracy.asks:
+        raise _no_witness("no accuracy that is asked for", ASK)
+    return machine
+
+
+def evaluate(request: Request, machine: Machine) -> xr.Dataset:
+    """The error budget over the file's workspace; what it warns of goes to stderr."""
+    with progress("error budget") as report:
+        found = truepose.budget(machine, progress=report)
+    refuse_left_out_of(request, machine, found)
+    for warning in warnings_of(found):
+        click.echo(f"warning[{warning['code']}]: {warning['sentence']}", err=True)
+    return found
+
+
+def correct(request: Request, machine: Machine) -> xr.Dataset:
+    """The compensation over the file's workspace."""
+    with progress("compensation") as report:
+        found = truepose.compensate(machine, progress=report)
+    refuse_left_out_of(request, machine, found)
+    return found
+
+
+def strain(request: Request, machine: Machine) -> xr.Dataset:
+    """The internal forces over the file's workspace."""
+    with progress("internal forces") as report:
+        found = truepose.strain(machine, progress=report)
+    refuse_left_out_of(request, machine, found)
+    return found
+
+
+def over_time(request: Request, machine: Machine) -> xr.Dataset:
+    """The error over the file's temperature log, at home."""
+    with progress("error over time") as report:
+        found = truepose.over_time(machine, progress=report)
+    refuse_left_out_of(request, machine, found)
+    return found
+
+
+def judge(machine: Machine, *states: str) -> tuple[Answer, ...]:
+    """The verdict over the file's workspace in the states asked, by default both."""
+    with progress("accuracy") as report:
+        return truepose.accuracy(machine, states=states or STATES, progress=report)
+
+
+def study_of(request: Request, machine: Machine) -> Study:
+    """The machine with both results, and the verdict on both."""
+    evaluated, corrected = evaluate(request, machine), correct(request, machine)
+    return Study(machine, evaluated, corrected, judge(machine))
+
+
+def with_time(study: Study) -> Study:
+    """The study with the error over time, where the file has a temperature log.
+
+    At two poses: the one nearest the middle, and the one where the logged temperatures do most.
+    """
+    machine = study.machine
+    if machine.condition.temperature_log is None:
+        return study
+    middle = int(nearest_middle(study.poses)[0])
+    thermal = study.position_norm(study.values("error")[:, study.sources.index("thermal")])
+    chosen = list(dict.fromkeys([middle, where_highest(thermal)]))
+    return replace(study, over_time=truepose.over_time(machine, study.poses[chosen]))
+
+
+def with_calibration(study: Study, measurements: Path | None) -> Study:
+    """The study with a calibration by the defaults, where there are measurements."""
+    if measurements is None:
+        return study
+    with waiting("calibration"):
+        found = truepose.calibrate(study.machine, measurements)
+    return replace(study, calibration=found.dataset)
+
+
+def with_strain(request: Request, study: Study) -> Study:
+    """The study with the internal forces, where the machine is over-constrained."""
+    if not study.machine.kernel.overconstrained:
+        return study
+    return replace(study, strain=strain(request, study.machine))
+
+
+def deliver(
+    request: Request,
+    result: Result,
+    tables: Iterable[Table | None],
+    answers: Sequence[Answer] = (),
+) -> None:
+    """Write the output file if one is asked for, and print the result in the format asked.
+
+    For people the `answers` come first.
+    """
+    if request.output is not None:
+        formats.write(result, request.output)
+    if request.format == "table":
+        show_answers(told(result.machine, answers), gains(answers))
+        show_tables(table for table in tables if table is not None)
+    else:
+        sys.stdout.writelines(formats.text(result, f".{request.format}"))
+    if request.output is not None:
+        note_written(request.output)
+
+
+def write_witness(request: Request, answers: Sequence[Answer], state: str) -> bool:
+    """Write the witness of the first answer of a state that is NOT met; whether there is one.
+
+    True too where none is asked for.
+    """
+    path = request.witness
+    if path is None:
+        return True
+    for answer in answers:
+        if answer.state == state and answer.answer == NOT_MET and answer.example is not None:
+            example, original = answer.example, request.machine_file
+            witness_file.write_witness(example.machine, example, path, original=original)
+            note_written(path)
+            return True
+    return False
+
+
+def no_witness(answers: Sequence[Answer], state: str) -> RequestError:
+    """What is raised where a witness was asked for, and the answers of the state have none."""
+    words = [
+        f"{each.quantity}: {each.answer or 'nothing asked'}"
+        for each in answers
+        if each.state == state
+    ]
+    sampled = any(each.coverage is not None for each in answers)
+    hint = "a coverage has no one machine: try --set accuracy.at=worst" if sampled else None
+    return _no_witness(f"{state}, {', '.join(words)}", hint)
+
+
+def _no_witness(found: str, hint: str | None) -> RequestError:
+    return RequestError(
+        Problem(
+            "no-witness",
+            "there is no witness to write",
+            found=found,
+            expected="an accuracy that is NOT met: the machine that exceeds it is the witness",
+            hint=hint,
+        )
+    )
+
+
+def exit_code(request: Request, met: bool | None) -> int:
+    """1 where the accuracy asked is required and not met, else 0."""
+    return int(request.require_accuracy and met is False)
+
+
+def report_page() -> ModuleType:
+    """The module that draws the page. Raises `RequestError` (extra-missing) without plotly."""
+    try:
+        from truepose.reporting import page
+    except ImportError as failure:
+        if failure.name is None or failure.name.startswith("truepose"):
+            raise
+        raise RequestError(
+            Problem(
+                "extra-missing",
+                "the report needs packages that are not installed",
+                found=f"no {failure.name}",
+                expected="jinja2 and plotly",
+                hint="pip install 'truepose[report]'",
+            )
+        ) from failure
+    return page
+
+
+def note_written(path: Path) -> None:
+    """Say on stderr which file was written, so that stdout stays what was asked for."""
+    click.echo(f"wrote {path}", err=True)
+
+
+def refuse_left_out(
+    request: Request, machine: Machine, numbers: ArrayLike, poses: ArrayLike, statuses: ArrayLike
+) -> None:
+    """With `--strict`, raise `RequestError` (unusable-pose) where poses were left out.
+
+    `numbers` (n,) in the poses asked for, `poses` (n, n_commanded) SI, `statuses` (n,) by name.
+    """
+    left_out = list(zip(np.asarray(numbers), np.asarray(poses), np.asarray(statuses), strict=True))
+    if not (request.strict and left_out):
+        return
+    line = machine.workspace.line if machine.workspace is not None else None
+    problems = [
+        Problem(
+            "unusable-pose",
+            f"pose {number} cannot be used: {pose_text(pose, machine.commanded, machine.shown)}",
+            file=machine.file,
+            line=line,
+            found=_why(machine, pose, str(status)),
+            expected="a pose within reach and travel, off singularities",
+        )
+        for number, pose, status in left_out[:MOST_PROBLEMS]
+    ]
+    if len(left_out) > MOST_PROBLEMS:
+        problems.append(
+            Problem(
+                "unusable-pose",
+                f"{counted(len(left_out) - MOST_PROBLEMS, 'more pose')} cannot be used",
+                file=machine.file,
+                line=line,
+                found=f"{len(left_out)} poses that cannot be used, the first {MOST_PROBLEMS} above",
+                expected="none",
+                hint="`truepose check` counts them and says why",
+            )
+        )
+    raise RequestError(*problems)
+
+
+def _why(machine: Machine, pose: np.ndarray, status: str) -> str:
+    """The status of a pose that cannot be used, and which part fails by how much."""
+    because = faults_text(machine, machine.kernel.explain(pose))
+    return reason_text(status) + (f": {because}" if because else "")
+
+
+def refuse_left_out_of(request: Request, machine: Machine, dataset: xr.Dataset) -> None:
+    """The same of the poses that a result left out."""
+    poses = [dataset[f"left_out_{name}"].values for name in machine.commanded]
+    refuse_left_out(
+        request,
+        machine,
+        dataset["left_out_index"].values,
+        np.stack(poses, axis=-1),
+        dataset["left_out_status"].values,
+    )

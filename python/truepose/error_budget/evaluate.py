@@ -1,0 +1,331 @@
+"""The budget: every source alone and all together, at every pose, and how they compare."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from truepose.arrays import Floats, Indices
+from truepose.error_budget import comparison, propagation, worst
+from truepose.error_budget.guide_loads import GuideLoads
+from truepose.error_budget.largest import largest, lengths
+from truepose.machine import Condition, Machine
+from truepose.runs import displacement, percent
+from truepose.runs.dataset import QUANTITY_UNITS, Rows, Schema, Variable, assemble, label, sizes
+from truepose.runs.first_order import effects_at, rows_of
+from truepose.runs.poses import (
+    OK,
+    Progress,
+    Walk,
+    is_path,
+    no_pose_left,
+    of_band,
+    requested_poses,
+    required_sources,
+)
+from truepose.runs.quantities import quantities
+from truepose.runs.variables import spread_of
+from truepose.sources import Block, Deviation, Source
+
+_EACH = ("pose", "source", "component")
+_ALL = ("pose", "component")
+_OVER = ("source", "component")
+
+SCHEMA: Schema = {
+    "error": Variable(_EACH, "component", "known error of the source alone, at its shift"),
+    "error_lower": Variable(
+        _EACH, "component", "error of the source alone, all lengths at their bands' lower ends"
+    ),
+    "error_upper": Variable(
+        _EACH, "component", "error of the source alone, all lengths at their bands' upper ends"
+    ),
+    "worst": Variable(_EACH, "component", "worst case of the source alone, of each component"),
+    "reach": Variable(
+        _EACH, "component", "how far the source's tolerance band reaches, the farther way"
+    ),
+    "largest": Variable(
+        ("pose", "source", "quantity"), "quantity", "linear maximum of the source alone"
+    ),
+    "uncertainty": Variable(
+        _EACH, "component", "standard uncertainty from the source's tolerance band"
+    ),
+    "percent_lower": Variable(_EACH, "%", "error_lower in % of the coordinate"),
+    "percent_upper": Variable(_EACH, "%", "error_upper in % of the coordinate"),
+    "overall_error": Variable(_ALL, "component", "known error of all sources, at their shifts"),
+    "overall_error_lower": Variable(
+        _ALL, "component", "error of all sources, toleranced lengths all at their lower ends"
+    ),
+    "overall_error_upper": Variable(
+        _ALL, "component", "error of all sources, toleranced lengths all at their upper ends"
+    ),
+    "overall_percent_lower": Variable(
+        _ALL, "%", "overall_error_lower in percent of the coordinate"
+    ),
+    "overall_percent_upper": Variable(
+        _ALL, "%", "overall_error_upper in percent of the coordinate"
+    ),
+    "percent_defined": Variable(
+        _ALL, "1", "whether the coordinate is large enough for a percent of it", np.bool_
+    ),
+    "linear_maximum": Variable(
+        ("pose", "quantity"), "quantity", "linear maximum: largest error of all sources together"
+    ),
+    "joint_nominal": Variable(("pose", "joint"), "joint", "joint coordinate, nominal command"),
+    "force": Variable(
+        ("pose", "closure"), "N", "closure force under all that acts, a strut's tension positive"
+    ),
+    "highest_lower": Variable(_OVER, "component", "highest |error_lower| over poses"),
+    "highest_upper": Variable(_OVER, "component", "highest |error_upper| over poses"),
+    "highest_percent_lower": Variable(_OVER, "%", "highest percent_lower over poses"),
+    "highest_percent_upper": Variable(_OVER, "%", "highest percent_upper over poses"),
+    "overall_highest_lower": Variable(
+        ("component",), "component", "highest |overall_error_lower| over poses"
+    ),
+    "overall_highest_upper": Variable(
+        ("component",), "component", "highest |overall_error_upper| over poses"
+    ),
+    "overall_highest_percent_lower": Variable(
+        ("component",), "%", "highest overall_percent_lower over poses"
+    ),
+    "overall_highest_percent_upper": Variable(
+        ("component",), "%", "highest overall_percent_upper over poses"
+    ),
+    "highest": Variable(
+        ("source", "quantity"), "quantity", "highest linear maximum of the source over poses"
+    ),
+    "rms": Variable(
+        ("source", "quantity"), "quantity", "root mean square of the source's linear maximum"
+    ),
+    "share": Variable(("source",), "1", "highest position error over the sum of all sources'"),
+    "rank": Variable(("source",), "1", "place of the source by its share, 1 the largest", np.intp),
+    "verdict": Variable(("source",), "1", "negligible, relevant or dominant", str),
+}
+
+FEW = 1024
+"""Poses whose sensitivities to every parameter stay in the cache together."""
+
+# What is highest over poses, and of which variable.
+_HIGHEST = {
+    "highest_lower": "error_lower",
+    "highest_upper": "error_upper",
+    "highest_percent_lower": "percent_lower",
+    "highest_percent_upper": "percent_upper",
+    "overall_highest_lower": "overall_error_lower",
+    "overall_highest_upper": "overall_error_upper",
+    "overall_highest_percent_lower": "overall_percent_lower",
+    "overall_highest_percent_upper": "overall_percent_upper",
+}
+
+
+def budget(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The error over the workspace, or at `poses`, from each source alone and from all together.
+
+    And how they compare. `poses` (..., n_commanded), SI, default the file's workspace; `condition`,
+    default the file's; `progress` is called with (poses done, poses in all). Loads and temperatures
+    are evaluated at nominal parameters and the commanded pose. The Dataset, SI, is described in
+    docs/results.md; errors are actual minus commanded, base frame (Gojtan & Hess-Coelho 2005,
+    equations 3-7; equation 8 for the percent of a source, 9 for that of all together).
+
+    Raises `RequestError`: bad-poses, no-workspace, no-source, no-pose-left; `TrueposeError` where
+    the condition asks for what the machine does not say (no-stiffness, no-expansion). What it warns
+    of (guide-taken-rigid) is in the attribute `warnings`.
+    """
+    given = machine.condition if condition is None else condition
+    table = requested_poses(machine, poses)
+    sources = required_sources(machine, given)
+    kinds = quantities(machine.components)
+    lengths = sizes(machine, len(table), source=len(sources), quantity=len(kinds))
+    rows = Rows(machine, SCHEMA, lengths)
+    highest = {
+        name: comparison.Highest(tuple(lengths[dim] for dim in SCHEMA[name].dims))
+        for name in _HIGHEST
+    }
+    statistics = comparison.LengthStatistics(len(sources), len(kinds))
+    guides = GuideLoads(machine)
+    distributions: list[dict[str, None]] = [{} for _ in sources]
+
+    walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
+    for block in walk:
+        deviations = [source.deviation(machine, given, block) for source in sources]
+        for found, deviation in zip(distributions, deviations, strict=True):
+            found.update((str(deviation.distribution[k]), None) for k in deviation.banded)
+        room = rows.room(block.indices.size)
+        values, shifted, edges = _evaluate(machine, block, sources, deviations, room)
+        usable = walk.keep(block.indices, *shifted, *map(of_band, edges))
+        rows.append(block, values, usable)
+        if usable.any():
+            for name, running in highest.items():
+                running.add(values[_HIGHEST[name]][usable])
+            statistics.add(values["largest"][usable])
+            guides.add(block, usable)
+    if rows.count == 0:
+        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
+
+    shares = comparison.share(statistics.highest[:, 0])
+    over_all: dict[str, Any] = {name: running.value for name, running in highest.items()}
+    over_all |= {
+        "highest": statistics.highest,
+        "rms": statistics.rms,
+        "share": shares,
+        "rank": comparison.rank(shares),
+        "verdict": comparison.verdict(statistics.highest, kinds, machine.accuracy),
+    }
+    coords = {
+        "source": label("source", [source.name for source in sources], "error source"),
+        "distribution": label(
+            "source",
+            [" / ".join(found) or "none" for found in distributions],
+            "distribution inside the band",
+        ),
+        "quantity": label("quantity", list(kinds), "what is compared"),
+        "quantity_units": label(
+            "quantity", [QUANTITY_UNITS[kind] for kind in kinds], "unit of the quantity"
+        ),
+    }
+    dataset = assemble(
+        machine, given, SCHEMA, rows, table, walk.left_out, over_all=over_all, coords=coords
+    )
+    dataset.attrs["warnings"] = json.dumps(guides.warnings())
+    return dataset
+
+
+def _evaluate(
+    machine: Machine,
+    block: Block,
+    sources: Sequence[Source],
+    deviations: Sequence[Deviation],
+    room: dict[str, np.ndarray],
+) -> tuple[dict[str, np.ndarray], list[np.ndarray], list[np.ndarray]]:
+    """Every variable over poses for one block, and all statuses (n,) met on the way.
+
+    First those at shifts, in the order of `displacement.at_shifts`, then those at edges of the
+    bands. Variables of each source are written into `room`.
+    """
+    coordinate, defined = percent.coordinates(machine, block.placements)
+    per_error = percent.per_error(coordinate, defined)
+    of_source = ("pose", "source")
+    values = {name: room[name] for name, each in SCHEMA.items() if each.dims[:2] == of_source}
+    shifted: list[np.ndarray] = []
+    at_edges: list[np.ndarray] = []
+    nominal: list[np.ndarray] = []
+    kinds = list(quantities(machine.components).values())
+    for at, deviation in enumerate(deviations):
+        edges = displacement.source_edges(machine, block, deviation)
+        band = _band(machine, block, deviation, edges.error, kinds)
+        values["error"][:, at] = edges.error
+        values["error_lower"][:, at] = edges.lower
+        values["error_upper"][:, at] = edges.upper
+        values["worst"][:, at] = worst.worst(edges.error, band.reach)
+        values["reach"][:, at] = np.maximum(*band.reach)
+        values["uncertainty"][:, at] = band.uncertainty
+        values["largest"][:, at] = band.largest
+        percent.percent(edges.lower, per_error, out=values["percent_lower"][:, at])
+        percent.percent(edges.upper, per_error, out=values["percent_upper"][:, at])
+        shifted.append(edges.status[0])
+        at_edges += edges.status[1:]
+        nominal.append(band.status)
+    overall = displacement.overall_edges(
+        machine,
+        block,
+        [(d, source.sets_overall_edges) for d, source in zip(deviations, sources, strict=True)],
+    )
+    together, regular = _together(machine, block, sources, deviations, overall.error, kinds)
+    shifted += [overall.status[0], *nominal, regular]
+    at_edges += overall.status[1:]
+    values |= {
+        "overall_error": overall.error,
+        "overall_error_lower": overall.lower,
+        "overall_error_upper": overall.upper,
+        "overall_percent_lower": percent.percent(overall.lower, per_error),
+        "overall_percent_upper": percent.percent(overall.upper, per_error),
+        "percent_defined": defined,
+        "linear_maximum": together,
+        "joint_nominal": block.joints,
+        "force": block.forces,
+    }
+    return values, shifted, at_edges
+
+
+@dataclass(frozen=True)
+class _Band:
+    """What one source's band does at n poses: m and rad.
+
+    `reach`: down and up, (n, n_component); `uncertainty` (n, n_component), standard; `largest`
+    (n, n_quantity); `status` (n,), the kernel's.
+    """
+
+    reach: tuple[Floats, Floats]
+    uncertainty: Floats
+    largest: Floats
+    status: np.ndarray
+
+
+def _band(
+    machine: Machine,
+    block: Block,
+    deviation: Deviation,
+    error: Floats,
+    kinds: Sequence[Indices],
+) -> _Band:
+    """Of one source, whose `error` at its shift is known."""
+    n_pose = block.indices.size
+    down = np.zeros((n_pose, len(machine.components)))
+    up, uncertain = np.zeros_like(down), np.zeros_like(down)
+    status = np.full(n_pose, OK, np.uint8)
+    if not deviation.banded.size:
+        return _Band((down, up), uncertain, lengths(error, kinds), status)
+    far = np.empty((n_pose, len(kinds)))
+    correlation = deviation.banded_correlation
+    for start in range(0, n_pose, FEW):
+        poses = slice(start, start + FEW)
+        effects, sigmas, status[poses] = worst.variable_effects(machine, block, deviation, poses)
+        far[poses] = largest(error[poses], effects, deviation.domain, kinds).length
+        # Sizes first, then their squares, in the one place; what is correlated keeps its signs.
+        scratch = effects if correlation is None else None
+        down[poses], up[poses] = deviation.domain.reach(effects, scratch)
+        uncertain[poses] = propagation.standard_uncertainty(
+            effects, sigmas, scratch=effects, correlation=correlation
+        )
+    return _Band((down, up), uncertain, far, status)
+
+
+def _together(
+    machine: Machine,
+    block: Block,
+    sources: Sequence[Source],
+    deviations: Sequence[Deviation],
+    error: Floats,
+    kinds: Sequence[Indices],
+) -> tuple[Floats, np.ndarray]:
+    """The largest lengths (n, n_quantity) of all sources together, and the kernel's status (n,).
+
+    From the `error` (n, n_component) with all of them at their shifts.
+    """
+    moves = spread_of(machine, sources, deviations)
+    n_pose = block.indices.size
+    status = np.full(n_pose, OK, np.uint8)
+    if not moves.names:
+        return lengths(error, kinds), status
+    far = np.empty((n_pose, len(kinds)))
+    parameters, shift = moves.shift
+    for start in range(0, n_pose, FEW):
+        poses = slice(start, start + FEW)
+        moved = (parameters, np.ascontiguousarray(rows_of(shift, poses)))
+        effects, status[poses] = effects_at(machine, block, moves, moved, poses)
+        far[poses] = largest(error[poses], effects, moves.domain, kinds).length
+    return far, status
+
+
+__all__ = ["SCHEMA", "budget"]

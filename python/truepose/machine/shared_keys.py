@@ -1,0 +1,100 @@
+"""`[each.strut]` and the like: keys that every row of an array table has unless it writes its own.
+
+They are handed to the rows before anything is validated, so that all that reads a row need not
+know; a problem with one of them is said once, where it is written.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Collection, Mapping, Sequence
+
+from truepose.errors import Problem
+from truepose.files.document import ARRAY_TABLES, Document, Key
+from truepose.files.settings import apply
+from truepose.files.units import shown_value, type_phrase
+from truepose.files.wording import did_you_mean, one_of
+
+EACH = "each"
+"""The table of the tables."""
+
+
+def share_each(
+    document: Document,
+    settings: Mapping[str, str] | Sequence[str],
+    free_tables: Collection[str] = (),
+) -> None:
+    """Give the rows what `[each.*]` says; settings of `each` go first, for rows go by them.
+
+    A key is shared as a whole: a row that writes one keeps all of its own value.
+    """
+    apply(document, _of_each(settings), free_tables)
+    tables = document.data.get(EACH)
+    if not isinstance(tables, dict):
+        return
+    for table in ARRAY_TABLES:
+        common, rows = tables.get(table), document.data.get(table)
+        if not isinstance(common, dict) or not isinstance(rows, list):
+            continue
+        for index, row in enumerate(rows):
+            for key, value in common.items():
+                if isinstance(row, dict) and key not in row and key != "name":
+                    row[key] = copy.deepcopy(value)
+                    document.shared[table, index, key] = (EACH, table, key)
+
+
+def _of_each(settings: Mapping[str, str] | Sequence[str]) -> Mapping[str, str] | Sequence[str]:
+    if isinstance(settings, Mapping):
+        return {path: text for path, text in settings.items() if _is_each(path)}
+    return [setting for setting in settings if _is_each(setting)]
+
+
+def _is_each(path: str) -> bool:
+    return path.strip().startswith(f"{EACH}.")
+
+
+def problems(document: Document) -> list[Problem]:
+    """What is wrong with `[each.*]` as such; its keys are judged in the rows that they go to."""
+    tables = document.data.get(EACH)
+    if tables is None:
+        return []
+    if not isinstance(tables, dict):
+        return [_not_tables(document, (EACH,), tables)]
+    found = []
+    for table, common in tables.items():
+        key: Key = (EACH, table)
+        if table not in ARRAY_TABLES or table not in document.data:
+            known = table in ARRAY_TABLES
+            found.append(
+                document.problem(
+                    "unknown-key",
+                    f"there is no [[{table}]] whose rows could share keys",
+                    key,
+                    found=table,
+                    expected=f"a [[{table}]] too" if known else one_of(ARRAY_TABLES),
+                    hint=None if known else did_you_mean(table, ARRAY_TABLES),
+                )
+            )
+        elif not isinstance(common, dict):
+            found.append(_not_tables(document, key, common))
+        elif "name" in common:
+            found.append(
+                document.problem(
+                    "unknown-key",
+                    f"the {table}s cannot share a name",
+                    (*key, "name"),
+                    found=shown_value(common["name"]),
+                    expected=f"a name of its own in every [[{table}]]",
+                )
+            )
+    return found
+
+
+def _not_tables(document: Document, key: Key, value: object) -> Problem:
+    return document.problem(
+        "wrong-type",
+        f"expected a table, found {type_phrase(value)}",
+        key,
+        found=shown_value(value),
+        expected=" or ".join(f"[{EACH}.{table}]" for table in ARRAY_TABLES),
+    )

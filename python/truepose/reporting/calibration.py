@@ -1,0 +1,460 @@
+"""The tables of a calibration: what is suspected, what was found, how sure, what to do next."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truepose.arrays import Floats
+from truepose.calibration.acceptance.sentences import listed, quantity, sentence
+from truepose.calibration.identification.robust import OUTLIER
+from truepose.files.shown_units import Shown, ShownUnits
+from truepose.reporting.display import MISSING, decimals_for, number, where_highest
+from truepose.reporting.tables import MOST_LISTED, Table
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.reporting.result import Result
+
+MOST_UNKNOWNS = 100
+"""Rows of the table of unknowns; those whose tolerance says least of what was found go first."""
+BAR = 10
+"""Characters of a full bar."""
+FEW = 0.1
+"""Share of the readings up to which those that do not fit are odd ones."""
+RESTS = 0.5
+"""Below this share of the measurements in a value it rests on its tolerance."""
+_FLAGS = {
+    "open": "nothing determines it",
+    "less certain": "the tolerance says more than the measurements",
+    "off tolerance": "the value is not within its tolerance",
+    "mostly tolerance": "the measurements say less than half of the value",
+}
+
+
+def tables(found: xr.Dataset, units: ShownUnits) -> list[Table]:
+    """All that there is to say, in the order of the terminal, where the last is seen first."""
+    return _there(
+        suspicions(found),
+        outliers(found),
+        unknowns(found, units),
+        instruments(found, units),
+        undetermined(found),
+        residuals(found, units),
+        tool(found, units),
+        heed(found),
+        next_measurement(found, units),
+    )
+
+
+def of_page(found: xr.Dataset, units: ShownUnits) -> list[Table]:
+    """The same for the page, where the first are seen first."""
+    return _there(
+        suspicions(found),
+        undetermined(found),
+        next_measurement(found, units),
+        heed(found),
+        tool(found, units),
+        residuals(found, units),
+        unknowns(found, units, bars=False),
+        instruments(found, units),
+        outliers(found),
+    )
+
+
+def _there(*every: Table | None) -> list[Table]:
+    return [table for table in every if table is not None]
+
+
+def said(found: xr.Dataset, name: str) -> Any:
+    """An attribute that holds JSON; None where there is nothing."""
+    text = str(found.attrs[name])
+    return json.loads(text) if text else None
+
+
+def suspicions(found: xr.Dataset) -> Table | None:
+    """What the measurements look like before anything is fitted."""
+    rows = [
+        (each["code"], "yes" if each["refuses"] else "no", each["sentence"])
+        for each in said(found, "suspicions")
+    ]
+    if not rows:
+        return None
+    return Table(
+        "suspicions",
+        "What the measurements look like",
+        ("suspicion", "refused for it", "why"),
+        tuple(rows),
+        words=3,
+        note="Suspected, not repaired: the fit below is of the measurements as they are.",
+    )
+
+
+def outliers(found: xr.Dataset) -> Table | None:
+    """Readings that do not fit, the worst first."""
+    every = said(found, "outliers")
+    if not every:
+        return None
+    in_file = any(each["line"] for each in every)
+    rows = [
+        (
+            each["instrument"],
+            each["what"],
+            str(each["line"] if in_file else each["row"]),
+            number(each["sigmas"], 1),
+        )
+        for each in every[:MOST_LISTED]
+    ]
+    note = "They count less in the fit, unless the robust loss is switched off."
+    if not _odd(found).any():
+        note = (
+            f"{len(every)} of {found.attrs['observations']} readings: these are no odd ones, the "
+            "data or the model are wrong as a whole."
+        )
+    if len(every) > len(rows):
+        note += f" {len(every) - len(rows)} more are in the files for programs."
+    return Table(
+        "outliers",
+        "Readings that do not fit",
+        ("instrument", "reading", "line" if in_file else "row", "standard deviations"),
+        tuple(rows),
+        words=2,
+        note=note,
+    )
+
+
+def unknowns(found: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> Table:
+    """What was found of the machine, and how much of it the measurements say, with bars of text."""
+    values = {
+        name: found[name].values
+        for name in (
+            "value", "standard_uncertainty", "prior_uncertainty", "data_share", "nominal",
+            "identified",
+        )
+    }  # fmt: skip
+    units = [str(unit) for unit in found["unknown_units"].values]
+    shown = _shown(found)
+    rows = []
+    for at in shown:
+        unit = units[at]
+        share = float(values["data_share"][at])
+        rows.append(
+            (
+                str(found["unknown_label"].values[at]),
+                _flag(found, at),
+                _value(float(values["nominal"][at]), unit, shown_in),
+                _value(float(values["identified"][at]), unit, shown_in),
+                signed(float(values["value"][at]), unit, shown_in),
+                _uncertainty(float(values["prior_uncertainty"][at]), unit, shown_in),
+                _uncertainty(float(values["standard_uncertainty"][at]), unit, shown_in),
+                f"{bar(share)} {100.0 * share:4.0f}" if bars else f"{100.0 * share:.0f}",
+            )
+        )
+    more = found.sizes["unknown"] - len(rows)
+    note = (
+        "±: standard uncertainty. From the data: how much of the value the "
+        "measurements say; the rest is its tolerance."
+    )
+    flags = dict.fromkeys(row[1] for row in rows if row[1])
+    note += "".join(f" {sentence(flag)}: {_FLAGS[flag]}." for flag in flags)
+    if more:
+        note += f" {more} more are in the files for programs."
+    return Table(
+        "unknowns",
+        "What was found",
+        (
+            "", "", "nominal", "identified", "change", "± before", "± after",
+            "from the data, %",
+        ),
+        tuple(rows),
+        words=2,
+        note=note,
+    )  # fmt: skip
+
+
+def _shown(found: xr.Dataset) -> list[int]:
+    count = found.sizes["unknown"]
+    if count <= MOST_UNKNOWNS:
+        return list(range(count))
+    order = np.argsort(-found["data_share"].values, kind="stable")[:MOST_UNKNOWNS]
+    return sorted(order.tolist())
+
+
+def _flag(found: xr.Dataset, at: int) -> str:
+    off = abs(float(found["value"].values[at]) - float(found["prior_mean"].values[at]))
+    half = float(found["prior_half"].values[at])
+    after = float(found["standard_uncertainty"].values[at])
+    if not math.isfinite(after):
+        return "open"
+    if after > float(found["prior_uncertainty"].values[at]):
+        return "less certain"
+    if math.isfinite(half) and off > half:
+        return "off tolerance"
+    if float(found["data_share"].values[at]) < RESTS:
+        return "mostly tolerance"
+    return ""
+
+
+def bar(share: float) -> str:
+    """A share as a bar of blocks."""
+    filled = round(BAR * share) if math.isfinite(share) else 0
+    return "█" * filled + "░" * (BAR - filled)
+
+
+def _value(value: float, unit: str, units: ShownUnits) -> str:
+    if not math.isfinite(value):
+        return MISSING
+    if unit not in ("m", "rad", "1"):
+        return quantity(value, unit, 4)
+    shown = units.of(unit)
+    return f"{number(value * shown.per_si, 4)} {shown.label}".rstrip()
+
+
+def signed(value: float, unit: str, units: ShownUnits) -> str:
+    """A change with its sign: "+0.456 mm", "−12.0 µm"."""
+    if not math.isfinite(value):
+        return MISSING
+    text = quantity(value, unit, 3, units)
+    return text if value <= 0.0 else f"+{text}"
+
+
+def _uncertainty(value: float, unit: str, units: ShownUnits) -> str:
+    return "open" if math.isinf(value) else quantity(value, unit, units=units)
+
+
+def instruments(found: xr.Dataset, units: ShownUnits) -> Table | None:
+    """Where the instruments stand, their targets, what they add."""
+    values = found["instrument_value"].values
+    if not values.size:
+        return None
+    rows = [
+        (
+            str(found["instrument_unknown_label"].values[at]),
+            signed(float(value), str(found["instrument_unknown_units"].values[at]), units),
+            _uncertainty(
+                float(found["instrument_uncertainty"].values[at]),
+                str(found["instrument_unknown_units"].values[at]),
+                units,
+            ),
+        )
+        for at, value in enumerate(values)
+    ]
+    return Table(
+        "instruments",
+        "What was found of the instruments",
+        ("", "from where it was looked for", "uncertainty"),
+        tuple(rows),
+        note="Open: moving the instrument does what moving the whole machine does.",
+    )
+
+
+def undetermined(found: xr.Dataset) -> Table | None:
+    """What could not be determined, in sentences."""
+    rows = [(f"{sentence(each)}.",) for each in said(found, "undetermined")]
+    if not rows:
+        return None
+    condition = float(found.attrs["condition_number"])
+    seen = f"Rank of the identification Jacobian: {found.attrs['rank']} of {found.sizes['unknown']}"
+    if math.isfinite(condition):
+        seen += f", condition number {condition:.3g}"
+    return Table(
+        "undetermined",
+        "What could not be determined",
+        ("",),
+        tuple(rows),
+        note=f"{seen}.",
+    )
+
+
+def residuals(found: xr.Dataset, shown_in: ShownUnits) -> Table:
+    """Root mean squares of what was read less what was predicted, for each instrument and unit."""
+    instrument = found["row_instrument"].values[found["observation_row"].values]
+    units = found["observation_units"].values
+    names = found["observation_what"].values
+    sigma = found["uncertainty"].values
+    named = _odd(found)
+    rows = []
+    for name, unit in dict.fromkeys(zip(instrument.tolist(), units.tolist(), strict=True)):
+        mine = (instrument == name) & (units == unit)
+        scale = Shown("", 1.0) if unit == "1" else shown_in.small(unit)
+        factor, shown = scale.per_si, scale.label
+        what = listed(list(dict.fromkeys(_plain(each) for each in names[mine].tolist())))
+        mine &= ~named
+        sizes = [
+            rms(found[key].values[mine] * (sigma[mine] if normalised else 1.0)) * factor
+            for key, normalised in (
+                ("residual_before", False),
+                ("residual_after", False),
+                ("held_out_before", True),
+                ("held_out_after", True),
+            )
+        ]
+        places = 6 if unit == "1" else decimals_for([each for each in sizes if each == each], 4)
+        rows.append(
+            (
+                str(name),
+                f"{what}, {shown}".rstrip(", "),
+                str(int(mine.sum())),
+                number(rms(sigma[mine]) * factor, places),
+                *(number(size, places) for size in sizes),
+                number(rms(found["normalised_after"].values[mine]), 2),
+            )
+        )
+    kind, folds = found.attrs["validation"], found.attrs["folds"]
+    how = {
+        "none": "Too few rows to hold any out.",
+        "folds": f"Held out: each of {folds} folds of the rows predicted by the others.",
+        "stated set": "Held out: the rows that the file keeps from the fit.",
+    }[kind]
+    note = f"{how} Before: the machine as filed, the instruments placed as fits it best."
+    if named.any():
+        note += " Without the readings named as not fitting."
+    return Table(
+        "residuals",
+        "Measurements against the machine, root mean square",
+        (
+            "instrument", "readings", "number", "stated", "before", "after",
+            "held out, before", "held out, after", "after / stated",
+        ),
+        tuple(rows),
+        words=2,
+        note=note,
+    )  # fmt: skip
+
+
+def _odd(found: xr.Dataset) -> np.ndarray:
+    """(n_observation,) readings that do not fit, where they are few: none where many do not."""
+    sizes = found["standardised"].values
+    flags: np.ndarray = np.abs(sizes) >= OUTLIER
+    return flags if flags.sum() <= FEW * np.isfinite(sizes).sum() else np.zeros_like(flags)
+
+
+def _plain(what: str) -> str:
+    """A reading without its strut: "strut.a1.length" is a length."""
+    return what.split(".", 2)[2] if what.startswith("strut.") else what
+
+
+def rms(values: Floats) -> float:
+    """Root mean square of those that are there; NaN where none is."""
+    there = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(there**2))) if there.size else float("nan")
+
+
+def tool(found: xr.Dataset, units: ShownUnits) -> Table:
+    """Standard uncertainty at the tool before and after, over the workspace."""
+    rows = []
+    names = [str(name) for name in found["quantity"].values]
+    for at, name in enumerate(names):
+        unit = units.error(name)
+        rows.append(
+            (
+                f"{name}, {unit.label}",
+                *_of_tool(
+                    found["tool_size_before"].values[:, at] * unit.per_si,
+                    found["tool_size_after"].values[:, at] * unit.per_si,
+                ),
+            )
+        )
+    for at, component in enumerate(found["component"].values):
+        unit = units.error(str(component))
+        before, after = (
+            found[f"tool_{when}"].values[:, at] * unit.per_si for when in ("before", "after")
+        )
+        rows.append((f"{component}, {unit.label}", *_of_tool(before, after)))
+    note = "Standard uncertainty of where the tool is, over the poses of the workspace."
+    if found.attrs["relative"]:
+        note += " Where the machine as a whole stands in the instrument's frame is not in it."
+    return Table(
+        "tool",
+        "What that is worth at the tool",
+        ("", "worst before", "worst after", "rms before", "rms after", "after / before"),
+        tuple(rows),
+        note=note,
+    )
+
+
+def _of_tool(before: Floats, after: Floats) -> tuple[str, ...]:
+    sizes = [_worst(before), _worst(after), _rms_or_open(before), _rms_or_open(after)]
+    places = decimals_for([each for each in sizes if math.isfinite(each)], 4)
+    ratio = sizes[1] / sizes[0] if sizes[0] > 0.0 and math.isfinite(sizes[1]) else float("nan")
+    return (
+        *("open" if math.isinf(each) else number(each, places) for each in sizes),
+        number(ratio, 2),
+    )
+
+
+def _worst(sizes: Floats) -> float:
+    if np.isnan(sizes).all():
+        return float("nan")
+    return (
+        float(sizes[where_highest(sizes)]) if np.isfinite(sizes).all() else float(np.nanmax(sizes))
+    )
+
+
+def _rms_or_open(sizes: Floats) -> float:
+    return float("inf") if np.isinf(sizes).any() else rms(sizes)
+
+
+def heed(found: xr.Dataset) -> Table | None:
+    """Warnings."""
+    rows = [(f"{sentence(each['sentence'])}.",) for each in said(found, "warnings")]
+    return Table("heed", "To heed", ("",), tuple(rows)) if rows else None
+
+
+def next_measurement(found: xr.Dataset, units: ShownUnits) -> Table | None:
+    """The cheapest measurement that would turn the verdict."""
+    remedy = said(found, "remedy")
+    if remedy is None:
+        return None
+    note = ""
+    then = [
+        f"{what} known to {quantity(remedy[name], unit, units=units)}"
+        for what, name, unit in (
+            ("position", "position", "m"),
+            ("orientation", "rotation", "rad"),
+        )
+        if remedy[name]
+    ]
+    if then:
+        note = f"With it the tool would have its {' and its '.join(then)} at the worst pose."
+    rows = ((f"{sentence(remedy['sentence'])}.",),)
+    return Table("next", "Recommended next measurement", ("",), rows, note=note)
+
+
+def csv_text(result: Result) -> Iterator[str]:
+    """One row for each unknown, in the machine file's units; those of instruments last."""
+    found = result.dataset
+    names = [name for name in result.variables() if found[name].dims == ("unknown",)]
+    columns = {name: result.values(name) for name in names}
+    instrument = {
+        "value": result.values("instrument_value"),
+        "standard_uncertainty": result.values("instrument_uncertainty"),
+    }
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(["of", "unknown", "label", "units", *names])
+    for at, name in enumerate(found["unknown"].values.tolist()):
+        cells = [_cell(columns[each].array[at]) for each in names]
+        unit = _unit(columns["value"], at)
+        writer.writerow(["machine", name, found["unknown_label"].values[at], unit, *cells])
+    for at, name in enumerate(found["instrument_unknown"].values.tolist()):
+        cells = [_cell(instrument[each].array[at]) if each in instrument else "" for each in names]
+        unit = _unit(instrument["value"], at)
+        label = found["instrument_unknown_label"].values[at]
+        writer.writerow(["instrument", name, label, unit, *cells])
+    yield buffer.getvalue()
+
+
+def _unit(values: Any, at: int) -> str:
+    return str(values.unit(at) if values.mixed else values.units[0])
+
+
+def _cell(value: Any) -> str:
+    return repr(float(value)) if math.isfinite(value) else ""

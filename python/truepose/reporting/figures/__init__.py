@@ -1,0 +1,86 @@
+"""The figures of the report: one figure is one file, `Study` in, plotly figure out.
+
+A figure's module has `TITLE`, `caption(study)` and `figure(study)`. To add one: write the module
+and name it in `FIGURES`, where the order is that of the report. A figure of a result that not every
+study has names it, `NEEDS = "compensation"`, and is left out where `study.compensation` is None.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import ModuleType
+
+import plotly.graph_objects as go
+
+from truepose.reporting.figures import (
+    before_after,
+    calibration_correlation,
+    calibration_map,
+    calibration_residuals,
+    calibration_tool,
+    calibration_unknowns,
+    coverage_ellipses,
+    distribution,
+    error_over_time,
+    how_far,
+    internal_forces,
+    machine_drawing,
+    overall_error,
+    ranking,
+    source_errors,
+    tornado,
+    workspace_maps,
+)
+from truepose.reporting.study import Study
+
+FIGURES: tuple[ModuleType, ...] = (
+    calibration_residuals,
+    calibration_map,
+    calibration_unknowns,
+    calibration_correlation,
+    calibration_tool,
+    machine_drawing,
+    ranking,
+    source_errors,
+    overall_error,
+    workspace_maps,
+    how_far,
+    distribution,
+    coverage_ellipses,
+    tornado,
+    error_over_time,
+    internal_forces,
+    before_after,
+)
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One figure with its name (the module's), its title, its caption and the result it needs."""
+
+    name: str
+    title: str
+    caption: str
+    figure: go.Figure
+    needs: str | None = None
+
+
+def _there(result: object) -> bool:
+    """Whether a study has a result: a Dataset, or answers, of which there may be none."""
+    return len(result) > 0 if isinstance(result, tuple) else result is not None
+
+
+def draw(study: Study) -> Iterator[Drawn]:
+    """Every registered figure of a study, in the order of the report."""
+    for module in FIGURES:
+        needed: str | None = getattr(module, "NEEDS", None)
+        if needed is not None and not _there(getattr(study, needed)):
+            continue
+        yield Drawn(
+            name=module.__name__.rpartition(".")[2],
+            title=module.TITLE,
+            caption=module.caption(study),
+            figure=module.figure(study),
+            needs=needed,
+        )

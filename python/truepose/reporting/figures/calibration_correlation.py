@@ -1,0 +1,101 @@
+"""Which unknowns the measurements tell apart only together."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from truepose.reporting.figures._style import finish, small
+from truepose.reporting.study import Study
+
+TITLE = "Correlation"
+NEEDS = "calibration"
+MOST_DRAWN = 120
+MOST_NAMED = 60
+STRONG = 0.9
+SCALE = [[0.0, "#0072B2"], [0.5, "#FFFFFF"], [1.0, "#D55E00"]]
+"""Blue and vermilion of Okabe and Ito, told apart by colour-blind readers too."""
+
+
+def caption(study: Study) -> str:
+    """What the colours mean, and the strongest pair."""
+    text = (
+        "Correlation of the values found. Near +1 or −1 two unknowns are known well together "
+        "(their difference, or their sum) and badly by themselves: what such values are worth "
+        "shows at the tool only."
+    )
+    pair = _strongest(study)
+    if pair is not None:
+        first, second, value = pair
+        sign = "+" if value > 0 else "\N{MINUS SIGN}"
+        text += f" The strongest: {first} with {second}, {sign}{abs(value):.3f}."
+    if study.calibrated.sizes["unknown"] > MOST_DRAWN:
+        text += f" Drawn: the first {MOST_DRAWN} unknowns; files for programs have all."
+    return text
+
+
+def figure(study: Study) -> go.Figure:
+    """A heat map of the correlation matrix."""
+    found = study.calibrated
+    names = found["unknown_label"].values[:MOST_DRAWN].tolist()
+    values = found["correlation"].values[:MOST_DRAWN, :MOST_DRAWN]
+    named = len(names) <= MOST_NAMED
+    places = list(range(len(names)))
+    figure = go.Figure(
+        go.Heatmap(
+            x=places,
+            y=places,
+            z=small(values),
+            customdata=np.array([[f"{one}<br>{other}" for one in names] for other in names]),
+            zmin=-1.0,
+            zmax=1.0,
+            colorscale=SCALE,
+            colorbar={
+                "orientation": "h",
+                "thickness": 14,
+                "len": 0.45,
+                "x": 0.0,
+                "xanchor": "left",
+                "y": 1.02,
+                "yanchor": "bottom",
+            },
+            hovertemplate="%{customdata}<br>%{z:.3f}<extra></extra>",
+        )
+    )
+    size = min(max(16 * len(names), 340), 760)
+    margin = 175 if named else 60
+    finish(
+        figure,
+        size + min(margin, 140) + 70,
+        margin={"l": margin, "r": 20, "t": 70, "b": min(margin, 140)},
+    )
+    ticks = {"tickmode": "array", "tickvals": places, "ticktext": names, "tickfont": {"size": 11}}
+    common = {"showgrid": False, "zeroline": False, "ticks": "", "constrain": "domain"}
+    figure.update_xaxes(
+        **(ticks if named else {"showticklabels": False}),
+        tickangle=-60,
+        constraintoward="left",
+        **common,
+    )
+    figure.update_yaxes(
+        **(ticks if named else {"showticklabels": False}),
+        autorange="reversed",
+        scaleanchor="x",
+        **common,
+    )
+    return figure
+
+
+def _strongest(study: Study) -> tuple[str, str, float] | None:
+    """The two unknowns that are correlated most, where that is strong."""
+    found = study.calibrated
+    values = np.nan_to_num(found["correlation"].values.copy())
+    np.fill_diagonal(values, 0.0)
+    if not values.size:
+        return None
+    first, second = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    value = float(values[first, second])
+    if abs(value) < STRONG:
+        return None
+    names = found["unknown_label"].values
+    return str(names[first]), str(names[second]), value

@@ -1,0 +1,82 @@
+"""Where in the workspace the measurements do not fit, before and after calibration."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from truepose.arrays import Floats
+from truepose.reporting.figures._maps import label_map_axes, map_trace, places_of
+from truepose.reporting.figures._style import COLOUR_SCALE, finish
+from truepose.reporting.study import Study
+
+TITLE = "Residuals in the workspace"
+NEEDS = "calibration"
+HEIGHT = 420
+GAP = 0.17
+"""Share of the width between the two maps: the scale of the first and a name of the second."""
+_MARGINS = {True: {"l": 5, "r": 5, "t": 40, "b": 5}, False: {"l": 65, "r": 60, "t": 45, "b": 55}}
+"""Pixels about the maps, by whether they are spatial."""
+
+
+def caption(_: Study) -> str:
+    """What the colour is."""
+    return (
+        "Each point is a measured pose, its colour the root mean square of its residuals over "
+        "their stated uncertainties. The two scales differ. After calibration no place should "
+        "stand out, and all should be near one; places that do show what the model lacks."
+    )
+
+
+def figure(study: Study) -> go.Figure:
+    """Two maps over the measured poses, each with its own scale."""
+    found = study.calibrated
+    names = study.machine.commanded
+    poses = np.stack([found[f"row_{name}"].values for name in names], axis=-1)
+    places = places_of(poses, names, study.units)
+    kinds = [("before", "normalised_before"), ("after", "normalised_after")]
+    spatial = len(places.axes) == 3
+    figure = make_subplots(
+        rows=1,
+        cols=2,
+        subplot_titles=[name for name, _ in kinds],
+        specs=[[{"type": "scene" if spatial else "xy"}] * 2],
+        horizontal_spacing=GAP,
+    )
+    finish(figure, HEIGHT, margin=_MARGINS[spatial])
+    for number, (_, name) in enumerate(kinds):
+        sizes = _by_place(study, found[name].values, places.of_pose, len(places.points))
+        drawn = np.flatnonzero(np.isfinite(sizes))
+        axis = "coloraxis" if number == 0 else "coloraxis2"
+        trace = map_trace(places, drawn, sizes, "stated uncertainties", axis)
+        figure.add_trace(trace, row=1, col=number + 1)
+        highest = float(sizes[drawn].max(initial=1.0))
+        figure.update_layout(
+            {
+                axis: {
+                    "colorscale": COLOUR_SCALE,
+                    "cmin": 0.0,
+                    "cmax": highest,
+                    "colorbar": {
+                        "thickness": 14,
+                        "len": 0.85,
+                        "x": (1.0 - GAP) / 2 + 0.005 if number == 0 else 1.005,
+                    },
+                }
+            }
+        )
+    label_map_axes(figure, places, 2)
+    return figure
+
+
+def _by_place(study: Study, values: Floats, of_row: np.ndarray, count: int) -> Floats:
+    """(n_place,) root mean square of the residuals at each place; NaN where none was fitted."""
+    rows = study.calibrated["observation_row"].values
+    there = np.isfinite(values)
+    at = of_row[rows[there]]
+    total = np.bincount(at, values[there] ** 2, minlength=count)
+    number = np.bincount(at, minlength=count)
+    with np.errstate(invalid="ignore"):
+        sizes: Floats = np.sqrt(total / number)
+    return sizes

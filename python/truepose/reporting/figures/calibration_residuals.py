@@ -1,0 +1,159 @@
+"""What was measured against the machine before and after calibration, reading by reading."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from truepose.arrays import Floats
+from truepose.calibration.identification.robust import OUTLIER
+from truepose.files.shown_units import Shown
+from truepose.reporting.figures._style import AFTER, BEFORE, OVERALL, finish, small
+from truepose.reporting.study import Study
+
+TITLE = "Residuals"
+NEEDS = "calibration"
+
+PANEL_HEIGHT = 270
+COVERAGE = 2.0
+"""Standard uncertainties within which 95 of 100 readings should be."""
+
+
+def caption(study: Study) -> str:
+    """What the points are, and where they should be."""
+    text = (
+        "Predicted minus measured. Left: the machine as filed, its instruments placed as fits it "
+        "best, against the calibrated one. Right: the calibrated machine alone, where 95 in 100 "
+        "points should lie in the grey band of twice the stated uncertainty, and show no pattern."
+    )
+    if _named(study).any():
+        text += " Readings that do not fit are further out than it shows."
+    kind = study.calibrated.attrs["validation"]
+    if kind == "folds":
+        text += " Open circles: rows predicted by a fit that did not use them."
+    if kind == "stated set":
+        text += " Open circles: rows that the file keeps from the fit."
+    return text
+
+
+def figure(study: Study) -> go.Figure:
+    """One row of panels for each unit: before and after on one scale, then after alone."""
+    found = study.calibrated
+    units = list(dict.fromkeys(found["observation_units"].values.tolist()))
+    figure = make_subplots(
+        rows=len(units),
+        cols=2,
+        horizontal_spacing=0.09,
+        vertical_spacing=0.25 / len(units),
+        column_titles=["before and after", "after, enlarged"],
+    )
+    rows = found["observation_row"].values
+    lines = found["row_line"].values
+    in_file = bool((lines > 0).all())
+    where = (lines if in_file else found["row"].values)[rows]
+    labels = _labels(study)
+    sigma = found["uncertainty"].values
+    for number, unit in enumerate(units):
+        mine = found["observation_units"].values == unit
+        scale = Shown("1", 1.0) if unit == "1" else study.units.small(unit)
+        factor, shown = scale.per_si, scale.label
+        sets = {
+            name: (found[name].values * (sigma if normalised else 1.0))[mine] * factor
+            for name, normalised in (
+                ("residual_before", False),
+                ("residual_after", False),
+                ("held_out_after", True),
+            )
+        }
+        at, text = where[mine], labels[mine]
+        first = number == 0
+        for column in (1, 2):
+            place = {"row": number + 1, "col": column}
+            if column == 1:
+                figure.add_trace(
+                    _points(at, sets["residual_before"], text, "before", BEFORE, first), **place
+                )
+            else:
+                figure.add_traces(
+                    _band(at, sigma[mine] * factor), rows=[number + 1] * 2, cols=[2] * 2
+                )
+            figure.add_trace(
+                _points(at, sets["residual_after"], text, "after", AFTER, first and column == 1),
+                **place,
+            )
+            if column == 2 and np.isfinite(sets["held_out_after"]).any():
+                figure.add_trace(
+                    _points(
+                        at, sets["held_out_after"], text, "not used for the fit", OVERALL, first,
+                        "circle-open",
+                    ),
+                    **place,
+                )  # fmt: skip
+        figure.update_yaxes(title_text=f"residual, {shown}", row=number + 1, col=1)
+        fit = mine & ~_named(study)
+        after = (found["normalised_after"].values * sigma)[fit] * factor
+        held_out = (found["held_out_after"].values * sigma)[fit] * factor
+        reach = np.abs(np.concatenate([after, held_out, 2.5 * sigma[mine] * factor]))
+        most = 1.08 * float(np.nanmax(reach))
+        figure.update_yaxes(range=[-most, most], row=number + 1, col=2)
+    finish(figure, 110 + PANEL_HEIGHT * len(units), margin={"l": 75, "r": 20, "t": 70, "b": 55})
+    name = "line of the file" if in_file else "row"
+    figure.update_xaxes(title_text=name, row=len(units))
+    return figure
+
+
+def _named(study: Study) -> np.ndarray:
+    """(n_observation,) readings that are named as not fitting."""
+    flags: np.ndarray = np.abs(study.calibrated["standardised"].values) >= OUTLIER
+    return flags
+
+
+def _labels(study: Study) -> np.ndarray:
+    """(n_observation,) what each reading is: "tracker, x"."""
+    found = study.calibrated
+    names = found["row_instrument"].values[found["observation_row"].values]
+    return np.array(
+        [
+            f"{name}, {what}"
+            for name, what in zip(names, found["observation_what"].values, strict=True)
+        ],
+        dtype=np.str_,
+    )
+
+
+def _points(
+    at: np.ndarray,
+    values: Floats,
+    text: np.ndarray,
+    name: str,
+    colour: str,
+    legend: bool,
+    symbol: str = "circle",
+) -> go.Scatter:
+    return go.Scatter(
+        x=at,
+        y=small(values),
+        text=text,
+        name=name,
+        legendgroup=name,
+        showlegend=legend,
+        mode="markers",
+        marker={"color": colour, "size": 7, "symbol": symbol, "opacity": 0.85},
+        hovertemplate="%{text}: %{y:.3f}<extra>" + name + "</extra>",
+    )
+
+
+def _band(at: np.ndarray, sigma: Floats) -> list[go.Scatter]:
+    """Twice the stated uncertainty either side, the largest at each row."""
+    where = np.unique(at)
+    half = COVERAGE * np.array([sigma[at == each].max() for each in where])
+    # Half a row further at both ends, so that points at the ends lie in it too.
+    where = np.concatenate([[where[0] - 0.5], where, [where[-1] + 0.5]])
+    half = np.concatenate([half[:1], half, half[-1:]])
+    common = {"x": small(where), "mode": "lines", "line": {"width": 0}, "showlegend": False,
+              "hoverinfo": "skip"}  # fmt: skip
+    return [
+        go.Scatter(y=small(-half), **common),
+        go.Scatter(y=small(half), fill="tonexty", fillcolor="rgba(27,42,65,0.10)", **common),
+    ]

@@ -1,0 +1,102 @@
+"""How far off the tool can be, over the whole workspace: the known numbers side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.files.wording import counted
+from truepose.reporting.accuracy import AFTER, BEFORE
+from truepose.reporting.display import MISSING
+from truepose.reporting.study import Study
+from truepose.reporting.tables import Table
+from truepose.reporting.uncertainty_tables import rounded
+
+NUMBERS = {
+    "sampled": "95 %",
+    "witness": "witness",
+    "linear": "linear maximum",
+    "bound": "proven bound",
+}
+"""The numbers, by rising caution."""
+
+
+@dataclass(frozen=True)
+class HowFar:
+    """One quantity in one state: m or rad by the names of `NUMBERS`, NaN where there is none."""
+
+    quantity: str
+    state: str
+    sizes: Mapping[str, float]
+
+
+def how_far(study: Study) -> list[HowFar]:
+    """Every quantity before and after compensation.
+
+    At a coverage the verdict's own numbers are of that, and of the worst case the linear maximum is
+    known alone.
+    """
+    rows = []
+    worst_cases = _linear_maxima(study)
+    sampled = {(each.state, each.quantity): each for each in study.sampled}
+    for answer in study.accuracy:
+        share = sampled.get((answer.state, answer.quantity))
+        worst = answer.coverage is None
+        sizes = {
+            "sampled": math.nan if share is None else share.linear.value,
+            "witness": answer.witness.value if worst else math.nan,
+            "linear": answer.linear.value if worst else worst_cases[answer.state][answer.quantity],
+            "bound": answer.bound.value if worst else math.nan,
+        }
+        finite = {name: size if math.isfinite(size) else math.nan for name, size in sizes.items()}
+        rows.append(HowFar(answer.quantity, answer.state, finite))
+    return rows
+
+
+def _linear_maxima(study: Study) -> Mapping[str, Mapping[str, float]]:
+    """By state and quantity, m and rad: the largest over all poses."""
+    return {
+        state: {
+            str(quantity): float(np.nanmax(found["linear_maximum"].values[:, at]))
+            for at, quantity in enumerate(found["quantity"].values)
+        }
+        for state, found in ((BEFORE, study.budget), (AFTER, study.compensation))
+        if found is not None
+    }
+
+
+def share_note(study: Study) -> str:
+    """What 95 % is, and how it was found."""
+    said = "95 %: so many of all machines stay below it at the worst pose, sampled, solved exactly"
+    found = [each.coverage for each in study.sampled if each.coverage is not None]
+    if not found:
+        return f"{said}."
+    draws = max(each.draws for each in found)
+    sampled = {each.sampled for each in found}
+    up_to = "up to " if len(sampled) > 1 else ""
+    poses = counted(found[0].poses, "pose")
+    return f"{said}: {draws:,} machines at {up_to}{max(sampled):,} of {poses}."
+
+
+def table(study: Study) -> Table:
+    """The same as a table."""
+    rows = []
+    for row in how_far(study):
+        unit = study.units.error(row.quantity)
+        sizes = np.array([row.sizes[name] * unit.per_si for name in NUMBERS])
+        cells = rounded(sizes, [int(name == "bound") for name in NUMBERS])
+        rows.append((row.quantity, row.state, *cells, unit.label))
+    return Table(
+        "how_far",
+        "How far off can the tool be?",
+        ("", "", *NUMBERS.values(), ""),
+        tuple(rows),
+        words=2,
+        note=f"The largest over all poses. {share_note(study)} {MISSING}: there is no such number.",
+    )
+
+
+__all__ = ["AFTER", "BEFORE", "NUMBERS", "HowFar", "how_far", "table"]

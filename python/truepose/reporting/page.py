@@ -1,0 +1,100 @@
+"""The report: one HTML file with everything in it, which opens from disk without any network."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+import jinja2
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+
+from truepose.calibration.acceptance.sentences import sentence
+from truepose.files.writing import replacing
+from truepose.reporting import calibration, how_far, inputs, tables, uncertainty_tables
+from truepose.reporting.accuracy import gains, told
+from truepose.reporting.figures import Drawn, draw
+from truepose.reporting.study import Study
+
+LIMITS = (
+    "These results hold for the sources found in the machine file and for the poses evaluated, "
+    "nothing else. Sources that the file does not name (backlash, joint clearance, wear, control "
+    "and measuring errors, bending of frame, platform and guides) are not in them. A linear "
+    "maximum is of first order; a witness is one machine, solved exactly; a proven bound says so, "
+    "and holds at the poses that it names. Loads and temperatures act on the nominal machine at "
+    "the commanded pose."
+)
+FIGURE_SETTINGS = {"displaylogo": False, "responsive": True, "displayModeBar": "hover"}
+
+
+def render(study: Study, machine_text: str = "") -> str:
+    """The page as text. `machine_text` is the machine file, shown as it was read."""
+    environment = jinja2.Environment(
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=jinja2.FunctionLoader(_resource),
+    )
+    environment.filters["capitalise"] = sentence
+    results = [tables.ranking(study), tables.highest_absolute(study), tables.highest_percent(study)]
+    if study.compensation is not None:
+        results.append(tables.compensation(study))
+    results += tables.strain(study)
+    results += [tables.answers(study.machine, study.accuracy), how_far.table(study)]
+    results += uncertainty_tables.tables(study)
+    left_out = tables.poses_left_out(study)
+    if left_out is not None:
+        results.append(left_out)
+    drawn = [(each, _embedded(each.name, each.figure)) for each in draw(study)]
+    return environment.get_template("page.html.jinja").render(
+        study=study,
+        machine=study.machine,
+        attrs=study.budget.attrs,
+        answers=told(study.machine, study.accuracy),
+        gains=gains(study.accuracy),
+        figures=[pair for pair in drawn if not _of_calibration(pair[0])],
+        calibration=None if study.calibration is None else study.calibration.attrs,
+        calibration_figures=[pair for pair in drawn if _of_calibration(pair[0])],
+        calibration_tables=[]
+        if study.calibration is None
+        else calibration.of_page(study.calibration, study.units),
+        results=results,
+        warnings=tables.warnings(study),
+        inputs=[
+            table(study.machine)
+            for table in (inputs.machine, inputs.condition, inputs.sources, inputs.deviations)
+        ],
+        parameters=inputs.parameters(study.machine),
+        machine_text=machine_text,
+        limits=LIMITS,
+        css=_resource("page.css"),
+        plotly_js=get_plotlyjs(),
+    )
+
+
+def _of_calibration(drawn: Drawn) -> bool:
+    """Whether a figure stands with the calibration, before what the machine as filed does."""
+    return drawn.needs == "calibration"
+
+
+def write(study: Study, path: Path, machine_text: str = "") -> None:
+    """Write the page to `path`, whole or not at all."""
+    text = render(study, machine_text)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _resource(name: str) -> str:
+    return files("truepose.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _embedded(name: str, figure: go.Figure) -> str:
+    """A figure as HTML that uses the library inlined once in the page."""
+    html: str = figure.to_html(
+        full_html=False,
+        include_plotlyjs=False,
+        div_id=f"figure-{name}",
+        config=FIGURE_SETTINGS,
+    )
+    return html

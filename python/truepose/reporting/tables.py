@@ -1,0 +1,384 @@
+"""The tables of the command line and of the report: the same text in both.
+
+In the units for people (`truepose.files.shown_units`), percentages of the commanded coordinate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truepose.arrays import Floats
+from truepose.reporting.accuracy import told
+from truepose.reporting.display import (
+    LOWER,
+    UPPER,
+    column,
+    decimals_for,
+    is_position,
+    number,
+    pose_text,
+    where_highest,
+)
+from truepose.reporting.study import Study, warnings_of
+from truepose.runs.poses import reason_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+    from truepose.verdict.answer import Answer
+
+MOST_LISTED = 20
+"""Rows of a list of poses shown to people; files for programs hold them all."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table ready to be shown: every cell is text, `words` leading columns are words.
+
+    The other columns are numbers and stand to the right.
+    """
+
+    name: str
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: int = 1
+    note: str = ""
+
+
+def with_not_included(table: Table, parts: str) -> Table:
+    """The table, whose note also names what is not in the results, where anything is not.
+
+    `parts`: as the attribute `not_included` of a result has them, `frame (no material)`.
+    """
+    return replace(table, note=f"{table.note} Not included: {parts}.") if parts else table
+
+
+def ranking(study: Study) -> Table:
+    """The sources by rank: what each alone can do at most, its share and the verdict."""
+    order = study.by_rank
+    parts = [str(name) for name in study.budget["quantity"].values]
+    header = ["source", "verdict", "rank"]
+    columns: list[Sequence[str]] = [
+        [study.sources[index] for index in order],
+        [str(study.values("verdict")[index]) for index in order],
+        [str(int(study.values("rank")[index])) for index in order],
+    ]
+    for part, name in enumerate(parts):
+        unit = study.units.error(name)
+        header += [f"highest {name}, {unit.label}", f"rms {name}, {unit.label}"]
+        columns += [
+            column(study.values(kind)[order, part] * unit.per_si) for kind in ("highest", "rms")
+        ]
+    header.append("share, %")
+    columns.append(column(study.values("share")[order] * 100, 1))
+    table = Table(
+        "ranking",
+        "The sources compared",
+        tuple(header),
+        tuple(zip(*columns, strict=True)),
+        words=2,
+        note="Highest: the worst case of this source alone (linear maximum), at its worst pose.",
+    )
+    return with_not_included(table, str(study.budget.attrs["not_included"]))
+
+
+def highest_absolute(study: Study) -> Table:
+    """Highest absolute error over the poses, per source and component (table 5, in form).
+
+    The rows of all sources together are not in that table of the paper.
+    """
+    cells = [
+        column(values) for values in study.shown(_highest(study, "highest", "overall_highest")).T
+    ]
+    return Table(
+        "highest_absolute",
+        "Highest absolute error",
+        ("source", *(f"{name}, {study.units.error(name).label}" for name in study.components)),
+        tuple(zip(_end_labels(study), *cells, strict=True)),
+        note="Over all poses, per axis of the base frame, exact. All at lower, all at upper ends: "
+        "lengths and offsets all at that end of their tolerance bands, the rest as known; the "
+        "worst case of a source is in the ranking.",
+    )
+
+
+def highest_percent(study: Study) -> Table:
+    """Highest error as a percentage of the coordinate, per source (table 6, in form)."""
+    highest = _highest(study, "highest_percent", "overall_highest_percent")
+    shown = [index for index in study.positions if np.isfinite(highest[:, index]).any()]
+    cells = [column(highest[:, index], 4) for index in shown]
+    return Table(
+        "highest_percent",
+        "Highest error as a percentage of the coordinate",
+        ("source", *(f"{study.components[index]}, %" for index in shown)),
+        tuple(zip(_end_labels(study), *cells, strict=True)),
+        note="Of the commanded coordinate at the same pose, where that is not near zero.",
+    )
+
+
+def compensation(study: Study) -> Table:
+    """Highest absolute error per component and of the position, before and after."""
+    components = study.components
+    rows: list[tuple[str, Floats, Floats | None]] = [
+        (f"before, {LOWER}", study.values("overall_error_lower"), None),
+        ("before, known error", study.values("overall_error"), None),
+        (f"before, {UPPER}", study.values("overall_error_upper"), None),
+        ("before, worst case", study.overall_worst, study.largest),
+        (f"after, {LOWER}", study.compensated("residual_lower"), None),
+        ("after, known error", study.compensated("residual_middle"), None),
+        (f"after, {UPPER}", study.compensated("residual_upper"), None),
+        ("after, worst case", study.compensated("bound"), study.remaining_largest),
+    ]
+    units, names = study.units, (*components, *(["position"] if study.positions else []))
+    highest = np.stack(
+        [
+            np.append(
+                np.nanmax(np.abs(errors), axis=0),
+                [np.nanmax(study.position_norm(errors) if size is None else size)]
+                if study.positions
+                else [],
+            )
+            for _, errors, size in rows
+        ]
+    )
+    # The middle is at rounding level; the decimals of the other rows show it as zero.
+    cells = [column(values, decimals_for(values)) for values in units.errors(highest, names).T]
+    return Table(
+        "compensation",
+        "Before and after compensation",
+        (
+            "highest over all poses",
+            *(f"{name}, {units.error(name).label}" for name in names),
+        ),
+        tuple(zip([name for name, _, _ in rows], *cells, strict=True)),
+        note="After: the corrected command driven through the actual machine. Known error: of all "
+        "that is known. All at lower, all at upper ends: lengths and offsets all at that end of "
+        "their tolerance bands. Worst case: of each component by itself, and of the position what "
+        "one machine can do (linear maximum); both to first order.",
+    )
+
+
+MOMENTS = 9
+"""Moments of an error over time shown to people, evenly spaced."""
+
+
+def over_time(machine: Machine, found: xr.Dataset) -> Table:
+    """The error at the first of the poses, at some moments of the temperature log and the worst."""
+    units = machine.shown
+    times, error = found["time"].values, found["error"].values[:, 0]
+    components = [str(name) for name in found["component"].values]
+    size = np.linalg.norm(error[:, [is_position(name) for name in components]], axis=1)
+    worst = where_highest(size)
+    shown = np.unique(np.linspace(0, len(times) - 1, min(MOMENTS, len(times))).astype(int))
+    rows = [*shown, worst]
+    pose = np.array([found[f"pose_{name}"].values[0] for name in machine.commanded])
+    columns = [
+        [*(number(times[row] / 60.0, 2) for row in shown), f"{times[worst] / 60.0:.2f} (worst)"],
+        *(
+            column(error[rows, index] * units.error(name).per_si)
+            for index, name in enumerate(components)
+        ),
+        column(size[rows] * units.small_length.per_si),
+    ]
+    return Table(
+        "over_time",
+        "Error over time",
+        (
+            "time, min",
+            *(f"{name}, {units.error(name).label}" for name in (*components, "position")),
+        ),
+        tuple(zip(*columns, strict=True)),
+        note=f"From the logged temperatures alone, exact, at "
+        f"{pose_text(pose, machine.commanded, units)}.",
+    )
+
+
+def strain(study: Study) -> list[Table]:
+    """The tables of the internal forces; none where the machine has none."""
+    if study.strain is None:
+        return []
+    return [internal_forces(study), closure_forces(study)]
+
+
+def internal_forces(study: Study) -> Table:
+    """What each source's misfit makes of force inside the structure, and what clearances take."""
+    found = study.strained
+    order = np.argsort(-found["highest_force_rigid"].values, kind="stable")
+    commanded, units = study.machine.commanded, study.units
+    small, force_unit = units.small_length, units.force
+    poses = np.stack([found[f"pose_{name}"].values for name in commanded], axis=-1)
+    closures, places = [], []
+    for source in order:
+        force = np.abs(found["force"].values[:, source])
+        if not force.any():
+            force = np.abs(found["force_rigid"].values[:, source])
+        pose, closure = divmod(where_highest(force.ravel()), force.shape[1])
+        closures.append(str(found["closure"].values[closure]))
+        places.append(pose_text(poses[pose], commanded, units))
+
+    def highest(name: str) -> Floats:
+        return np.asarray(np.abs(found[name].values[:, order]).max(axis=(0, 2)))
+
+    columns = [
+        [str(name) for name in found["source"].values[order]],
+        [str(verdict) for verdict in found["verdict"].values[order]],
+        closures,
+        places,
+        column(highest("force") * force_unit.per_si),
+        column(highest("force_rigid") * force_unit.per_si),
+        column(found["remaining"].values[order] * 100, 1),
+        column(highest("absorbed") * small.per_si),
+        column(highest("strain") * small.per_si),
+    ]
+    return Table(
+        "internal_forces",
+        "Internal forces from each source",
+        (
+            "source",
+            "verdict",
+            "closure",
+            "at",
+            f"highest force, {force_unit.label}",
+            f"without clearances, {force_unit.label}",
+            "remains, %",
+            f"absorbed, {small.label}",
+            f"strain, {small.label}",
+        ),
+        tuple(zip(*columns, strict=True)),
+        words=4,
+        note="Each source alone and without load, where it loads a closure most. Fits: no force "
+        "even without clearances. Absorbed: the clearances take all of it; partly: some of it; "
+        "strains: next to nothing.",
+    )
+
+
+def closure_forces(study: Study) -> Table:
+    """What each closure carries with all sources at their shifts and all loads."""
+    found = study.strained
+    small, unit = study.units.small_length, study.units.force
+    force = found["overall_force"].values * unit.per_si
+    absorbed, strain = (
+        np.abs(found[f"overall_{name}"].values).max(axis=0) * small.per_si
+        for name in ("absorbed", "strain")
+    )
+    return Table(
+        "closure_forces",
+        "Forces in the closures",
+        (
+            "closure",
+            f"lowest, {unit.label}",
+            f"highest, {unit.label}",
+            f"absorbed, {small.label}",
+            f"strain, {small.label}",
+        ),
+        tuple(
+            zip(
+                [str(name) for name in found["closure"].values],
+                column(force.min(axis=0), decimals_for(force)),
+                column(force.max(axis=0), decimals_for(force)),
+                column(absorbed),
+                column(strain),
+                strict=True,
+            )
+        ),
+        note="Over all poses: all sources at their shifts, under all loads. Tension is positive.",
+    )
+
+
+def answers(machine: Machine, found: Sequence[Answer]) -> Table:
+    """What the machine can do against the accuracy asked: the three known numbers of each."""
+    shares = {each.coverage.probability for each in found if each.coverage is not None}
+    rows = [
+        (
+            each.name,
+            each.word,
+            *(
+                each.text(one.value, side)
+                for one, side in (
+                    (each.answer.witness, 0),
+                    (each.answer.linear, 0),
+                    (each.answer.bound, 1),
+                )
+            ),
+            each.asked,
+            each.at(each.told),
+        )
+        for each in told(machine, found)
+    ]
+    names: Sequence[str] = NUMBERS
+    if shares:
+        quantile = f"{100.0 * shares.pop():.6g} % quantile"
+        names = ("confidence, lower end", quantile, "confidence, upper end")
+    return Table(
+        "answers",
+        "Against the accuracy asked",
+        ("", "answer", *names, "asked", "at"),
+        tuple(rows),
+        words=2,
+        note=_NUMBERS if names is NUMBERS else _SAMPLED,
+    )
+
+
+NUMBERS = ("witness", "linear maximum", "proven bound")
+"""The numbers that are known of a largest error."""
+
+_NUMBERS = (
+    "Witness: the largest error found of one machine inside the bands, solved exactly. Linear "
+    "maximum: of all of them, to first order. Proven bound: no machine inside the bands exceeds it."
+)
+_SAMPLED = (
+    "At a coverage: the quantile of the error's length at the worst pose, and the ends of its "
+    "confidence interval of 99 %."
+)
+
+
+def warnings(study: Study) -> Table | None:
+    """What the budget warns of; None where nothing."""
+    sentences = [warning["sentence"] for warning in warnings_of(study.budget)]
+    rows = [(f"{text[:1].upper()}{text[1:]}.",) for text in sentences]
+    return Table("warnings", "Warnings", ("",), tuple(rows)) if rows else None
+
+
+def poses_left_out(study: Study) -> Table | None:
+    """Poses that cannot be used and why, the first of them; None where all can be used."""
+    count = len(study.left_out)
+    if count == 0:
+        return None
+    rows = [
+        (pose_text(pose, study.machine.commanded, study.units), reason_text(status))
+        for pose, status in zip(
+            study.left_out[:MOST_LISTED], study.left_out_statuses[:MOST_LISTED], strict=True
+        )
+    ]
+    more = f" The first {MOST_LISTED} are listed." if count > MOST_LISTED else ""
+    return Table(
+        "left_out",
+        f"Poses left out: {count:,} of {count + study.n_pose:,}",
+        ("pose", "status"),
+        tuple(rows),
+        words=2,
+        note="No result includes them." + more,
+    )
+
+
+def _end_labels(study: Study) -> list[str]:
+    """Rows of the paper's tables: both ends of a source with a band, one row otherwise."""
+    labels = []
+    for source, band in zip(study.sources, study.has_band, strict=True):
+        labels += [f"{source}, {LOWER}", f"{source}, {UPPER}"] if band else [source]
+    return [*labels, f"overall, {LOWER}", f"overall, {UPPER}"]
+
+
+def _highest(study: Study, of_source: str, overall: str) -> Floats:
+    """(row, component) the values for `_end_labels`, SI or percent."""
+    lower, upper = study.values(f"{of_source}_lower"), study.values(f"{of_source}_upper")
+    rows: list[Floats] = []
+    for index, band in enumerate(study.has_band):
+        rows += [lower[index], upper[index]] if band else [upper[index]]
+    rows += [study.values(f"{overall}_lower"), study.values(f"{overall}_upper")]
+    return np.stack(rows)

@@ -1,0 +1,385 @@
+"""Tables of how sure an error is: sampled, proven, worst case, and whose share it is.
+
+Each is made from one Dataset of `truepose.monte_carlo`, `bounds`, `worst_case` or `shares`, as
+the functions return it. In the units for people (`truepose.files.shown_units`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truepose.arrays import Floats
+from truepose.files.wording import counted
+from truepose.reporting.display import (
+    MISSING,
+    column,
+    decimals_for,
+    nearest_middle,
+    pose_text,
+    where_highest,
+)
+from truepose.reporting.reading import at_text, components, percent_text, quantities, worst_pose
+from truepose.reporting.study import Study
+from truepose.reporting.tables import MOST_LISTED, Table
+from truepose.reporting.variance_shares import shares
+from truepose.runs.poses import not_assembled_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+
+PROVEN = "proven"
+UNPROVEN = {
+    "box_too_wide": "the bands are too wide for a proof",
+    "near_singular": "too near a singularity for a proof",
+}
+"""What a status without a proof means."""
+
+
+def rounded(values: Floats, senses: Sequence[int]) -> tuple[str, ...]:
+    """Numbers of one row as `column` shows them, each rounded up (+1), down (-1) or to nearest (0).
+
+    A proof that is rounded the wrong way is none.
+    """
+    places = decimals_for(values)
+    scaled, ways = values * 10.0**places, np.asarray(senses)
+    whole = np.where(ways > 0, np.ceil(scaled), np.where(ways < 0, np.floor(scaled), scaled))
+    return column(whole / 10.0**places, places)
+
+
+def spread_over(poses: Floats, axes: list[int]) -> list[int]:
+    """Indices of at most 25 of `poses` (n, n_coordinate), spread over their middle planes.
+
+    `axes` are the coordinates over which ellipses are drawn, at most three. Over two of them five
+    by five poses nearest to an even grid, over each pair of three three by three, the other
+    coordinates nearest to the middle of their ranges.
+    """
+    if len(poses) == 0 or not axes:
+        return [int(pose) for pose in nearest_middle(poses)[:1]]
+    span = np.ptp(poses, axis=0)
+    middle = poses[nearest_middle(poses)[0]]
+    scaled = (poses - middle) / np.where(span > 0, span, 1.0)
+    low, high = scaled.min(axis=0), scaled.max(axis=0)
+    pairs = [(0, 1), (0, 2), (1, 2)] if len(axes) > 2 else [tuple(range(len(axes)))]
+    count = 3 if len(axes) > 2 else 5
+    chosen: dict[int, None] = {}
+    for pair in pairs:
+        shown = [axes[at] for at in pair]
+        steps = [np.linspace(low[at], high[at], count) for at in shown]
+        for place in np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, len(shown)):
+            target = np.zeros(poses.shape[1])
+            target[shown] = place
+            off = ((scaled - target) ** 2).sum(axis=1).round(9)
+            chosen[int(np.argmin(off))] = None
+    return sorted(chosen)
+
+
+def _named(machine: Machine, name: str) -> str:
+    """A component or quantity with its unit for people."""
+    return f"{name}, {machine.shown.error(name).label}"
+
+
+def sampled(machine: Machine, found: xr.Dataset) -> list[Table]:
+    """What the samples say at the pose where the position is farthest off, and over all poses."""
+    pose = worst_pose(found, "magnitude_upper")
+    tables = [_sampled_at(machine, found, pose)]
+    if found.sizes["pose"] > 1:
+        tables.append(_sampled_over(machine, found))
+    return tables
+
+
+def _sampled_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
+    names = components(found)
+    ends = ("lower", "upper", "shortest_lower", "shortest_upper", "minimum", "maximum")
+    kinds = ("mean", "standard_deviation", *ends)
+    values = np.stack([found[kind].values[pose] for kind in kinds], axis=-1)
+    rows = [
+        (_named(machine, name), *column(row * machine.shown.error(name).per_si))
+        for name, row in zip(names, values, strict=True)
+    ]
+    for at, name in enumerate(quantities(found)):
+        mean, upper, most = (
+            found[f"magnitude_{kind}"].values[pose, at] for kind in ("mean", "upper", "maximum")
+        )
+        cells = [mean, np.nan, np.nan, upper, np.nan, upper, np.nan, most]
+        scaled = np.array(cells) * machine.shown.error(name).per_si
+        rows.append((_named(machine, name), *column(scaled)))
+    percent = percent_text(float(found.attrs["probability"]))
+    return Table(
+        "sampled",
+        f"Sampled error, {percent} coverage intervals",
+        (
+            "",
+            "mean",
+            "standard deviation",
+            f"{percent} from",
+            "to",
+            "shortest from",
+            "to",
+            "least sample",
+            "largest sample",
+        ),
+        tuple(rows),
+        note=f"At {at_text(machine, found, pose)}, where the position is farthest off. "
+        f"{percent} of the samples lie in this coverage interval, as many below as above it; the "
+        "shortest interval with as many is beside it. Of a magnitude, as many lie below its end. "
+        + _drawn(found, pose),
+    )
+
+
+def _drawn(found: xr.Dataset, pose: int) -> str:
+    """How many samples, how drawn, and how many of them the machine could not follow."""
+    count, failed = int(found["samples"].values[pose]), int(found["failed"].values[pose])
+    how = "scrambled Sobol points" if found.attrs["sampling"] == "sobol" else "samples"
+    text = f"{count:,} {how}, seed {found.attrs['seed']}."
+    if found.attrs.get("digits"):
+        digits = counted(int(found.attrs["digits"]), "digit")
+        text += f" As many as make {digits} of the standard deviation stable (JCGM 101, 7.9)."
+    if failed:
+        text += (
+            f" {not_assembled_text(failed, count + failed)}: they count as beyond both ends of "
+            "every interval, and are in no mean, standard deviation or extreme."
+        )
+    if found.attrs.get("interrupted"):
+        text += " Interrupted: fewer than were asked for."
+    return text
+
+
+def _sampled_over(machine: Machine, found: xr.Dataset) -> Table:
+    names = components(found)
+    far = np.maximum(np.abs(found["lower"].values), np.abs(found["upper"].values))
+    spread = found["standard_deviation"].values
+    most = np.maximum(np.abs(found["minimum"].values), np.abs(found["maximum"].values))
+    rows = []
+    for at, name in enumerate(names):
+        pose = where_highest(far[:, at])
+        sizes = np.array([spread[:, at].max(), far[pose, at], most[:, at].max()])
+        cells = column(sizes * machine.shown.error(name).per_si)
+        rows.append((_named(machine, name), at_text(machine, found, pose), *cells))
+    for at, name in enumerate(quantities(found)):
+        upper = found["magnitude_upper"].values[:, at]
+        pose = where_highest(upper)
+        largest = found["magnitude_maximum"].values[:, at].max()
+        cells = column(np.array([np.nan, upper[pose], largest]) * machine.shown.error(name).per_si)
+        rows.append((_named(machine, name), at_text(machine, found, pose), *cells))
+    return Table(
+        "sampled_over",
+        f"Sampled error over {found.sizes['pose']:,} poses",
+        (
+            "",
+            "farthest at",
+            "highest standard deviation",
+            f"farthest of {percent_text(float(found.attrs['probability']))}",
+            "farthest sample",
+        ),
+        tuple(rows),
+        words=2,
+        note="Farthest: the end of the coverage interval that is farther from zero." + _lost(found),
+    )
+
+
+def _lost(found: xr.Dataset) -> str:
+    """How many samples could not be assembled anywhere, and where too many for an interval."""
+    lost = str(found.attrs.get("not_assembled", "none"))
+    if lost == "none":
+        return ""
+    none = int(np.isnan(found["magnitude_upper"].values[:, 0]).sum())
+    where = f"; at {counted(none, 'pose')} so many that no interval is left" if none else ""
+    return f" Of all samples {lost}{where}."
+
+
+def bounds(machine: Machine, found: xr.Dataset) -> list[Table]:
+    """What is proven: at poses or over a region, and where nothing could be."""
+    if "pose" not in found.sizes:
+        return [_region(machine, found)]
+    tables = [_bounds_at(machine, found, worst_pose(found, "magnitude"))]
+    unproven = _unproven(machine, found)
+    return tables if unproven is None else [*tables, unproven]
+
+
+def _bounds_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
+    rows = []
+    for at, name in enumerate(components(found)):
+        ends = [found[f"{kind}lower"].values[pose, at] for kind in ("", "reached_")]
+        tops = [found[f"{kind}upper"].values[pose, at] for kind in ("reached_", "")]
+        linear = found["linear"].values[pose, at]
+        row = np.array([ends[0], ends[1], tops[0], tops[1], linear])
+        cells = rounded(row * machine.shown.error(name).per_si, (-1, 1, -1, 1, 0))
+        rows.append((_named(machine, name), *cells))
+    for at, name in enumerate(quantities(found)):
+        size = [found[f"{kind}magnitude"].values[pose, at] for kind in ("reached_", "")]
+        row = np.array([np.nan, np.nan, *size, np.nan]) * machine.shown.error(name).per_si
+        rows.append((_named(machine, name), *rounded(row, (0, 0, -1, 1, 0))))
+    return Table(
+        "bounds",
+        "Proven bounds",
+        ("", "never below", "reached", "reached", "never above", "linear worst case"),
+        tuple(rows),
+        note=f"At {at_text(machine, found, pose)}, where the position's bound is highest. For "
+        "every deviation inside the bands the tool is there and nowhere else, and its error "
+        "between these ends, rounding included; the error that is reached shows how much of the "
+        "bound is used." + _taken_to_end(found),
+    )
+
+
+def _taken_to_end(found: xr.Dataset) -> str:
+    """Where bounds take distributions without ends to end, as a sentence; nothing without any."""
+    where = found.attrs.get("truncate", "none")
+    if where == "none":
+        return ""
+    kinds = " and ".join(each.split(":")[0] for each in str(found.attrs["unbounded"]).split("; "))
+    if where == "as stated":
+        return f" Deviations without ends are taken at their stated k sigma: {kinds}."
+    return f" Deviations without ends ({kinds}) are taken to end at {where:g} standard deviations."
+
+
+def _unproven(machine: Machine, found: xr.Dataset) -> Table | None:
+    """Poses without a proof and why; None where all have one."""
+    status = np.array([str(each) for each in found["status"].values])
+    lost = np.flatnonzero(status != PROVEN)
+    if lost.size == 0:
+        return None
+    rows = [
+        (at_text(machine, found, int(pose)), unproven_text(status[pose]))
+        for pose in lost[:MOST_LISTED]
+    ]
+    more = f" The first {MOST_LISTED} are listed." if lost.size > MOST_LISTED else ""
+    return Table(
+        "unproven",
+        f"Poses without a proof: {lost.size:,} of {status.size:,}",
+        ("pose", "status"),
+        tuple(rows),
+        words=2,
+        note="No bound is given where none is proven." + more,
+    )
+
+
+def _region(machine: Machine, found: xr.Dataset) -> Table:
+    rows = []
+    for name, bound, reached, where in region_answers(found):
+        per_si = machine.shown.error(name).per_si
+        least = abs(reached) * per_si
+        most = abs(bound) * per_si
+        gap = 100.0 * (most / least - 1.0) if least > 0 else np.nan
+        cells = rounded(np.array([most, least]), (1, -1))
+        rows.append(
+            (
+                _named(machine, name),
+                pose_text(where, machine.commanded, machine.shown)
+                if np.isfinite(where).all()
+                else MISSING,
+                *cells,
+                *column(np.array([gap]), 1),
+            )
+        )
+    name, bound, reached, _ = region_answers(found)[0]
+    asked = float(found.attrs["gap"])
+    open_ = (
+        ""
+        if bound <= reached * (1.0 + asked)
+        else (f" The gap asked, {percent_text(asked)}, was not reached.")
+    )
+    status = str(found["status"].values)
+    proof = (
+        f"Proven over the whole region, cut into {int(found['boxes'].values):,} boxes."
+        if status == PROVEN
+        else f"Not proven: {_unproven_where(machine, found)}."
+    )
+    return Table(
+        "region",
+        "Proven bounds over a region",
+        ("", "reached at", "nowhere more than", "reached", "gap, %"),
+        tuple(rows),
+        words=2,
+        note=proof
+        + open_
+        + " Every pose in the region, not only those of a grid; the error's sign left "
+        "out." + _taken_to_end(found),
+    )
+
+
+def region_answers(found: xr.Dataset) -> list[tuple[str, float, float, Floats]]:
+    """Name, bound, what is reached and where (n_commanded,), of every component and quantity.
+
+    Of a component's two ends the one that is farther from zero.
+    """
+    answers: list[tuple[str, float, float, Floats]] = []
+    for at, name in enumerate(quantities(found)):
+        size, reached = (float(found[f"{k}magnitude"].values[at]) for k in ("", "reached_"))
+        answers.append((name, size, reached, np.asarray(found["where_magnitude"].values[at])))
+    for at, name in enumerate(components(found)):
+        low, high = float(found["lower"].values[at]), float(found["upper"].values[at])
+        side = "upper" if not abs(low) > abs(high) else "lower"
+        reached = float(found[f"reached_{side}"].values[at])
+        bound = high if side == "upper" else low
+        where = found["where" if side == "upper" else "where_lower"].values[at]
+        answers.append((name, bound, reached, np.asarray(where)))
+    return answers
+
+
+def _unproven_where(machine: Machine, found: xr.Dataset) -> str:
+    """Why a region has no proof, and a pose of it where that is so."""
+    reason = unproven_text(str(found["status"].values))
+    pose = np.asarray(found["where_unproven"].values)
+    if not np.isfinite(pose).all():
+        return reason
+    return f"{reason} at {pose_text(pose, machine.commanded, machine.shown)}"
+
+
+def sentence(machine: Machine, found: xr.Dataset) -> str:
+    """A region's answer in words."""
+    name, bound, reached, where = region_answers(found)[0]
+    if str(found["status"].values) != PROVEN or not np.isfinite(bound):
+        return f"No bound is proven over this region: {_unproven_where(machine, found)}."
+    unit = machine.shown.error(name)
+    most, least = rounded(np.array([bound, reached]) * unit.per_si, (1, -1))
+    what = "deviate" if name == "position" else "turn"
+    return (
+        f"Nowhere in this region does the tool {what} more than {most} {unit.label}; "
+        f"{least} {unit.label} is reached at "
+        f"{pose_text(where, machine.commanded, machine.shown)}."
+    )
+
+
+LACKING = {
+    "monte_carlo": "sampled answer",
+    "ellipses": "coverage ellipse",
+    "bounds": "proven bound",
+    "worst_case": "worst case",
+    "shares": "shares",
+}
+"""What is said not to be there, by the result that would have it."""
+
+
+def unproven_text(status: str) -> str:
+    """Why there is no proof, for people."""
+    return UNPROVEN.get(status, status.replace("_", " "))
+
+
+IN_SHORT = ("shares_parameter_position", "shares_parameter_orientation", "lacking")
+"""Names of the tables that the report prints as well; the page has them all."""
+
+
+def in_short(study: Study) -> list[Table]:
+    """What the report prints of these results."""
+    return [table for table in tables(study) if table.name in IN_SHORT]
+
+
+def tables(study: Study) -> list[Table]:
+    """All that the report's page shows of these results."""
+    shown: list[Any] = []
+    for result, of in (
+        (study.monte_carlo, sampled),
+        (study.bounds, bounds),
+        (study.shares, shares),
+    ):
+        if result is not None:
+            shown += of(study.machine, result)
+    rows = tuple((LACKING[name], why) for name, why in study.missing.items() if name in LACKING)
+    if rows:
+        shown.append(Table("lacking", "What could not be said, and why", ("", ""), rows, words=2))
+    return shown

@@ -1,0 +1,136 @@
+"""Whose fault the spread is: tables and numbers of a result of `truepose.shares`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truepose.arrays import Floats
+from truepose.files.wording import counted
+from truepose.reporting.display import column, is_position, where_highest
+from truepose.reporting.reading import at_text, components, position_of
+from truepose.reporting.tables import MOST_LISTED, Table
+from truepose.uncertainty_analysis.shares import first_to_tighten
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+
+
+@dataclass(frozen=True)
+class Blame:
+    """Shares of the position's variance at one pose, largest first.
+
+    `kinds` has for `first`, `total`, `linear` and, where inputs are correlated, `shapley` a share
+    of each name (n_name,), `confidence` the half width of the first two's intervals.
+    """
+
+    names: tuple[str, ...]
+    kinds: dict[str, Floats]
+    confidence: dict[str, Floats]
+
+
+def blame(found: xr.Dataset, pose: int, of: str = "parameter", part: str = "position") -> Blame:
+    """Who makes how much of the variance of a vector at one pose.
+
+    The shares of the components, weighted with their variances (Lamboni, Monod & Makowski 2011,
+    "Multivariate sensitivity analysis to measure global contribution of input factors in dynamic
+    models", equation 11). `of` is "parameter" or "source", `part` "position" or "orientation".
+    """
+    names = components(found)
+    among = [at for at, name in enumerate(names) if is_position(name) == (part == "position")]
+    variance = np.asarray(found["standard_deviation"].values)[pose, among] ** 2
+    total = float(variance.sum())
+    weight = variance / total if total > 0 else np.zeros_like(variance)
+    before = "" if of == "parameter" else "source_"
+
+    def weighted(name: str) -> Floats:
+        values = np.asarray(found[before + name].values)[pose][:, among]
+        return np.asarray(np.where(weight > 0, values, 0.0) @ weight)
+
+    kinds = [kind for kind in ("first", "total", "linear", "shapley") if before + kind in found]
+    values = {kind: weighted(kind) for kind in kinds}
+    # Components are estimated from the same samples: their errors may all have one sign.
+    half = {
+        kind: weighted(f"{kind}_confidence")
+        for kind in kinds
+        if f"{before}{kind}_confidence" in found
+    }
+    order = np.argsort(-values["shapley" if "shapley" in values else "total"], kind="stable")
+    labels = [str(name) for name in found[of].values]
+    return Blame(
+        tuple(labels[at] for at in order),
+        {kind: each[order] for kind, each in values.items()},
+        {kind: each[order] for kind, each in half.items()},
+    )
+
+
+def spread_pose(found: xr.Dataset) -> int:
+    """Index of the pose at which the position of the tool spreads most."""
+    among = position_of(found)
+    return where_highest(np.linalg.norm(found["standard_deviation"].values[:, among], axis=1))
+
+
+def parts_of(found: xr.Dataset) -> list[str]:
+    """Position, orientation or both: what the components of a result are of."""
+    lengths = [is_position(name) for name in components(found)]
+    return ["position"] * any(lengths) + ["orientation"] * (not all(lengths))
+
+
+def shares(machine: Machine, found: xr.Dataset) -> list[Table]:
+    """Who makes the spread, by parameter and by source, where it is largest."""
+    pose = spread_pose(found)
+    parts = parts_of(found)
+    tables = [_shares(machine, found, pose, "parameter", part) for part in parts]
+    return [*tables, *(_shares(machine, found, pose, "source", part) for part in parts)]
+
+
+def _shares(machine: Machine, found: xr.Dataset, pose: int, of: str, part: str) -> Table:
+    who = blame(found, pose, of, part)
+    header, cells = [of], []
+    for kind, title in (
+        ("first", "first, %"),
+        ("total", "total, %"),
+        ("linear", "linear, %"),
+        ("shapley", "Shapley, %"),
+    ):
+        if kind not in who.kinds:
+            continue
+        header.append(title)
+        cells.append(column(100.0 * who.kinds[kind], 2))
+        if kind in who.confidence:
+            header.append("±")
+            cells.append(column(100.0 * who.confidence[kind], 2))
+    rows = tuple(zip(who.names, *cells, strict=True))
+    more = ""
+    if of == "parameter" and len(rows) > MOST_LISTED:
+        more = f" The {MOST_LISTED} largest of {len(rows)}."
+        rows = rows[:MOST_LISTED]
+    first = ""
+    if of == "parameter" and rows:
+        first = f" To be tightened first: {who.names[0]}."
+        if part == parts_of(found)[0] and found.sizes["pose"] > 1:
+            name, share = first_to_tighten(found)
+            first += (
+                f" Over all {found.sizes['pose']:,} poses together: {name}, {100 * share:.1f} % of "
+                "the variance."
+            )
+    failed = int(found["failed"].values[pose])
+    lost = (
+        f" At this pose {counted(failed, 'base sample')} could not be assembled: the shares are "
+        "those of the machines that could."
+        if failed
+        else ""
+    )
+    return Table(
+        f"shares_{of}_{part}",
+        f"Shares of the {part}'s variance, by {of}",
+        tuple(header),
+        rows,
+        note=f"At {at_text(machine, found, pose)}, where the tool spreads most, of the variances "
+        "of all components together. First: what would go if this one were known; total: what "
+        "would stay if all others were; linear: to first order." + first + more + lost,
+    )

@@ -1,0 +1,251 @@
+"""Spread: what all sources leave unknown at the poses of a block, as one set of variables.
+
+    deviation of the parameters = shift + sum over columns of swing t[variable],   t in the domain
+
+Each source brings its variables; which there are, their names and their numbers for drawing them
+are worked out here once, for everything that combines them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from truepose.arrays import Flags, Floats, Indices
+from truepose.machine import Machine
+from truepose.probability.domain import Domain
+from truepose.runs.displacement import Moved, together
+from truepose.sources import REGISTRY, Block, Deviation, Source
+from truepose.sources.deviation import Distribution
+
+ROUNDING = 1e-14
+"""By which a band is made wider where its middle and its half are rounded, so that none is lost."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """The variables of all sources at the n poses of a block, and what they move.
+
+    `shift`: parameters, each once, and their values (n or 1, k0) where all variables are 0;
+    `alone`: the same of each source.
+    `columns` (k,): kernel parameter of each column that has a band; one may repeat.
+    `variables` (k,): which variable moves the column; `swing` (n or 1, k): its deviation, m, rad
+    or 1, where that variable is +1.
+    `distributions`, `names` (unique) and `sources` of the n_variable variables, and the `domain`
+    that they lie in.
+    `streams`, `numbers` (n_variable,): identity for random numbers, whatever else acts: the place
+    of the source in the registry, and the variable's number in that source's deviation.
+    `correlation` (n_variable, n_variable): Pearson's; None where all are independent.
+    """
+
+    shift: Moved
+    alone: tuple[Moved, ...]
+    columns: Indices
+    variables: Indices
+    swing: Floats
+    distributions: tuple[Distribution, ...]
+    names: tuple[str, ...]
+    sources: tuple[str, ...]
+    streams: Indices
+    numbers: Indices
+    correlation: Floats | None
+    domain: Domain
+
+    @property
+    def directions(self) -> tuple[Indices, ...]:
+        """Numbers of the variables that are together a unit vector."""
+        return self.domain.directions
+
+    def centred(self) -> Spread:
+        """The same deviations with every single variable in [-1, 1], a band about its middle.
+
+        For what needs a box about the shift; the distributions are no longer those of the
+        variables.
+        """
+        if self.domain.symmetric:
+            return self
+        middle, half = self.domain.middle[self.variables], self.domain.half[self.variables]
+        half = half * (1.0 + ROUNDING)
+        ones = np.ones(len(self.names))
+        return dataclasses.replace(
+            self,
+            shift=together([self.shift, (self.columns, self.swing * middle)]),
+            swing=self.swing * half,
+            domain=Domain(-ones, ones, self.directions),
+        )
+
+    def at(self, pose: int) -> Spread:
+        """The same at one pose of the block."""
+        return self.select(slice(pose, pose + 1))
+
+    def select(self, poses: Flags | slice) -> Spread:
+        """The same at some poses of the block, as `Block.select` has them."""
+        return dataclasses.replace(
+            self,
+            shift=_rows(self.shift, poses),
+            alone=tuple(_rows(each, poses) for each in self.alone),
+            swing=self.swing if len(self.swing) == 1 else self.swing[poses],
+        )
+
+    def parameters_moved(self, t: Floats) -> Moved:
+        """Parameters, each once, and their deviations (s, k) where the variables are t (s, v).
+
+        Of a spread at one pose.
+        """
+        parameters, shift, moves = self._matrix
+        return parameters, shift + np.asarray(t, np.float64) @ moves
+
+    @cached_property
+    def _matrix(self) -> tuple[Indices, Floats, Floats]:
+        """Parameters (k,), shift (1, k), and what each variable moves (n_variable, k), one pose."""
+        parameters, shift = self.shift
+        if len(shift) != 1 or len(self.swing) != 1:
+            raise ValueError("a spread over several poses; take one of them with at()")
+        every = np.union1d(parameters, self.columns).astype(np.intp)
+        moves = np.zeros((len(self.names), every.size))
+        np.add.at(moves, (self.variables, np.searchsorted(every, self.columns)), self.swing[0])
+        centre = np.zeros((1, every.size))
+        centre[:, np.searchsorted(every, parameters)] = shift
+        moved = centre[0].astype(np.bool_) | moves.any(axis=0)
+        return every[moved], centre[:, moved], moves[:, moved]
+
+
+def spread(machine: Machine, block: Block, sources: Sequence[Source]) -> Spread:
+    """All sources at the poses of `block`: the variables that have a band at one of them."""
+    deviations = [source.deviation(machine, block.condition, block) for source in sources]
+    return spread_of(machine, sources, deviations)
+
+
+def spread_of(
+    machine: Machine, sources: Sequence[Source], deviations: Sequence[Deviation]
+) -> Spread:
+    """The same from what each source says there."""
+    parts = [
+        _part(machine, source, position, deviation)
+        for position, (source, deviation) in enumerate(zip(sources, deviations, strict=True))
+    ]
+    counts = [len(part.names) for part in parts]
+    first = np.cumsum([0, *counts])
+    names = [name for part in parts for name in part.names]
+    owners = [part.source for part in parts for _ in part.names]
+    swings = [part.swing for part in parts]
+    rows = max((len(swing) for swing in swings), default=1)
+    empty = np.empty(0, np.intp)
+    alone = tuple((part.deviation.parameters, part.deviation.shift) for part in parts)
+    return Spread(
+        shift=together(alone),
+        alone=alone,
+        columns=np.concatenate([empty, *(part.columns for part in parts)]),
+        variables=np.concatenate(
+            [empty, *(part.variables + at for part, at in zip(parts, first[:-1], strict=True))]
+        ),
+        swing=np.concatenate(
+            [
+                np.empty((rows, 0)),
+                *(np.broadcast_to(each, (rows, each.shape[1])) for each in swings),
+            ],
+            axis=1,
+        ),
+        distributions=tuple(each for part in parts for each in part.distributions),
+        names=_unique(names, owners),
+        sources=tuple(owners),
+        streams=np.repeat([part.stream for part in parts], counts).astype(np.intp),
+        numbers=np.concatenate([empty, *(part.numbers for part in parts)]),
+        correlation=_correlation(parts, first),
+        domain=Domain.of(
+            [each for part in parts for each in part.distributions],
+            [
+                members + at
+                for part, at in zip(parts, first[:-1], strict=True)
+                for members in part.deviation.domain.directions
+            ],
+        ),
+    )
+
+
+def _rows(moved: Moved, poses: Flags | slice) -> Moved:
+    """Deviations at some poses of a block."""
+    parameters, shift = moved
+    return parameters, shift if len(shift) == 1 else shift[poses]
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """What one source brings: its columns that have a band, and their variables."""
+
+    source: str
+    stream: int
+    deviation: Deviation
+    columns: Indices
+    variables: Indices
+    swing: Floats
+    numbers: Indices
+    names: tuple[str, ...]
+    distributions: tuple[Distribution, ...]
+
+
+def _part(machine: Machine, source: Source, position: int, deviation: Deviation) -> _Part:
+    banded = deviation.banded
+    numbers, variables = deviation.banded_variables
+    columns = deviation.parameters[banded]
+    first = [int(banded[np.flatnonzero(variables == at)[0]]) for at in range(numbers.size)]
+    names = []
+    for at, column in enumerate(first):
+        moved = [machine.parameters[each] for each in columns[variables == at]]
+        group = deviation.group_names.get(int(deviation.groups[column]))
+        direction = any(at in members for members in deviation.domain.directions)
+        if len(moved) == 1 and not direction:
+            names.append(moved[0])
+        else:
+            names.append(group or f"{source.name}: {moved[0]} and others")
+    kinds: list[type] = list(REGISTRY)
+    kind = type(source)
+    return _Part(
+        source=source.name,
+        # One that no registry has comes after all that it has, in the order given.
+        stream=kinds.index(kind) if kind in kinds else len(kinds) + position,
+        deviation=deviation,
+        columns=columns,
+        variables=variables,
+        swing=deviation.signed_half[:, banded],
+        numbers=numbers,
+        names=tuple(names),
+        distributions=tuple(deviation.distribution[column] for column in first),
+    )
+
+
+def _unique(names: Sequence[str], owners: Sequence[str]) -> tuple[str, ...]:
+    """A name that several variables have goes with its source; if that is one too, with a count."""
+    count = Counter(names)
+    told = [
+        name if count[name] == 1 or name.startswith(f"{owner}: ") else f"{owner}: {name}"
+        for name, owner in zip(names, owners, strict=True)
+    ]
+    taken: set[str] = set()
+    unique = []
+    for name in told:
+        number, tried = 1, name
+        while tried in taken:
+            number += 1
+            tried = f"{name} ({number})"
+        taken.add(tried)
+        unique.append(tried)
+    return tuple(unique)
+
+
+def _correlation(parts: Sequence[_Part], first: Indices) -> Floats | None:
+    """The sources' own, side by side: causes of different sources are independent."""
+    found = [part.deviation.banded_correlation for part in parts]
+    if all(each is None for each in found):
+        return None
+    matrix = np.eye(int(first[-1]))
+    for at, each in enumerate(found):
+        if each is not None:
+            own = slice(int(first[at]), int(first[at + 1]))
+            matrix[own, own] = each
+    return matrix

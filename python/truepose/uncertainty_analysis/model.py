@@ -1,0 +1,404 @@
+"""A model as those that combine see it: outputs as a function of variables t.
+
+A machine at one pose, whose outputs are the components of the error, and a plain function, whose
+outputs are what it returns, are both `Model`s: everything that combines is written once for both.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from truepose.arrays import Flags, Floats, Indices
+from truepose.errors import Problem, RequestError
+from truepose.machine import Condition, Machine
+from truepose.runs.dataset import Rows, Schema, assemble, component_units, sizes
+from truepose.runs.displacement import at_shifts, displacement
+from truepose.runs.first_order import first_order
+from truepose.runs.poses import (
+    OK,
+    Progress,
+    Walk,
+    is_path,
+    no_pose_left,
+    requested_poses,
+    required_sources,
+)
+from truepose.runs.variables import Spread, spread
+from truepose.sources import Block
+from truepose.sources.deviation import Distribution
+from truepose.uncertainty_analysis.functions import derivatives
+from truepose.uncertainty_analysis.functions.inputs import Correlation, Input, correlation_matrix
+
+PART = 8192
+"""Samples that go to the kernel at once."""
+
+VALUE = "value"
+"""Output of a function that returns one array."""
+
+
+@dataclass(frozen=True)
+class Linear:
+    """First order: output = value (m,) + effects (m, n_variable) @ t."""
+
+    value: Floats
+    effects: Floats
+
+
+class Model(Protocol):
+    """Outputs, of which there are m, as a function of n_variable variables t.
+
+    `names`, `sources`, `distributions`, `correlation`, `directions`, `streams` and `numbers` of the
+    variables are those of `Spread`; `dofs` (n_variable,): degrees of freedom of Student variables
+    and of estimated standard uncertainties, else inf. `outputs` and `output_units` (m).
+    """
+
+    names: tuple[str, ...]
+    sources: tuple[str, ...]
+    distributions: tuple[Distribution, ...]
+    correlation: Floats | None
+    directions: tuple[Indices, ...]
+    streams: Indices
+    numbers: Indices
+    dofs: Floats
+    outputs: tuple[str, ...]
+    output_units: tuple[str, ...]
+
+    def linear(self) -> Linear:
+        """The outputs where all variables are 0, and what each changes to first order."""
+        ...
+
+    def evaluate(self, t: Floats) -> tuple[Floats, Flags]:
+        """Outputs (s, m) where the variables are t (s, n_variable), and (s,) whether they are."""
+        ...
+
+
+class MachineModel:
+    """The exact error of a machine at one pose of a block, m and rad, base frame."""
+
+    def __init__(self, machine: Machine, block: Block, moves: Spread, pose: int) -> None:
+        """`moves` of the whole block; `pose`: number of the pose in it."""
+        self.machine, self.block, self.pose = machine, block, pose
+        self.spread = moves.at(pose)
+        self.names, self.sources = moves.names, moves.sources
+        self.distributions, self.correlation = moves.distributions, moves.correlation
+        self.streams, self.numbers = moves.streams, moves.numbers
+        self.directions = moves.directions
+        self.dofs: Floats = np.array([each.degrees for each in moves.distributions], np.float64)
+        self.outputs: tuple[str, ...] = machine.components
+        self.output_units = tuple(component_units(machine))
+
+    @cached_property
+    def at(self) -> Block:
+        """The block of this pose alone."""
+        chosen = np.zeros(self.block.indices.size, np.bool_)
+        chosen[self.pose] = True
+        return self.block.select(chosen)
+
+    @property
+    def joints(self) -> Floats:
+        """(1, n_joint) commanded joint coordinates, m or rad."""
+        return self.block.joints[self.pose : self.pose + 1]
+
+    @property
+    def placement(self) -> Floats:
+        """(1, 7) tool point and unit quaternion commanded, base frame."""
+        return self.block.placements[self.pose : self.pose + 1]
+
+    def linear(self) -> Linear:
+        """Value and slopes where all sources are at their shift."""
+        only = slice(self.pose, self.pose + 1)
+        value, effects, _ = first_order(self.machine, self.block, self.spread, only)
+        return Linear(value[0], effects[0])
+
+    def evaluate(self, t: Floats) -> tuple[Floats, Flags]:
+        """Errors (s, m), exact; not ok where the moved machine cannot be placed."""
+        values = np.empty((len(t), len(self.outputs)))
+        fine = np.empty(len(t), np.bool_)
+        for start in range(0, len(t), PART):
+            part = slice(start, start + PART)
+            moved = self.spread.parameters_moved(t[part])
+            count = len(moved[1])
+            joints = np.repeat(self.joints, count, axis=0)
+            placements = np.repeat(self.placement, count, axis=0)
+            values[part], status = displacement(self.machine, joints, placements, moved)
+            fine[part] = status == OK
+        return values, fine
+
+
+class FunctionModel:
+    """A plain function of uncertain inputs.
+
+    It is called with one array (s,) for each input, by its name, and returns an array (s,), or a
+    dict of them by the outputs' names. `correlation`: coefficients by pairs of input names, or a
+    matrix in the order of `inputs`.
+
+    Raises `RequestError`: no-input, unknown-input, bad-function, not-finite at the estimates, and
+    as `truepose.uncertainty_analysis.functions.inputs.correlation_matrix` does.
+    """
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        inputs: Mapping[str, Input],
+        correlation: Correlation = None,
+    ) -> None:
+        self.function = _callable(function)
+        self.inputs: dict[str, Input] = _inputs(inputs)
+        _check_arguments(function, self.inputs)
+        self.names = tuple(self.inputs)
+        self.sources = self.names
+        each = tuple(self.inputs.values())
+        self.distributions = tuple(one.distribution for one in each)
+        self.correlation = correlation_matrix(self.names, correlation)
+        self.directions: tuple[Indices, ...] = ()
+        self.streams: Indices = np.zeros(len(each), np.intp)
+        self.numbers: Indices = np.arange(len(each), dtype=np.intp)
+        self.dofs: Floats = np.array(
+            [min(one.dof, one.distribution.degrees) for one in each], np.float64
+        )
+        self._centre = np.array([one.centre for one in each], np.float64)
+        self._half = np.array([one.half for one in each], np.float64)
+        self.outputs, self._value = self._probe()
+        self.output_units = ("1",) * len(self.outputs)
+
+    def evaluate(self, t: Floats) -> tuple[Floats, Flags]:
+        """Outputs (s, m), and (s,) whether all of a sample are finite."""
+        with np.errstate(all="ignore"):
+            values = np.asarray(self._call(self._centre + self._half * t), np.float64)
+        fine: Flags = np.asarray(np.isfinite(values).all(axis=1))
+        return values, fine
+
+    def linear(self) -> Linear:
+        """Value at the estimates, and effects by differences, or a complex step where it can."""
+        scale = derivatives.steps(self._centre, self._half)
+        slopes = derivatives.slopes(self._call, self._centre, scale)
+        return Linear(self._value, slopes * self._half)
+
+    def _call(self, arguments: np.ndarray) -> np.ndarray:
+        """Outputs (s, m) at arguments (s, n)."""
+        columns = {name: arguments[:, at].copy() for at, name in enumerate(self.names)}
+        returned = self.function(**columns)
+        named = returned if isinstance(returned, Mapping) else {VALUE: returned}
+        return np.stack([np.asarray(named[name]) for name in self.outputs], axis=1)
+
+    def _probe(self) -> tuple[tuple[str, ...], Floats]:
+        """Names of the outputs, and their values (m,) at the estimates."""
+        count = 3
+        columns = {
+            name: np.full(count, centre)
+            for name, centre in zip(self.names, self._centre.tolist(), strict=True)
+        }
+        with np.errstate(all="ignore"):
+            try:
+                returned = self.function(**columns)
+            except (TypeError, ValueError) as error:
+                raise _bad_function(
+                    "the function cannot be called with arrays", f"{type(error).__name__}: {error}"
+                ) from error
+        named = returned if isinstance(returned, Mapping) else {VALUE: returned}
+        if not named:
+            raise _bad_function("the function returns nothing", "a dict without an entry")
+        for name, values in named.items():
+            if not isinstance(name, str):
+                raise _bad_function("an output is named by text", repr(name))
+            _check_returned(name, values, count)
+        first = np.array([np.asarray(values, np.float64)[0] for values in named.values()])
+        unfit = [name for name, fine in zip(named, np.isfinite(first), strict=True) if not fine]
+        if unfit:
+            raise RequestError(
+                Problem(
+                    "not-finite",
+                    "the function has no finite value at the estimates of its inputs",
+                    found=", ".join(unfit),
+                    expected="a finite number",
+                    hint="look at the estimates: "
+                    + ", ".join(f"{name} = {one.centre:g}" for name, one in self.inputs.items()),
+                )
+            )
+        return tuple(named), first
+
+
+def _callable(function: Callable[..., Any]) -> Callable[..., Any]:
+    if callable(function):
+        return function
+    raise _bad_function(
+        "neither a machine nor a function", f"something of type {type(function).__name__}"
+    )
+
+
+def _inputs(inputs: Mapping[str, Input]) -> dict[str, Input]:
+    """The inputs by name, checked to be some."""
+    if not isinstance(inputs, Mapping) or not inputs:
+        raise RequestError(
+            Problem(
+                "no-input",
+                "a function needs inputs that are uncertain",
+                found="nothing" if not inputs else f"something of type {type(inputs).__name__}",
+                expected='inputs by name, such as {"x": tp.Input.normal(1.0, 0.1)}',
+            )
+        )
+    for name, one in inputs.items():
+        if not isinstance(one, Input):
+            raise RequestError(
+                Problem(
+                    "wrong-type",
+                    f"{name} is no input",
+                    found=repr(one),
+                    expected="a tp.Input",
+                    hint=f"tp.Input.exact({one!r}) is a value without uncertainty",
+                )
+            )
+    return dict(inputs)
+
+
+def _check_arguments(function: Callable[..., Any], inputs: Mapping[str, Input]) -> None:
+    """Whether the function takes just these inputs; one that cannot be asked is simply called."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        return
+    try:
+        signature.bind(**inputs)
+    except TypeError as error:
+        raise RequestError(
+            Problem(
+                "unknown-input",
+                f"the function does not take these inputs: {error}",
+                found=", ".join(inputs),
+                expected=", ".join(signature.parameters) or "no argument",
+            )
+        ) from None
+
+
+def _check_returned(name: str, values: Any, count: int) -> None:
+    try:
+        array = np.asarray(values)
+        real = array.dtype.kind in "biuf"
+    except (TypeError, ValueError):
+        real, array = False, np.empty(0)
+    if not real:
+        raise _bad_function(
+            f"{name}: the function does not return real numbers", f"{type(values).__name__}"
+        )
+    if array.shape != (count,):
+        raise _bad_function(
+            f"{name}: the function does not return one number for each sample",
+            f"shape {array.shape} where arrays of {count} went in",
+        )
+
+
+def _bad_function(message: str, found: str) -> RequestError:
+    return RequestError(
+        Problem(
+            "bad-function",
+            message,
+            found=found,
+            expected="a function of arrays of one length, by name, that returns such an array, "
+            "or a dict of them",
+            hint="numpy's functions take arrays: np.sqrt for math.sqrt, np.where for if; "
+            "np.vectorize makes any function take them",
+        )
+    )
+
+
+class Models:
+    """The machine at each of some poses, one after the other; poses that cannot be used set aside.
+
+    `condition`, default the file's; `progress` is called with (poses done, poses in all).
+    Raises `RequestError`: bad-poses, no-workspace, no-source.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        poses: ArrayLike | None = None,
+        condition: Condition | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        self.machine = machine
+        self.condition = machine.condition if condition is None else condition
+        self.table = requested_poses(machine, poses)
+        self.sources = required_sources(machine, self.condition)
+        self._of_file = poses is None
+        self._progress = progress
+        self._walk = Walk(
+            machine, self.table, self.condition, path=poses is None and is_path(machine)
+        )
+
+    def __iter__(self) -> Iterator[tuple[int, MachineModel]]:
+        total = len(self.table)
+        for block in self._walk:
+            moves = spread(self.machine, block, self.sources)
+            shifted = at_shifts(self.machine, block, moves.alone, moves.shift)
+            usable = self._walk.keep(block.indices, shifted)
+            for pose in np.flatnonzero(usable).tolist():
+                number = int(block.indices[pose])
+                yield number, MachineModel(self.machine, block, moves, pose)
+                if self._progress is not None:
+                    self._progress(number + 1, total)
+        if self._progress is not None:
+            self._progress(total, total)
+
+    def leave_out(self, model: MachineModel, status: int) -> None:
+        """Set a pose aside for a reason that turned out, a kernel code or a number of `REASONS`."""
+        self._walk.left_out.add(model.at.indices, np.array([status], np.uint8))
+
+    def rows(self, schema: Schema, **others: int) -> Rows:
+        """Room for a result over all poses; `others`: lengths of dims that no machine has."""
+        return Rows(self.machine, schema, sizes(self.machine, len(self.table), **others))
+
+    def append(self, rows: Rows, model: MachineModel, values: Mapping[str, ArrayLike]) -> None:
+        """One pose of a result, `values` without their dim pose."""
+        given = {name: np.asarray(value)[np.newaxis] for name, value in values.items()}
+        rows.append(model.at, given, np.ones(1, np.bool_))
+
+    def dataset(
+        self,
+        schema: Schema,
+        rows: Rows,
+        *,
+        over_all: Mapping[str, Any] | None = None,
+        coords: Mapping[str, xr.Variable] | None = None,
+    ) -> xr.Dataset:
+        """The Dataset of the poses appended. Raises `RequestError` (no-pose-left) if none was."""
+        left_out = self._walk.left_out
+        if rows.count == 0:
+            raise no_pose_left(self.machine, self.table, left_out, of_file=self._of_file)
+        return assemble(
+            self.machine,
+            self.condition,
+            schema,
+            rows,
+            self.table,
+            left_out,
+            over_all=over_all,
+            coords=coords,
+        )
+
+
+def models(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    progress: Progress | None = None,
+) -> Models:
+    """(number of the pose in those asked for, its model), pose by pose; see `Models`."""
+    return Models(machine, poses, condition, progress)
+
+
+__all__ = [
+    "FunctionModel",
+    "Linear",
+    "MachineModel",
+    "Model",
+    "Models",
+    "models",
+]

@@ -1,0 +1,540 @@
+"""Monte Carlo: the exact error of machines drawn at random, with its coverage interval.
+
+A sample is one machine: its variables are drawn once and it goes to every pose. Random numbers are
+counter-based (`truepose._kernel.Variables`), so a sample depends on the seed and its number alone.
+Memory does not grow with the samples: moments, extremes and histograms are kept.
+
+A sample that cannot be assembled is a machine too, and in no interval: what says of which share of
+the machines something holds (quantiles, intervals, ellipses) counts it as beyond both ends, as
+many samples on either side. Where too many fail for the share asked, there is no such number. What
+describes errors (mean, standard deviation, covariance, extremes) is of those that have one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+import numpy as np
+import xarray as xr
+from numpy.typing import ArrayLike
+
+from truepose._kernel import Study, Tallies
+from truepose.arrays import Floats
+from truepose.errors import Problem, RequestError
+from truepose.machine import Condition, Machine
+from truepose.runs.dataset import (
+    Rows,
+    Schema,
+    Variable,
+    assemble,
+    label,
+    quantity_coords,
+    sizes,
+)
+from truepose.runs.displacement import at_shifts
+from truepose.runs.first_order import first_order
+from truepose.runs.poses import (
+    BAND,
+    Progress,
+    Walk,
+    is_path,
+    no_pose_left,
+    reason_unless,
+    requested_poses,
+    required_sources,
+)
+from truepose.runs.quantities import POSITIONS, quantities
+from truepose.runs.variables import Spread, spread
+from truepose.sources import Block
+from truepose.uncertainty_analysis.arguments import (
+    required_digits,
+    required_probability,
+    required_samples,
+    required_seed,
+)
+from truepose.uncertainty_analysis.failed_samples import OfAll, lost_text
+from truepose.uncertainty_analysis.functions.dataset import function_dataset
+from truepose.uncertainty_analysis.model import FunctionModel
+from truepose.uncertainty_analysis.sampler import (
+    Adaptive,
+    Draws,
+    Enough,
+    Fixed,
+    Random,
+    Sampler,
+    sobol,
+)
+
+if TYPE_CHECKING:
+    from truepose.uncertainty_analysis.functions.inputs import Correlation, Input
+
+POSES = 256
+"""Poses that are sampled together: their histograms take some 50 MB."""
+
+LEVELS = np.linspace(0.0, 1.0, 201)
+"""Probabilities of the quantiles that a result has."""
+
+FINENESS = 100.0
+"""Bins of a histogram in one standard deviation."""
+
+_EACH = ("pose", "component")
+_SIZE = ("pose", "quantity")
+
+SCHEMA: Schema = {
+    "mean": Variable(_EACH, "component", "mean of the error, of samples that have one"),
+    "standard_deviation": Variable(_EACH, "component", "standard deviation of the error"),
+    "covariance": Variable((*_EACH, "other_component"), "covariance", "covariance of the error"),
+    "lower": Variable(_EACH, "component", "lower end of the symmetric coverage interval"),
+    "upper": Variable(_EACH, "component", "upper end of the symmetric coverage interval"),
+    "shortest_lower": Variable(_EACH, "component", "lower end of the shortest coverage interval"),
+    "shortest_upper": Variable(_EACH, "component", "upper end of the shortest coverage interval"),
+    "minimum": Variable(_EACH, "component", "lowest error of a sample"),
+    "maximum": Variable(_EACH, "component", "highest error of a sample"),
+    "quantile": Variable((*_EACH, "level"), "component", "error that a share of samples is below"),
+    "samples": Variable(("pose",), "1", "samples with a result", np.int64),
+    "failed": Variable(
+        ("pose",), "1", "samples without a result, beyond both ends of every interval", np.int64
+    ),
+}
+
+MACHINE: Schema = {
+    "magnitude_mean": Variable(_SIZE, "quantity", "mean size of the error"),
+    "magnitude_upper": Variable(
+        _SIZE,
+        "quantity",
+        "upper end of the coverage interval from zero: size that the probability asked is below",
+    ),
+    "magnitude_maximum": Variable(_SIZE, "quantity", "largest size of the error of a sample"),
+    "magnitude_quantile": Variable(
+        (*_SIZE, "level"), "quantity", "size of the error that a share of samples is below"
+    ),
+}
+"""What a machine's result has besides."""
+
+ELLIPSE: Schema = {
+    "ellipse_centre": Variable(("pose", "axis"), "m", "centre of the coverage ellipsoid"),
+    "ellipse": Variable(
+        ("pose", "axis", "other_axis"), "m^2", "E of the ellipsoid (e - c)' E^-1 (e - c) <= 1"
+    ),
+}
+"""What the result of a machine whose tool moves has besides."""
+
+
+@dataclass(frozen=True)
+class _Asked:
+    probability: float
+    samples: int | None
+    seed: int
+    digits: int
+    sampling: str
+
+    @property
+    def stop(self) -> Enough:
+        """When there are enough samples."""
+        if self.samples is None:
+            return Adaptive(self.probability, self.digits)
+        return Fixed(self.samples)
+
+    @property
+    def attrs(self) -> dict[str, Any]:
+        return {
+            "seed": self.seed,
+            "probability": self.probability,
+            "sampling": self.sampling,
+            "digits": self.digits if self.samples is None else 0,
+        }
+
+    def draws(self, of: Spread | FunctionModel) -> Draws:
+        """The variables' samples."""
+        random = Random(of, self.seed)
+        return random if self.sampling == "random" else sobol(random, self.samples or 0)
+
+
+@overload
+def monte_carlo(
+    model: Machine,
+    poses: ArrayLike | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    probability: float = 0.95,
+    *,
+    condition: Condition | None = None,
+    digits: int = 2,
+    sampling: Literal["random", "sobol"] = "random",
+    progress: Progress | None = None,
+) -> xr.Dataset: ...
+
+
+@overload
+def monte_carlo(
+    model: Callable[..., Any],
+    poses: Mapping[str, Input] | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    probability: float = 0.95,
+    *,
+    inputs: Mapping[str, Input] | None = None,
+    correlation: Correlation = None,
+    digits: int = 2,
+    sampling: Literal["random", "sobol"] = "random",
+    progress: Progress | None = None,
+) -> xr.Dataset: ...
+
+
+def monte_carlo(
+    model: Machine | Callable[..., Any],
+    poses: Any = None,
+    samples: int | None = None,
+    seed: int = 0,
+    probability: float = 0.95,
+    *,
+    condition: Condition | None = None,
+    inputs: Mapping[str, Input] | None = None,
+    correlation: Correlation = None,
+    digits: int = 2,
+    sampling: Literal["random", "sobol"] = "random",
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The distribution of the error, sampled: moments, quantiles and coverage intervals.
+
+    Of a machine: `poses` (..., n_commanded), SI, default the file's workspace; every sample is a
+    machine with its parameters deviated as the sources' distributions say, solved exactly. Of a
+    plain function: its `inputs`, as the second argument or by name, and their `correlation`.
+
+    `samples` at each pose; by default as many as JCGM 101:2008, 7.9 takes until so many significant
+    `digits` of the standard deviation are stable. Intervals hold the share `probability` of the
+    samples. `sampling` "sobol": scrambled Sobol points instead of random ones (`samples` a power of
+    two; needs scipy). `progress` is called with (samples done over all poses, samples in all or 0).
+    Ctrl-C, once there are samples, gives the result so far (attribute `interrupted`). The Dataset,
+    SI, is described in docs/results.md.
+
+    Raises `RequestError`: bad-samples, bad-seed, bad-probability, bad-digits, bad-poses,
+    no-workspace, no-source, no-pose-left, extra-missing; `TrueposeError` as the sources do.
+    """
+    asked = _Asked(
+        required_probability(probability),
+        None if samples is None else required_samples(samples, 2),
+        required_seed(seed),
+        required_digits(digits),
+        _required_sampling(sampling, samples),
+    )
+    if isinstance(model, Machine):
+        return _of_machine(model, poses, condition, asked, progress)
+    of = FunctionModel(model, poses if inputs is None else inputs, correlation)
+    return _of_function(of, asked, progress)
+
+
+def _required_sampling(sampling: str, samples: int | None) -> str:
+    if sampling not in ("random", "sobol"):
+        raise RequestError(
+            Problem(
+                "bad-sampling",
+                "there is no such way of sampling",
+                found=f"{sampling!r}",
+                expected='"random" or "sobol"',
+            )
+        )
+    if sampling == "sobol" and (samples is None or samples < 1 or samples & (samples - 1)):
+        near = 2 ** max(10, round(math.log2(samples))) if samples else 65536
+        raise RequestError(
+            Problem(
+                "bad-samples",
+                "Sobol points fill the bands evenly only in powers of two",
+                found="no number of samples" if samples is None else f"{samples}",
+                expected=f"a power of two, such as {near}",
+            )
+        )
+    return sampling
+
+
+class _Account:
+    """Samples done over all poses, for whoever looks on."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress, self._total, self._done = progress, total, 0
+
+    def add(self, samples: int) -> None:
+        self._done += samples
+        if self._progress is not None:
+            self._progress(self._done, self._total)
+
+
+def _of_machine(
+    machine: Machine,
+    poses: ArrayLike | None,
+    condition: Condition | None,
+    asked: _Asked,
+    progress: Progress | None,
+) -> xr.Dataset:
+    given = machine.condition if condition is None else condition
+    table = requested_poses(machine, poses)
+    sources = required_sources(machine, given)
+    kinds = quantities(machine.components)
+    axes = [name for name in machine.components if name in POSITIONS]
+    schema = {**SCHEMA, **MACHINE, **(ELLIPSE if axes else {})}
+    lengths = sizes(
+        machine,
+        len(table),
+        other_component=len(machine.components),
+        level=LEVELS.size,
+        quantity=len(kinds),
+        axis=len(axes),
+        other_axis=len(axes),
+    )
+    rows = Rows(machine, schema, lengths)
+    account = _Account(progress, len(table) * (asked.samples or 0))
+    walk = Walk(machine, table, given, path=poses is None and is_path(machine))
+    interrupted = False
+    for block in walk:
+        every = spread(machine, block, sources)
+        usable = walk.keep(block.indices, at_shifts(machine, block, every.alone, every.shift))
+        block, every = block.select(usable), every.select(usable)
+        draws = asked.draws(every)
+        for start in range(0, block.indices.size, POSES):
+            chosen = np.zeros(block.indices.size, np.bool_)
+            chosen[start : start + POSES] = True
+            part = block.select(chosen)
+            sampler = _MachineSampler(machine, part, every.select(chosen))
+            drawn = sampler.run(draws, asked.stop, account.add)
+            interrupted = drawn.interrupted
+            if drawn.tallies is not None:
+                values = sampler.values(drawn.tallies, asked.probability)
+                sampled = reason_unless(np.asarray(drawn.tallies.count) > 1, BAND)
+                rows.append(part, values, walk.keep(part.indices, sampled))
+            if interrupted:
+                break
+        if interrupted:
+            break
+    if interrupted and rows.count == 0:
+        raise KeyboardInterrupt
+    if rows.count == 0:
+        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
+    names = list(machine.components)
+    coords = {
+        "other_component": label("other_component", names, "the other component of a covariance"),
+        "level": label("level", LEVELS, "share of the samples"),
+        **quantity_coords(machine),
+    }
+    if axes:
+        coords["axis"] = label("axis", axes, "component of the position error")
+        coords["other_axis"] = label("other_axis", axes, "the other component")
+    found = assemble(machine, given, schema, rows, table, walk.left_out, coords=coords)
+    found.attrs |= {**asked.attrs, "interrupted": int(interrupted)}
+    return found.assign_attrs(
+        not_assembled=lost_text(found["failed"], found["samples"] + found["failed"])
+    )
+
+
+class _MachineSampler(Sampler):
+    """A machine at some poses; columns of its tallies: components, magnitudes, ellipse distance."""
+
+    def __init__(self, machine: Machine, block: Block, moves: Spread) -> None:
+        self.machine, self.block, self.spread = machine, block, moves
+        self._study = self._studied(None)
+        kinds = quantities(machine.components)
+        self._kinds = list(kinds.values())
+        self._axes = [at for at, name in enumerate(machine.components) if name in POSITIONS]
+        self.n_pose = block.indices.size
+        self._unwhitened = (self._origins()[0], self._widths())
+
+    def _studied(self, whitening: Floats | None) -> Study:
+        shifted, shift = self.spread.shift
+        return Study(
+            self.machine.kernel,
+            self.block.joints,
+            self.block.placements,
+            shifted,
+            np.ascontiguousarray(shift),
+            self.spread.columns,
+            self.spread.variables.tolist(),
+            np.ascontiguousarray(self.spread.swing),
+            whitening,
+        )
+
+    def _origins(self) -> tuple[Floats, int]:
+        error = np.asarray(self._study.shift_error)
+        origins = np.concatenate([error, np.zeros((len(error), len(self._kinds)))], axis=1)
+        return np.where(np.isfinite(origins), origins, 0.0), error.shape[1]
+
+    def _widths(self) -> Floats:
+        """(n, n_column) bins of the order of a hundredth of the first-order spread."""
+        _, effects, _ = first_order(self.machine, self.block, self.spread)
+        sigmas = np.array([each.sigmas for each in self.spread.distributions])
+        deviation = np.sqrt(np.square(effects / sigmas).sum(axis=2)) if sigmas.size else 0.0
+        deviation = np.nan_to_num(np.broadcast_to(deviation, effects.shape[:2]))
+        parts = [np.linalg.norm(deviation[:, kind], axis=1) for kind in self._kinds]
+        every = np.concatenate([deviation, np.stack(parts, axis=1)], axis=1)
+        # Where first order has no spread the bins begin tiny, and widen to what is met.
+        widths: Floats = np.maximum(every, 1e-15) / FINENESS
+        return widths
+
+    def tallies(self) -> Tallies:
+        """New ones, without the ellipse."""
+        origins, widths = self._unwhitened
+        return Tallies(origins, widths, origins.shape[1], len(self.machine.components))
+
+    def begin(self, pilot: Tallies) -> Tallies:
+        """Tallies with the ellipse, whose shape is the covariance of the pilot."""
+        origins, widths = self._unwhitened
+        if self._axes:
+            covariance = np.asarray(pilot.covariance)[:, self._axes][:, :, self._axes]
+            self._centre = np.asarray(pilot.mean)[:, self._axes]
+            self._shape = np.nan_to_num(covariance)
+            self._study = self._studied(_whitening(self.machine, self._centre, self._shape))
+            more = np.ones((self.n_pose, 1))
+            origins = np.concatenate([origins, 0.0 * more], axis=1)
+            widths = np.concatenate([widths, more / FINENESS], axis=1)
+        return Tallies(origins, widths, origins.shape[1], len(self.machine.components))
+
+    def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
+        """Evaluates the samples from number `first` on."""
+        given = draws.given(first, count)
+        if given is None:
+            self._study.sample(draws.variables, draws.seed, first, count, into)
+        else:
+            self._study.sample_given(draws.variables, given, into)
+
+    @property
+    def checked(self) -> slice:
+        """Columns whose figures are to be stable."""
+        return slice(0, len(self.machine.components))
+
+    def values(self, tallies: Tallies, probability: float) -> dict[str, np.ndarray]:
+        """All variables of the schema, over poses first."""
+        m = len(self.machine.components)
+        values = statistics(tallies, m, probability)
+        sizes = slice(m, m + len(self._kinds))
+        of_all = OfAll(tallies)
+        upper = of_all.below([probability])[..., 0]
+        values |= {
+            "magnitude_mean": np.asarray(tallies.mean)[:, sizes],
+            "magnitude_upper": upper[:, sizes],
+            "magnitude_maximum": np.asarray(tallies.extremes)[:, sizes, 1],
+            "magnitude_quantile": of_all.below(LEVELS.tolist())[:, sizes],
+        }
+        if self._axes:
+            factor = upper[:, -1]
+            values["ellipse_centre"] = self._centre
+            values["ellipse"] = self._shape * np.square(factor)[:, np.newaxis, np.newaxis]
+        return values
+
+
+def _whitening(machine: Machine, centre: Floats, covariance: Floats) -> Floats:
+    """(n, 12) centre and matrix of the position error, in three components.
+
+    A direction in which nothing spreads does not count.
+    """
+    places = [POSITIONS.index(name) for name in machine.components if name in POSITIONS]
+    rows = np.zeros((len(centre), 12))
+    rows[:, places] = centre
+    values, vectors = np.linalg.eigh(covariance)
+    least = 1e-12 * values[:, -1:]
+    scale = np.where(values > np.maximum(least, 0.0), values, np.inf) ** -0.5
+    matrix: Floats = np.asarray(scale[:, :, np.newaxis] * np.swapaxes(vectors, 1, 2))
+    for row in range(len(places)):
+        for column, place in enumerate(places):
+            rows[:, 3 + 3 * row + place] = matrix[:, row, column]
+    return rows
+
+
+def statistics(tallies: Tallies, m: int, probability: float) -> dict[str, np.ndarray]:
+    """The variables of `SCHEMA` of the first m columns, over poses first."""
+    tail = 0.5 * (1.0 - probability)
+    of_all = OfAll(tallies)
+    ends = of_all.between([tail, 1.0 - tail])[:, :m]
+    shortest = of_all.shortest(probability)[:, :m]
+    extremes = np.asarray(tallies.extremes)[:, :m]
+    covariance = np.asarray(tallies.covariance)
+    variance = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
+    return {
+        "mean": np.asarray(tallies.mean)[:, :m],
+        "standard_deviation": np.sqrt(variance),
+        "covariance": covariance,
+        "lower": ends[..., 0],
+        "upper": ends[..., 1],
+        "shortest_lower": shortest[..., 0],
+        "shortest_upper": shortest[..., 1],
+        "minimum": extremes[..., 0],
+        "maximum": extremes[..., 1],
+        "quantile": of_all.between(LEVELS.tolist())[:, :m],
+        "samples": np.asarray(tallies.count),
+        "failed": np.asarray(tallies.failed),
+    }
+
+
+class _FunctionSampler(Sampler):
+    """A plain function: one pose, so to say, and its outputs as columns."""
+
+    n_pose = 1
+
+    def __init__(self, model: FunctionModel) -> None:
+        self.model = model
+        m = len(model.outputs)
+        self._origins, self._widths = np.zeros((1, m)), np.ones((1, m))
+        self.failed = 0
+
+    def tallies(self) -> Tallies:
+        """New ones."""
+        m = self._origins.shape[1]
+        return Tallies(self._origins, self._widths, m, m)
+
+    def prepare(self, draws: Draws) -> None:
+        """Origins and widths from some first samples."""
+        values, fine = self.model.evaluate(draws.rows(0, 1000))
+        if not fine.any():
+            return
+        middle = np.median(values[fine], axis=0)
+        spread = values[fine].std(axis=0)
+        tiny = 1e-15 * np.abs(middle) + np.finfo(np.float64).tiny / np.finfo(np.float64).eps
+        self._origins = middle[np.newaxis]
+        self._widths = np.maximum(spread, tiny)[np.newaxis] / FINENESS
+
+    def begin(self, pilot: Tallies) -> Tallies:
+        """The same once more: nothing is learnt from the pilot."""
+        return pilot.blank()
+
+    def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
+        """Evaluates the samples from number `first` on."""
+        values, fine = self.model.evaluate(draws.rows(first, count))
+        into.add(np.ascontiguousarray(values[fine]))
+        into.fail(int((~fine).sum()))
+
+    @property
+    def checked(self) -> slice:
+        """All outputs."""
+        return slice(None)
+
+
+def _of_function(model: FunctionModel, asked: _Asked, progress: Progress | None) -> xr.Dataset:
+    sampler = _FunctionSampler(model)
+    draws = asked.draws(model)
+    sampler.prepare(draws)
+    drawn = sampler.run(draws, asked.stop, _Account(progress, asked.samples or 0).add)
+    if drawn.tallies is None or drawn.tallies.count[0] < 2:
+        if drawn.interrupted:
+            raise KeyboardInterrupt
+        raise RequestError(
+            Problem(
+                "bad-samples",
+                "too few of the samples have a result",
+                found="none or one",
+                expected="two or more samples at which the function is finite",
+            )
+        )
+    values = statistics(drawn.tallies, len(model.outputs), asked.probability)
+    found = function_dataset(
+        SCHEMA,
+        {name: value[0] for name, value in values.items()},
+        model,
+        coords={"level": label("level", LEVELS, "share of the samples")},
+    )
+    found.attrs |= {**asked.attrs, "interrupted": int(drawn.interrupted)}
+    return found.assign_attrs(
+        not_assembled=lost_text(found["failed"], found["samples"] + found["failed"], plain=True)
+    )
+
+
+__all__ = ["ELLIPSE", "LEVELS", "MACHINE", "SCHEMA", "monte_carlo", "statistics"]

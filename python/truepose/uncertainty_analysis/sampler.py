@@ -1,0 +1,309 @@
+"""Samples drawn in batches until there are enough: by number, or by JCGM 101's adaptive rule."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from truepose.arrays import Floats, Indices
+from truepose.errors import Problem, RequestError
+from truepose.probability.copula import Copula
+from truepose.probability.domain import unit
+from truepose.probability.quantiles import normal_quantile
+from truepose.sources.deviation import Distribution
+
+if TYPE_CHECKING:
+    from truepose._kernel import Tallies
+    from truepose._kernel import Variables as KernelVariables
+
+BATCH = 10_000
+"""Samples of a batch at least (JCGM 101:2008, 7.9.4 a)."""
+
+SLICE = 2_000_000
+"""Samples, over all poses together, between two looks at Ctrl-C and progress."""
+
+MOST = 10_000_000
+"""Samples at which the adaptive rule ends though some figure is not stable."""
+
+_STUDENT = "student-t"
+
+
+class Variables(Protocol):
+    """What draws are made of: `truepose.runs.variables.Spread`, or a `Model`."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Label of each."""
+        ...
+
+    @property
+    def distributions(self) -> tuple[Distribution, ...]:
+        """How each is distributed."""
+        ...
+
+    @property
+    def correlation(self) -> Floats | None:
+        """(n_variable, n_variable); None where all are independent."""
+        ...
+
+    @property
+    def directions(self) -> Sequence[Indices]:
+        """Numbers of the variables that are together a unit vector."""
+        ...
+
+    @property
+    def streams(self) -> Indices:
+        """(n_variable,) what each belongs to, for random numbers."""
+        ...
+
+    @property
+    def numbers(self) -> Indices:
+        """(n_variable,) number of each there."""
+        ...
+
+
+class Draws(Protocol):
+    """The variables of any sample, by its number."""
+
+    variables: KernelVariables
+    seed: int
+
+    def given(self, first: int, count: int) -> Floats | None:
+        """(count, n_variable), or None where the kernel draws them itself."""
+        ...
+
+    def rows(self, first: int, count: int) -> Floats:
+        """(count, n_variable)."""
+        ...
+
+
+class Random:
+    """Random numbers of the kernel; correlated ones through a Gaussian copula."""
+
+    def __init__(self, of: Variables, seed: int) -> None:
+        from truepose._kernel import Variables as KernelVariables
+
+        self.seed = seed
+        self.distributions = of.distributions
+        self.directions = of.directions
+        self.copula = Copula.of(of.distributions, of.correlation, of.names)
+        linked = self.copula.linked.tolist()
+        # The kernel has no quantile function of Student's distribution.
+        self._by_hand = any(of.distributions[k].name == _STUDENT for k in linked)
+        described = [
+            _described(distribution, int(stream), int(number))
+            for distribution, stream, number in zip(
+                of.distributions, of.streams, of.numbers, strict=True
+            )
+        ]
+        if self._by_hand:
+            for k in linked:
+                described[k] |= {"kind": "normal", "sigmas": 1.0}
+            linked = []
+        factor = self.copula.factor if linked else np.empty((0, 0))
+        self.variables = KernelVariables(
+            described,
+            linked,
+            factor.ravel().tolist(),
+            [members.tolist() for members in of.directions],
+        )
+
+    def given(self, first: int, count: int) -> Floats | None:
+        """None, but where a correlated variable is of Student's distribution."""
+        return self.rows(first, count) if self._by_hand else None
+
+    def rows(self, first: int, count: int) -> Floats:
+        """(count, n_variable)."""
+        drawn = np.asarray(self.variables.draw(self.seed, first, count))
+        if self._by_hand:
+            linked = self.copula.linked
+            drawn[:, linked] = self.copula.variables(drawn[:, linked] @ self.copula.factor.T)
+        return drawn
+
+
+def _described(distribution: Distribution, stream: int, number: int) -> dict[str, object]:
+    described: dict[str, object] = {
+        "kind": distribution.name,
+        "sigmas": distribution.sigmas,
+        "stream": stream,
+        "number": number,
+    }
+    if distribution.dof is not None:
+        described["dof"] = distribution.dof
+    if distribution.values:
+        values, up_to = distribution.steps
+        described |= {
+            "kind": "discrete",
+            "values": values.tolist(),
+            "probabilities": np.diff(up_to, prepend=0.0).tolist(),
+        }
+    return described
+
+
+class _Sobol:
+    """Scrambled Sobol points through the quantile functions of the variables."""
+
+    def __init__(self, random: Random, samples: int) -> None:
+        try:
+            from scipy.stats import qmc
+        except ImportError as failure:
+            raise RequestError(
+                Problem(
+                    "extra-missing",
+                    "Sobol points need a package that is not installed",
+                    found=f"no {failure.name}",
+                    expected="scipy",
+                    hint="pip install 'truepose[sobol]'",
+                )
+            ) from failure
+        self.variables, self.seed = random.variables, random.seed
+        count = len(random.distributions)
+        points = qmc.Sobol(count, scramble=True, rng=random.seed)
+        # A point at 0 would be minus infinity of a normal variable.
+        u = np.clip(points.random(samples), 2.0**-53, 1.0 - 2.0**-53)
+        self._rows = np.empty_like(u)
+        copula = random.copula
+        for column, distribution in enumerate(random.distributions):
+            if column not in copula.linked:
+                self._rows[:, column] = distribution.quantile(u[:, column])
+        if copula.linked.size:
+            normals = normal_quantile(u[:, copula.linked]) @ copula.factor.T
+            self._rows[:, copula.linked] = copula.variables(normals)
+        for members in random.directions:
+            self._rows[:, members] = unit(normal_quantile(u[:, members]))
+
+    def given(self, first: int, count: int) -> Floats:
+        """(count, n_variable)."""
+        return np.ascontiguousarray(self._rows[first : first + count])
+
+    rows = given
+
+
+def sobol(random: Random, samples: int) -> Draws:
+    """Scrambled Sobol points in place of random ones. Raises `RequestError` (extra-missing)."""
+    return _Sobol(random, samples)
+
+
+class Enough(ABC):
+    """When there are enough samples."""
+
+    adaptive = False
+
+    @abstractmethod
+    def next(self, done: int, n_pose: int) -> int:
+        """Samples to draw next at every pose; 0: there are enough."""
+
+
+@dataclass(frozen=True)
+class Fixed(Enough):
+    """As many as asked for."""
+
+    samples: int
+
+    def next(self, done: int, n_pose: int) -> int:
+        """As many as are looked at together, at most what is left."""
+        together = max(1, SLICE // (n_pose * BATCH)) * BATCH
+        return min(together, self.samples - done)
+
+
+class Adaptive(Enough):
+    """JCGM 101:2008, 7.9.4: batches until mean, standard deviation and ends are stable.
+
+    Stable: twice the standard deviation of a figure's mean over the batches is below half a unit of
+    the last of `digits` significant digits of the standard deviation of the output.
+    """
+
+    adaptive = True
+
+    def __init__(self, probability: float, digits: int) -> None:
+        self._tails = [0.5 * (1.0 - probability), 0.5 * (1.0 + probability)]
+        self._digits = digits
+        # Less what is rounding: 1 - 0.9999 is a little less than 0.0001.
+        self.batch = max(math.ceil(100.0 / (1.0 - probability) * (1.0 - 1e-9)), BATCH)
+        self._figures: list[Floats] = []
+
+    def next(self, done: int, n_pose: int) -> int:
+        """A batch, or 0."""
+        return 0 if done >= MOST or self._stable() else self.batch
+
+    def take(self, batch: Tallies, columns: slice) -> None:
+        """The figures of one batch."""
+        m = np.asarray(batch.covariance).shape[1]
+        variance = np.diagonal(np.asarray(batch.covariance), axis1=1, axis2=2)
+        ends = np.asarray(batch.quantiles(self._tails))[:, :m]
+        figures = [np.asarray(batch.mean)[:, :m], np.sqrt(np.maximum(variance, 0.0))]
+        self._figures.append(np.stack([*figures, ends[..., 0], ends[..., 1]]))
+
+    def _stable(self) -> bool:
+        count = len(self._figures)
+        if count < 2:
+            return False
+        figures = np.stack(self._figures)
+        deviation = figures.std(axis=0, ddof=1) / np.sqrt(count)
+        spread = figures[:, 1].mean(axis=0)
+        size = np.abs(figures[:, 0]).max(axis=0) + spread
+        # A pose at which no sample has a result, and what does not vary, are as they are.
+        varying = np.isfinite(spread) & (spread > 1e-12 * size)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            last = np.floor(np.log10(spread)) - self._digits + 1.0
+            tolerance = 0.5 * 10.0**last
+        return bool((2.0 * deviation < tolerance)[:, varying].all())
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Tallies of all samples, None where there are none; whether Ctrl-C ended it."""
+
+    tallies: Tallies | None
+    interrupted: bool
+
+
+class Sampler(ABC):
+    """Whatever samples are evaluated on."""
+
+    n_pose: int
+
+    @abstractmethod
+    def tallies(self) -> Tallies:
+        """New ones for a pilot."""
+
+    @abstractmethod
+    def begin(self, pilot: Tallies) -> Tallies:
+        """New ones, with what was learnt from the pilot."""
+
+    @abstractmethod
+    def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
+        """Evaluates the `count` samples from number `first` on into tallies."""
+
+    @property
+    @abstractmethod
+    def checked(self) -> slice:
+        """Columns whose figures are to be stable."""
+
+    def run(self, draws: Draws, enough: Enough, account: Callable[[int], None]) -> Drawn:
+        """Draws until there are enough; the first batch, drawn again, is the pilot."""
+        whole: Tallies | None = None
+        done = 0
+        try:
+            pilot = self.tallies()
+            first = enough.next(0, self.n_pose)
+            self.sample(draws, 0, min(first, BATCH), pilot)
+            while count := enough.next(done, self.n_pose):
+                batch = self.begin(pilot) if whole is None else whole.blank()
+                self.sample(draws, done, count, batch)
+                if isinstance(enough, Adaptive):
+                    enough.take(batch, self.checked)
+                if whole is None:
+                    whole = batch
+                else:
+                    whole.merge(batch)
+                done += count
+                account(count * self.n_pose)
+        except KeyboardInterrupt:
+            return Drawn(whole, True)
+        return Drawn(whole, False)

@@ -1,0 +1,247 @@
+"""Shapley shares: the variance divided among variables that may be correlated.
+
+The Shapley share of a variable is what it takes away from the variance that is left, as the
+variables become known one after the other, averaged over all orders in which they can (Owen 2014;
+Song, Nelson & Staum 2016). The shares are not negative and add up to one, correlated or not, where
+Sobol indices of correlated variables do neither.
+
+Sampled, by Goda's walk (2021, "A simple algorithm for global sensitivity analysis with Shapley
+effects"): in a random order, one variable after another of a point is drawn anew,
+
+    share V = E[(f_before - f_after) (f_start - (f_before + f_after) / 2)]
+
+which needs n_variable + 1 evaluations a walk for all shares. Goda has independent variables;
+for correlated ones those that are still to change must keep their values and those that were
+changed be drawn given them. With the correlated coordinates z = L e, L a Cholesky factor in the
+reverse of the walk's order, that is drawing anew the last components of e.
+
+A linear function of the coordinates has its shares in closed form (Owen & Prieur 2017, "On Shapley
+value for measuring importance of dependent inputs", theorem 2 in sums over subsets), and stands in
+as a control variate as for Sobol indices.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from truepose.arrays import Flags, Floats, Indices
+from truepose.uncertainty_analysis.random_points import Drawing, generator
+from truepose.uncertainty_analysis.sobol import (
+    LEAST,
+    ORDER,
+    RANK,
+    WALK_BASE,
+    WALK_OTHER,
+    Estimate,
+    Evaluate,
+    Sums,
+    estimate,
+    parts,
+    regression,
+)
+
+SUBSETS = 12
+"""Correlated variables up to which all subsets of them are summed over, not orders drawn."""
+
+ORDERS = 1 << 12
+"""Orders drawn for a linear function of more correlated variables than `SUBSETS`."""
+
+
+@dataclass(frozen=True)
+class ShapleyShares:
+    """Shares (n_cause, m) of the outputs' variance, in the order of `Drawing.by_itself`.
+
+    `failed`: walks left out, since the model could not be evaluated somewhere on them; `points`:
+    evaluations made.
+    """
+
+    shares: Estimate
+    failed: int
+    points: int
+
+
+def shares(
+    evaluate: Evaluate,
+    drawing: Drawing,
+    slopes: Floats,
+    *,
+    samples: int,
+    seed: int,
+    confidence: float,
+    floor: Floats,
+) -> ShapleyShares:
+    """Shapley shares of every cause, from `samples` walks.
+
+    `slopes` (n_variable, m): a linear function of the coordinates close to the outputs. `floor`
+    (m,): standard deviation that is no more than rounding; the shares of an output below are NaN.
+    """
+    causes = drawing.by_itself
+    sums = Sums(seed, slopes.shape[1])
+    failed = points = 0
+    for order, values, linear, good in _walks(evaluate, drawing, slopes, samples, seed):
+        points += good.size * (1 + len(causes))
+        failed += int(good.size - good.sum())
+        taken = _taken(values) - _taken(linear)
+        by_cause = np.empty_like(taken)
+        np.put_along_axis(by_cause, order[:, :, np.newaxis], taken, axis=1)
+        sums.add(by_cause[good])
+    linear_parts = linear_shares(drawing, slopes, seed)
+    # The components of a direction are not correlated, so that their linear parts add up.
+    found = sums.means() + np.stack([linear_parts[members].sum(axis=0) for members in causes])
+    # Of its own sum, so that the shares add up to one.
+    variance = found.sum(axis=1)
+    defined = (np.sqrt(np.maximum(variance[0], 0.0)) > floor) & (sums.count >= LEAST)
+    return ShapleyShares(estimate(found, variance, defined, confidence), failed, points)
+
+
+def linear_shares(drawing: Drawing, slopes: Floats, seed: int) -> Floats:
+    """(n_variable, m) Shapley parts of the variance of a linear function of the coordinates.
+
+    Exact for up to `SUBSETS` correlated variables, else over random orders of them.
+    """
+    found: Floats = slopes**2
+    linked = drawing.linked
+    latent = drawing.copula.latent
+    for block in _blocks(latent):
+        inside = latent[np.ix_(block, block)]
+        of_block = slopes[linked[block]]
+        if block.size <= SUBSETS:
+            part = _over_subsets(inside, of_block)
+        else:
+            part = _over_orders(inside, of_block, generator(seed, 1, ORDER))
+        found[linked[block]] = part
+    return found
+
+
+def _over_subsets(latent: Floats, slopes: Floats) -> Floats:
+    """(k, m) Shapley parts of b' z over every subset of the k coordinates."""
+    count = len(slopes)
+    known = np.zeros((1 << count, slopes.shape[1]))  # variance of the mean given the subset
+    for subset in range(1, 1 << count):
+        given = np.array([bool(subset >> index & 1) for index in range(count)])
+        mean = regression(latent, given).T @ slopes
+        known[subset] = ((latent @ mean) * slopes).sum(axis=0)
+    found = np.zeros_like(slopes)
+    subsets = np.arange(1 << count)
+    sizes = np.array([int(subset).bit_count() for subset in subsets])
+    weights = np.array([1.0 / (count * math.comb(count - 1, size)) for size in range(count)])
+    for index in range(count):
+        without = subsets[(subsets >> index & 1) == 0]
+        added = known[without | (1 << index)] - known[without]
+        found[index] = weights[sizes[without]] @ added
+    return found
+
+
+def _over_orders(latent: Floats, slopes: Floats, numbers: np.random.Generator) -> Floats:
+    """(k, m) as `_over_subsets`, the mean over `ORDERS` random orders."""
+    count = len(slopes)
+    found = np.zeros_like(slopes)
+    some = max(1, (1 << 20) // count**2)
+    for start in range(0, ORDERS, some):
+        orders = _orders(numbers, min(some, ORDERS - start), count)
+        # What the j-th of an order adds, given those before it, is the square of b' L in it.
+        added = np.einsum("njm,njk->nkm", slopes[orders], factors(latent, orders)) ** 2
+        for place in range(count):
+            np.add.at(found, orders[:, place], added[:, place])
+    return found / ORDERS
+
+
+def _blocks(latent: Floats) -> Iterator[Indices]:
+    """Sets of coordinates that are correlated among each other and with none besides."""
+    left = set(range(len(latent)))
+    while left:
+        reached, front = set(), {min(left)}
+        while front:
+            reached |= front
+            nearby = np.flatnonzero((latent[sorted(front)] != 0.0).any(axis=0))
+            front = set(nearby.tolist()) - reached
+        left -= reached
+        yield np.array(sorted(reached), np.intp)
+
+
+def _orders(numbers: np.random.Generator, count: int, size: int) -> Indices:
+    """(count, size) random orders of `size` things."""
+    orders: Indices = np.argsort(numbers.random((count, size)), axis=1)
+    return orders
+
+
+def factors(latent: Floats, orders: Indices) -> Floats:
+    """(n, k, k) Cholesky factors of `latent` (k, k), rows and columns in each order (n, k).
+
+    Of a singular one: a coordinate that follows from those before it has a column of zeros.
+    """
+    left = latent[orders[:, :, np.newaxis], orders[:, np.newaxis, :]]
+    found = np.zeros_like(left)
+    for column in range(orders.shape[1]):
+        pivot = left[:, column, column]
+        root = np.sqrt(np.where(pivot > RANK, pivot, np.inf))
+        found[:, :, column] = left[:, :, column] / root[:, np.newaxis]
+        found[:, :column, column] = 0.0
+        line = found[:, :, column]
+        left -= line[:, :, np.newaxis] * line[:, np.newaxis, :]
+    return found
+
+
+def _taken(values: Floats) -> Floats:
+    """(n, d, m) Goda's product of each step, from f (n, d + 1, m) along the walks."""
+    before, after = values[:, :-1], values[:, 1:]
+    taken: Floats = (before - after) * (values[:, :1] - 0.5 * (before + after))
+    return taken
+
+
+def _walks(
+    evaluate: Evaluate, drawing: Drawing, slopes: Floats, samples: int, seed: int
+) -> Iterator[tuple[Indices, Floats, Floats, Flags]]:
+    """In parts: orders (n, d), f and linear function (n, d + 1, m) on the way, good walks (n,).
+
+    d causes, which become known one after the other.
+    """
+    n_cause, n_variable = len(drawing.by_itself), len(slopes)
+    bases, others = drawing.points(WALK_BASE), drawing.points(WALK_OTHER)
+    numbers = generator(seed, 0, ORDER)
+    for count in parts(samples, n_cause + 1):
+        order = _orders(numbers, count, n_cause)
+        coordinates = _coordinates(
+            drawing, order, bases.independent(count), others.independent(count)
+        )
+        flat = coordinates.reshape(-1, n_variable)
+        values, good = evaluate(drawing.variables(flat))
+        values = np.where(good[:, np.newaxis], values, 0.0)
+        shape = (n_cause + 1, count, slopes.shape[1])
+        yield (
+            order,
+            values.reshape(shape).swapaxes(0, 1),
+            (flat @ slopes).reshape(shape).swapaxes(0, 1),
+            np.asarray(good.reshape(n_cause + 1, count).all(axis=0)),
+        )
+
+
+def _coordinates(drawing: Drawing, order: Indices, base: Floats, other: Floats) -> Floats:
+    """(d + 1, n, v) coordinates along the walks of `order` (n, d), all of `base` at their start.
+
+    `base`, `other` (n, v): independent ones; those of linked variables become the components of e.
+    """
+    n_cause = order.shape[1]
+    linked = drawing.linked
+    cause_of = np.empty(base.shape[1], np.intp)
+    for cause, members in enumerate(drawing.by_itself):
+        cause_of[members] = cause
+    steps = np.empty((n_cause + 1, *base.shape))
+    steps[0] = base
+    for step in range(n_cause):
+        steps[step + 1] = np.where(cause_of == order[:, [step]], other, steps[step])
+    if linked.size:
+        # Place of each linked variable among them, the last of the walk first: what changes first
+        # is drawn given all others, so its component of e comes last.
+        place = np.argsort(order, axis=1)[:, cause_of[linked]]
+        reverse = np.argsort(-place, axis=1)
+        lower = factors(drawing.copula.latent, reverse)
+        moved = np.take_along_axis(steps[:, :, linked], reverse[np.newaxis], axis=2)
+        together = np.matmul(lower[np.newaxis], moved[..., np.newaxis])[..., 0]
+        back = np.argsort(reverse, axis=1)
+        steps[:, :, linked] = np.take_along_axis(together, back[np.newaxis], axis=2)
+    return steps

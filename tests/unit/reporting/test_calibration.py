@@ -1,0 +1,225 @@
+"""Tables and figures of a calibration against the Dataset that they are made from."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from made_calibration import UNKNOWNS, calibration
+from made_study import MADE_UNITS, hexapod_study, planar_study
+from truepose.reporting import calibration as told
+from truepose.reporting import page
+from truepose.reporting.figures import (
+    calibration_correlation,
+    calibration_map,
+    calibration_residuals,
+    calibration_tool,
+    calibration_unknowns,
+)
+from truepose.reporting.study import Study
+from truepose.reporting.tables import Table
+
+FIGURES = (
+    calibration_residuals,
+    calibration_map,
+    calibration_unknowns,
+    calibration_correlation,
+    calibration_tool,
+)
+STUDIES = {"planar": planar_study(), "hexapod": hexapod_study(3)}
+
+
+@pytest.fixture(params=STUDIES)
+def study(request: pytest.FixtureRequest) -> Study:
+    made = STUDIES[request.param]
+    return replace(made, calibration=calibration(made.machine, made.poses, accepted=False))
+
+
+def named(found: xr.Dataset) -> dict[str, Table]:
+    return {table.name: table for table in told.tables(found, MADE_UNITS)}
+
+
+def test_every_table_is_rectangular(study: Study) -> None:
+    for table in (
+        *told.tables(study.calibrated, MADE_UNITS),
+        *told.of_page(study.calibrated, MADE_UNITS),
+    ):
+        assert table.rows
+        assert {len(row) for row in table.rows} == {len(table.header)}
+
+
+def test_a_refusal_has_every_table_and_the_terminal_ends_with_what_to_do(study: Study) -> None:
+    names = list(named(study.calibrated))
+    assert names == [
+        "suspicions", "outliers", "unknowns", "instruments", "undetermined", "residuals", "tool",
+        "heed", "next",
+    ]  # fmt: skip
+    page_names = [table.name for table in told.of_page(study.calibrated, MADE_UNITS)]
+    assert sorted(page_names) == sorted(names)
+    assert page_names[:3] == ["suspicions", "undetermined", "next"]
+
+
+def test_an_acceptance_has_no_empty_table(study: Study) -> None:
+    found = calibration(study.machine, study.poses)
+    assert list(named(found)) == [
+        "outliers",
+        "unknowns",
+        "instruments",
+        "residuals",
+        "tool",
+        "heed",
+    ]
+
+
+def test_unknowns_say_what_they_rest_on(study: Study) -> None:
+    table = named(study.calibrated)["unknowns"]
+    assert [row[0] for row in table.rows] == [label for label, _ in UNKNOWNS.values()]
+    assert [row[1] for row in table.rows] == ["off tolerance", "", "mostly tolerance", "open"]
+    for word in ("Off tolerance: ", "Mostly tolerance: ", "Open: "):
+        assert word in table.note
+    first, tilt, expansion = table.rows[0], table.rows[2], table.rows[3]
+    assert first[2:7] == ("500.0000 mm", "500.2000 mm", "+0.200 mm", "58 µm", "10 µm")
+    assert first[7].startswith("██████████")
+    assert (tilt[2], tilt[3]) == ("–", "–")
+    assert expansion[6] == "open"
+    assert expansion[7] == "░░░░░░░░░░    0"
+
+
+def test_what_is_less_certain_than_its_tolerance_is_told(study: Study) -> None:
+    found = study.calibrated.copy(deep=True)
+    found["standard_uncertainty"].values[1] = 1e-3
+    assert named(found)["unknowns"].rows[1][1] == "less certain"
+
+
+def test_residuals_are_by_instrument_and_unit(study: Study) -> None:
+    found = study.calibrated
+    table = named(found)["residuals"]
+    assert [row[:3] for row in table.rows] == [
+        ("tracker", "x, µm", "7"),
+        ("tracker", "c, µrad", "7"),
+    ]
+    after = found["residual_after"].values[::2]
+    assert float(table.rows[0][5]) == pytest.approx(1e6 * np.sqrt(np.mean(after**2)), abs=0.06)
+    assert "5 folds" in table.note
+
+
+def test_readings_that_do_not_fit_are_not_in_the_residuals(study: Study) -> None:
+    found = study.calibrated.copy(deep=True)
+    for name in ("residual_after", "normalised_after", "standardised"):
+        found[name].values[0] = 100.0
+    table = named(found)["residuals"]
+    assert table.rows[0][2] == "6"
+    assert float(table.rows[0][5]) < 100.0
+    assert "Without the readings named" in table.note
+
+
+def test_where_most_readings_do_not_fit_none_is_odd(study: Study) -> None:
+    found = study.calibrated.copy(deep=True)
+    found["standardised"].values[:] = 50.0
+    tables = named(found)
+    assert "wrong as a whole" in tables["outliers"].note
+    assert tables["residuals"].rows[0][2] == "7"
+    found.attrs["outliers"] = json.dumps(25 * json.loads(found.attrs["outliers"]))
+    assert len(named(found)["outliers"].rows) == 20
+    assert "5 more" in named(found)["outliers"].note
+
+
+def test_the_tool_is_in_micrometres(study: Study) -> None:
+    found = study.calibrated
+    table = named(found)["tool"]
+    assert table.rows[0][0] == "position, µm"
+    highest = 1e6 * found["tool_size_after"].values[:, 0].max()
+    assert float(table.rows[0][2]) == pytest.approx(highest, rel=1e-3)
+    assert table.rows[0][5] == "0.50"
+    assert "as a whole" in table.note
+
+
+def test_a_tool_that_nothing_limits_is_open_and_one_without_a_before_has_a_dash(
+    study: Study,
+) -> None:
+    found = study.calibrated.copy(deep=True)
+    found["tool_size_after"].values[0] = np.inf
+    found["tool_size_before"].values[:] = np.nan
+    row = named(found)["tool"].rows[0]
+    assert row[1:] == ("–", "open", "–", "open", "–")
+    drawn = replace(study, calibration=found)
+    assert "no before" in calibration_tool.caption(drawn)
+    assert "nothing limits" in calibration_tool.caption(drawn)
+    assert len(calibration_tool.figure(drawn).data) == 1
+
+
+def test_suspicions_outliers_and_what_to_measure(study: Study) -> None:
+    tables = named(study.calibrated)
+    assert tables["suspicions"].rows == (
+        ("swapped-columns", "yes", "tracker: it looks as if x and y were exchanged"),
+    )
+    assert tables["outliers"].rows == (("tracker", "x", "11", "−12.3"),)
+    assert tables["next"].rows == (("Probe in x and y too.",),)
+    assert "position known to 12 µm" in tables["next"].note
+
+
+def test_a_large_machine_is_cut(study: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(told, "MOST_UNKNOWNS", 2)
+    table = named(study.calibrated)["unknowns"]
+    assert len(table.rows) == 2
+    assert "2 more are in the files" in table.note
+    monkeypatch.setattr(calibration_unknowns, "MOST_DRAWN", 3)
+    assert "the 3 of 4 unknowns" in calibration_unknowns.caption(study)
+    assert len(calibration_unknowns.figure(study).data[0].y) == 3
+    monkeypatch.setattr(calibration_correlation, "MOST_DRAWN", 2)
+    assert "the first 2 unknowns" in calibration_correlation.caption(study)
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_figures_show_the_dataset(figure: object, study: Study) -> None:
+    drawn = figure.figure(study)  # type: ignore[attr-defined]
+    assert drawn.data
+    assert figure.caption(study).endswith(".")  # type: ignore[attr-defined]
+
+
+def test_residuals_are_drawn_in_micrometres_by_line(study: Study) -> None:
+    drawn = calibration_residuals.figure(study)
+    before = next(each for each in drawn.data if each.name == "before")
+    np.testing.assert_allclose(
+        before.y, 1e6 * study.calibrated["residual_before"].values[::2], rtol=1e-6
+    )
+    np.testing.assert_array_equal(before.x, np.arange(7) + 9)
+    assert drawn.layout.xaxis3.title.text == "line of the file"
+
+
+def test_one_wrong_reading_does_not_flatten_the_others(study: Study) -> None:
+    found = study.calibrated.copy(deep=True)
+    for name in ("residual_after", "normalised_after", "standardised", "held_out_after"):
+        found[name].values[0] = 1e3
+    shown = replace(study, calibration=found)
+    low, high = calibration_residuals.figure(shown).layout.yaxis2.range
+    assert -100 < low < high < 100
+    assert "further out" in calibration_residuals.caption(shown)
+
+
+def test_changes_are_in_half_bands(study: Study) -> None:
+    drawn = calibration_unknowns.figure(study)
+    change = drawn.data[-1]
+    np.testing.assert_allclose(change.x, [2.0, -0.5, 0.5, np.nan])
+    assert change.text[0] == "+0.200 mm"
+    shares = [each.x for each in drawn.data[:2]]
+    np.testing.assert_allclose(shares[0] + shares[1], 100.0)
+
+
+def test_the_strongest_correlation_is_named(study: Study) -> None:
+    said = calibration_correlation.caption(study)
+    assert "length of strut 1 with length of strut 2, \N{MINUS SIGN}0.970" in said
+
+
+def test_the_page_begins_with_it(study: Study) -> None:
+    text = page.render(study)
+    assert text.index('id="calibration"') < text.index('id="summary"')
+    assert "<h2>The machine as filed</h2>" in text
+    assert "Calibration and positioning error report" in text
+    without = page.render(replace(study, calibration=None))
+    assert 'id="calibration"' not in without
+    assert "calibration_tool" not in without

@@ -1,0 +1,335 @@
+"""Every registered figure on every kind of machine: what is drawn is what the Datasets say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from made_how_sure import shares, sure_study
+from made_study import hexapod_study, planar_study
+from sweeps import sweep
+from truepose.reporting import figures, variance_shares
+from truepose.reporting import how_far as numbers
+from truepose.reporting.figures import (
+    FIGURES,
+    _style,
+    coverage_ellipses,
+    distribution,
+    draw,
+    error_over_time,
+    how_far,
+    internal_forces,
+    machine_drawing,
+    overall_error,
+    ranking,
+    source_errors,
+    tornado,
+    workspace_maps,
+)
+from truepose.reporting.study import Study
+from truepose.verdict.answer import Answer
+
+STUDIES = {
+    "planar": sure_study(planar_study()),
+    "hexapod": sure_study(hexapod_study(3)),
+    "one pose": sure_study(planar_study(1)),
+}
+NEEDING = {module.__name__.rpartition(".")[2] for module in FIGURES if hasattr(module, "NEEDS")}
+
+
+@pytest.fixture(params=STUDIES)
+def study(request: pytest.FixtureRequest) -> Study:
+    return STUDIES[request.param]
+
+
+def test_the_registry_holds_every_module_of_the_folder() -> None:
+    from importlib.resources import files
+
+    folder = files("truepose.reporting.figures")
+    modules = {
+        path.name.removesuffix(".py")
+        for path in folder.iterdir()
+        if path.name.endswith(".py") and not path.name.startswith("_")
+    }
+    assert {module.__name__.rpartition(".")[2] for module in FIGURES} == modules
+
+
+def test_every_figure_has_traces_a_title_and_a_caption(study: Study) -> None:
+    drawn = list(draw(study))
+    assert len(drawn) == len(FIGURES)
+    for each in drawn:
+        assert each.figure.data, each.name
+        assert each.title
+        assert each.caption.endswith(".")
+        assert each.figure.layout.height > 100
+
+
+def test_figures_of_results_that_not_every_study_has_need_one(study: Study) -> None:
+    names = {each.name for each in draw(Study(study.machine, study.budget))}
+    every = {module.__name__.rpartition(".")[2] for module in FIGURES}
+    assert names == every - NEEDING
+    assert {"before_after", "error_over_time", "internal_forces", "tornado"} <= NEEDING
+
+
+def trace(figure: go.Figure, name: str, nth: int = 0) -> go.Scatter:
+    return [each for each in figure.data if each.name == name][nth]
+
+
+def test_lines_are_the_errors_in_micrometres(study: Study) -> None:
+    for nth in range(len(study.components)):
+        upper = trace(source_errors.figure(study), "tolerance, all at upper ends", nth)
+        expected = study.budget["error_upper"].sel(source="tolerance").values[:, nth] * 1e6
+        np.testing.assert_allclose(upper.y, expected, rtol=1e-6)
+        lower = trace(overall_error.figure(study), "all at lower ends", nth)
+        expected = study.budget["overall_error_lower"].values[:, nth] * 1e6
+        np.testing.assert_allclose(lower.y, expected, rtol=1e-6)
+
+
+def test_poses_have_the_number_that_files_give_them() -> None:
+    study = planar_study()
+    fewer = Study(study.machine, study.budget.isel(pose=[2, 3, 7]))
+    for each in (source_errors.figure(fewer), overall_error.figure(fewer)):
+        np.testing.assert_array_equal(each.data[0].x, fewer.budget["pose"].values)
+
+
+def test_bars_are_the_highest_with_the_largest_on_top(study: Study) -> None:
+    bars = ranking.figure(study).data[0]
+    assert list(bars.y) == ["elastic", "thermal", "tolerance"]
+    expected = study.budget["highest"].sel(quantity="position", source=list(bars.y)).values
+    np.testing.assert_allclose(bars.x, expected * 1e6, rtol=1e-6)
+
+
+def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: Study) -> None:
+    figure = internal_forces.figure(study)
+    for name, variable in (
+        ("with clearances", "highest_force"),
+        ("without clearances", "highest_force_rigid"),
+    ):
+        bars = trace(figure, name)
+        assert list(bars.y) == ["thermal", "tolerance"], "the largest on top"
+        expected = study.strained[variable].sel(source=list(bars.y)).values
+        np.testing.assert_allclose(bars.x, expected, rtol=1e-6)
+    for closure in study.strained["closure"].values:
+        line = trace(figure, str(closure))
+        expected = study.strained["overall_force"].sel(closure=closure).values
+        np.testing.assert_allclose(line.y, expected, rtol=1e-6)
+    assert "more closures than freedoms" in internal_forces.caption(study)
+
+
+def test_maps_share_one_colour_scale(study: Study) -> None:
+    figure = workspace_maps.figure(study)
+    sizes = [study.largest, study.values("largest")[:, :, 0]]
+    assert figure.layout.coloraxis.cmin == 0
+    assert figure.layout.coloraxis.cmax == pytest.approx(max(map(np.max, sizes)) * 1e6)
+    for each in figure.data:
+        colours = each.coloraxis if each.type == "heatmap" else each.marker.coloraxis
+        assert colours == "coloraxis"
+    titles = [note.text for note in figure.layout.annotations]
+    assert titles == ["all sources", "after compensation", "tolerance", "thermal", "elastic"]
+
+
+def test_a_heat_map_has_each_value_at_its_place() -> None:
+    study = planar_study()
+    first = workspace_maps.figure(study).data[0]
+    size = study.largest * 1e6
+    for pose, expected in zip(study.poses, size, strict=True):
+        column = int(np.argmin(np.abs(first.x - pose[0] * 1e3)))
+        row = int(np.argmin(np.abs(first.y - pose[1] * 1e3)))
+        assert first.z[row, column] == pytest.approx(expected, rel=1e-6)
+
+
+def test_poses_that_differ_in_what_is_not_shown_give_the_largest() -> None:
+    study = hexapod_study(3)
+    twice = Study(study.machine, study.budget.isel(pose=np.repeat(np.arange(27), 2)))
+    turned = twice.budget["pose_a"].values.copy()
+    turned[1::2] = 0.1
+    twice.budget["pose_a"] = ("pose", turned)
+    figure = workspace_maps.figure(twice)
+    assert len(figure.data[0].x) == 27
+    assert "Over a the largest is shown." in workspace_maps.caption(twice)
+
+
+def test_the_drawing_joins_carriages_and_tool() -> None:
+    study = planar_study()
+    figure = machine_drawing.figure(study)
+    struts = trace(figure, "struts")
+    height = 200 + np.sqrt(500**2 - 300**2)
+    np.testing.assert_allclose(struts.x[[0, 1, 3, 4]], [0, 300, 600, 300], atol=1e-3)
+    np.testing.assert_allclose(struts.y[[0, 1, 3, 4]], [height, 200, height, 200], rtol=1e-6)
+    assert figure.layout.yaxis.scaleanchor == "x", "drawn to scale"
+    guideways = trace(figure, "travel of the drives")
+    assert (np.nanmin(guideways.y), np.nanmax(guideways.y)) == (0, 900)
+
+
+def test_the_drawing_of_a_body_has_its_platform_and_frame() -> None:
+    study = hexapod_study(3)
+    figure = machine_drawing.figure(study)
+    for name in ("platform", "frame"):
+        outline = trace(figure, name)
+        assert len(outline.x) == 7, "six corners, closed"
+        radius = np.hypot(outline.x, outline.y)
+        assert np.allclose(radius, radius[0])
+        turn = np.unwrap(np.arctan2(outline.y, outline.x))
+        assert abs(turn[-1] - turn[0]) == pytest.approx(2 * np.pi), "once round, no crossing"
+    assert figure.layout.scene.aspectmode == "data"
+
+
+def test_many_poses_are_thinned_and_the_largest_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_style, "MOST_DRAWN", 100)
+    study = planar_study(32)
+    worst = int(np.argmax(study.largest))
+    line = trace(source_errors.figure(study), "thermal")
+    assert len(line.x) <= 101
+    assert worst in line.x
+    assert "one in 11 of the 1,024 poses" in source_errors.caption(study)
+    assert "one in" not in source_errors.caption(planar_study())
+
+
+@sweep
+def test_values_are_kept_in_single_precision(study: Study) -> None:
+    for each in figures.draw(study):
+        for one in each.figure.data:
+            for values in (one.y, getattr(one, "z", None)):
+                if isinstance(values, np.ndarray) and values.dtype.kind == "f":
+                    assert values.dtype == np.float32, (each.name, one.name)
+
+
+def test_the_error_over_time_is_drawn_at_each_pose_and_over_the_temperatures(study: Study) -> None:
+    drawn = error_over_time.figure(study)
+    errors = study.time["error"].values * 1e6
+    lines = [each for each in drawn.data if each.line.color == _style.source_colour(0)]
+    assert len(lines) == errors.shape[1] * errors.shape[2]
+    assert np.allclose(lines[0].y, errors[:, 0, 0], rtol=1e-5)
+    assert np.allclose(lines[0].x, study.time["time"].values / 60.0)
+    assert lines[0].line.dash != lines[-1].line.dash
+    others = [each for each in drawn.data if each.line.color != _style.source_colour(0)]
+    # Strut 2 and frame go by one temperature, the tool is not in the log.
+    assert [each.name for each in others] == ["strut.1", "strut.2 and 1 more"]
+    temperatures = study.time["temperature"].values[:, 0] - 273.15
+    assert np.allclose(others[0].y, temperatures, atol=1e-4)
+    titles = {axis.title.text for axis in drawn.select_yaxes()}
+    assert {"error in x, µm", "temperature, °C"} <= titles
+    assert "time, min" in {axis.title.text for axis in drawn.select_xaxes()}
+    assert "log.csv" in error_over_time.caption(study)
+
+
+def test_many_times_are_thinned_and_the_last_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = STUDIES["planar"]
+    monkeypatch.setattr(error_over_time, "MOST_DRAWN", 50)
+    x = np.asarray(error_over_time.figure(study).data[0].x)
+    assert len(x) <= 51
+    assert x[-1] == pytest.approx(60.0)
+    assert "of 361 times" in error_over_time.caption(study)
+
+
+def test_the_histogram_has_the_shares_that_the_quantiles_say() -> None:
+    levels = np.linspace(0.0, 1.0, 101)
+    edges, share = distribution.histogram(levels, levels**2, bars=10)
+    np.testing.assert_allclose(np.cumsum(share), np.sqrt(edges[1:]), atol=0.01)
+    # Three values of probability 1/4, 1/2 and 1/4: bars at the ends and in the middle only.
+    steps = np.select([levels <= 0.25, levels <= 0.75], [-1.0, 0.0], 1.0)
+    edges, share = distribution.histogram(levels, steps, bars=5)
+    assert share[[0, 2, 4]] == pytest.approx([0.25, 0.5, 0.25], abs=0.02)
+    assert share.sum() == pytest.approx(1.0)
+    # A fifth that has no error, half of it below and half above, is in no bar.
+    within = (levels >= 0.1 - 1e-9) & (levels <= 0.9 + 1e-9)
+    edges, share = distribution.histogram(levels[within], levels[within], bars=8)
+    assert np.allclose(edges, np.linspace(0.1, 0.9, 9))
+    assert np.allclose(share, 0.1)
+    edges, share = distribution.histogram(levels, np.full(101, 3.0))
+    assert (edges[0], edges[-1], share.sum()) == (3.0, 3.0, 1.0)
+
+
+def test_the_distribution_is_dark_inside_its_coverage_interval(study: Study) -> None:
+    found = study.monte_carlo
+    assert found is not None
+    pose = int(found["magnitude_upper"].values[:, 0].argmax())
+    drawn = distribution.figure(study)
+    bars = [each for each in drawn.data if isinstance(each, go.Bar) and len(each.x) > 1]
+    assert len(bars) == len(study.components) + (2 if study.rotations else 1)
+    first = bars[0]
+    ends = [float(found[end].values[pose, 0]) * 1e6 for end in ("lower", "upper")]
+    inside = [
+        x for x, c in zip(first.x, first.marker.color, strict=True) if c == distribution.WITHIN
+    ]
+    assert ends[0] <= min(inside)
+    assert max(inside) <= ends[1]
+    dark = [y for y, c in zip(first.y, first.marker.color, strict=True) if c == distribution.WITHIN]
+    assert sum(dark) == pytest.approx(95.0, abs=4.0)
+    assert "4,000 samples" in distribution.caption(study)
+
+
+def test_how_far_off_has_a_bar_for_each_number_and_state(study: Study) -> None:
+    drawn = how_far.figure(study)
+    rows = numbers.how_far(study)
+    kinds = list(dict.fromkeys(row.quantity for row in rows))
+    for key, title in numbers.NUMBERS.items():
+        for nth, kind in enumerate(kinds):
+            bars = trace(drawn, title, nth)
+            of_kind = [row for row in rows if row.quantity == kind]
+            assert list(bars.x) == [row.state for row in of_kind]
+            expected = [row.sizes[key] * 1e6 for row in of_kind]
+            np.testing.assert_allclose(bars.y, expected, rtol=1e-6)
+    (asked,) = [shape for shape in drawn.layout.shapes if shape.type == "line"]
+    assert asked.y0 == asked.y1 == pytest.approx(500.0), "no angle is asked for"
+    lines = [each.name for each in drawn.data if each.type == "scatter"]
+    assert lines == ["position asked, 0.5 mm"]
+
+
+def test_a_number_that_there_is_not_has_no_bar(study: Study) -> None:
+    def without_a_bound(answer: Answer) -> Answer:
+        return replace(answer, bound=replace(answer.bound, value=np.inf))
+
+    unbounded = tuple(without_a_bound(answer) for answer in study.accuracy)
+    names = {
+        each.name
+        for each in how_far.figure(replace(study, accuracy=unbounded, sampled=())).data
+        if each.type == "bar"
+    }
+    assert names == {"witness", "linear maximum"}
+
+
+def test_the_tornado_has_the_largest_on_top(study: Study) -> None:
+    assert study.shares is not None
+    who = variance_shares.blame(study.shares, variance_shares.spread_pose(study.shares))
+    drawn = tornado.figure(study)
+    for kind, name in (("first", "first order"), ("total", "total"), ("linear", "linear")):
+        bars = trace(drawn, name)
+        assert list(bars.y) == list(who.names)[::-1]
+        np.testing.assert_allclose(bars.x, 100 * who.kinds[kind][::-1], rtol=1e-6)
+    correlated = replace(study, shares=shares(study.machine, study.poses[:1], correlated=True))
+    names = {each.name for each in tornado.figure(correlated).data}
+    assert names == {"Shapley", "linear"}
+    assert "Shapley shares do" in tornado.caption(correlated)
+
+
+def test_an_ellipse_holds_what_it_says(study: Study) -> None:
+    found = study.ellipses
+    assert found is not None
+    centre, outline = coverage_ellipses.ellipse(found, 0, (0, 1))
+    matrix = found["ellipse"].values[0][:2, :2]
+    squared = np.einsum("ni,ij,nj->n", outline, np.linalg.inv(matrix), outline)
+    np.testing.assert_allclose(squared, 1.0, rtol=1e-9)
+    np.testing.assert_array_equal(centre, found["ellipse_centre"].values[0, :2])
+    flat = found.copy(deep=True)
+    flat["ellipse"].values[:] = 0.0
+    flat["ellipse"].values[:, 0, 0] = 1e-10
+    _, line = coverage_ellipses.ellipse(flat, 0, (0, 1))
+    assert (line[:, 0].max(), abs(line[:, 1]).max()) == (pytest.approx(1e-5), 0.0)
+
+
+def test_ellipses_do_not_touch_and_are_to_one_scale(study: Study) -> None:
+    drawn = coverage_ellipses.figure(study)
+    outlines = [each for each in drawn.data if each.legendgroup == "ellipse"]
+    assert study.ellipses is not None
+    spatial = study.ellipses.sizes["axis"] == 3
+    assert len(outlines) == (27 if spatial else study.ellipses.sizes["pose"])
+    first, second = outlines[0], outlines[min(1, len(outlines) - 1)]
+    if first is not second and first.xaxis == second.xaxis:
+        apart = np.hypot(*(np.mean(first[a]) - np.mean(second[a]) for a in "xy"))
+        assert apart > max(np.ptp(first.x), np.ptp(first.y))
+    assert drawn.layout.yaxis.scaleanchor == "x"
+    assert "times as large as the workspace" in coverage_ellipses.caption(study)

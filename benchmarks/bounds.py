@@ -15,7 +15,7 @@ from benchmarks.timing import best_seconds
 from truepose.probability.domain import Domain
 from truepose.runs.quantities import quantities
 from truepose.sources import UNIFORM
-from truepose.uncertainty_analysis.corners import worst_vertices
+from truepose.uncertainty_analysis.corners import worst_corners
 
 BAND = 1e-4  # m, of every parameter of the hexapod, to either side
 ROUNDS = 7
@@ -74,7 +74,7 @@ def _at_home() -> list[Row]:
     kinds = quantities(machine.components)
     nothing = np.zeros((1, len(machine.components)))
     domain = Domain.of([UNIFORM] * columns.size)
-    found = worst_vertices(exact, nothing, BAND * slopes, domain, list(kinds.values()))
+    found = worst_corners(exact, nothing, BAND * slopes, domain, list(kinds.values()))
     if found.status.any():
         raise RuntimeError("the hexapod does not close at one of the corners")
     reached = found.most[0]

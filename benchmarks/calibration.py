@@ -16,7 +16,7 @@ from benchmarks import numpy_hexapod
 from benchmarks.hexapod import N_STRUT, Array, Batch
 from benchmarks.rows import Row
 from benchmarks.timing import DisagreementError, best_seconds
-from truepose.calibration.identification.problem import Prior, Problem
+from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.instruments import Frame, Instrument
 from truepose.calibration.measurements import Measurements
@@ -82,7 +82,7 @@ def measure() -> list[Row]:
     batch = Batch.of(POSES)
     measurements = measurements_of(batch)
     unknowns = unknowns_of(batch.machine, measurements)
-    problem = Problem(batch.machine, measurements, unknowns)
+    problem = IdentificationProblem(batch.machine, measurements, unknowns)
     random = np.random.default_rng(7)
     # Each unknown is one parameter: where it stands among the benchmark's columns.
     order = [int(np.flatnonzero(unknowns.effects[list(unknowns.columns).index(column)])[0])

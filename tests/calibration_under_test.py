@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from made_measurements import made_measurements, poses_within
-from truepose.calibration.identification.fit import Equations, placed, whitened
-from truepose.calibration.identification.problem import Prior, Problem
+from truepose.calibration.identification.fit import Equations, place_instruments, whitened
+from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.measurements import Measurements
@@ -64,9 +64,9 @@ class CalibrationUnderTest:
         return unknowns_of(self.machine, self.measurements)
 
     @cached_property
-    def problem(self) -> Problem:
+    def problem(self) -> IdentificationProblem:
         """The measurements with their frames where they begin."""
-        return placed(self.machine, self.measurements, self.unknowns)[0]
+        return place_instruments(self.machine, self.measurements, self.unknowns)[0]
 
     def equations(self, *, use_prior: bool) -> Equations:
         """At the values where the search starts."""

@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from made_measurements import made_measurements, poses_within
-from truepose.calibration.data_checks.nominal import Geometry, Setup, nominal_readings, turned
+from truepose.calibration.data_checks.nominal import Geometry, Placement, nominal_readings, turned
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Machine
-from truepose.sources.tolerance import Tolerance
+from truepose.sources.tolerance import DimensionalTolerance
 
 Floats = NDArray[np.float64]
 
 
 def drawn(machine: Machine, seed: int) -> Machine:
     """The machine with every tolerance somewhere in its band."""
-    (bands,) = (each.bands for each in machine.sources if isinstance(each, Tolerance))
+    (bands,) = (each.bands for each in machine.sources if isinstance(each, DimensionalTolerance))
     t = np.random.default_rng(seed).uniform(-1.0, 1.0, bands.n_variable)
     moved = np.zeros(len(machine.parameters))
     np.add.at(moved, bands.parameters, (bands.shift + bands.signed_half * t[bands.variables])[0])
@@ -33,7 +33,7 @@ def shown(
     nominal: Machine,
     actual: Machine,
     measurements: Measurements,
-    setups: list[Setup] | None = None,
+    setups: list[Placement] | None = None,
 ) -> Floats:
     """(n_observation,) what an actual machine shows at the commanded joints, without noise."""
     start = nominal.kernel.pose_of(measurements.placements)
@@ -61,8 +61,10 @@ def good(
         random = np.random.default_rng(seed + 7)
         unknown = np.array(made.instruments[0].frame.unknown, float)
         far = unknown * np.r_[random.uniform(-1.0, 1.0, 3), random.uniform(-0.3, 0.3, 3)]
-        stated = Setup.stated(made.instruments[0])
-        setups = [Setup(stated.origin + far[:3], turned(far[3:]) @ stated.rotation, stated.target)]
+        stated = Placement.stated(made.instruments[0])
+        setups = [
+            Placement(stated.origin + far[:3], turned(far[3:]) @ stated.rotation, stated.target)
+        ]
     return with_noise(made, shown(machine, drawn(machine, seed), made, setups), seed)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truepose.machine import Machine
-from truepose.sources import OWN_GROUP, Block, Deviation
+from truepose.sources import OWN_GROUP, Deviation, PoseBlock
 
 # Of each unit: about 0.1 mm, 0.2 mrad and 1e-4 of the travel, machines being about a metre.
 SIZE = {"m": 1e-4, "rad": 2e-4, "1": 1e-4}
@@ -26,7 +26,7 @@ class MadeSource:
 
     name: str
     given: Deviation | None = None
-    of_block: Callable[[Block], Deviation] | None = None
+    of_block: Callable[[PoseBlock], Deviation] | None = None
     sets_overall_edges: bool = False
     asked: list[int] = field(default_factory=list)
 
@@ -37,7 +37,7 @@ class MadeSource:
     def acts(self, condition: object) -> bool:
         return True
 
-    def deviation(self, machine: Machine, condition: object, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: object, block: PoseBlock) -> Deviation:
         self.asked.append(block.indices.size)
         if self.of_block is not None:
             return self.of_block(block)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from truepose.machine import Machine
-from truepose.runs.first_order import Mover
+from truepose.runs.first_order import ExactError
 from truepose.runs.poses import OK
 from truepose.runs.quantities import quantities
 from truepose.uncertainty_analysis.sampler import Random
@@ -93,7 +93,7 @@ def drawn_inside(state: State, columns: NDArray[np.intp], count: int, seed: int 
     t = Random(state.spread, seed).rows(0, count)
     domain = state.spread.domain
     t = np.clip(t, domain.lower, domain.upper)
-    mover = Mover(state.machine, state.block, state.spread)
+    mover = ExactError(state.machine, state.block, state.spread)
     error, status = mover(np.zeros(count, np.intp), t)
     size = np.linalg.norm(error[:, columns], axis=1)
     return np.where(status == OK, size, np.inf)

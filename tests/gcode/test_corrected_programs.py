@@ -33,7 +33,7 @@ from truepose.controllers.gcode.correct import correct_program
 from truepose.controllers.gcode.proof import Proof
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.sources import Block, Deviation
+from truepose.sources import Deviation, PoseBlock
 
 TOLERANCE = 5e-6
 SYSTEM_PYTHON = Path("/usr/bin/python3")
@@ -658,7 +658,7 @@ def test_a_jump_within_a_move_is_refused(tmp_path: Path) -> None:
     """As of a play whose load changes its sign: however it is divided, half the jump is left."""
     base = tp.load(MACHINES / "planar_two_slider.toml")
 
-    def jumping(block: Block) -> Deviation:
+    def jumping(block: PoseBlock) -> Deviation:
         side = np.where(block.placements[:, :1] < 0.3, 2e-5, -2e-5)
         return Deviation.of(base.kernel.length_parameters, np.hstack([side, side]))
 

@@ -20,7 +20,7 @@ from truepose._kernel import STATUS
 from truepose.compensation.commands import ActualMachine, actual_of_joints, actual_poses
 from truepose.controllers.gcode import division
 from truepose.controllers.gcode._axes import Axes
-from truepose.controllers.gcode._way import crossings
+from truepose.controllers.gcode._singularity_crossings import singularity_crossings
 from truepose.controllers.gcode.division import (
     TOO_SHORT,
     CannotCorrect,
@@ -30,7 +30,7 @@ from truepose.controllers.gcode.division import (
     Moves,
 )
 from truepose.machine import Machine
-from truepose.sources import Block, Deviation
+from truepose.sources import Deviation, PoseBlock
 
 TOLERANCE = 5e-6
 LEAST = 1e-5
@@ -226,7 +226,7 @@ def test_an_s_shaped_deviation_is_seen() -> None:
     """It is nil in the middle of the move and at both ends."""
     base = tp.load(MACHINES / "planar_two_slider.toml")
 
-    def wavy(block: Block) -> Deviation:
+    def wavy(block: PoseBlock) -> Deviation:
         x = block.placements[:, :1]
         wave = 2e-5 * np.sin(2.0 * math.pi * (x - 0.25) / 0.1)
         return Deviation.of(base.kernel.length_parameters, np.hstack([wave, wave]))
@@ -389,7 +389,7 @@ def test_a_singularity_on_the_way_is_found_by_the_sign_of_the_jacobian() -> None
         crossing.append(bool((signs != signs[0]).any()))
         worst.append(machine.conditioning(poses).min())
     begins, ends = (np.array([way[at] for way in ways]) for at in (0, 1))
-    found = crossings(ActualMachine(machine), begins, ends)
+    found = singularity_crossings(ActualMachine(machine), begins, ends)
     assert 10 < sum(crossing) < len(crossing) - 50
     assert set(np.flatnonzero(crossing)) <= set(found.tolist())
     # Beside those only ways that begin or end on the very brink of one.
@@ -403,7 +403,7 @@ def test_a_jump_cannot_be_divided(step: float) -> None:
     """As of a play whose side changes: however short the piece, it is half the jump off."""
     base = tp.load(MACHINES / "planar_two_slider.toml")
 
-    def jumping(block: Block) -> Deviation:
+    def jumping(block: PoseBlock) -> Deviation:
         side = np.where(block.placements[:, :1] < 0.3, 2e-5, -2e-5)
         return Deviation.of(base.kernel.length_parameters, np.hstack([side, side]))
 

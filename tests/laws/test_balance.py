@@ -21,7 +21,7 @@ from machine_under_test import MachineUnderTest
 from random_machines import DrawnMachine
 from reference_kinematics import rotation_of, rotation_of_quaternion, turned_about, unit
 from truepose.machine import Condition, Machine, Strut
-from truepose.sources import Block, Loads
+from truepose.sources import Loads, PoseBlock
 
 Floats = NDArray[np.float64]
 
@@ -80,10 +80,10 @@ class Bodies:
     machine: Machine
 
     @cached_property
-    def block(self) -> Block:
+    def block(self) -> PoseBlock:
         joints, placements = (np.ascontiguousarray(all_[POSES]) for all_ in self.under_test.placed)
         poses = self.under_test.poses[POSES]
-        return Block(
+        return PoseBlock(
             self.machine, self.machine.condition, poses, np.arange(len(poses)), joints, placements
         )
 

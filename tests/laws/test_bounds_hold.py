@@ -10,10 +10,10 @@ import truepose as tp
 from machine_under_test import OK, MachineUnderTest
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.runs.first_order import Mover
-from truepose.runs.poses import Walk, required_sources
+from truepose.runs.first_order import ExactError
+from truepose.runs.poses import PoseRun, required_sources
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import spread
+from truepose.runs.variables import variables_at
 from truepose.uncertainty_analysis.truncation import Ends
 
 Array = NDArray[np.float64]
@@ -26,16 +26,16 @@ ROUNDING = 1e-13
 
 def sampled(machine: Machine, poses: Array) -> tuple[Array, Array]:
     """Largest |error| (n, m) and length (n, n_quantity) of machines drawn anywhere in the bands."""
-    (block,) = Walk(machine, poses, machine.condition)
-    moves = Ends(None).narrowed(
-        spread(machine, block, required_sources(machine, machine.condition))
+    (block,) = PoseRun(machine, poses, machine.condition)
+    moves = Ends(None).truncated(
+        variables_at(machine, block, required_sources(machine, machine.condition))
     )
     random = np.random.default_rng(5)
     count, n = SAMPLES, len(poses)
     t = random.uniform(-1.0, 1.0, (count * n, len(moves.names)))
     for members in moves.directions:
         t[:, members] /= np.linalg.norm(t[:, members], axis=1, keepdims=True)
-    errors, status = Mover(machine, block, moves)(np.repeat(np.arange(n), count), t)
+    errors, status = ExactError(machine, block, moves)(np.repeat(np.arange(n), count), t)
     assert (status == OK).all()
     kinds = quantities(machine.components).values()
     sizes = np.stack([np.linalg.norm(errors[:, kind], axis=1) for kind in kinds], axis=1)

@@ -12,8 +12,8 @@ from build_machine import machine_files
 from calibration_under_test import CalibrationUnderTest, kinds_for
 from made_measurements import nominal_values
 from sweeps import one_a_machine, thinned
-from truepose.calibration.identification.problem import Prior, Problem
-from truepose.sources import Tolerance
+from truepose.calibration.identification.problem import IdentificationProblem, Prior
+from truepose.sources import DimensionalTolerance
 
 MACHINES = {path.stem: tp.load(path) for path in machine_files()}
 CASES = [(name, kind) for name, machine in MACHINES.items() for kind in kinds_for(machine)]
@@ -31,9 +31,11 @@ def case(request: pytest.FixtureRequest) -> CalibrationUnderTest:
 def test_the_machine_as_filed_reads_what_plain_numpy_says(case: CalibrationUnderTest) -> None:
     """Two roads to every reading: the kernel's, and NumPy's from placements and joint centres."""
     # Cold and unloaded: without the sources that know better than the geometry.
-    tolerances = tuple(each for each in case.machine.sources if isinstance(each, Tolerance))
+    tolerances = tuple(
+        each for each in case.machine.sources if isinstance(each, DimensionalTolerance)
+    )
     plain = dataclasses.replace(case.machine, sources=tolerances)
-    problem = Problem(plain, case.problem.measurements, case.unknowns)
+    problem = IdentificationProblem(plain, case.problem.measurements, case.unknowns)
     expected = nominal_values(plain, case.problem.measurements)
     assert np.abs(problem.predict(np.zeros(case.unknowns.count)) - expected).max() < 1e-11
 

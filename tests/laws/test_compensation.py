@@ -13,7 +13,7 @@ from made_source import MadeSource, random_deviation, sizes, with_sources
 from random_machines import DrawnMachine
 from sweeps import thinned
 from truepose.machine import Machine
-from truepose.runs.displacement import together
+from truepose.runs.displacement import sum_deviations
 from truepose.sources import Deviation
 
 ROUNDING = 1e-13
@@ -104,7 +104,7 @@ def test_what_remains_is_within_the_bound(
     for t in [*adversarial, *drawn]:
         values = deviation.shift + deviation.signed_half * (t @ member.T)
         moved, status = machine.kernel.displacement(
-            joints, placements, *together([(deviation.parameters, values)])
+            joints, placements, *sum_deviations([(deviation.parameters, values)])
         )
         assert (status == OK).all()
         remains = np.abs(moved - found.residual_middle.values)

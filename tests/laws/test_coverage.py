@@ -18,8 +18,8 @@ from machine_texts import HEXAPOD, PLANAR, edited, load_text
 from reference_kinematics import rotation_of_quaternion, vector_of
 from truepose.machine import Machine
 from truepose.probability.copula import Copula
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import Spread, spread
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import Variables, variables_at
 
 Array = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def error_of(machine: Machine, commanded: Array, changed: dict[str, float]) -> A
     return found
 
 
-def drawn_by_numpy(moves: Spread, count: int) -> Array:
+def drawn_by_numpy(moves: Variables, count: int) -> Array:
     """(count, n_variable) variables, by other random numbers than the kernel's."""
     random = np.random.default_rng(SEED)
     uniform = random.uniform(size=(count, len(moves.names)))
@@ -96,8 +96,8 @@ def drawn_by_numpy(moves: Spread, count: int) -> Array:
 
 def true_errors(machine: Machine, poses: Array) -> Array:
     """(pose, true machine, component) of machines drawn at random, each driven to one pose."""
-    (block,) = Walk(machine, poses, machine.condition)
-    moves = spread(machine, block, required_sources(machine, machine.condition))
+    (block,) = PoseRun(machine, poses, machine.condition)
+    moves = variables_at(machine, block, required_sources(machine, machine.condition))
     each = TRUE_MACHINES // len(poses)
     drawn = drawn_by_numpy(moves, TRUE_MACHINES)
     errors = np.empty((len(poses), each, len(machine.components)))

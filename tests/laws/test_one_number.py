@@ -184,13 +184,13 @@ def after_is_no_more_than_before(machine: Machine) -> None:
     states = zip(known.population.states(BEFORE), known.population.states(AFTER), strict=True)
     changes, values, symmetric = [], [], True
     for one, other in states:
-        symmetric &= one.spread.domain.symmetric and other.spread.domain.symmetric
-        if not symmetric or one.spread.names != other.spread.names:
+        symmetric &= one.variables.domain.symmetric and other.variables.domain.symmetric
+        if not symmetric or one.variables.names != other.variables.names:
             return
-        value, effects, _ = first_order(machine, one.block, one.spread)
-        left, moved, _ = first_order(machine, other.block, other.spread)
+        value, effects, _ = first_order(machine, one.block, one.variables)
+        left, moved, _ = first_order(machine, other.block, other.variables)
         kinds = list(known.kinds.values())
-        change = largest(np.zeros_like(value), moved - effects, one.spread.domain, kinds)
+        change = largest(np.zeros_like(value), moved - effects, one.variables.domain, kinds)
         changes.append(change.length)
         values.append([[np.linalg.norm(e[c]) for c in kinds] for e in value])
         for kind, columns in known.kinds.items():

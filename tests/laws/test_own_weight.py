@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import truepose
 from machine_under_test import MachineUnderTest
 from truepose.machine import Body, Machine
-from truepose.sources import Block
+from truepose.sources import PoseBlock
 
 Floats = NDArray[np.float64]
 
@@ -55,10 +55,10 @@ def heavy(machine: MachineUnderTest) -> Machine:
     )
 
 
-def block_of(machine: MachineUnderTest, loaded: Machine) -> Block:
+def block_of(machine: MachineUnderTest, loaded: Machine) -> PoseBlock:
     joints, placements = machine.placed
     indices = np.arange(len(machine.poses))
-    return Block(loaded, loaded.condition, machine.poses, indices, joints, placements)
+    return PoseBlock(loaded, loaded.condition, machine.poses, indices, joints, placements)
 
 
 def close(found: Floats, expected: Floats, tolerance: float) -> bool:

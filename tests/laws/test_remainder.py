@@ -16,11 +16,11 @@ from sweeps import thinned
 from truepose.compensation.corrected import corrected
 from truepose.compensation.remainder import Bounds, Remainder
 from truepose.machine import Machine
-from truepose.runs.first_order import Mover, first_order
-from truepose.runs.poses import Walk
-from truepose.runs.variables import Spread, spread
-from truepose.sources import Block, Deviation, acting
-from truepose.uncertainty_analysis.corners import worst_vertices
+from truepose.runs.first_order import ExactError, first_order
+from truepose.runs.poses import PoseRun
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import Deviation, PoseBlock, acting
+from truepose.uncertainty_analysis.corners import worst_corners
 
 Floats = NDArray[np.float64]
 ROUNDING = 1e-13
@@ -37,20 +37,20 @@ class State:
 
     def __init__(self, machine: Machine, poses: Floats, *, after: bool) -> None:
         sources = acting(machine, machine.condition)
-        block = next(iter(Walk(machine, poses, machine.condition)))
+        block = next(iter(PoseRun(machine, poses, machine.condition)))
         self.machine = machine
-        self.block: Block = block
-        self.spread: Spread
+        self.block: PoseBlock = block
+        self.spread: Variables
         if after:
             self.block, self.spread, status = corrected(machine, block, sources)
             assert (status == OK).all()
         else:
-            self.spread = spread(machine, block, sources)
+            self.spread = variables_at(machine, block, sources)
         self.value, self.effects, _ = first_order(machine, self.block, self.spread)
         self.bounds: Bounds = Remainder(machine).bound(
             self.block, self.spread, self.value, self.effects
         )
-        self.mover = Mover(machine, self.block, self.spread)
+        self.mover = ExactError(machine, self.block, self.spread)
         turns = np.array([name.startswith("r") for name in machine.components])
         self.quantities = [np.flatnonzero(part) for part in (~turns, turns) if part.any()]
 
@@ -99,7 +99,7 @@ def it_holds(machine: Machine, poses: Floats, *, after: bool, seed: int) -> floa
     state = State(machine, poses, after=after)
     bounds, random = state.bounds, np.random.default_rng(seed)
     assert bounds.proven.all()
-    worst = worst_vertices(
+    worst = worst_corners(
         state.mover, state.value, state.effects, state.spread.domain, state.quantities
     )
     m = len(machine.components)

@@ -21,8 +21,8 @@ from random_machines import DrawnMachine
 from reversed_machine import reversed_file
 from truepose.machine import Machine
 from truepose.runs import displacement
-from truepose.runs.poses import Walk
-from truepose.sources import Block, Deviation
+from truepose.runs.poses import PoseRun
+from truepose.sources import Deviation, PoseBlock
 
 Floats = NDArray[np.float64]
 
@@ -47,12 +47,12 @@ class BothWays:
         self.one, self.other = loaded(file), loaded(reversed_file(file))
 
     @cached_property
-    def block(self) -> Block:
-        (block,) = Walk(self.one, self.poses, self.one.condition)
+    def block(self) -> PoseBlock:
+        (block,) = PoseRun(self.one, self.poses, self.one.condition)
         return block
 
     def deviations(self, machine: Machine) -> dict[str, Deviation]:
-        (block,) = Walk(machine, self.poses, machine.condition)
+        (block,) = PoseRun(machine, self.poses, machine.condition)
         return {
             source.name: source.deviation(machine, machine.condition, block)
             for source in machine.sources
@@ -64,7 +64,7 @@ class BothWays:
         values = share * deviation.at_edge(side)
         total = 0.0
         for sign in (1.0, -1.0):
-            moved = displacement.together([(deviation.parameters, sign * values)])
+            moved = displacement.sum_deviations([(deviation.parameters, sign * values)])
             error, status = displacement.displacement(
                 self.one, self.block.joints, self.block.placements, moved
             )

@@ -18,7 +18,7 @@ import truepose as tp
 from build_machine import MACHINES
 from machine_texts import PLANAR, edited, load_text
 from truepose.machine import Machine
-from truepose.runs.poses import Walk, required_sources
+from truepose.runs.poses import PoseRun, required_sources
 from truepose.uncertainty_analysis.functions.inputs import Input
 
 Array = NDArray[np.float64]
@@ -147,7 +147,7 @@ def by_chain_rule(machine: Machine, pose: Array) -> Array:
 
     By the slopes where every source is at its shift.
     """
-    (block,) = Walk(machine, pose[np.newaxis], machine.condition)
+    (block,) = PoseRun(machine, pose[np.newaxis], machine.condition)
     sources = required_sources(machine, machine.condition)
     deviations = [source.deviation(machine, machine.condition, block) for source in sources]
     shift = np.zeros((1, len(machine.parameters)))

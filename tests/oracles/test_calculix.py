@@ -26,7 +26,7 @@ from machine_under_test import OK, MachineUnderTest
 from reference_kinematics import rotation_of
 from sweeps import sweep
 from truepose.machine import Condition, Joint, Machine
-from truepose.runs.poses import Walk
+from truepose.runs.poses import PoseRun
 from truepose.sources import Source
 from truss_of_machine import COMPONENTS, Truss
 
@@ -163,7 +163,7 @@ def by_truepose(
 ) -> Vector:
     """(n_pose, n_component) sensitivity . deviation of the source `name`."""
     (source,) = (one for one in cast("tuple[Source, ...]", machine.sources) if one.name == name)
-    (block,) = Walk(machine, under_test.poses[POSES], condition)
+    (block,) = PoseRun(machine, under_test.poses[POSES], condition)
     assert len(block.indices) == len(POSES)
     deviation = source.deviation(machine, condition, block)
     assert not deviation.half.any()

@@ -17,7 +17,7 @@ from build_machine import machine_files
 from made_measurements import made_measurements, poses_within
 from sweeps import thinned
 from truepose.calibration.calibrate import Calibration, calibrate
-from truepose.calibration.identification.problem import Problem
+from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.machine import Machine
 from truepose.runs.displacement import displacement
@@ -46,7 +46,7 @@ def measured(
     data = made_measurements(machine, "pose", poses, uncertainty=4e-6, held_out=flags)
     unknowns = unknowns_of(machine, data)
     truth = truth_of(unknowns, random)
-    read = Problem(machine, data, unknowns).predict(truth)
+    read = IdentificationProblem(machine, data, unknowns).predict(truth)
     read += data.uncertainty * random.standard_normal(read.size)
     return calibrate(machine, data.with_values(read)), truth
 
@@ -85,7 +85,7 @@ def test_the_budget_of_the_calibrated_file_is_what_the_tool_is_off(
         shown.append(np.mean(checked.after[checked.used] ** 2) - 1.0)
         fit = calibration.fit
         rows = calibration.measurements.select(calibration.measurements.held_out)
-        problem = Problem(machine, rows, fit.unknowns)
+        problem = IdentificationProblem(machine, rows, fit.unknowns)
         slope = problem.jacobian(fit.values) / rows.uncertainty[:, np.newaxis]
         promised.append(np.mean(np.einsum("ij,jk,ik->i", slope, fit.covariance, slope)))
     ratio = np.sqrt(np.mean(actual) / np.mean(stated))

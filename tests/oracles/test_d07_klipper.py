@@ -22,7 +22,7 @@ from oracle_cases import case
 from truepose.compensation.commands import actual_of_joints
 from truepose.controllers._export import options_of
 from truepose.controllers.klipper import Klipper
-from truepose.controllers.klipper.linear import Linear
+from truepose.controllers.klipper.linear import KlipperLinear
 from truepose.controllers.klipper.rotary import Rotary
 
 CASE = case("d07_delta_stable_positions")
@@ -68,7 +68,7 @@ def test_linear(tmp_path: Path) -> None:
     assert np.abs(probed[:, :2] - data["expected_xy"]).max() < 2e-4
     assert np.abs(probed[:, 2]).max() < 1e-5
     # ... what the exported model counts: half a step and what the points are off ...
-    model = Linear(machine, options)
+    model = KlipperLinear(machine, options)
     values = model.taken(model.printed(np.array([p.start for p in model.parameters])))
     joints = model.joints(values, wanted())
     counted = (tops - joints / MM) / data["step_mm"]

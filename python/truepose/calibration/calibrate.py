@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, judge
+from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, assess
 from truepose.calibration.data_checks import Suspicion, suspicions
-from truepose.calibration.identification.consider_covariance import considered, with_considered
-from truepose.calibration.identification.fit import Fit, fit, placed
+from truepose.calibration.identification.consider_covariance import (
+    consider_covariance,
+    with_considered,
+)
+from truepose.calibration.identification.fit import Fit, fit, place_instruments
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
     candidates,
@@ -132,7 +135,7 @@ def calibrate(
     checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
     gate = _judged(machine, fitted, checked, effects, placements[usable, :3], margin)
-    rest = considered(machine, fitted, identify, joints[usable], placements[usable])
+    rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
     gate = with_considered(gate, rest, (machine.accuracy.target, machine.accuracy.angle_target))
     return Calibration(
         machine,
@@ -155,7 +158,7 @@ def _suspected(machine: Machine, whole: Measurements, unknowns: Unknowns) -> tup
     declared too.
     """
     try:
-        standing = placed(machine, whole, unknowns)[0].measurements
+        standing = place_instruments(machine, whole, unknowns)[0].measurements
     except RequestError:
         return suspicions(machine, whole)
     found = suspicions(machine, standing)
@@ -195,7 +198,7 @@ def _judged(
 ) -> Gate:
     unknowns = fitted.unknowns
     accuracy = machine.accuracy
-    return judge(
+    return assess(
         unknowns,
         values=fitted.values,
         jacobian=fitted.jacobian,

@@ -30,7 +30,7 @@ from truepose.runs.dataset import (
 from truepose.runs.quantities import POSITIONS, quantities
 
 if TYPE_CHECKING:
-    from truepose.calibration.acceptance.tool_uncertainty import AtTool
+    from truepose.calibration.acceptance.tool_uncertainty import ToolUncertainty
     from truepose.calibration.calibrate import Calibration
     from truepose.calibration.measurements import Measurements
 
@@ -304,7 +304,7 @@ def _of_tool(calibration: Calibration) -> dict[str, Floats]:
     return found
 
 
-def _sizes(tool: AtTool, machine: Machine) -> Floats:
+def _sizes(tool: ToolUncertainty, machine: Machine) -> Floats:
     """(n_pose, n_quantity) of position and orientation, those that the machine has."""
     by_name = {"position": tool.position, "orientation": tool.rotation}
     return np.stack([by_name[kind] for kind in quantities(machine.components)], axis=-1)

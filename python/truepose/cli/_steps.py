@@ -105,7 +105,7 @@ def over_time(request: Request, machine: Machine) -> xr.Dataset:
     return found
 
 
-def judge(machine: Machine, *states: str) -> tuple[Answer, ...]:
+def answers_of(machine: Machine, *states: str) -> tuple[Answer, ...]:
     """The verdict over the file's workspace in the states asked, by default both."""
     with progress("accuracy") as report:
         return truepose.accuracy(machine, states=states or STATES, progress=report)
@@ -114,7 +114,7 @@ def judge(machine: Machine, *states: str) -> tuple[Answer, ...]:
 def study_of(request: Request, machine: Machine) -> Study:
     """The machine with both results, and the verdict on both."""
     evaluated, corrected = evaluate(request, machine), correct(request, machine)
-    return Study(machine, evaluated, corrected, judge(machine))
+    return Study(machine, evaluated, corrected, answers_of(machine))
 
 
 def with_time(study: Study) -> Study:

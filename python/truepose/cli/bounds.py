@@ -64,7 +64,7 @@ def command(region: str | None, gap: float | None, truncate: float | None, **opt
     found = _uncertainty.bound(request, machine, region, gap, truncate)
     result, tables = Result("bounds", machine, found), uncertainty_tables.bounds(machine, found)
     if region is None and truncate is None:
-        answers = _steps.judge(machine, BEFORE)
+        answers = _steps.answers_of(machine, BEFORE)
         _steps.deliver(request, result, tables, answers)
         return _steps.exit_code(request, met(answers, BEFORE))
     # Another set of machines or of poses than the verdict is on: what is proven of that.

@@ -46,7 +46,7 @@ def command(**options: Any) -> int:
     request = Request(**options)
     machine = _steps.read_machine(request)
     study = Study(machine, _steps.evaluate(request, machine))
-    answers = _steps.judge(machine, BEFORE)
+    answers = _steps.answers_of(machine, BEFORE)
     written = _steps.write_witness(request, answers, BEFORE)
     _steps.deliver(
         request,

@@ -113,7 +113,7 @@ def command(**options: Any) -> int:
     beforehand. All that is found comes with its uncertainty, how much of it the measurements say,
     and what it is worth at the tool over the whole workspace.
     """
-    asked = _Asked(options)
+    asked = _Options(options)
     asked.check()
     from dataclasses import replace
 
@@ -164,7 +164,7 @@ def command(**options: Any) -> int:
     return 0 if found.accepted or options["force"] else 1
 
 
-class _Asked:
+class _Options:
     """The options of the command, sorted."""
 
     def __init__(self, options: dict[str, Any]) -> None:
@@ -202,7 +202,7 @@ def _folded(text: str) -> str:
     return textwrap.fill(text, 100)
 
 
-def _write_files(asked: _Asked, found: Calibration, result: Result) -> None:
+def _write_files(asked: _Options, found: Calibration, result: Result) -> None:
     """All files that are asked for, before anything is printed: a reader may stop reading."""
     from truepose.cli._steps import note_written
     from truepose.reporting import formats
@@ -216,7 +216,7 @@ def _write_files(asked: _Asked, found: Calibration, result: Result) -> None:
         _write_machine(asked, found)
 
 
-def _write_machine(asked: _Asked, found: Calibration) -> None:
+def _write_machine(asked: _Options, found: Calibration) -> None:
     """The calibrated file, unless the answer is no and nobody forces it."""
     from truepose.calibration.dataset import verdict_of
     from truepose.calibration.result.save import save

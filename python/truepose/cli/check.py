@@ -20,7 +20,7 @@ from truepose.cli._options import (
 if TYPE_CHECKING:
     from truepose.machine import Machine
     from truepose.reporting.tables import Table
-    from truepose.reporting.workspace_check import Reach
+    from truepose.reporting.workspace_check import WorkspaceCheck
     from truepose.verdict.answer import Answer
 
 
@@ -45,12 +45,12 @@ def command(**options: Any) -> int:
     from truepose.reporting import inputs
     from truepose.reporting.accuracy import gains, told
     from truepose.reporting.study import warnings_of
-    from truepose.reporting.workspace_check import reach
+    from truepose.reporting.workspace_check import check_workspace
     from truepose.verdict.answer import AFTER, BEFORE, met
 
     request = Request(**options)
     machine = _steps.read_machine(request, [".json", ".csv"])
-    found = reach(machine)
+    found = check_workspace(machine)
     out = ~found.usable
     _steps.refuse_left_out(request, machine, out.nonzero()[0], found.poses[out], found.status[out])
     answers: tuple[Answer, ...] = ()
@@ -58,7 +58,7 @@ def command(**options: Any) -> int:
     # Without a source the file may still be asked about its workspace, unless it asks for more.
     asked = machine.accuracy.target is not None or machine.accuracy.angle_target is not None
     if asked or any(inputs.acting(machine)):
-        answers = _steps.judge(machine)
+        answers = _steps.answers_of(machine)
         try:
             warnings = warnings_of(_steps.evaluate(request, machine))
         except RequestError as error:
@@ -85,7 +85,7 @@ def command(**options: Any) -> int:
     return int(not kept)
 
 
-def _tables(machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> list[Table]:
+def _tables(machine: Machine, found: WorkspaceCheck, answers: tuple[Answer, ...]) -> list[Table]:
     from truepose.reporting import calibrated_files, inputs, tables, workspace_check
     from truepose.sources import not_included_text
 
@@ -105,7 +105,7 @@ def _tables(machine: Machine, found: Reach, answers: tuple[Answer, ...]) -> list
 def _text(
     form: str,
     machine: Machine,
-    found: Reach,
+    found: WorkspaceCheck,
     answers: tuple[Answer, ...],
     warnings: list[dict[str, str]],
 ) -> str:

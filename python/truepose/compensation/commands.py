@@ -28,9 +28,9 @@ from truepose.arrays import Codes, Flags, Floats
 from truepose.compensation.corrected import corrected_joints
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.displacement import Moved, displacement, together
+from truepose.runs.displacement import ParameterDeviation, displacement, sum_deviations
 from truepose.runs.poses import BLOCK, OK, requested_poses
-from truepose.sources import Block, acting
+from truepose.sources import PoseBlock, acting
 
 MOST_PASSES = 12
 """Passes after which the pose that is reached is taken for one that does not settle.
@@ -48,7 +48,7 @@ _NOT_CONVERGED = STATUS.index("not_converged")
 _WITH_JOINTS = tuple(STATUS.index(name) for name in ("ok", "out_of_travel", "joint_limit"))
 """Statuses of poses whose joints are known, though some of them must not be commanded."""
 
-UNMOVED: Moved = (np.empty(0, np.intp), np.empty((1, 0)))
+NO_DEVIATION: ParameterDeviation = (np.empty(0, np.intp), np.empty((1, 0)))
 """The nominal machine."""
 
 
@@ -92,7 +92,7 @@ def actual_poses(
     status = np.empty(len(table), np.uint8)
     for rows in blocks(len(table)):
         joints, _, placed = machine.kernel.place(table[rows])
-        at = np.flatnonzero(with_joints(placed))
+        at = np.flatnonzero(has_joints(placed))
         reached, settled = actual.reached(joints[at], table[rows][at])
         found[rows][at] = reached
         placed[at] = _first(placed[at], settled)
@@ -127,7 +127,7 @@ def actual_of_joints(
     found = np.full(starts.shape, np.nan)
     status = placed.copy()
     for rows in blocks(len(given)):
-        at = np.flatnonzero(with_joints(placed[rows]))
+        at = np.flatnonzero(has_joints(placed[rows]))
         reached, settled = actual.reached(given[rows][at], starts[rows][at])
         found[rows][at] = reached
         status[rows][at] = settled
@@ -135,7 +135,7 @@ def actual_of_joints(
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class PoseDeviations:
     """Some poses, and how far every parameter is known to be off its nominal value there.
 
     `block`: those of the poses that have joints and a balance of forces, with their numbers in
@@ -144,8 +144,8 @@ class Known:
     that are commanded say, so that with another command `moved` is another.
     """
 
-    block: Block
-    moved: Moved
+    block: PoseBlock
+    moved: ParameterDeviation
     status: Codes
     followed: bool = False
 
@@ -196,17 +196,17 @@ class ActualMachine:
         length = machine.characteristic_length
         self.unit = np.array([length if name in "xyz" else 1.0 for name in machine.commanded])
 
-    def known(self, poses: Floats, moved: Moved | None = None) -> Known:
+    def known(self, poses: Floats, moved: ParameterDeviation | None = None) -> PoseDeviations:
         """What is known at `poses` (n, n_commanded).
 
         `moved`: the deviations there, where they are known already; for poses that have joints.
         """
         joints, placements, placed = self.machine.kernel.place(poses)
         indices = np.arange(len(poses), dtype=np.intp)
-        block = Block(self.machine, self.condition, poses, indices, joints, placements)
-        block = block.select(with_joints(placed))
+        block = PoseBlock(self.machine, self.condition, poses, indices, joints, placements)
+        block = block.select(has_joints(placed))
         if moved is not None and block.indices.size == len(poses):
-            return Known(block, moved, placed)
+            return PoseDeviations(block, moved, placed)
         try:
             moved = self._moved(block)
         except ValueError:
@@ -216,22 +216,22 @@ class ActualMachine:
             placed[block.indices[failed]] = balanced[failed]
             block = block.select(~failed)
             moved = self._moved(block)
-        return Known(block, moved, placed, block.is_followed)
+        return PoseDeviations(block, moved, placed, block.is_followed)
 
-    def _moved(self, block: Block) -> Moved:
+    def _moved(self, block: PoseBlock) -> ParameterDeviation:
         """What the sources move, each at its shift. Raises `ValueError` if that is not finite."""
         if not (block.indices.size and self.sources):
-            return UNMOVED
+            return NO_DEVIATION
         shifts = []
         for source in self.sources:
             deviation = source.deviation(self.machine, self.condition, block)
             # Columns that only have a band would be carried through every solution.
             shifted = deviation.shift.any(axis=0)
             shifts.append((deviation.parameters[shifted], deviation.shift[:, shifted]))
-        columns, values = together(shifts)
+        columns, values = sum_deviations(shifts)
         return columns, np.ascontiguousarray(values)
 
-    def command(self, known: Known) -> Command:
+    def command(self, known: PoseDeviations) -> Command:
         """The corrected command for the poses of `known`."""
         poses = _requested(known.block)
         if not len(poses):
@@ -239,11 +239,11 @@ class ActualMachine:
         joints, _, corrected = corrected_joints(
             known.block, known.moved, lambda moved: moved, self._moved if known.followed else None
         )
-        nominal, solved = displacement(self.machine, joints, known.block.placements, UNMOVED)
+        nominal, solved = displacement(self.machine, joints, known.block.placements, NO_DEVIATION)
         found = self.poses_from(known.block.placements, nominal, poses)
         return Command(joints, found, _first(corrected, solved))
 
-    def error(self, known: Known, joints: Floats) -> tuple[Floats, Codes]:
+    def error(self, known: PoseDeviations, joints: Floats) -> tuple[Floats, Codes]:
         """Where `joints` (m, n_joint) take the tool, less the poses of `known`.
 
         (m, n_component) and a status (m,). The shifts are those of the poses of `known`, not of
@@ -316,7 +316,7 @@ class ActualMachine:
         poses[:, angles] = found
 
 
-def _requested(block: Block) -> Floats:
+def _requested(block: PoseBlock) -> Floats:
     if block.indices.size == len(block.requested):
         return block.requested
     return block.requested[block.indices]
@@ -328,7 +328,7 @@ def blocks(count: int) -> Iterator[slice]:
         yield slice(start, min(start + BLOCK, count))
 
 
-def with_joints(status: Codes) -> Flags:
+def has_joints(status: Codes) -> Flags:
     """(n,) whether poses of this status have joints, be they such as must not be commanded."""
     flags: Flags = status == OK
     for code in _WITH_JOINTS[1:]:
@@ -385,7 +385,7 @@ def _bad(found: str, expected: str) -> RequestError:
 __all__ = [
     "ActualMachine",
     "Command",
-    "Known",
+    "PoseDeviations",
     "actual_of_joints",
     "actual_poses",
     "corrected_poses",

@@ -12,12 +12,12 @@ from truepose.compensation.corrected import corrected_deviations
 from truepose.compensation.remainder import Remainder
 from truepose.error_budget.largest import largest
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import Rows, Schema, Variable, assemble, quantity_coords, sizes
-from truepose.runs.displacement import at_shifts, displacement, together
+from truepose.runs.dataset import DatasetRows, Schema, Variable, assemble, quantity_coords, sizes
+from truepose.runs.displacement import at_shifts, displacement, sum_deviations
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
+    PoseRun,
     Progress,
-    Walk,
     is_path,
     no_pose_left,
     of_band,
@@ -26,8 +26,8 @@ from truepose.runs.poses import (
     required_sources,
 )
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import spread_of
-from truepose.sources import Block, Deviation, Source
+from truepose.runs.variables import variables_of
+from truepose.sources import Deviation, PoseBlock, Source
 
 _ALL = ("pose", "component")
 
@@ -88,13 +88,13 @@ def compensate(
     table = requested_poses(machine, poses)
     sources = required_sources(machine, given)
     kinds = quantities(machine.components)
-    rows = Rows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
+    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
     remainder = Remainder(machine)
-    walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
+    walk = PoseRun(machine, table, given, progress, path=poses is None and is_path(machine))
     for block in walk:
         deviations = [source.deviation(machine, given, block) for source in sources]
         alone = [(d.parameters, d.shift) for d in deviations]
-        shifted = at_shifts(machine, block, alone, together(alone))
+        shifted = at_shifts(machine, block, alone, sum_deviations(alone))
         values, followed, edges = _correct(machine, block, sources, deviations, remainder)
         usable = walk.keep(
             block.indices, shifted, *map(of_correction, followed), *map(of_band, edges)
@@ -108,7 +108,7 @@ def compensate(
 
 def _correct(
     machine: Machine,
-    block: Block,
+    block: PoseBlock,
     sources: Sequence[Source],
     nominal: list[Deviation],
     remainder: Remainder,
@@ -119,7 +119,7 @@ def _correct(
     the shifts, then those at edges of the bands.
     """
     after, deviations, corrected = corrected_deviations(block, sources, nominal)
-    spread = spread_of(machine, sources, deviations)
+    spread = variables_of(machine, sources, deviations)
     middle, effects, at_middle = first_order(machine, after, spread)
     kinds = list(quantities(machine.components).values())
     bounds = remainder.bound(after, spread, middle, effects)
@@ -135,7 +135,7 @@ def _correct(
     }
     edges = []
     for name, side in (("residual_lower", -1.0), ("residual_upper", +1.0)):
-        moved = together([(each.parameters, each.at_edge(side)) for each in deviations])
+        moved = sum_deviations([(each.parameters, each.at_edge(side)) for each in deviations])
         values[name], status = displacement(machine, after.joints, after.placements, moved)
         edges.append(status)
     return values, [corrected, at_middle], edges

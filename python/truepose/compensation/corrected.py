@@ -7,7 +7,8 @@ such as a periodic error of its screw, follows the joints that are really comman
 
 is a fixed point. It is found by iteration: by how much the shifts change with q (2 um on 5 mm: by
 1/400) is by how much each round comes nearer. Loads, lengths and temperatures stay those of the
-nominal command (`Block.sent_to`). Where no source follows the joints the first round is the last.
+nominal command (`PoseBlock.sent_to`). Where no source follows the joints the first round is the
+last.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.machine import Machine
-from truepose.runs.displacement import Moved, together
+from truepose.runs.displacement import ParameterDeviation, sum_deviations
 from truepose.runs.poses import NOT_CONVERGED, OK
-from truepose.runs.variables import Spread, spread_of
-from truepose.sources import Block, Deviation, Source
+from truepose.runs.variables import Variables, variables_of
+from truepose.sources import Deviation, PoseBlock, Source
 
 Known = TypeVar("Known")
 """What is known of the machine at the poses of a block, in whatever form."""
@@ -39,8 +40,8 @@ ROUNDING = 1e-13
 
 
 def corrected(
-    machine: Machine, block: Block, sources: Sequence[Source]
-) -> tuple[Block, Spread, np.ndarray]:
+    machine: Machine, block: PoseBlock, sources: Sequence[Source]
+) -> tuple[PoseBlock, Variables, np.ndarray]:
     """The block with the corrected joints, the spread of all sources there, and a status (n,).
 
     The spread is one about the shifts at that command. Statuses are the kernel's: not_converged
@@ -48,12 +49,12 @@ def corrected(
     """
     first = [source.deviation(machine, block.condition, block) for source in sources]
     after, deviations, status = corrected_deviations(block, sources, first)
-    return after, spread_of(machine, sources, deviations), status
+    return after, variables_of(machine, sources, deviations), status
 
 
 def corrected_deviations(
-    block: Block, sources: Sequence[Source], first: list[Deviation]
-) -> tuple[Block, list[Deviation], np.ndarray]:
+    block: PoseBlock, sources: Sequence[Source], first: list[Deviation]
+) -> tuple[PoseBlock, list[Deviation], np.ndarray]:
     """The block with the corrected joints, the sources' deviations there, and a status (n,).
 
     `first`: the deviations at the nominal command, as the sources found them in this block.
@@ -61,7 +62,7 @@ def corrected_deviations(
     joints, deviations, status = corrected_joints(
         block,
         first,
-        lambda known: together([(each.parameters, each.shift) for each in known]),
+        lambda known: sum_deviations([(each.parameters, each.shift) for each in known]),
         (
             lambda sent: [
                 source.deviation(block.machine, block.condition, sent) for source in sources
@@ -74,10 +75,10 @@ def corrected_deviations(
 
 
 def corrected_joints(
-    block: Block,
+    block: PoseBlock,
     first: Known,
-    shift_of: Callable[[Known], Moved],
-    look: Callable[[Block], Known] | None,
+    shift_of: Callable[[Known], ParameterDeviation],
+    look: Callable[[PoseBlock], Known] | None,
 ) -> tuple[Floats, Known, np.ndarray]:
     """Corrected joints (n, n_joint), what is known at them, and kernel status (n,).
 
@@ -109,7 +110,9 @@ def corrected_joints(
     return joints, known, np.where(moving, NOT_CONVERGED, status).astype(np.uint8)
 
 
-def _inverse(machine: Machine, poses: Floats, moved: Moved) -> tuple[Floats, Floats, np.ndarray]:
+def _inverse(
+    machine: Machine, poses: Floats, moved: ParameterDeviation
+) -> tuple[Floats, Floats, np.ndarray]:
     columns, values = moved
     return machine.kernel.corrected(poses, columns, np.ascontiguousarray(values))
 

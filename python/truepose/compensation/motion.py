@@ -17,8 +17,8 @@ from truepose.machine import Machine
 from truepose.probability.domain import Domain
 from truepose.runs.first_order import rows_of
 from truepose.runs.quantities import POSITIONS
-from truepose.runs.variables import Spread
-from truepose.sources import Block
+from truepose.runs.variables import Variables
+from truepose.sources import PoseBlock
 from truepose.sources.pose_block import rotations_of
 
 ROTATIONS = ("rx", "ry", "rz")
@@ -52,9 +52,9 @@ class Motion:
 
     `joints` (n, n_joint) as commanded. `position` (n, 3), m, and `rotation` (n, 3, 3): where the
     machine takes the platform; `turned` (n, 3): rotation vector from the pose asked for to there.
-    `parameters` (n or 1, n_parameter): values; `columns`, `variables`, `swing` and `domain` are the
-    spread's; `effects` (n, m, v + m) on displacement and rotation vector, of the variables, and of
-    these components themselves.
+    `parameters` (n or 1, n_parameter): values; `columns`, `variables`, `half_width` and
+    `domain` are the spread's; `effects` (n, m, v + m) on displacement and rotation vector, of
+    the variables, and of these components themselves.
     """
 
     components: tuple[str, ...]
@@ -65,7 +65,7 @@ class Motion:
     parameters: Floats
     columns: Indices
     variables: Indices
-    swing: Floats
+    half_width: Floats
     domain: Domain
     effects: Floats
 
@@ -73,8 +73,8 @@ class Motion:
     def at(
         cls,
         machine: Machine,
-        block: Block,
-        spread: Spread,
+        block: PoseBlock,
+        spread: Variables,
         first: tuple[Floats, Floats],
         poses: slice,
     ) -> Motion:
@@ -99,7 +99,7 @@ class Motion:
             parameters,
             spread.columns,
             spread.variables,
-            rows_of(spread.swing, poses),
+            rows_of(spread.half_width, poses),
             spread.domain,
             np.concatenate([effects, itself], axis=2),
         )
@@ -160,12 +160,12 @@ class Motion:
         found: dict[int, list[tuple[int, Floats]]] = {}
         columns, variables = self.columns.tolist(), self.variables.tolist()
         for at, (parameter, variable) in enumerate(zip(columns, variables, strict=True)):
-            found.setdefault(parameter, []).append((variable, self.swing[:, at]))
+            found.setdefault(parameter, []).append((variable, self.half_width[:, at]))
         return found
 
     def forms(self, parameters: Sequence[int] | Indices) -> Floats:
         """(n or 1, k, v + m) linear forms of some parameters."""
-        rows = np.zeros((len(self.swing), len(parameters), self.effects.shape[2]))
+        rows = np.zeros((len(self.half_width), len(parameters), self.effects.shape[2]))
         for row, parameter in enumerate(parameters):
             for variable, swing in self.of_parameter(int(parameter)):
                 rows[:, row, variable] += swing

@@ -51,8 +51,8 @@ from truepose.compensation.remainder_rings import Rings
 from truepose.compensation.remainder_struts import Struts
 from truepose.machine import Machine
 from truepose.runs.first_order import rows_of
-from truepose.runs.variables import Spread
-from truepose.sources import Block
+from truepose.runs.variables import Variables
+from truepose.sources import PoseBlock
 
 FEW = 512
 """Poses at once: what is worked on stays in the cache."""
@@ -105,7 +105,7 @@ class Remainder:
         self._parameters = np.concatenate([part.parameters for part in parts])
         self._known = not machine.kernel.overconstrained and all(part.known for part in parts)
 
-    def bound(self, block: Block, spread: Spread, value: Floats, effects: Floats) -> Bounds:
+    def bound(self, block: PoseBlock, spread: Variables, value: Floats, effects: Floats) -> Bounds:
         """At the poses of a block, with the value (n, m) and the effects (n, m, v) of its spread.
 
         Those that `truepose.runs.first_order` has of the same block and spread.
@@ -126,7 +126,7 @@ class Remainder:
         return Bounds(components, norms, np.asarray(proven, np.bool_))
 
     def _some(
-        self, block: Block, spread: Spread, first: tuple[Floats, Floats], poses: slice
+        self, block: PoseBlock, spread: Variables, first: tuple[Floats, Floats], poses: slice
     ) -> tuple[Floats, Floats]:
         """Components (n, m) and norms (n, q) at some poses; not finite where not proven."""
         motion = Motion.at(self._machine, block, spread, first, poses)

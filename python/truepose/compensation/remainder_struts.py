@@ -318,7 +318,7 @@ class Struts:
     def _own(self, motion: Motion) -> Floats:
         """(n or 1, s, 3, v) w, what the platform's own dimensions move each joint, its axes."""
         forms = motion.forms(self._platform.ravel())
-        forms = forms.reshape(len(motion.swing), len(self._struts), 3, -1)
+        forms = forms.reshape(len(motion.half_width), len(self._struts), 3, -1)
         return np.asarray(forms - motion.forms(self._tool)[:, np.newaxis])
 
 

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.compensation.commands import with_joints
-from truepose.controllers._export import cannot
+from truepose.compensation.commands import has_joints
+from truepose.controllers._export import unsupported_machine
 from truepose.controllers._homing import switch_option
 from truepose.controllers._small_model import INSTEAD, MM, value, vector
 from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.machine.parts import Drive
-from truepose.runs.poses import LeftOut, no_pose_left
+from truepose.runs.poses import SkippedPoses, no_pose_left
 
 LEAN = math.radians(5.0)
 """What a drive's axis may be off that of the controller's model: more is another machine."""
@@ -64,7 +64,7 @@ def limbs(machine: Machine, controller: str, kind: str) -> list[Limb]:
     wanted = f"a delta: three {kind} drives, x y z commanded, and two equal, parallel rods a drive"
 
     def refused(found: str) -> RequestError:
-        return cannot(controller, machine, found, wanted, INSTEAD)
+        return unsupported_machine(controller, machine, found, wanted, INSTEAD)
 
     if machine.commanded != ("x", "y", "z"):
         raise refused(f"commanded freedoms {' '.join(machine.commanded)}")
@@ -78,8 +78,8 @@ def limbs(machine: Machine, controller: str, kind: str) -> list[Limb]:
         raise refused(f"strut {unmoved[0]}, which no drive moves")
     home = machine.home[[machine.dof.index(name) for name in machine.commanded]]
     joints, placements, status = machine.kernel.place(home[np.newaxis, :])
-    if not with_joints(status)[0]:
-        left_out = LeftOut()
+    if not has_joints(status)[0]:
+        left_out = SkippedPoses()
         left_out.add(np.zeros(1, np.intp), status)
         raise no_pose_left(machine, home[np.newaxis, :], left_out, of_file=True)
     centres = machine.kernel.joint_centres(joints, placements)[0]

@@ -132,7 +132,9 @@ def _unknown(controller: type[Controller], key: str) -> Problem:
     )
 
 
-def cannot(controller: str, machine: Machine, found: str, expected: str, hint: str) -> RequestError:
+def unsupported_machine(
+    controller: str, machine: Machine, found: str, expected: str, hint: str
+) -> RequestError:
     """The refusal of a machine that the controller has no way to take."""
     return RequestError(
         Problem(
@@ -146,4 +148,4 @@ def cannot(controller: str, machine: Machine, found: str, expected: str, hint: s
     )
 
 
-__all__ = ["Controller", "Export", "Option", "cannot", "options_of"]
+__all__ = ["Controller", "Export", "Option", "options_of", "unsupported_machine"]

@@ -37,7 +37,7 @@ from truepose.errors import Problem, RequestError
 from truepose.files.wording import counted
 from truepose.machine import Machine
 from truepose.machine.condition import STANDARD_GRAVITY
-from truepose.runs.poses import OK, Walk, no_pose_left, pose_in_words
+from truepose.runs.poses import OK, PoseRun, no_pose_left, pose_in_words
 from truepose.version import version
 
 MOST_FITTED = 2000
@@ -111,7 +111,7 @@ class Error:
 
 
 @dataclass(frozen=True)
-class Fit:
+class ModelFit:
     """A fitted model: its numbers as `printed` and what they leave.
 
     `values` (n,): what the controller makes of `printed`. `before`: with the numbers of the
@@ -175,7 +175,7 @@ class Fit:
         return tuple(lines)
 
 
-def heading(machine: Machine, fit: Fit, controller: str) -> tuple[str, ...]:
+def heading(machine: Machine, fit: ModelFit, controller: str) -> tuple[str, ...]:
     """Lines that say what a block is of, in ASCII, for its comment."""
     units = dict(zip(machine.parameters, machine.units, strict=True))
     changes = [f"{key} = {value}" for key, value in machine.settings.items()]
@@ -190,7 +190,7 @@ def heading(machine: Machine, fit: Fit, controller: str) -> tuple[str, ...]:
     return tuple(ascii_only(line) for line in lines)
 
 
-def fit(machine: Machine, model: SmallModel, *, most_evaluations: int = 1000) -> Fit:
+def fit(machine: Machine, model: SmallModel, *, most_evaluations: int = 1000) -> ModelFit:
     """Find a model's numbers for the actual machine, and judge them.
 
     Raises `RequestError`: no-workspace, no-pose-left, and controller-cannot where the model does
@@ -201,17 +201,17 @@ def fit(machine: Machine, model: SmallModel, *, most_evaluations: int = 1000) ->
     chosen = poses[_spread(len(poses), MOST_FITTED)]
     start = np.array([parameter.start for parameter in model.parameters])
     as_designed = _NominalMachine(machine)
-    designed, _ = _judge(as_designed, model, start, poses)
+    designed, _ = _assess(as_designed, model, start, poses)
     if designed.position.highest > HELD * machine.characteristic_length:
         suited, _ = _solved(as_designed, model, chosen, FEW)
-        designed, _ = _judge(as_designed, model, suited, poses)
+        designed, _ = _assess(as_designed, model, suited, poses)
         _require_alike(machine, designed, poses)
     found, solution = _solved(actual, model, chosen, most_evaluations)
     printed = model.printed(found)
     values = model.taken(printed)
-    before, _ = _judge(actual, model, model.taken(model.printed(start)), poses)
-    after, joints = _judge(actual, model, values, poses)
-    return Fit(
+    before, _ = _assess(actual, model, model.taken(model.printed(start)), poses)
+    after, joints = _assess(actual, model, values, poses)
+    return ModelFit(
         printed,
         values,
         before,
@@ -381,7 +381,7 @@ class _FitProblem:
 def _usable(machine: Machine, actual: ActualMachine) -> tuple[Floats, int]:
     """(n, n_commanded) poses of the workspace that can be used, and how many cannot."""
     table = machine.poses()
-    walk = Walk(machine, table, actual.condition)
+    walk = PoseRun(machine, table, actual.condition)
     kept = [table[block.indices] for block in walk]
     if not kept:
         raise no_pose_left(machine, table, walk.left_out, of_file=True)
@@ -404,7 +404,7 @@ def _commanded_components(machine: Machine) -> list[int]:
     ]
 
 
-def _judge(
+def _assess(
     actual: ActualMachine, model: SmallModel, values: Floats, poses: Floats
 ) -> tuple[Error, Floats]:
     """The error with some numbers at all poses, the shifts taken where the tool comes to.
@@ -575,4 +575,4 @@ def _highest(extent: Extent | None) -> float:
     return 0.0 if extent is None else extent.highest
 
 
-__all__ = ["Error", "Extent", "Fit", "angle_between", "extent", "fit", "heading"]
+__all__ = ["Error", "Extent", "ModelFit", "angle_between", "extent", "fit", "heading"]

@@ -24,7 +24,7 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.controllers._delta import AROUND, LEAN, limbs, surrounded
-from truepose.controllers._export import cannot
+from truepose.controllers._export import unsupported_machine
 from truepose.controllers._homing import switches
 from truepose.controllers._small_model import INSTEAD, MM, Parameter, ascii_only, scales
 from truepose.machine import Machine
@@ -188,7 +188,7 @@ def _degrees(angles: Floats) -> str:
 
 def _refused(machine: Machine, controller: str, found: str, hint: str = INSTEAD) -> Exception:
     wanted = "a delta with upright guideways around the z axis and the carriages above the platform"
-    return cannot(controller, machine, found, wanted, hint)
+    return unsupported_machine(controller, machine, found, wanted, hint)
 
 
 __all__ = [

@@ -17,12 +17,20 @@ from truepose.error_budget.guide_loads import GuideLoads
 from truepose.error_budget.largest import largest, lengths
 from truepose.machine import Condition, Machine
 from truepose.runs import displacement, percent
-from truepose.runs.dataset import QUANTITY_UNITS, Rows, Schema, Variable, assemble, label, sizes
+from truepose.runs.dataset import (
+    QUANTITY_UNITS,
+    DatasetRows,
+    Schema,
+    Variable,
+    assemble,
+    label,
+    sizes,
+)
 from truepose.runs.first_order import effects_at, rows_of
 from truepose.runs.poses import (
     OK,
+    PoseRun,
     Progress,
-    Walk,
     is_path,
     no_pose_left,
     of_band,
@@ -30,8 +38,8 @@ from truepose.runs.poses import (
     required_sources,
 )
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import spread_of
-from truepose.sources import Block, Deviation, Source
+from truepose.runs.variables import variables_of
+from truepose.sources import Deviation, PoseBlock, Source
 
 _EACH = ("pose", "source", "component")
 _ALL = ("pose", "component")
@@ -147,7 +155,7 @@ def budget(
     sources = required_sources(machine, given)
     kinds = quantities(machine.components)
     lengths = sizes(machine, len(table), source=len(sources), quantity=len(kinds))
-    rows = Rows(machine, SCHEMA, lengths)
+    rows = DatasetRows(machine, SCHEMA, lengths)
     highest = {
         name: comparison.Highest(tuple(lengths[dim] for dim in SCHEMA[name].dims))
         for name in _HIGHEST
@@ -156,7 +164,7 @@ def budget(
     guides = GuideLoads(machine)
     distributions: list[dict[str, None]] = [{} for _ in sources]
 
-    walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
+    walk = PoseRun(machine, table, given, progress, path=poses is None and is_path(machine))
     for block in walk:
         deviations = [source.deviation(machine, given, block) for source in sources]
         for found, deviation in zip(distributions, deviations, strict=True):
@@ -203,7 +211,7 @@ def budget(
 
 def _evaluate(
     machine: Machine,
-    block: Block,
+    block: PoseBlock,
     sources: Sequence[Source],
     deviations: Sequence[Deviation],
     room: dict[str, np.ndarray],
@@ -274,7 +282,7 @@ class _Band:
 
 def _band(
     machine: Machine,
-    block: Block,
+    block: PoseBlock,
     deviation: Deviation,
     error: Floats,
     kinds: Sequence[Indices],
@@ -303,7 +311,7 @@ def _band(
 
 def _together(
     machine: Machine,
-    block: Block,
+    block: PoseBlock,
     sources: Sequence[Source],
     deviations: Sequence[Deviation],
     error: Floats,
@@ -313,7 +321,7 @@ def _together(
 
     From the `error` (n, n_component) with all of them at their shifts.
     """
-    moves = spread_of(machine, sources, deviations)
+    moves = variables_of(machine, sources, deviations)
     n_pose = block.indices.size
     status = np.full(n_pose, OK, np.uint8)
     if not moves.names:

@@ -6,7 +6,7 @@ import numpy as np
 
 from truepose.arrays import Flags, Floats
 from truepose.machine import Guide, Machine
-from truepose.sources import Block
+from truepose.sources import PoseBlock
 from truepose.sources._play import NO_LOAD, all_that_acts
 
 CODE = "guide-taken-rigid"
@@ -30,7 +30,7 @@ class GuideLoads:
         self._highest = np.zeros(len(machine.guides))
         self._acting = 0.0
 
-    def add(self, block: Block, usable: Flags) -> None:
+    def add(self, block: PoseBlock, usable: Flags) -> None:
         """The poses of a block where `usable` (n,)."""
         if not (self._guides and usable.any()):
             return
@@ -65,7 +65,7 @@ def _is_turned(guide: Guide) -> bool:
     return guide.kind == "universal"
 
 
-def _of_any_direction(block: Block) -> Floats | None:
+def _of_any_direction(block: PoseBlock) -> Floats | None:
     """(n, n_closure, n_direction) N of every closure under the force of unknown direction."""
     envelope = block.condition.envelope
     if envelope is None:

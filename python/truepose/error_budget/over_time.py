@@ -12,9 +12,9 @@ from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs import displacement
-from truepose.runs.dataset import Rows, Schema, Variable, assemble, label, sizes
-from truepose.runs.poses import BLOCK, OK, Progress, Walk, no_pose_left, requested_poses
-from truepose.sources import Block, Thermal
+from truepose.runs.dataset import DatasetRows, Schema, Variable, assemble, label, sizes
+from truepose.runs.poses import BLOCK, OK, PoseRun, Progress, no_pose_left, requested_poses
+from truepose.sources import PoseBlock, Thermal
 
 SCHEMA: Schema = {
     "error": Variable(
@@ -54,8 +54,8 @@ def over_time(
     thermal = Thermal(requested=True)
     parts = machine.parts
     lengths = sizes(machine, len(table), time=len(moments), part=len(parts))
-    rows = Rows(machine, _FILLED, lengths)
-    walk = Walk(machine, table, given, progress)
+    rows = DatasetRows(machine, _FILLED, lengths)
+    walk = PoseRun(machine, table, given, progress)
     for block in walk:
         error, status = _errors(thermal, block, moments)
         rows.append(block, {"error": error}, walk.keep(block.indices, status))
@@ -82,7 +82,7 @@ def over_time(
     return found
 
 
-def _errors(thermal: Thermal, block: Block, times: Floats) -> tuple[Floats, np.ndarray]:
+def _errors(thermal: Thermal, block: PoseBlock, times: Floats) -> tuple[Floats, np.ndarray]:
     """Errors (n_pose, n_time, n_component) and, of each pose, its worst status (n_pose,)."""
     machine, n_pose = block.machine, block.indices.size
     error = np.empty((n_pose, times.size, len(machine.components)))
@@ -100,7 +100,7 @@ def _errors(thermal: Thermal, block: Block, times: Floats) -> tuple[Floats, np.n
             times=np.repeat(moments, n_pose),
         )
         deviation = thermal.deviation(machine, block.condition, many)
-        moved = displacement.together([(deviation.parameters, deviation.shift)])
+        moved = displacement.sum_deviations([(deviation.parameters, deviation.shift)])
         found, failed = displacement.displacement(machine, many.joints, many.placements, moved)
         shape = (moments.size, n_pose)
         error[:, start : start + chunk] = found.reshape(*shape, -1).swapaxes(0, 1)

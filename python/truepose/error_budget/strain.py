@@ -26,17 +26,17 @@ from truepose.error_budget import worst
 from truepose.error_budget.comparison import Highest
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import Rows, Schema, Variable, assemble, label, sizes
-from truepose.runs.displacement import Moved, together
+from truepose.runs.dataset import DatasetRows, Schema, Variable, assemble, label, sizes
+from truepose.runs.displacement import ParameterDeviation, sum_deviations
 from truepose.runs.poses import (
+    PoseRun,
     Progress,
-    Walk,
     is_path,
     no_pose_left,
     requested_poses,
     required_sources,
 )
-from truepose.sources import Block, Clearance, Deviation, Elastic, Loads, Source
+from truepose.sources import Clearance, Deviation, Elastic, Loads, PoseBlock, Source
 from truepose.sources.clearance import half_clearances
 
 FITS = 1e-9
@@ -97,9 +97,9 @@ def strain(
     given = machine.condition if condition is None else condition
     table = requested_poses(machine, poses)
     sources, of_loads = _sources(machine, given)
-    rows = Rows(machine, SCHEMA, sizes(machine, len(table), source=len(sources)))
+    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), source=len(sources)))
     tally = _Tally(len(sources))
-    walk = Walk(machine, table, given, progress, path=poses is None and is_path(machine))
+    walk = PoseRun(machine, table, given, progress, path=poses is None and is_path(machine))
     for block in walk:
         for source in of_loads:
             source.deviation(machine, given, block)  # refuses what the machine cannot carry
@@ -179,7 +179,7 @@ class _Corners:
 
 
 def _evaluate(
-    block: Block, sources: Sequence[Source]
+    block: PoseBlock, sources: Sequence[Source]
 ) -> tuple[dict[str, np.ndarray], _Fit, list[np.ndarray]]:
     """Every variable over poses for one block, what decides on a fit, and all statuses (n,)."""
     machine, n_pose = block.machine, block.indices.size
@@ -193,7 +193,7 @@ def _evaluate(
     }
     deviations = [source.deviation(machine, block.condition, block) for source in sources]
     unloaded = np.zeros((1, 6))
-    drawn = _settle(block, together([]), np.zeros((1, n_closure)), unloaded)
+    drawn = _settle(block, sum_deviations([]), np.zeros((1, n_closure)), unloaded)
     fit = _Fit(np.empty((n_pose, len(sources))), np.empty((n_pose, len(sources))))
     stiffest = _stiffest(block)
     statuses: list[np.ndarray] = [drawn.status]
@@ -205,7 +205,7 @@ def _evaluate(
         values["force_rigid"][:, at] = corners.force_rigid
         for number, corner in enumerate(corners.values):
             closures = slice(None) if len(corners.values) == 1 else number
-            moved = together([(deviation.parameters, corner)])
+            moved = sum_deviations([(deviation.parameters, corner)])
             rest = _settle(block, moved, gaps, unloaded)
             statuses.append(rest.status)
             values["force"][:, at, closures] = rest.force[:, closures]
@@ -213,14 +213,14 @@ def _evaluate(
             values["strain"][:, at, closures] = rest.strain[:, closures]
     shifts = [(each.parameters, each.shift) for each in deviations]
     wrench = block.tool_wrench + block.own_wrench
-    rest = _settle(block, together([*shifts, *_own_weight(block)]), gaps, wrench)
+    rest = _settle(block, sum_deviations([*shifts, *_own_weight(block)]), gaps, wrench)
     values["overall_force"] = rest.force
     values["overall_absorbed"] = rest.absorbed
     values["overall_strain"] = rest.strain
     return values, fit, [*statuses, rest.status]
 
 
-def _corners(block: Block, deviation: Deviation, drawn: Floats) -> _Corners:
+def _corners(block: PoseBlock, deviation: Deviation, drawn: Floats) -> _Corners:
     """The corners of a source's deviation, from the forces of unit deviations.
 
     `drawn` (n, n_closure): N, the forces in the nominal machine.
@@ -250,7 +250,7 @@ def _corners(block: Block, deviation: Deviation, drawn: Floats) -> _Corners:
     )
 
 
-def _settle(block: Block, moved: Moved, gaps: Floats, wrench: Floats) -> _Rest:
+def _settle(block: PoseBlock, moved: ParameterDeviation, gaps: Floats, wrench: Floats) -> _Rest:
     """The machine with its parameters moved, at rest within `gaps` (n, n_closure), half, m."""
     columns, values = moved
     _, force, absorbed, strained, status = block.machine.kernel.settle_at(
@@ -259,11 +259,11 @@ def _settle(block: Block, moved: Moved, gaps: Floats, wrench: Floats) -> _Rest:
     return _Rest(force, absorbed, strained, status)
 
 
-def _own_weight(block: Block) -> list[Moved]:
+def _own_weight(block: PoseBlock) -> list[ParameterDeviation]:
     """What gives way under weight that does not act on the platform: at the bases, along struts."""
     uneven = block.uneven_stretch
     lengths = block.machine.kernel.length_parameters
-    moved: list[Moved] = [] if uneven is None else [(lengths, uneven)]
+    moved: list[ParameterDeviation] = [] if uneven is None else [(lengths, uneven)]
     if block.base_forces is None:
         return moved
     columns, compliance = block.compliances
@@ -281,7 +281,7 @@ def _misfit(machine: Machine, deviation: Deviation) -> Floats:
     return misfit
 
 
-def _stiffest(block: Block) -> Floats:
+def _stiffest(block: PoseBlock) -> Floats:
     """(n,) N/m: the largest force that one unit of misfit, along a strut, makes anywhere."""
     kernel = block.machine.kernel
     slopes, _ = kernel.internal_forces_at(block.joints, block.placements, kernel.length_parameters)

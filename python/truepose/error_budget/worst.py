@@ -14,15 +14,15 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.machine import Machine
-from truepose.runs.displacement import together
-from truepose.sources import Block, Deviation
+from truepose.runs.displacement import sum_deviations
+from truepose.sources import Deviation, PoseBlock
 
 EVERY = slice(None)
 """All poses of a block."""
 
 
 def variable_effects(
-    machine: Machine, block: Block, deviation: Deviation, poses: slice = EVERY
+    machine: Machine, block: PoseBlock, deviation: Deviation, poses: slice = EVERY
 ) -> tuple[Floats, Floats, np.ndarray]:
     """First-order error of each variable at +1, about the shift, at some poses of the block.
 
@@ -33,7 +33,7 @@ def variable_effects(
     banded = deviation.banded
     joints, placements = block.joints[poses], block.placements[poses]
     columns = deviation.parameters[banded]
-    parameters, shift = together([(deviation.parameters, deviation.shift)])
+    parameters, shift = sum_deviations([(deviation.parameters, deviation.shift)])
     if shift.any():
         moved = np.ascontiguousarray(shift if len(shift) == 1 else shift[poses])
         sensitivity, status = machine.kernel.sensitivity_moved(

@@ -108,7 +108,7 @@ class Document:
             value = _item(value, part)
         return value
 
-    def says(self, path: str) -> bool:
+    def has(self, path: str) -> bool:
         """Whether the file (or a setting) writes the key that `path` names."""
         return self.value(self.key(path)) is not None
 

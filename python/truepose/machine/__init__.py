@@ -12,7 +12,7 @@ from truepose.machine.condition import Condition, Envelope
 from truepose.machine.loader import load
 from truepose.machine.model import Machine
 from truepose.machine.parts import Body, Drive, Guide, Joint, Strut
-from truepose.machine.source_builder import ErrorSource, FileParts, SourceType
+from truepose.machine.source_builder import ErrorSource, SourceBuilder, SourceType
 from truepose.machine.workspace import Accuracy, GridAxis, Workspace
 
 __all__ = [
@@ -23,12 +23,12 @@ __all__ = [
     "Drive",
     "Envelope",
     "ErrorSource",
-    "FileParts",
     "FileUnit",
     "GridAxis",
     "Guide",
     "Joint",
     "Machine",
+    "SourceBuilder",
     "SourceType",
     "Strut",
     "Tolerance",

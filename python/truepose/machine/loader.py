@@ -15,7 +15,7 @@ from truepose.machine.condition import Condition
 from truepose.machine.model import Machine
 from truepose.machine.parts import BODIES, Drive, Strut
 from truepose.machine.shared_keys import share_each
-from truepose.machine.source_builder import ErrorSource, FileParts, SourceType
+from truepose.machine.source_builder import ErrorSource, SourceBuilder, SourceType
 from truepose.machine.tables import SCHEMA, owners
 from truepose.machine.tables.accuracy import AccuracyTable
 from truepose.machine.tables.calibration import CalibrationTable
@@ -105,7 +105,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
     kernel = build_kernel.kernel(described)
     _raise(build_kernel.problems(described, kernel))
     platform, frame, tool = build_parts.bodies(validated)
-    parts = FileParts(
+    parts = SourceBuilder(
         document,
         validated,
         kernel,

@@ -33,7 +33,7 @@ class ErrorSource(Protocol):
     tables: ClassVar[Mapping[str, type[BaseModel]]]
 
     @classmethod
-    def build(cls, parts: FileParts) -> ErrorSource | None:
+    def build(cls, parts: SourceBuilder) -> ErrorSource | None:
         """The source, or None where the file says nothing about it."""
         ...
 
@@ -41,7 +41,7 @@ class ErrorSource(Protocol):
 SourceType: TypeAlias = type[ErrorSource]
 
 
-class FileParts:
+class SourceBuilder:
     """The parts of one file, SI. Problems that a source finds are collected, not raised."""
 
     def __init__(
@@ -78,9 +78,9 @@ class FileParts:
         """What a single table says in the keys of `model`; None where there is no such table."""
         return self._validated.table(model)
 
-    def says(self, path: str) -> bool:
+    def has(self, path: str) -> bool:
         """Whether the file writes a key: `condition.force`, `strut.1.length_tolerance`."""
-        return self._document.says(path)
+        return self._document.has(path)
 
     def tolerance(self, value: object, dimension: str, path: str) -> Tolerance | None:
         """A raw value of the file as a tolerance; None, and a problem, where it is none."""

@@ -49,7 +49,7 @@ def tables(found: xr.Dataset, units: ShownUnits) -> list[Table]:
         undetermined(found),
         residuals(found, units),
         tool(found, units),
-        heed(found),
+        warning_lines(found),
         next_measurement(found, units),
     )
 
@@ -60,7 +60,7 @@ def of_page(found: xr.Dataset, units: ShownUnits) -> list[Table]:
         suspicions(found),
         undetermined(found),
         next_measurement(found, units),
-        heed(found),
+        warning_lines(found),
         tool(found, units),
         residuals(found, units),
         unknowns(found, units, bars=False),
@@ -73,7 +73,7 @@ def _there(*every: Table | None) -> list[Table]:
     return [table for table in every if table is not None]
 
 
-def said(found: xr.Dataset, name: str) -> Any:
+def json_attribute(found: xr.Dataset, name: str) -> Any:
     """An attribute that holds JSON; None where there is nothing."""
     text = str(found.attrs[name])
     return json.loads(text) if text else None
@@ -83,7 +83,7 @@ def suspicions(found: xr.Dataset) -> Table | None:
     """What the measurements look like before anything is fitted."""
     rows = [
         (each["code"], "yes" if each["refuses"] else "no", each["sentence"])
-        for each in said(found, "suspicions")
+        for each in json_attribute(found, "suspicions")
     ]
     if not rows:
         return None
@@ -99,7 +99,7 @@ def suspicions(found: xr.Dataset) -> Table | None:
 
 def outliers(found: xr.Dataset) -> Table | None:
     """Readings that do not fit, the worst first."""
-    every = said(found, "outliers")
+    every = json_attribute(found, "outliers")
     if not every:
         return None
     in_file = any(each["line"] for each in every)
@@ -257,7 +257,7 @@ def instruments(found: xr.Dataset, units: ShownUnits) -> Table | None:
 
 def undetermined(found: xr.Dataset) -> Table | None:
     """What could not be determined, in sentences."""
-    rows = [(f"{sentence(each)}.",) for each in said(found, "undetermined")]
+    rows = [(f"{sentence(each)}.",) for each in json_attribute(found, "undetermined")]
     if not rows:
         return None
     condition = float(found.attrs["condition_number"])
@@ -402,15 +402,15 @@ def _rms_or_open(sizes: Floats) -> float:
     return float("inf") if np.isinf(sizes).any() else rms(sizes)
 
 
-def heed(found: xr.Dataset) -> Table | None:
+def warning_lines(found: xr.Dataset) -> Table | None:
     """Warnings."""
-    rows = [(f"{sentence(each['sentence'])}.",) for each in said(found, "warnings")]
+    rows = [(f"{sentence(each['sentence'])}.",) for each in json_attribute(found, "warnings")]
     return Table("heed", "To heed", ("",), tuple(rows)) if rows else None
 
 
 def next_measurement(found: xr.Dataset, units: ShownUnits) -> Table | None:
     """The cheapest measurement that would turn the verdict."""
-    remedy = said(found, "remedy")
+    remedy = json_attribute(found, "remedy")
     if remedy is None:
         return None
     note = ""

@@ -199,12 +199,12 @@ def _listed(names: list[str]) -> str:
 
 
 def _deviations_at_middle(it: Machine) -> list[tuple[Source, Deviation]]:
-    from truepose.runs.poses import Walk
+    from truepose.runs.poses import PoseRun
 
     sources = acting(it)
     poses = it.poses() if sources else np.empty((0, len(it.commanded)))
     for index in nearest_middle(poses)[:TRIED]:
-        for block in Walk(it, poses[[index]], it.condition):
+        for block in PoseRun(it, poses[[index]], it.condition):
             return [(source, source.deviation(it, it.condition, block)) for source in sources]
     return []
 

@@ -13,7 +13,7 @@ from truepose.calibration.acceptance.sentences import sentence
 from truepose.files.writing import replacing
 from truepose.reporting import calibration, how_far, inputs, tables, uncertainty_tables
 from truepose.reporting.accuracy import gains, told
-from truepose.reporting.figures import Drawn, draw
+from truepose.reporting.figures import DrawnFigure, draw
 from truepose.reporting.study import Study
 
 LIMITS = (
@@ -73,7 +73,7 @@ def render(study: Study, machine_text: str = "") -> str:
     )
 
 
-def _of_calibration(drawn: Drawn) -> bool:
+def _of_calibration(drawn: DrawnFigure) -> bool:
     """Whether a figure stands with the calibration, before what the machine as filed does."""
     return drawn.needs == "calibration"
 

@@ -23,7 +23,7 @@ EXPLAINED = 2000
 
 
 @dataclass(frozen=True)
-class Reason:
+class SkipReason:
     """One cause for leaving poses out: which part, in how many poses, at most by how much.
 
     `amount` in m for a strut, m or rad for a travel, rad for a strut that leans at its base_joint
@@ -54,7 +54,7 @@ class Reason:
 
 
 @dataclass(frozen=True)
-class Reach:
+class WorkspaceCheck:
     """What became of the poses of a workspace.
 
     `status` (n_pose,): kernel status by name. `worst_conditioning` of the usable poses (smallest
@@ -64,7 +64,7 @@ class Reach:
 
     poses: Floats
     status: NDArray[np.str_]
-    reasons: tuple[Reason, ...]
+    reasons: tuple[SkipReason, ...]
     worst_conditioning: float
     worst_pose: Floats
 
@@ -74,7 +74,7 @@ class Reach:
         return np.asarray(self.status == "ok")
 
 
-def reach(machine: Machine) -> Reach:
+def check_workspace(machine: Machine) -> WorkspaceCheck:
     """Try every pose of the machine's workspace."""
     from truepose._kernel import STATUS
 
@@ -84,7 +84,7 @@ def reach(machine: Machine) -> Reach:
     codes = np.where(codes == OK, solved, codes)
     usable = codes == OK
     worst = where_highest(-np.where(usable, conditioning, np.inf)) if usable.any() else 0
-    return Reach(
+    return WorkspaceCheck(
         poses,
         np.array(STATUS)[codes],
         _reasons(machine, poses[~usable]),
@@ -93,7 +93,7 @@ def reach(machine: Machine) -> Reach:
     )
 
 
-def _reasons(machine: Machine, poses: Floats) -> tuple[Reason, ...]:
+def _reasons(machine: Machine, poses: Floats) -> tuple[SkipReason, ...]:
     """Causes by part and side, the one that stops most poses first."""
     found: dict[tuple[str, str, str, bool], list[float]] = {}
     for pose in poses[:: max(1, -(-len(poses) // EXPLAINED))]:
@@ -102,7 +102,7 @@ def _reasons(machine: Machine, poses: Floats) -> tuple[Reason, ...]:
             what, name, unit = (str(cause[key]) for key in ("what", "name", "unit"))
             found.setdefault((what, name, unit, amount < 0.0), []).append(amount)
     reasons = [
-        Reason(
+        SkipReason(
             what,
             name,
             len(amounts),
@@ -114,7 +114,7 @@ def _reasons(machine: Machine, poses: Floats) -> tuple[Reason, ...]:
     return tuple(sorted(reasons, key=lambda reason: -reason.count))
 
 
-def table(machine: Machine, found: Reach) -> Table:
+def table(machine: Machine, found: WorkspaceCheck) -> Table:
     """The workspace for people."""
     usable = int(found.usable.sum())
     rows = [("poses", f"{len(found.poses):,}"), ("usable", f"{usable:,}")]
@@ -137,7 +137,7 @@ def table(machine: Machine, found: Reach) -> Table:
     )
 
 
-def as_data(machine: Machine, found: Reach) -> dict[str, Any]:
+def as_data(machine: Machine, found: WorkspaceCheck) -> dict[str, Any]:
     """The workspace for programs, in the units of the machine's file."""
     names, counts = np.unique(found.status, return_counts=True)
     reasons = []

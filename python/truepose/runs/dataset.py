@@ -15,9 +15,9 @@ import xarray as xr
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.machine import Condition, Machine
-from truepose.runs.poses import LeftOut
+from truepose.runs.poses import SkippedPoses
 from truepose.runs.quantities import POSITIONS, quantities
-from truepose.sources import Block, not_included_text
+from truepose.sources import PoseBlock, not_included_text
 from truepose.version import version
 
 
@@ -43,7 +43,7 @@ _PRODUCTS = {(False, True): "m^2", (True, False): "rad^2", (True, True): "m^2, m
 """Units of a covariance, by whether the machine turns and whether it moves."""
 
 
-class Rows:
+class DatasetRows:
     """The variables over poses of one result, allocated once and filled in place.
 
     A million poses of a hexapod leave no room for a second copy of a result.
@@ -69,7 +69,7 @@ class Rows:
             name: array[self.count : self.count + n_pose] for name, array in self._arrays.items()
         }
 
-    def append(self, block: Block, values: Mapping[str, np.ndarray], usable: Flags) -> None:
+    def append(self, block: PoseBlock, values: Mapping[str, np.ndarray], usable: Flags) -> None:
         """Write the poses of `block` where `usable` (n,), with `values` (n, ...) of each name."""
         rows = slice(self.count, self.count + int(usable.sum()))
         every = bool(usable.all())
@@ -114,9 +114,9 @@ def assemble(
     machine: Machine,
     condition: Condition,
     schema: Schema,
-    rows: Rows,
+    rows: DatasetRows,
     poses: Floats,
-    left_out: LeftOut,
+    left_out: SkippedPoses,
     *,
     over_all: Mapping[str, Any] | None = None,
     coords: Mapping[str, xr.Variable] | None = None,
@@ -221,7 +221,7 @@ def _machine_coords(machine: Machine, schema: Schema) -> dict[str, xr.Variable]:
     }
 
 
-def _pose_coords(machine: Machine, rows: Rows, poses: Floats) -> dict[str, xr.Variable]:
+def _pose_coords(machine: Machine, rows: DatasetRows, poses: Floats) -> dict[str, xr.Variable]:
     indices = rows.indices
     coords = {"pose": label("pose", indices, "number of the pose in the poses asked for")}
     parasitic = iter(rows.parasitic.T)
@@ -235,7 +235,9 @@ def _pose_coords(machine: Machine, rows: Rows, poses: Floats) -> dict[str, xr.Va
     return coords
 
 
-def _left_out_coords(machine: Machine, poses: Floats, left_out: LeftOut) -> dict[str, xr.Variable]:
+def _left_out_coords(
+    machine: Machine, poses: Floats, left_out: SkippedPoses
+) -> dict[str, xr.Variable]:
     indices, status = left_out.sorted()
     coords = {
         "left_out_index": label("left_out", indices, "number of the pose in the poses asked for"),

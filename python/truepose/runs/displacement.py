@@ -15,9 +15,9 @@ import numpy as np
 from truepose.arrays import Floats, Indices
 from truepose.machine import Machine
 from truepose.runs.poses import OK, finite_or
-from truepose.sources import Block, Deviation
+from truepose.sources import Deviation, PoseBlock
 
-Moved = tuple[Indices, Floats]
+ParameterDeviation = tuple[Indices, Floats]
 """Parameters (k,), each once, and their deviations (n or 1, k), SI."""
 
 
@@ -31,7 +31,7 @@ class Edges:
     status: tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def together(parts: Iterable[Moved]) -> Moved:
+def sum_deviations(parts: Iterable[ParameterDeviation]) -> ParameterDeviation:
     """Deviations of several causes as one: each parameter once, with the sum of its deviations."""
     listed = list(parts)
     if not listed:
@@ -49,7 +49,9 @@ def together(parts: Iterable[Moved]) -> Moved:
     return np.asarray(columns, np.intp), total
 
 
-def further(moved: Moved, parts: Iterable[Moved]) -> Moved:
+def add_deviations(
+    moved: ParameterDeviation, parts: Iterable[ParameterDeviation]
+) -> ParameterDeviation:
     """What is `moved` already, moved on by `parts` of the same parameters."""
     columns, values = moved
     place = {int(column): at for at, column in enumerate(columns)}
@@ -63,7 +65,7 @@ def further(moved: Moved, parts: Iterable[Moved]) -> Moved:
 
 
 def displacement(
-    machine: Machine, joints: Floats, placements: Floats, moved: Moved
+    machine: Machine, joints: Floats, placements: Floats, moved: ParameterDeviation
 ) -> tuple[Floats, np.ndarray]:
     """Where `joints` (n, n_joint) take the tool of the moved machine, less `placements` (n, 7).
 
@@ -77,7 +79,13 @@ def displacement(
     return error, finite_or(status, error)
 
 
-def edges(machine: Machine, block: Block, centre: Moved, lower: Moved, upper: Moved) -> Edges:
+def edges(
+    machine: Machine,
+    block: PoseBlock,
+    centre: ParameterDeviation,
+    lower: ParameterDeviation,
+    upper: ParameterDeviation,
+) -> Edges:
     """Errors of the nominal command with the parameters moved to a centre and two edges.
 
     A machine that is not moved has no error, and where an edge is the centre, so is its error:
@@ -91,7 +99,12 @@ def edges(machine: Machine, block: Block, centre: Moved, lower: Moved, upper: Mo
     return Edges(error, low, high, (centred, at_low, at_high))
 
 
-def at_shifts(machine: Machine, block: Block, alone: Iterable[Moved], all_: Moved) -> np.ndarray:
+def at_shifts(
+    machine: Machine,
+    block: PoseBlock,
+    alone: Iterable[ParameterDeviation],
+    all_: ParameterDeviation,
+) -> np.ndarray:
     """(n,) kernel status of the nominal command with each source `alone`, and `all_`, at shifts.
 
     Ok where the pose belongs to a run, the same for every command (`budget.poses`); else the first
@@ -106,40 +119,44 @@ def at_shifts(machine: Machine, block: Block, alone: Iterable[Moved], all_: Move
     return found
 
 
-def source_edges(machine: Machine, block: Block, deviation: Deviation) -> Edges:
+def source_edges(machine: Machine, block: PoseBlock, deviation: Deviation) -> Edges:
     """Errors of one source alone: at its shift and at the edges of its lengths and offsets."""
     columns = deviation.parameters
     return edges(
         machine,
         block,
-        together([(columns, deviation.shift)]),
-        together([(columns, deviation.at_edge(-1.0))]),
-        together([(columns, deviation.at_edge(+1.0))]),
+        sum_deviations([(columns, deviation.shift)]),
+        sum_deviations([(columns, deviation.at_edge(-1.0))]),
+        sum_deviations([(columns, deviation.at_edge(+1.0))]),
     )
 
 
-def overall_edges(machine: Machine, block: Block, parts: Iterable[tuple[Deviation, bool]]) -> Edges:
+def overall_edges(
+    machine: Machine, block: PoseBlock, parts: Iterable[tuple[Deviation, bool]]
+) -> Edges:
     """Errors of all sources together (equations 3-6).
 
     `parts` are the sources' deviations, each with whether it goes to its edges at the overall
     minimum and maximum (the tolerance does); all others stay at their shift.
     """
     listed = list(parts)
-    centre = together([(d.parameters, d.shift) for d, _ in listed])
+    centre = sum_deviations([(d.parameters, d.shift) for d, _ in listed])
     bands = [d for d, moves in listed if moves]
 
-    def at(side: float) -> Moved:
-        return further(centre, [(d.parameters, d.at_edge(side) - d.shift) for d in bands])
+    def at(side: float) -> ParameterDeviation:
+        return add_deviations(centre, [(d.parameters, d.at_edge(side) - d.shift) for d in bands])
 
     return edges(machine, block, centre, at(-1.0), at(+1.0))
 
 
-def _error(machine: Machine, block: Block, moved: Moved) -> tuple[Floats, np.ndarray]:
+def _error(
+    machine: Machine, block: PoseBlock, moved: ParameterDeviation
+) -> tuple[Floats, np.ndarray]:
     if not moved[1].any():
         shape = (block.indices.size, len(machine.components))
         return np.zeros(shape), np.full(shape[0], OK, np.uint8)
     return displacement(machine, block.joints, block.placements, moved)
 
 
-def _same(one: Moved, other: Moved) -> bool:
+def _same(one: ParameterDeviation, other: ParameterDeviation) -> bool:
     return np.array_equal(one[1], other[1])

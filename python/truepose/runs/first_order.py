@@ -12,17 +12,17 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.machine import Machine
-from truepose.runs.displacement import Moved, displacement
+from truepose.runs.displacement import ParameterDeviation, displacement
 from truepose.runs.poses import OK
-from truepose.runs.variables import Spread
-from truepose.sources import Block
+from truepose.runs.variables import Variables
+from truepose.sources import PoseBlock
 
 EVERY = slice(None)
 """All poses of a block."""
 
 
 def first_order(
-    machine: Machine, block: Block, spread: Spread, poses: slice = EVERY
+    machine: Machine, block: PoseBlock, spread: Variables, poses: slice = EVERY
 ) -> tuple[Floats, Floats, np.ndarray]:
     """Value (n, m) and effects (n, m, n_variable), m and rad, and a kernel status (n,).
 
@@ -37,7 +37,11 @@ def first_order(
 
 
 def effects_at(
-    machine: Machine, block: Block, spread: Spread, moved: Moved, poses: slice = EVERY
+    machine: Machine,
+    block: PoseBlock,
+    spread: Variables,
+    moved: ParameterDeviation,
+    poses: slice = EVERY,
 ) -> tuple[Floats, np.ndarray]:
     """Effects (n, m, n_variable), m and rad, where the parameters are `moved`, and a status (n,).
 
@@ -46,7 +50,7 @@ def effects_at(
     slopes, status = machine.kernel.sensitivity_moved(
         block.joints[poses], block.placements[poses], spread.columns, *moved
     )
-    slopes *= rows_of(spread.swing, poses)[:, np.newaxis]
+    slopes *= rows_of(spread.half_width, poses)[:, np.newaxis]
     count = len(spread.names)
     if np.array_equal(spread.variables, np.arange(count)):
         return slopes, status
@@ -55,10 +59,10 @@ def effects_at(
     return slopes @ member, status
 
 
-class Mover:
+class ExactError:
     """Evaluates the exact error at any poses of a block, each with variables of its own."""
 
-    def __init__(self, machine: Machine, block: Block, spread: Spread) -> None:
+    def __init__(self, machine: Machine, block: PoseBlock, spread: Variables) -> None:
         self._machine, self._block, self._spread = machine, block, spread
         parameters, shift = spread.shift
         every = np.union1d(parameters, spread.columns)
@@ -70,7 +74,7 @@ class Mover:
     def __call__(self, poses: Indices, t: Floats) -> tuple[Floats, np.ndarray]:
         """Errors (s, m) and kernel status (s,) at poses (s,) of the block, variables (s, v)."""
         moved = t[:, self._spread.variables]
-        moved *= _at(self._spread.swing, poses)
+        moved *= _at(self._spread.half_width, poses)
         values = _at(self._shift, poses) + np.zeros((len(t), 1))
         if np.unique(self._place).size == self._place.size:
             values[:, self._place] += moved

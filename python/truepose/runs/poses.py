@@ -23,7 +23,7 @@ from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.sources import Block, Source, acting
+from truepose.sources import PoseBlock, Source, acting
 
 BLOCK = 8192
 """Poses in a block."""
@@ -104,7 +104,7 @@ def required_sources(machine: Machine, condition: Condition) -> tuple[Source, ..
 
 
 @dataclass
-class LeftOut:
+class SkippedPoses:
     """Poses that cannot be used: their numbers in the poses asked for, and why (`REASONS`)."""
 
     indices: list[Indices] = field(default_factory=list)
@@ -136,7 +136,7 @@ def _keep_freed_memory() -> None:
     np.empty(31 << 20, np.uint8)
 
 
-class Walk:
+class PoseRun:
     """Iterates over blocks of usable poses; keeps account of those left out.
 
     A pose is usable when the inverse finds it within travel and the closures are not singular
@@ -157,13 +157,13 @@ class Walk:
         machine.check_condition(condition)
         self.machine = machine
         self.poses = poses
-        self.left_out = LeftOut()
+        self.left_out = SkippedPoses()
         self._condition = condition
         self._progress = progress
         self._times = times
         self._travel = Travel(machine) if path else None
 
-    def __iter__(self) -> Iterator[Block]:
+    def __iter__(self) -> Iterator[PoseBlock]:
         total = len(self.poses)
         _keep_freed_memory()
         for start in range(0, total, BLOCK):
@@ -173,10 +173,10 @@ class Walk:
             if self._progress is not None:
                 self._progress(min(start + BLOCK, total), total)
 
-    def _block(self, start: int, poses: Floats) -> Block:
+    def _block(self, start: int, poses: Floats) -> PoseBlock:
         joints, placements, status = self.machine.kernel.place(poses)
         indices = np.arange(start, start + len(poses), dtype=np.intp)
-        block = Block(
+        block = PoseBlock(
             self.machine,
             self._condition,
             self.poses,
@@ -289,7 +289,7 @@ def _carried_on(rows: Floats, counts: Callable[[Floats], np.ndarray]) -> Floats:
 
 
 def no_pose_left(
-    machine: Machine, poses: Floats, left_out: LeftOut, *, of_file: bool
+    machine: Machine, poses: Floats, left_out: SkippedPoses, *, of_file: bool
 ) -> RequestError:
     """The error where no pose can be used: what fails, by how much, where it fails least.
 

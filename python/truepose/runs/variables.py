@@ -1,6 +1,7 @@
 """Spread: what all sources leave unknown at the poses of a block, as one set of variables.
 
-    deviation of the parameters = shift + sum over columns of swing t[variable],   t in the domain
+    deviation of the parameters = shift + sum over columns of half_width t[variable],   t in the
+    domain
 
 Each source brings its variables; which there are, their names and their numbers for drawing them
 are worked out here once, for everything that combines them.
@@ -19,8 +20,8 @@ import numpy as np
 from truepose.arrays import Flags, Floats, Indices
 from truepose.machine import Machine
 from truepose.probability.domain import Domain
-from truepose.runs.displacement import Moved, together
-from truepose.sources import REGISTRY, Block, Deviation, Source
+from truepose.runs.displacement import ParameterDeviation, sum_deviations
+from truepose.sources import REGISTRY, Deviation, PoseBlock, Source
 from truepose.sources.deviation import Distribution
 
 ROUNDING = 1e-14
@@ -28,26 +29,25 @@ ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class Variables:
     """The variables of all sources at the n poses of a block, and what they move.
 
     `shift`: parameters, each once, and their values (n or 1, k0) where all variables are 0;
     `alone`: the same of each source.
     `columns` (k,): kernel parameter of each column that has a band; one may repeat.
-    `variables` (k,): which variable moves the column; `swing` (n or 1, k): its deviation, m, rad
-    or 1, where that variable is +1.
-    `distributions`, `names` (unique) and `sources` of the n_variable variables, and the `domain`
-    that they lie in.
-    `streams`, `numbers` (n_variable,): identity for random numbers, whatever else acts: the place
-    of the source in the registry, and the variable's number in that source's deviation.
-    `correlation` (n_variable, n_variable): Pearson's; None where all are independent.
+    `variables` (k,): which variable moves the column; `half_width` (n or 1, k): its deviation,
+    m, rad or 1, where that variable is +1. `distributions`, `names` (unique) and `sources` of
+    the n_variable variables, and the `domain` that they lie in. `streams`, `numbers`
+    (n_variable,): identity for random numbers, whatever else acts: the place of the source in
+    the registry, and the variable's number in that source's deviation. `correlation`
+    (n_variable, n_variable): Pearson's; None where all are independent.
     """
 
-    shift: Moved
-    alone: tuple[Moved, ...]
+    shift: ParameterDeviation
+    alone: tuple[ParameterDeviation, ...]
     columns: Indices
     variables: Indices
-    swing: Floats
+    half_width: Floats
     distributions: tuple[Distribution, ...]
     names: tuple[str, ...]
     sources: tuple[str, ...]
@@ -61,7 +61,7 @@ class Spread:
         """Numbers of the variables that are together a unit vector."""
         return self.domain.directions
 
-    def centred(self) -> Spread:
+    def centred(self) -> Variables:
         """The same deviations with every single variable in [-1, 1], a band about its middle.
 
         For what needs a box about the shift; the distributions are no longer those of the
@@ -74,25 +74,25 @@ class Spread:
         ones = np.ones(len(self.names))
         return dataclasses.replace(
             self,
-            shift=together([self.shift, (self.columns, self.swing * middle)]),
-            swing=self.swing * half,
+            shift=sum_deviations([self.shift, (self.columns, self.half_width * middle)]),
+            half_width=self.half_width * half,
             domain=Domain(-ones, ones, self.directions),
         )
 
-    def at(self, pose: int) -> Spread:
+    def at(self, pose: int) -> Variables:
         """The same at one pose of the block."""
         return self.select(slice(pose, pose + 1))
 
-    def select(self, poses: Flags | slice) -> Spread:
-        """The same at some poses of the block, as `Block.select` has them."""
+    def select(self, poses: Flags | slice) -> Variables:
+        """The same at some poses of the block, as `PoseBlock.select` has them."""
         return dataclasses.replace(
             self,
             shift=_rows(self.shift, poses),
             alone=tuple(_rows(each, poses) for each in self.alone),
-            swing=self.swing if len(self.swing) == 1 else self.swing[poses],
+            half_width=self.half_width if len(self.half_width) == 1 else self.half_width[poses],
         )
 
-    def parameters_moved(self, t: Floats) -> Moved:
+    def parameters_moved(self, t: Floats) -> ParameterDeviation:
         """Parameters, each once, and their deviations (s, k) where the variables are t (s, v).
 
         Of a spread at one pose.
@@ -104,26 +104,26 @@ class Spread:
     def _matrix(self) -> tuple[Indices, Floats, Floats]:
         """Parameters (k,), shift (1, k), and what each variable moves (n_variable, k), one pose."""
         parameters, shift = self.shift
-        if len(shift) != 1 or len(self.swing) != 1:
+        if len(shift) != 1 or len(self.half_width) != 1:
             raise ValueError("a spread over several poses; take one of them with at()")
         every = np.union1d(parameters, self.columns).astype(np.intp)
         moves = np.zeros((len(self.names), every.size))
-        np.add.at(moves, (self.variables, np.searchsorted(every, self.columns)), self.swing[0])
+        np.add.at(moves, (self.variables, np.searchsorted(every, self.columns)), self.half_width[0])
         centre = np.zeros((1, every.size))
         centre[:, np.searchsorted(every, parameters)] = shift
         moved = centre[0].astype(np.bool_) | moves.any(axis=0)
         return every[moved], centre[:, moved], moves[:, moved]
 
 
-def spread(machine: Machine, block: Block, sources: Sequence[Source]) -> Spread:
+def variables_at(machine: Machine, block: PoseBlock, sources: Sequence[Source]) -> Variables:
     """All sources at the poses of `block`: the variables that have a band at one of them."""
     deviations = [source.deviation(machine, block.condition, block) for source in sources]
-    return spread_of(machine, sources, deviations)
+    return variables_of(machine, sources, deviations)
 
 
-def spread_of(
+def variables_of(
     machine: Machine, sources: Sequence[Source], deviations: Sequence[Deviation]
-) -> Spread:
+) -> Variables:
     """The same from what each source says there."""
     parts = [
         _part(machine, source, position, deviation)
@@ -133,18 +133,18 @@ def spread_of(
     first = np.cumsum([0, *counts])
     names = [name for part in parts for name in part.names]
     owners = [part.source for part in parts for _ in part.names]
-    swings = [part.swing for part in parts]
+    swings = [part.half_width for part in parts]
     rows = max((len(swing) for swing in swings), default=1)
     empty = np.empty(0, np.intp)
     alone = tuple((part.deviation.parameters, part.deviation.shift) for part in parts)
-    return Spread(
-        shift=together(alone),
+    return Variables(
+        shift=sum_deviations(alone),
         alone=alone,
         columns=np.concatenate([empty, *(part.columns for part in parts)]),
         variables=np.concatenate(
             [empty, *(part.variables + at for part, at in zip(parts, first[:-1], strict=True))]
         ),
-        swing=np.concatenate(
+        half_width=np.concatenate(
             [
                 np.empty((rows, 0)),
                 *(np.broadcast_to(each, (rows, each.shape[1])) for each in swings),
@@ -168,7 +168,7 @@ def spread_of(
     )
 
 
-def _rows(moved: Moved, poses: Flags | slice) -> Moved:
+def _rows(moved: ParameterDeviation, poses: Flags | slice) -> ParameterDeviation:
     """Deviations at some poses of a block."""
     parameters, shift = moved
     return parameters, shift if len(shift) == 1 else shift[poses]
@@ -183,7 +183,7 @@ class _Part:
     deviation: Deviation
     columns: Indices
     variables: Indices
-    swing: Floats
+    half_width: Floats
     numbers: Indices
     names: tuple[str, ...]
     distributions: tuple[Distribution, ...]
@@ -212,7 +212,7 @@ def _part(machine: Machine, source: Source, position: int, deviation: Deviation)
         deviation=deviation,
         columns=columns,
         variables=variables,
-        swing=deviation.signed_half[:, banded],
+        half_width=deviation.signed_half[:, banded],
         numbers=numbers,
         names=tuple(names),
         distributions=tuple(deviation.distribution[column] for column in first),

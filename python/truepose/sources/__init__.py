@@ -27,17 +27,17 @@ from truepose.sources.deviation import (
 from truepose.sources.elastic import Elastic
 from truepose.sources.guideway import Guideway
 from truepose.sources.loads import Loads
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 from truepose.sources.screw_coupling import ScrewCoupling
 from truepose.sources.sensor import Sensor
 from truepose.sources.thermal import Thermal
-from truepose.sources.tolerance import Tolerance
+from truepose.sources.tolerance import DimensionalTolerance
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Machine
 
 REGISTRY: tuple[type[Source], ...] = (
-    Tolerance,
+    DimensionalTolerance,
     Thermal,
     Elastic,
     Loads,
@@ -65,13 +65,13 @@ __all__ = [
     "TRIANGULAR",
     "TWO_POINT",
     "UNIFORM",
-    "Block",
     "Clearance",
     "Deviation",
     "Distribution",
     "Elastic",
     "Listed",
     "Loads",
+    "PoseBlock",
     "Source",
     "Thermal",
     "acting",

@@ -29,7 +29,7 @@ class Columns:
         self,
         parameter: int,
         shift: ArrayLike = 0.0,
-        swing: ArrayLike = 0.0,
+        half_width: ArrayLike = 0.0,
         *,
         group: int = OWN_GROUP,
         edge: bool = True,
@@ -37,11 +37,11 @@ class Columns:
     ) -> None:
         """A column of the kernel's `parameter`, one number or (n,) of each kind.
 
-        `swing` is the deviation about `shift` where the column's variable is at +1: the half band,
-        with the sign that the column has in its group.
+        `half_width` is the deviation about `shift` where the column's variable is at +1:
+        the half band, with the sign that the column has in its group.
         """
         self._parameters.append(parameter)
-        self._tables.append((shift, swing))
+        self._tables.append((shift, half_width))
         self._groups.append(group)
         self._edge.append(edge)
         self._distributions.append(distribution)

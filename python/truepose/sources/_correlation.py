@@ -21,7 +21,7 @@ from truepose.probability.semidefinite import clash
 from truepose.sources.deviation import Deviation
 
 if TYPE_CHECKING:
-    from truepose.machine import FileParts
+    from truepose.machine import SourceBuilder
 
 
 class CorrelationTable(FileTable):
@@ -43,7 +43,7 @@ class CorrelationTable(FileTable):
     )
 
 
-def read_correlation(parts: FileParts, bands: Deviation) -> Floats | None:
+def read_correlation(parts: SourceBuilder, bands: Deviation) -> Floats | None:
     """(n_variable, n_variable) of the variables of `bands`; None where all are independent.
 
     Or where a problem is recorded: names that match nothing, fewer than two variables, a pair that
@@ -89,7 +89,7 @@ def read_correlation(parts: FileParts, bands: Deviation) -> Floats | None:
 
 
 def _coefficients(
-    parts: FileParts, names: _Names, row: CorrelationTable, path: str
+    parts: SourceBuilder, names: _Names, row: CorrelationTable, path: str
 ) -> dict[tuple[int, int], float]:
     """The coefficient of each pair of variables (the lower number first) that a row states.
 
@@ -125,7 +125,7 @@ def _coefficients(
 
 
 def _require_coefficients(
-    parts: FileParts, coefficients: Sequence[float], path: str, where: str = ""
+    parts: SourceBuilder, coefficients: Sequence[float], path: str, where: str = ""
 ) -> None:
     """Record a problem for the first of them that is no number from -1 to 1."""
     for each in coefficients:
@@ -141,7 +141,7 @@ def _require_coefficients(
 
 
 def _require_shape(
-    parts: FileParts, between: Sequence[str], matrix: Sequence[Sequence[float]], path: str
+    parts: SourceBuilder, between: Sequence[str], matrix: Sequence[Sequence[float]], path: str
 ) -> None:
     """Record a problem where a matrix has not one row for each name after the first."""
     found, wanted = [len(line) for line in matrix], list(range(1, len(between)))
@@ -169,7 +169,7 @@ class _Names:
     `of_variable` (n_variable): what each variable is called: its group, or its parameter.
     """
 
-    def __init__(self, parts: FileParts, bands: Deviation) -> None:
+    def __init__(self, parts: SourceBuilder, bands: Deviation) -> None:
         self._parts = parts
         self._parameters = parts.kernel.parameters
         self._groups: dict[str, int] = {}

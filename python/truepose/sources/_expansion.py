@@ -19,7 +19,7 @@ from truepose.machine.parts import Body, Drive, Guide, Strut, is_body
 
 if TYPE_CHECKING:
     from truepose._kernel import Machine as KernelMachine
-    from truepose.machine import Condition, FileParts, Machine
+    from truepose.machine import Condition, Machine, SourceBuilder
 
 ASKED_BY = ("condition.temperature", "condition.gradient", "condition.temperature_log")
 """Keys of a file that ask for thermal expansion."""
@@ -127,11 +127,11 @@ def silent(
             yield _no_expansion(body.part, what, kind)
 
 
-def located(parts: FileParts, problem: Problem) -> Problem:
+def located(parts: SourceBuilder, problem: Problem) -> Problem:
     """A part that the file does not describe is wrong where the condition names it."""
     part = str(problem.path)
     named = (f"condition.temperature.{part}", f"condition.gradient.{part}", ASKED_BY[2])
-    found = next((path for path in (part, *named) if parts.says(path)), part)
+    found = next((path for path in (part, *named) if parts.has(path)), part)
     return replace(problem, path=found)
 
 

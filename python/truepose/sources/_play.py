@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 NO_LOAD = 1e-9
 """Load, in all that acts on the machine, at or below which a part carries nothing but rounding."""
 
 
 def pressed(
-    block: Block, columns: Indices, loads: Floats, threshold: ArrayLike, lever: ArrayLike = 1.0
+    block: PoseBlock, columns: Indices, loads: Floats, threshold: ArrayLike, lever: ArrayLike = 1.0
 ) -> tuple[Floats, Flags]:
     """To which side the known `loads` (n, k) on parameters `columns` (k,) press each, -1 or +1.
 
@@ -28,7 +28,7 @@ def pressed(
     return side, np.abs(loads) + unknown <= least
 
 
-def all_that_acts(block: Block) -> Floats:
+def all_that_acts(block: PoseBlock) -> Floats:
     """(n or 1, 1) N: the size of all that acts, moments by the machine's size."""
     wrench = np.abs(block.tool_wrench) + np.abs(block.own_wrench)
     size = block.machine.characteristic_length
@@ -40,7 +40,7 @@ def all_that_acts(block: Block) -> Floats:
     return np.asarray(acting[:, np.newaxis])
 
 
-def _of_any_direction(block: Block, columns: Indices) -> Floats | float:
+def _of_any_direction(block: PoseBlock, columns: Indices) -> Floats | float:
     """(n, k) the most that a force of unknown direction can load parameters: Cauchy-Schwarz."""
     envelope = block.condition.envelope
     if envelope is None:

@@ -21,7 +21,7 @@ from truepose.files.data_file import Column, DataTable
 from truepose.sources._coverage import uncovered
 
 if TYPE_CHECKING:
-    from truepose.machine import Drive, FileParts
+    from truepose.machine import Drive, SourceBuilder
 
 COVERAGE = 2.0
 """Expanded in standard deviations: the coverage factor of ISO 230-2:2014."""
@@ -55,7 +55,7 @@ class PositioningTable:
 
 
 def read_positioning(
-    parts: FileParts, drive: Drive, file: str, path: str
+    parts: SourceBuilder, drive: Drive, file: str, path: str
 ) -> PositioningTable | None:
     """The table in `file`, which the machine file names at `path`; None, and problems, if bad."""
     target, direction, deviation = _COLUMNS

@@ -35,10 +35,10 @@ from truepose.sources._columns import Columns
 from truepose.sources._positioning import COVERAGE, PositioningTable, read_positioning
 from truepose.sources._scale_error import add_scale_error
 from truepose.sources.deviation import ARCSINE, TWO_POINT, Deviation, normal
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
-    from truepose.machine import Condition, Drive, FileParts, Machine
+    from truepose.machine import Condition, Drive, Machine, SourceBuilder
 
 _OF_THE_SCREW = ("lead_error", "periodic")
 """Keys of what a direct scale does not let through."""
@@ -132,7 +132,7 @@ class Actuator:
     actuations: tuple[Actuation, ...]
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """From `actuator` of the drives; None where no drive has it."""
         rows = zip(parts.drives, parts.rows(DriveActuator), strict=True)
         actuations = tuple(
@@ -146,7 +146,7 @@ class Actuator:
         """In every condition."""
         return True
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """Of offsets, m or rad, and scales, (n or 1, k)."""
         columns = Columns()
         for each in self.actuations:
@@ -161,7 +161,7 @@ class Actuator:
         return columns.deviation()
 
 
-def _actuation(parts: FileParts, joint: int, drive: Drive, row: ActuatorTable) -> Actuation:
+def _actuation(parts: SourceBuilder, joint: int, drive: Drive, row: ActuatorTable) -> Actuation:
     path = f"{drive.part}.actuator"
     for key in _OF_THE_SCREW:
         if drive.feedback == "direct" and getattr(row, key) is not None:
@@ -176,7 +176,7 @@ def _actuation(parts: FileParts, joint: int, drive: Drive, row: ActuatorTable) -
     found = None
     if row.table is not None:
         for key in _IN_A_TABLE:
-            if parts.says(f"{drive.part}.{key}"):
+            if parts.has(f"{drive.part}.{key}"):
                 parts.refuse(
                     "excluding-keys",
                     f"the measured positions have the drive's {key} in them",
@@ -197,7 +197,7 @@ def _actuation(parts: FileParts, joint: int, drive: Drive, row: ActuatorTable) -
 
 def _add_periodic(columns: Columns, offset: int, periodic: PeriodicTable, joint: Floats) -> None:
     if periodic.phase is None:
-        columns.add(offset, swing=periodic.amplitude, distribution=ARCSINE)
+        columns.add(offset, half_width=periodic.amplitude, distribution=ARCSINE)
     else:
         turns = math.tau * joint / periodic.period
         columns.add(offset, periodic.amplitude * np.sin(turns + periodic.phase))
@@ -225,4 +225,4 @@ def _add_table(
         distribution=normal(COVERAGE),
     )
     reversal = np.where(way == 0.0, 0.5 * (means[1] - means[0]), 0.0)
-    columns.add(offset, swing=reversal, distribution=TWO_POINT)
+    columns.add(offset, half_width=reversal, distribution=TWO_POINT)

@@ -21,10 +21,10 @@ from truepose.files.file_table import FileTable
 from truepose.files.quantity import NonNegativeCoordinate, NonNegativeDriveLoad
 from truepose.sources._play import pressed
 from truepose.sources.deviation import Deviation
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
-    from truepose.machine import Condition, Drive, FileParts, Machine
+    from truepose.machine import Condition, Drive, Machine, SourceBuilder
 
 
 class BacklashTable(FileTable):
@@ -61,7 +61,7 @@ class Backlash:
     thresholds: tuple[float, ...]
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """From `backlash` of the drives; None where no drive has it."""
         found = []
         for index, (drive, row) in enumerate(
@@ -81,7 +81,7 @@ class Backlash:
         """In every condition."""
         return True
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """Where the carriages stand in their play, m or rad, (n, k)."""
         drives = [machine.drives[joint] for joint in self.joints]
         columns = np.array(
@@ -100,7 +100,7 @@ class Backlash:
         return Deviation.of(columns, side * reach, np.where(side == 0.0, reach, 0.0))
 
 
-def _refuse_direct(parts: FileParts, drive: Drive) -> None:
+def _refuse_direct(parts: SourceBuilder, drive: Drive) -> None:
     parts.refuse(
         "unwanted-backlash",
         "a drive that is measured directly on its carriage has no backlash to see",

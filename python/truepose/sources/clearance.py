@@ -24,12 +24,12 @@ from truepose.files.quantity import quantity
 from truepose.sources._directions import of_base_side
 from truepose.sources._play import pressed
 from truepose.sources.deviation import Deviation
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from truepose.machine import Condition, FileParts, Machine
+    from truepose.machine import Condition, Machine, SourceBuilder
     from truepose.machine.parts import Joint
 
 _ENDS = ("base_joint", "platform_joint")
@@ -64,7 +64,7 @@ class Clearance:
     threshold: float
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """From the joints of the struts; None where none has play."""
         table = parts.table(ClearanceTable)
         found = []
@@ -89,7 +89,7 @@ class Clearance:
         """In every condition."""
         return True
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """What each joint adds to the distance of its strut's joint centres, m, (n, k)."""
         struts = [joint.strut for joint in self.joints]
         reach = np.ones((block.indices.size, len(struts)))
@@ -101,7 +101,7 @@ class Clearance:
         return Deviation.of(columns, side * reach, np.where(side == 0.0, reach, 0.0))
 
 
-def half_clearances(block: Block) -> Floats:
+def half_clearances(block: PoseBlock) -> Floats:
     """(n, n_strut) m: how far the play of both its joints lets each strut give way, either side."""
     struts = block.machine.struts
     half = np.zeros((block.indices.size, len(struts)))
@@ -111,7 +111,7 @@ def half_clearances(block: Block) -> Floats:
     return half
 
 
-def _reach(machine: Machine, block: Block, at: JointOfStrut) -> Floats | float:
+def _reach(machine: Machine, block: PoseBlock, at: JointOfStrut) -> Floats | float:
     """(n,) m: how far the joint gives way along its strut."""
     strut = machine.struts[at.strut]
     joint: Joint = strut.joints[at.end]

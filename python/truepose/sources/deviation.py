@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from truepose.errors import Problem
-    from truepose.machine import Condition, FileParts, Machine
-    from truepose.sources.pose_block import Block
+    from truepose.machine import Condition, Machine, SourceBuilder
+    from truepose.sources.pose_block import PoseBlock
 
 
 OWN_GROUP = -1
@@ -257,7 +257,7 @@ class Source(Protocol):
     sets_overall_edges: ClassVar[bool]
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """The source, or None when the file says nothing about it.
 
         Wrong or missing data are recorded with `parts.refuse`: the load fails once every source
@@ -269,7 +269,7 @@ class Source(Protocol):
         """Whether a budget in this condition has a row for the source."""
         ...
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """What the source does to the parameters at the poses of `block`.
 
         Raises `TrueposeError` where the condition asks for what the machine does not say.
@@ -277,7 +277,7 @@ class Source(Protocol):
         ...
 
 
-def refuse(parts: FileParts, problem: Problem) -> None:
+def refuse(parts: SourceBuilder, problem: Problem) -> None:
     """Record a problem that a source also raises when a condition given later brings it up."""
     parts.refuse(
         problem.code,

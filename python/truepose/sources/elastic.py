@@ -19,12 +19,12 @@ import numpy as np
 from truepose.errors import TrueposeError
 from truepose.sources._stiffness import lacking
 from truepose.sources.deviation import Deviation, refuse
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from truepose.machine import Condition, FileParts, Machine
+    from truepose.machine import Condition, Machine, SourceBuilder
 
 _ASKED_BY = ("condition.force", "condition.moment", "condition.cutting", "condition.kienzle")
 _CAUSE = "a force acts on the tool"
@@ -44,20 +44,20 @@ class Elastic:
     """The file gives a wrench and a stiffness, were the wrench zero."""
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """Always there, for a condition given later may have a force that the file has not."""
         problems = lacking(parts.drives, parts.struts, _CAUSE)
         if np.any(parts.condition.wrench != 0.0):
             for problem in problems:
                 refuse(parts, problem)
         known = len(problems) < len(parts.struts)
-        return cls(requested=known and any(map(parts.says, _ASKED_BY)))
+        return cls(requested=known and any(map(parts.has, _ASKED_BY)))
 
     def acts(self, condition: Condition) -> bool:
         """Where the file asks for it, and in any condition with a force or moment."""
         return self.requested or bool(np.any(condition.wrench != 0.0))
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """Deflection of every parameter that gives way, m or rad, (n, k).
 
         Raises `TrueposeError` (no-stiffness) for limbs whose stiffness the machine does not say;

@@ -29,10 +29,10 @@ from truepose.machine.parts import Vector
 from truepose.sources._columns import Columns
 from truepose.sources._coverage import uncovered
 from truepose.sources.deviation import Deviation
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
-    from truepose.machine import Condition, Drive, FileParts, Machine
+    from truepose.machine import Condition, Drive, Machine, SourceBuilder
 
 ALONG = 1e-2
 """Cosine of the angle between a direction and the guideway above which it is not across it."""
@@ -231,7 +231,7 @@ class Guideway:
     rails: tuple[Rail, ...]
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """From `guideway` of the drives; None where no drive has it."""
         rails = []
         for joint, (drive, row) in enumerate(
@@ -256,7 +256,7 @@ class Guideway:
         """In every condition."""
         return True
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """Of origins, m, and axes, rad, (n or 1, k)."""
         columns = Columns()
         for rail in self.rails:
@@ -301,13 +301,13 @@ class _Moved:
         """The axis, in both its freedoms by itself, or the carriage by its way along the axis."""
         if lean.direction is None:
             for freedom in ("axis.u", "axis.v"):
-                self._columns.add(self._at[freedom], swing=lean.band.half, edge=False)
+                self._columns.add(self._at[freedom], half_width=lean.band.half, edge=False)
             return
         way = self._scale * joint + self._offset
         self.along(lean.direction, lean.band.shift * way, lean.band.half * way)
 
 
-def _rail(parts: FileParts, joint: int, drive: Drive, row: GuidewayTable) -> Rail:
+def _rail(parts: SourceBuilder, joint: int, drive: Drive, row: GuidewayTable) -> Rail:
     path = f"{drive.part}.guideway"
     start, stop = drive.travel
     shapes = []
@@ -328,7 +328,7 @@ def _rail(parts: FileParts, joint: int, drive: Drive, row: GuidewayTable) -> Rai
 
 
 def _across(
-    parts: FileParts, drive: Drive, direction: Vector, path: str, number: int | None = None
+    parts: SourceBuilder, drive: Drive, direction: Vector, path: str, number: int | None = None
 ) -> Vector:
     """The part of a unit direction across the guideway, as a unit vector; a problem, if along."""
     given, axis = np.array(direction), np.array(drive.fields["axis"], np.float64)
@@ -349,7 +349,9 @@ def _across(
     return (x, y, z)
 
 
-def _profiles(parts: FileParts, drive: Drive, row: GuidewayTable, path: str) -> tuple[Profile, ...]:
+def _profiles(
+    parts: SourceBuilder, drive: Drive, row: GuidewayTable, path: str
+) -> tuple[Profile, ...]:
     if row.table is None or row.directions is None:
         return ()
     directions = {

@@ -29,12 +29,12 @@ import numpy as np
 from truepose.errors import Problem, TrueposeError
 from truepose.sources._stiffness import lacking
 from truepose.sources.deviation import ARCSINE, OWN_GROUP, UNIFORM, Deviation, refuse
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from truepose.machine import Condition, Envelope, FileParts, Machine
+    from truepose.machine import Condition, Envelope, Machine, SourceBuilder
 
 UNKNOWN_DIRECTION = "force of unknown direction"
 """What varies with the direction of the envelope's force."""
@@ -55,14 +55,14 @@ class Loads:
     """Something has a mass."""
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """Always there, for a condition given later may have what the file has not."""
         masses = [parts.platform.mass]
         masses += [drive.mass for drive in parts.drives]
         masses += [strut.mass for strut in parts.struts]
         source = cls(weighs=any(mass > 0.0 for mass in masses))
         condition = parts.condition
-        if not source.weighs and condition.gravity > 0.0 and parts.says("condition.gravity"):
+        if not source.weighs and condition.gravity > 0.0 and parts.has("condition.gravity"):
             refuse(parts, _no_mass("gravity", "a mass of [platform], a [[strut]] or a [[drive]]"))
         if np.any(condition.acceleration) and parts.platform.mass == 0.0:
             refuse(parts, _no_mass("acceleration", "a mass of [platform]"))
@@ -80,7 +80,7 @@ class Loads:
         weight = self.weighs and condition.gravity > 0.0
         return weight or accelerated or condition.envelope is not None
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """Deflection of every parameter that gives way, m or rad, and its band, (n, k).
 
         Raises `TrueposeError`: no-stiffness for limbs whose stiffness the machine does not say;
@@ -101,7 +101,7 @@ class Loads:
         return _with_envelope(block, condition.envelope, shift)
 
 
-def _with_envelope(block: Block, envelope: Envelope, shift: np.ndarray) -> Deviation:
+def _with_envelope(block: PoseBlock, envelope: Envelope, shift: np.ndarray) -> Deviation:
     """The shift, and for each axis a group of columns moved by the direction's component."""
     columns, compliance = block.compliances
     shifts, halves, signs = [shift], [np.zeros_like(shift)], [np.ones_like(shift)]

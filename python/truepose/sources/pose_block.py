@@ -21,7 +21,7 @@ Cause = Literal["tool", "own", "all"]
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class PoseBlock:
     """Some usable poses of a run, at nominal parameters: where a source looks.
 
     `requested` (n_requested, n_commanded): all poses of the run, m or rad, usable or not, and
@@ -45,7 +45,7 @@ class Block:
     times: Floats | None = None
     corrected: Floats | None = None
 
-    def select(self, usable: Flags) -> Block:
+    def select(self, usable: Flags) -> PoseBlock:
         """The poses where `usable` (n,); the block itself where all are."""
         if usable.all():
             return self
@@ -72,7 +72,7 @@ class Block:
         """Whether a source has asked for `drive_joints`: it deviates as the command says."""
         return "drive_joints" in vars(self)
 
-    def sent_to(self, corrected: Floats) -> Block:
+    def sent_to(self, corrected: Floats) -> PoseBlock:
         """The same poses with the drives at `corrected` (n, n_joint); nothing else is different."""
         block = dataclasses.replace(self, corrected=corrected)
         known = {name: value for name, value in vars(self).items() if name not in _OF_COMMAND}

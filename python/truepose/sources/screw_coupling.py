@@ -25,11 +25,11 @@ from truepose.files.file_table import FileTable
 from truepose.files.quantity import Direction, Length
 from truepose.machine.parts import Vector
 from truepose.sources.deviation import Deviation, refuse
-from truepose.sources.pose_block import Block, rotations_of
+from truepose.sources.pose_block import PoseBlock, rotations_of
 
 if TYPE_CHECKING:
     from truepose._kernel import Machine as KernelMachine
-    from truepose.machine import Condition, FileParts, Machine
+    from truepose.machine import Condition, Machine, SourceBuilder
 
 PARALLEL = 1e-6
 """Sine of the angle between a universal joint's axis and the strut below which the screw's turn is
@@ -97,7 +97,7 @@ class ScrewCoupling:
     screws: tuple[Screw, ...]
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """From `screw` of the struts; None where no strut has one."""
         screws = []
         for index, row in enumerate(parts.rows(StrutScrew)):
@@ -136,7 +136,7 @@ class ScrewCoupling:
         """In every condition."""
         return True
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """Change of the struts' lengths, m, (n, k).
 
         Raises `TrueposeError` (screw-axis-parallel) at a pose where a strut lies along the axis of
@@ -172,7 +172,7 @@ class ScrewCoupling:
         return np.arctan2(ahead, (base * platform).sum(axis=-1)), sines
 
     def _parallel(
-        self, machine: Machine, block: Block, pose: int, number: int, end: int
+        self, machine: Machine, block: PoseBlock, pose: int, number: int, end: int
     ) -> Problem:
         strut = machine.struts[self.screws[number].strut]
         requested = block.requested[block.indices[pose]]

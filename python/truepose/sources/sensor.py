@@ -23,10 +23,10 @@ from truepose.files.tolerance import Band
 from truepose.sources._columns import Columns
 from truepose.sources._scale_error import add_scale_error
 from truepose.sources.deviation import Deviation
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
-    from truepose.machine import Condition, FileParts, Machine
+    from truepose.machine import Condition, Machine, SourceBuilder
 
 
 class SensorTable(FileTable):
@@ -86,7 +86,7 @@ class Sensor:
     readings: tuple[Reading, ...]
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """From `sensor` of the drives; None where no drive has it."""
         readings = tuple(
             Reading(
@@ -104,7 +104,7 @@ class Sensor:
         """In every condition."""
         return True
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """Of offsets, m or rad, and scales, (1, k)."""
         columns = Columns()
         for reading in self.readings:
@@ -112,7 +112,7 @@ class Sensor:
             if reading.resolution > 0.0:
                 # Of the joint coordinate, as the command is: the drive makes `scale` of it.
                 scale = machine.nominal[machine.parameters.index(f"{reading.drive}.scale")]
-                columns.add(offset, swing=0.5 * scale * reading.resolution)
+                columns.add(offset, half_width=0.5 * scale * reading.resolution)
             if reading.scale_error is not None:
                 add_scale_error(
                     columns, machine, reading.drive, reading.scale_error, reading.zero_at

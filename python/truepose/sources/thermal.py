@@ -25,12 +25,12 @@ from truepose.machine.parts import Body, Drive, Strut
 from truepose.sources._expansion import ASKED_BY, located, silent, twice
 from truepose.sources._growth import Growth, along_line
 from truepose.sources.deviation import Deviation, refuse
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from truepose.machine import Condition, FileParts, Machine
+    from truepose.machine import Condition, Machine, SourceBuilder
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Thermal:
     """The file gives temperatures and an expansion, were all at the reference temperature."""
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """Always there, for a condition given later may have temperatures that the file has not."""
         bodies = (parts.platform, parts.frame, parts.tool, *parts.carriages)
         for problem in silent(parts.condition, parts.drives, parts.struts, bodies):
@@ -56,7 +56,7 @@ class Thermal:
             refuse(parts, problem)
         every: tuple[Drive | Strut | Body, ...] = (*parts.drives, *parts.struts, *bodies)
         known = any(part.expansion is not None for part in every)
-        return cls(requested=known and any(map(parts.says, ASKED_BY)))
+        return cls(requested=known and any(map(parts.has, ASKED_BY)))
 
     def acts(self, condition: Condition) -> bool:
         """Where the file asks for it, and in any condition that leaves the reference."""
@@ -68,7 +68,7 @@ class Thermal:
             or condition.temperature_log is not None
         )
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """The lengths of all struts, and what else moves, m, (n or 1, k); scales are ratios.
 
         Raises `TrueposeError` (no-expansion) for struts off the reference temperature, and other
@@ -94,7 +94,7 @@ class _Moved:
 
     machine: Machine
     condition: Condition
-    block: Block
+    block: PoseBlock
     columns: dict[int, Floats] = field(default_factory=dict)
     """Parameter -> shift (n or 1, 1)."""
 

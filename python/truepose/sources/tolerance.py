@@ -36,11 +36,11 @@ from truepose.probability.distributions import (
 )
 from truepose.sources._correlation import CorrelationTable, read_correlation
 from truepose.sources.deviation import OWN_GROUP, Deviation
-from truepose.sources.pose_block import Block
+from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
     from truepose.files import tolerance as file_tolerance
-    from truepose.machine import Condition, FileParts, Machine
+    from truepose.machine import Condition, Machine, SourceBuilder
 
 _EDGE_ENDINGS = (".length", ".offset")
 _WILDCARDS = frozenset("*?[")
@@ -77,7 +77,7 @@ class _Stated:
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class DimensionalTolerance:
     """Bands of any parameters, the same at every pose; members of a group vary together."""
 
     name: ClassVar[str] = "tolerance"
@@ -92,7 +92,7 @@ class Tolerance:
     bands: Deviation
 
     @classmethod
-    def build(cls, parts: FileParts) -> Self | None:
+    def build(cls, parts: SourceBuilder) -> Self | None:
         """From `length_tolerance` and `[tolerance]`; None where neither says anything."""
         stated = _of_struts(parts)
         stated |= _of_table(parts, stated)
@@ -121,12 +121,12 @@ class Tolerance:
         """In every condition."""
         return True
 
-    def deviation(self, machine: Machine, condition: Condition, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """The bands, m or rad or 1, (1, k)."""
         return self.bands
 
 
-def _mixed_groups(parts: FileParts, entries: Iterable[_Stated]) -> bool:
+def _mixed_groups(parts: SourceBuilder, entries: Iterable[_Stated]) -> bool:
     """Whether a group has two distributions though one variable; a problem, if so."""
     first: dict[str, _Stated] = {}
     refused = set()
@@ -147,7 +147,7 @@ def _mixed_groups(parts: FileParts, entries: Iterable[_Stated]) -> bool:
     return bool(refused)
 
 
-def _of_struts(parts: FileParts) -> dict[int, _Stated]:
+def _of_struts(parts: SourceBuilder) -> dict[int, _Stated]:
     """What the struts say of their lengths, by parameter."""
     stated: dict[int, _Stated] = {}
     sizes: np.ndarray | None = None
@@ -163,7 +163,7 @@ def _of_struts(parts: FileParts) -> dict[int, _Stated]:
     return stated
 
 
-def _strut_sizes(parts: FileParts) -> np.ndarray:
+def _strut_sizes(parts: SourceBuilder) -> np.ndarray:
     kernel = parts.kernel
     at = [kernel.dof.index(freedom) for freedom in kernel.commanded]
     joints, placements, _ = kernel.place(np.asarray(kernel.home)[at][np.newaxis, :])
@@ -174,7 +174,7 @@ def _strut_sizes(parts: FileParts) -> np.ndarray:
     return sizes
 
 
-def _of_table(parts: FileParts, of_struts: Mapping[int, _Stated]) -> dict[int, _Stated]:
+def _of_table(parts: SourceBuilder, of_struts: Mapping[int, _Stated]) -> dict[int, _Stated]:
     """What the `[tolerance]` table says, by parameter.
 
     A full parameter name goes before a pattern that names its part, and that before any other; a
@@ -211,7 +211,7 @@ def _rank(key: str, names: Iterable[str]) -> int:
     return 1 if len(part) == 2 and not _WILDCARDS & set("".join(part)) else 2
 
 
-def _is_one_kind(parts: FileParts, key: str, matches: list[int], value: object) -> bool:
+def _is_one_kind(parts: SourceBuilder, key: str, matches: list[int], value: object) -> bool:
     """Whether a key stands for parameters of one dimension, at least one; a problem, if not."""
     names = parts.kernel.parameters
     path = f"tolerance.{key}"
@@ -244,7 +244,7 @@ def _is_one_kind(parts: FileParts, key: str, matches: list[int], value: object) 
     return True
 
 
-def _is_twice(parts: FileParts, key: str, columns: list[int], taken: Mapping[int, str]) -> bool:
+def _is_twice(parts: SourceBuilder, key: str, columns: list[int], taken: Mapping[int, str]) -> bool:
     """Whether another key of the same rank has one of the parameters; a problem, if so."""
     doubled = [column for column in columns if column in taken]
     for column in doubled[:1]:
@@ -261,7 +261,9 @@ def _is_twice(parts: FileParts, key: str, columns: list[int], taken: Mapping[int
     return bool(doubled)
 
 
-def _stated(parts: FileParts, key: str, columns: list[int], value: object) -> dict[int, _Stated]:
+def _stated(
+    parts: SourceBuilder, key: str, columns: list[int], value: object
+) -> dict[int, _Stated]:
     """One entry of the table for each of its parameters; nothing, and a problem, if it is wrong."""
     path = f"tolerance.{key}"
     if not columns:
@@ -281,14 +283,14 @@ def _stated(parts: FileParts, key: str, columns: list[int], value: object) -> di
 
 
 def _entry(
-    parts: FileParts, tolerance: file_tolerance.Tolerance, nominal: float, path: str
+    parts: SourceBuilder, tolerance: file_tolerance.Tolerance, nominal: float, path: str
 ) -> _Stated | None:
     """A tolerance of a parameter of so much nominal value; None, and a problem, if bad."""
     return _with_band(parts, tolerance, _listed(parts, tolerance, path), nominal, path)
 
 
 def _with_band(
-    parts: FileParts,
+    parts: SourceBuilder,
     tolerance: file_tolerance.Tolerance,
     listed: Listed | None,
     nominal: float,
@@ -312,7 +314,7 @@ def _distribution(tolerance: file_tolerance.Tolerance) -> Distribution:
     return _WITHOUT_NUMBERS.get(tolerance.distribution) or normal(tolerance.sigmas)
 
 
-def _listed(parts: FileParts, tolerance: file_tolerance.Tolerance, path: str) -> Listed | None:
+def _listed(parts: SourceBuilder, tolerance: file_tolerance.Tolerance, path: str) -> Listed | None:
     """Listed values as a band; None where there are none, or, with a problem, no good ones."""
     if tolerance.data is not None:
         columns = (Column(DEVIATION, tolerance.dimension),)

@@ -19,13 +19,13 @@ from truepose.arrays import Flags, Floats
 from truepose.error_budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import Rows, Schema, Variable, assemble, quantity_coords, sizes
+from truepose.runs.dataset import DatasetRows, Schema, Variable, assemble, quantity_coords, sizes
 from truepose.runs.displacement import at_shifts
-from truepose.runs.first_order import Mover, first_order
+from truepose.runs.first_order import ExactError, first_order
 from truepose.runs.poses import (
     OK,
+    PoseRun,
     Progress,
-    Walk,
     is_path,
     no_pose_left,
     of_band,
@@ -33,14 +33,14 @@ from truepose.runs.poses import (
     required_sources,
 )
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import Spread, spread
-from truepose.sources import Block
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.bounds_over_region import (
     bounds_over_region,
     no_proof,
     required_gap,
 )
-from truepose.uncertainty_analysis.corners import worst_vertices
+from truepose.uncertainty_analysis.corners import worst_corners
 from truepose.uncertainty_analysis.truncation import Ends
 
 _EACH = ("pose", "component")
@@ -130,14 +130,14 @@ def _at_poses(
     table = requested_poses(machine, poses)
     sources = required_sources(machine, condition)
     kinds = quantities(machine.components)
-    rows = Rows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
-    walk = Walk(machine, table, condition, path=poses is None and is_path(machine))
+    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
+    walk = PoseRun(machine, table, condition, path=poses is None and is_path(machine))
     done = 0
     for block in walk:
-        every = spread(machine, block, sources)
+        every = variables_at(machine, block, sources)
         usable = walk.keep(block.indices, at_shifts(machine, block, every.alone, every.shift))
         done += int((~usable).sum())
-        block, every = block.select(usable), ends.narrowed(every.select(usable))
+        block, every = block.select(usable), ends.truncated(every.select(usable))
         for start in range(0, block.indices.size, POSES):
             chosen = np.zeros(block.indices.size, np.bool_)
             chosen[start : start + POSES] = True
@@ -163,8 +163,8 @@ def _at_poses(
 
 def proven_bounds(
     machine: Machine,
-    block: Block,
-    moves: Spread,
+    block: PoseBlock,
+    moves: Variables,
     most_boxes: int = 1,
     targets: ArrayLike | None = None,
 ) -> dict[str, np.ndarray]:
@@ -182,7 +182,7 @@ def proven_bounds(
         np.ascontiguousarray(shift),
         moves.columns,
         moves.variables.tolist(),
-        np.ascontiguousarray(moves.swing),
+        np.ascontiguousarray(moves.half_width),
         [members.tolist() for members in moves.directions],
         most_boxes,
         targets,
@@ -198,15 +198,15 @@ def proven_bounds(
 
 def _bounded(
     machine: Machine,
-    block: Block,
-    moves: Spread,
+    block: PoseBlock,
+    moves: Variables,
     order: tuple[Floats, Floats],
-    walk: Walk,
+    walk: PoseRun,
 ) -> tuple[dict[str, np.ndarray], Flags]:
     """Every variable over the poses of a block, and which of them are usable."""
     value, effects = order
     kinds = list(quantities(machine.components).values())
-    found = worst_vertices(Mover(machine, block, moves), value, effects, moves.domain, kinds)
+    found = worst_corners(ExactError(machine, block, moves), value, effects, moves.domain, kinds)
     m = len(machine.components)
     proven = proven_bounds(machine, block, moves)
     hard = np.asarray((proven["status"] != PROVEN) & (found.status == OK), np.bool_)

@@ -23,10 +23,10 @@ from truepose.errors import Problem, RequestError
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
 from truepose.runs.dataset import Schema, Variable, region_dataset
-from truepose.runs.poses import Progress, Walk, faults_text, pose_in_words, required_sources
+from truepose.runs.poses import PoseRun, Progress, faults_text, pose_in_words, required_sources
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import Spread, spread
-from truepose.sources import Block, Source
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import PoseBlock, Source
 from truepose.uncertainty_analysis.length_law import law_of_length
 from truepose.uncertainty_analysis.truncation import Ends
 
@@ -114,8 +114,8 @@ def bounds_over_region(
     for source in sources:
         of = _known(machine, condition, source, block)
         (yielding if getattr(source, "over_region", None) == "wrench" else shifts).extend(of)
-    every = spread(machine, block, sources)
-    moves = ends.narrowed(every)
+    every = variables_at(machine, block, sources)
+    moves = ends.truncated(every)
     shifts.extend(_middles(every))
     found = machine.kernel.bounds_over(
         sides,
@@ -126,7 +126,7 @@ def bounds_over_region(
             zip(
                 moves.columns.tolist(),
                 moves.variables.tolist(),
-                moves.swing[0].tolist(),
+                moves.half_width[0].tolist(),
                 strict=True,
             )
         ),
@@ -161,9 +161,9 @@ def bounds_over_region(
     )
 
 
-def _middles(moves: Spread) -> list[Affine]:
+def _middles(moves: Variables) -> list[Affine]:
     """By how much the middles of bands lie off their shifts, of listed values of no symmetry."""
-    offsets = moves.swing[0] * moves.domain.middle[moves.variables]
+    offsets = moves.half_width[0] * moves.domain.middle[moves.variables]
     columns = zip(moves.columns.tolist(), offsets.tolist(), strict=True)
     return [(column, (value, value), 0.0, 0) for column, value in columns if value != 0.0]
 
@@ -216,12 +216,12 @@ def _sides(machine: Machine, region: Mapping[str, Sequence[float]]) -> list[tupl
     return sides
 
 
-def _corners(machine: Machine, condition: Condition, sides: list[tuple[float, float]]) -> Block:
+def _corners(machine: Machine, condition: Condition, sides: list[tuple[float, float]]) -> PoseBlock:
     """The corners and the middle of a region. Raises `RequestError` (region-out-of-reach)."""
     varying = [side if side[1] > side[0] else side[:1] for side in sides]
     poses = [*itertools.product(*varying), tuple(0.5 * (low + high) for low, high in sides)]
     table = np.array(poses, np.float64)
-    walk = Walk(machine, table, condition)
+    walk = PoseRun(machine, table, condition)
     blocks = list(walk)
     outside, status = walk.left_out.sorted()
     if outside.size:
@@ -243,7 +243,9 @@ def _out_of_reach(machine: Machine, pose: np.ndarray, status: str) -> RequestErr
     )
 
 
-def _known(machine: Machine, condition: Condition, source: Source, block: Block) -> list[Affine]:
+def _known(
+    machine: Machine, condition: Condition, source: Source, block: PoseBlock
+) -> list[Affine]:
     """What a source knows over the region: shifts, or compliances of one that yields.
 
     Raises `RequestError` (no-proof) for a source that does not say how it follows from the pose.
@@ -272,7 +274,9 @@ def _varies(table: Floats) -> bool:
     return bool(np.ptp(table, axis=0).any())
 
 
-def _affine(machine: Machine, columns: Indices, table: Floats, block: Block) -> list[Affine] | None:
+def _affine(
+    machine: Machine, columns: Indices, table: Floats, block: PoseBlock
+) -> list[Affine] | None:
     """Each column as a constant and a multiple of its strut's length; None where one is not so."""
     of_strut = {int(column): k for k, column in enumerate(machine.kernel.length_parameters)}
     result: list[Affine] = []

@@ -84,7 +84,7 @@ class Targets:
 
 
 @dataclass
-class Found:
+class WorstCorners:
     """The largest of each target over the corners and the centre, for n poses.
 
     `most` (n, 2 m + q); `evaluated` (n,) corners; `status` (n,) of the first that failed, else ok.
@@ -103,13 +103,13 @@ class Found:
         self.status[poses[failed]] = status[failed]
 
 
-def worst_vertices(
+def worst_corners(
     evaluate: Evaluate,
     centre: Floats,
     effects: Floats,
     domain: Domain,
     quantities: Sequence[Indices] = (),
-) -> Found:
+) -> WorstCorners:
     """The exact worst case of n poses.
 
     `centre` (n, m): exact outputs where every variable is 0; `effects` (n, m, v): first-order
@@ -118,7 +118,9 @@ def worst_vertices(
     """
     targets = Targets(centre.shape[1], quantities)
     n_pose, _, n_variable = effects.shape
-    found = Found(targets.of(centre), np.zeros(n_pose, np.intp), np.full(n_pose, OK, np.uint8))
+    found = WorstCorners(
+        targets.of(centre), np.zeros(n_pose, np.intp), np.full(n_pose, OK, np.uint8)
+    )
     if n_variable == 0:
         return found
     if n_variable <= EVERY_VERTEX and not domain.directions:
@@ -147,7 +149,7 @@ def at_ends(domain: Domain, t: Floats) -> Floats:
     return np.where(t < 0.0, domain.lower, domain.upper)
 
 
-def _every(evaluate: Evaluate, targets: Targets, found: Found, t: Floats) -> None:
+def _every(evaluate: Evaluate, targets: Targets, found: WorstCorners, t: Floats) -> None:
     step = max(1, AT_ONCE // len(t))
     for start in range(0, len(found.most), step):
         poses = np.arange(start, min(start + step, len(found.most)))
@@ -263,7 +265,7 @@ def _climb(
     evaluate: Evaluate,
     targets: Targets,
     domain: Domain,
-    found: Found,
+    found: WorstCorners,
     poses: Indices,
     wanted: Indices,
     t: Floats,
@@ -353,7 +355,7 @@ class _Tried:
     evaluate: Evaluate
     targets: Targets
     domain: Domain
-    found: Found
+    found: WorstCorners
     poses: Indices
     wanted: Indices
 

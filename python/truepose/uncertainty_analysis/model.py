@@ -19,20 +19,20 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Flags, Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import Rows, Schema, assemble, component_units, sizes
+from truepose.runs.dataset import DatasetRows, Schema, assemble, component_units, sizes
 from truepose.runs.displacement import at_shifts, displacement
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
     OK,
+    PoseRun,
     Progress,
-    Walk,
     is_path,
     no_pose_left,
     requested_poses,
     required_sources,
 )
-from truepose.runs.variables import Spread, spread
-from truepose.sources import Block
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import PoseBlock
 from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.functions import derivatives
 from truepose.uncertainty_analysis.functions.inputs import Correlation, Input, correlation_matrix
@@ -45,7 +45,7 @@ VALUE = "value"
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearModel:
     """First order: output = value (m,) + effects (m, n_variable) @ t."""
 
     value: Floats
@@ -56,8 +56,9 @@ class Model(Protocol):
     """Outputs, of which there are m, as a function of n_variable variables t.
 
     `names`, `sources`, `distributions`, `correlation`, `directions`, `streams` and `numbers` of the
-    variables are those of `Spread`; `dofs` (n_variable,): degrees of freedom of Student variables
-    and of estimated standard uncertainties, else inf. `outputs` and `output_units` (m).
+    variables are those of `Variables`; `dofs` (n_variable,): degrees of freedom of Student
+    variables and of estimated standard uncertainties, else inf. `outputs` and `output_units`
+    (m).
     """
 
     names: tuple[str, ...]
@@ -71,7 +72,7 @@ class Model(Protocol):
     outputs: tuple[str, ...]
     output_units: tuple[str, ...]
 
-    def linear(self) -> Linear:
+    def linear(self) -> LinearModel:
         """The outputs where all variables are 0, and what each changes to first order."""
         ...
 
@@ -83,7 +84,7 @@ class Model(Protocol):
 class MachineModel:
     """The exact error of a machine at one pose of a block, m and rad, base frame."""
 
-    def __init__(self, machine: Machine, block: Block, moves: Spread, pose: int) -> None:
+    def __init__(self, machine: Machine, block: PoseBlock, moves: Variables, pose: int) -> None:
         """`moves` of the whole block; `pose`: number of the pose in it."""
         self.machine, self.block, self.pose = machine, block, pose
         self.spread = moves.at(pose)
@@ -96,7 +97,7 @@ class MachineModel:
         self.output_units = tuple(component_units(machine))
 
     @cached_property
-    def at(self) -> Block:
+    def at(self) -> PoseBlock:
         """The block of this pose alone."""
         chosen = np.zeros(self.block.indices.size, np.bool_)
         chosen[self.pose] = True
@@ -112,11 +113,11 @@ class MachineModel:
         """(1, 7) tool point and unit quaternion commanded, base frame."""
         return self.block.placements[self.pose : self.pose + 1]
 
-    def linear(self) -> Linear:
+    def linear(self) -> LinearModel:
         """Value and slopes where all sources are at their shift."""
         only = slice(self.pose, self.pose + 1)
         value, effects, _ = first_order(self.machine, self.block, self.spread, only)
-        return Linear(value[0], effects[0])
+        return LinearModel(value[0], effects[0])
 
     def evaluate(self, t: Floats) -> tuple[Floats, Flags]:
         """Errors (s, m), exact; not ok where the moved machine cannot be placed."""
@@ -176,11 +177,11 @@ class FunctionModel:
         fine: Flags = np.asarray(np.isfinite(values).all(axis=1))
         return values, fine
 
-    def linear(self) -> Linear:
+    def linear(self) -> LinearModel:
         """Value at the estimates, and effects by differences, or a complex step where it can."""
         scale = derivatives.steps(self._centre, self._half)
         slopes = derivatives.slopes(self._call, self._centre, scale)
-        return Linear(self._value, slopes * self._half)
+        return LinearModel(self._value, slopes * self._half)
 
     def _call(self, arguments: np.ndarray) -> np.ndarray:
         """Outputs (s, m) at arguments (s, n)."""
@@ -329,14 +330,14 @@ class Models:
         self.sources = required_sources(machine, self.condition)
         self._of_file = poses is None
         self._progress = progress
-        self._walk = Walk(
+        self._walk = PoseRun(
             machine, self.table, self.condition, path=poses is None and is_path(machine)
         )
 
     def __iter__(self) -> Iterator[tuple[int, MachineModel]]:
         total = len(self.table)
         for block in self._walk:
-            moves = spread(self.machine, block, self.sources)
+            moves = variables_at(self.machine, block, self.sources)
             shifted = at_shifts(self.machine, block, moves.alone, moves.shift)
             usable = self._walk.keep(block.indices, shifted)
             for pose in np.flatnonzero(usable).tolist():
@@ -351,11 +352,13 @@ class Models:
         """Set a pose aside for a reason that turned out, a kernel code or a number of `REASONS`."""
         self._walk.left_out.add(model.at.indices, np.array([status], np.uint8))
 
-    def rows(self, schema: Schema, **others: int) -> Rows:
+    def rows(self, schema: Schema, **others: int) -> DatasetRows:
         """Room for a result over all poses; `others`: lengths of dims that no machine has."""
-        return Rows(self.machine, schema, sizes(self.machine, len(self.table), **others))
+        return DatasetRows(self.machine, schema, sizes(self.machine, len(self.table), **others))
 
-    def append(self, rows: Rows, model: MachineModel, values: Mapping[str, ArrayLike]) -> None:
+    def append(
+        self, rows: DatasetRows, model: MachineModel, values: Mapping[str, ArrayLike]
+    ) -> None:
         """One pose of a result, `values` without their dim pose."""
         given = {name: np.asarray(value)[np.newaxis] for name, value in values.items()}
         rows.append(model.at, given, np.ones(1, np.bool_))
@@ -363,7 +366,7 @@ class Models:
     def dataset(
         self,
         schema: Schema,
-        rows: Rows,
+        rows: DatasetRows,
         *,
         over_all: Mapping[str, Any] | None = None,
         coords: Mapping[str, xr.Variable] | None = None,
@@ -396,7 +399,7 @@ def models(
 
 __all__ = [
     "FunctionModel",
-    "Linear",
+    "LinearModel",
     "MachineModel",
     "Model",
     "Models",

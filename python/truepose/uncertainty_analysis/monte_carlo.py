@@ -26,7 +26,7 @@ from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs.dataset import (
-    Rows,
+    DatasetRows,
     Schema,
     Variable,
     assemble,
@@ -38,8 +38,8 @@ from truepose.runs.displacement import at_shifts
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
     BAND,
+    PoseRun,
     Progress,
-    Walk,
     is_path,
     no_pose_left,
     reason_unless,
@@ -47,8 +47,8 @@ from truepose.runs.poses import (
     required_sources,
 )
 from truepose.runs.quantities import POSITIONS, quantities
-from truepose.runs.variables import Spread, spread
-from truepose.sources import Block
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.arguments import (
     required_digits,
     required_probability,
@@ -61,10 +61,10 @@ from truepose.uncertainty_analysis.model import FunctionModel
 from truepose.uncertainty_analysis.sampler import (
     Adaptive,
     Draws,
-    Enough,
-    Fixed,
+    FixedNumber,
     Random,
     Sampler,
+    StoppingRule,
     sobol,
 )
 
@@ -124,7 +124,7 @@ ELLIPSE: Schema = {
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Options:
     probability: float
     samples: int | None
     seed: int
@@ -132,11 +132,11 @@ class _Asked:
     sampling: str
 
     @property
-    def stop(self) -> Enough:
+    def stop(self) -> StoppingRule:
         """When there are enough samples."""
         if self.samples is None:
             return Adaptive(self.probability, self.digits)
-        return Fixed(self.samples)
+        return FixedNumber(self.samples)
 
     @property
     def attrs(self) -> dict[str, Any]:
@@ -147,7 +147,7 @@ class _Asked:
             "digits": self.digits if self.samples is None else 0,
         }
 
-    def draws(self, of: Spread | FunctionModel) -> Draws:
+    def draws(self, of: Variables | FunctionModel) -> Draws:
         """The variables' samples."""
         random = Random(of, self.seed)
         return random if self.sampling == "random" else sobol(random, self.samples or 0)
@@ -214,7 +214,7 @@ def monte_carlo(
     Raises `RequestError`: bad-samples, bad-seed, bad-probability, bad-digits, bad-poses,
     no-workspace, no-source, no-pose-left, extra-missing; `TrueposeError` as the sources do.
     """
-    asked = _Asked(
+    asked = _Options(
         required_probability(probability),
         None if samples is None else required_samples(samples, 2),
         required_seed(seed),
@@ -266,7 +266,7 @@ def _of_machine(
     machine: Machine,
     poses: ArrayLike | None,
     condition: Condition | None,
-    asked: _Asked,
+    asked: _Options,
     progress: Progress | None,
 ) -> xr.Dataset:
     given = machine.condition if condition is None else condition
@@ -284,12 +284,12 @@ def _of_machine(
         axis=len(axes),
         other_axis=len(axes),
     )
-    rows = Rows(machine, schema, lengths)
+    rows = DatasetRows(machine, schema, lengths)
     account = _Account(progress, len(table) * (asked.samples or 0))
-    walk = Walk(machine, table, given, path=poses is None and is_path(machine))
+    walk = PoseRun(machine, table, given, path=poses is None and is_path(machine))
     interrupted = False
     for block in walk:
-        every = spread(machine, block, sources)
+        every = variables_at(machine, block, sources)
         usable = walk.keep(block.indices, at_shifts(machine, block, every.alone, every.shift))
         block, every = block.select(usable), every.select(usable)
         draws = asked.draws(every)
@@ -331,7 +331,7 @@ def _of_machine(
 class _MachineSampler(Sampler):
     """A machine at some poses; columns of its tallies: components, magnitudes, ellipse distance."""
 
-    def __init__(self, machine: Machine, block: Block, moves: Spread) -> None:
+    def __init__(self, machine: Machine, block: PoseBlock, moves: Variables) -> None:
         self.machine, self.block, self.spread = machine, block, moves
         self._study = self._studied(None)
         kinds = quantities(machine.components)
@@ -350,7 +350,7 @@ class _MachineSampler(Sampler):
             np.ascontiguousarray(shift),
             self.spread.columns,
             self.spread.variables.tolist(),
-            np.ascontiguousarray(self.spread.swing),
+            np.ascontiguousarray(self.spread.half_width),
             whitening,
         )
 
@@ -487,10 +487,10 @@ class _FunctionSampler(Sampler):
         if not fine.any():
             return
         middle = np.median(values[fine], axis=0)
-        spread = values[fine].std(axis=0)
+        variables_at = values[fine].std(axis=0)
         tiny = 1e-15 * np.abs(middle) + np.finfo(np.float64).tiny / np.finfo(np.float64).eps
         self._origins = middle[np.newaxis]
-        self._widths = np.maximum(spread, tiny)[np.newaxis] / FINENESS
+        self._widths = np.maximum(variables_at, tiny)[np.newaxis] / FINENESS
 
     def begin(self, pilot: Tallies) -> Tallies:
         """The same once more: nothing is learnt from the pilot."""
@@ -508,7 +508,7 @@ class _FunctionSampler(Sampler):
         return slice(None)
 
 
-def _of_function(model: FunctionModel, asked: _Asked, progress: Progress | None) -> xr.Dataset:
+def _of_function(model: FunctionModel, asked: _Options, progress: Progress | None) -> xr.Dataset:
     sampler = _FunctionSampler(model)
     draws = asked.draws(model)
     sampler.prepare(draws)

@@ -33,8 +33,8 @@ MOST = 10_000_000
 _STUDENT = "student-t"
 
 
-class Variables(Protocol):
-    """What draws are made of: `truepose.runs.variables.Spread`, or a `Model`."""
+class SampledVariables(Protocol):
+    """What draws are made of: `truepose.runs.variables.Variables`, or a `Model`."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -85,7 +85,7 @@ class Draws(Protocol):
 class Random:
     """Random numbers of the kernel; correlated ones through a Gaussian copula."""
 
-    def __init__(self, of: Variables, seed: int) -> None:
+    def __init__(self, of: SampledVariables, seed: int) -> None:
         from truepose._kernel import Variables as KernelVariables
 
         self.seed = seed
@@ -189,7 +189,7 @@ def sobol(random: Random, samples: int) -> Draws:
     return _Sobol(random, samples)
 
 
-class Enough(ABC):
+class StoppingRule(ABC):
     """When there are enough samples."""
 
     adaptive = False
@@ -200,7 +200,7 @@ class Enough(ABC):
 
 
 @dataclass(frozen=True)
-class Fixed(Enough):
+class FixedNumber(StoppingRule):
     """As many as asked for."""
 
     samples: int
@@ -211,7 +211,7 @@ class Fixed(Enough):
         return min(together, self.samples - done)
 
 
-class Adaptive(Enough):
+class Adaptive(StoppingRule):
     """JCGM 101:2008, 7.9.4: batches until mean, standard deviation and ends are stable.
 
     Stable: twice the standard deviation of a figure's mean over the batches is below half a unit of
@@ -256,7 +256,7 @@ class Adaptive(Enough):
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnSamples:
     """Tallies of all samples, None where there are none; whether Ctrl-C ended it."""
 
     tallies: Tallies | None
@@ -285,7 +285,9 @@ class Sampler(ABC):
     def checked(self) -> slice:
         """Columns whose figures are to be stable."""
 
-    def run(self, draws: Draws, enough: Enough, account: Callable[[int], None]) -> Drawn:
+    def run(
+        self, draws: Draws, enough: StoppingRule, account: Callable[[int], None]
+    ) -> DrawnSamples:
         """Draws until there are enough; the first batch, drawn again, is the pilot."""
         whole: Tallies | None = None
         done = 0
@@ -305,5 +307,5 @@ class Sampler(ABC):
                 done += count
                 account(count * self.n_pose)
         except KeyboardInterrupt:
-            return Drawn(whole, True)
-        return Drawn(whole, False)
+            return DrawnSamples(whole, True)
+        return DrawnSamples(whole, False)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from truepose.errors import Problem, RequestError
-from truepose.runs.variables import Spread
+from truepose.runs.variables import Variables
 from truepose.sources import Distribution
 
 AS_STATED = "as stated"
@@ -76,7 +76,7 @@ class Ends:
         cut = AS_STATED if self.sigmas is None else self.sigmas
         return {"truncate": cut if self.endless else NONE, "unbounded": str(self.endless)}
 
-    def narrowed(self, moves: Spread) -> Spread:
+    def truncated(self, moves: Variables) -> Variables:
         """The spread with every single variable in [-1, 1], also what has no ends."""
         self.endless.note(moves.names, moves.distributions)
         if self.sigmas is None:
@@ -85,5 +85,5 @@ class Ends:
         for at, distribution in enumerate(moves.distributions):
             if not distribution.bounded:
                 factor[at] = self.sigmas / distribution.sigmas
-        cut = dataclasses.replace(moves, swing=moves.swing * factor[moves.variables])
+        cut = dataclasses.replace(moves, half_width=moves.half_width * factor[moves.variables])
         return cut.centred()

@@ -24,7 +24,7 @@ from truepose.error_budget.evaluate import FEW
 from truepose.error_budget.propagation import combine, coverage_factor
 from truepose.machine import Condition, Machine
 from truepose.runs.dataset import (
-    Rows,
+    DatasetRows,
     Schema,
     Variable,
     assemble,
@@ -36,14 +36,14 @@ from truepose.runs.displacement import at_shifts
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
     OK,
+    PoseRun,
     Progress,
-    Walk,
     is_path,
     no_pose_left,
     requested_poses,
     required_sources,
 )
-from truepose.runs.variables import spread
+from truepose.runs.variables import variables_at
 from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.arguments import required_digits, required_probability
 from truepose.uncertainty_analysis.failed_samples import lost_text
@@ -96,14 +96,14 @@ VALIDATION: Schema = {
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Options:
     """The coverage probability, and what the answer is to be compared with, to so many digits."""
 
     probability: float
     digits: int
     sampled: xr.Dataset | None = None
 
-    def against(self, sampled: xr.Dataset) -> _Asked:
+    def against(self, sampled: xr.Dataset) -> _Options:
         """The same, to be compared with the result of `monte_carlo`."""
         return replace(self, sampled=sampled)
 
@@ -203,7 +203,7 @@ def uncertainty(
     Raises `RequestError`: bad-probability, bad-digits, bad-poses, no-workspace, no-source,
     no-pose-left; `TrueposeError` as the sources do, and as `FunctionModel` does.
     """
-    asked = _Asked(required_probability(probability), required_digits(digits))
+    asked = _Options(required_probability(probability), required_digits(digits))
     drawn: dict[str, Any] = {
         "probability": probability,
         "samples": samples,
@@ -228,17 +228,17 @@ def _of_machine(
     poses: ArrayLike | None,
     condition: Condition,
     progress: Progress | None,
-    asked: _Asked,
+    asked: _Options,
 ) -> xr.Dataset:
     table = requested_poses(machine, poses)
     sources = required_sources(machine, condition)
     lengths = sizes(machine, len(table), other_component=len(machine.components))
-    rows = Rows(machine, asked.schema(), lengths)
+    rows = DatasetRows(machine, asked.schema(), lengths)
     units = component_units(machine)
     scale = np.array([machine.characteristic_length if unit == "m" else 1.0 for unit in units])
-    walk = Walk(machine, table, condition, progress, path=poses is None and is_path(machine))
+    walk = PoseRun(machine, table, condition, progress, path=poses is None and is_path(machine))
     for block in walk:
-        moves = spread(machine, block, sources)
+        moves = variables_at(machine, block, sources)
         variables = _Variables(
             moves.names,
             moves.distributions,
@@ -280,7 +280,7 @@ def _of_machine(
     return result.assign_attrs(asked.attrs)
 
 
-def _of_function(model: FunctionModel, asked: _Asked) -> xr.Dataset:
+def _of_function(model: FunctionModel, asked: _Options) -> xr.Dataset:
     law = model.linear()
     value, effects = law.value[np.newaxis], law.effects[np.newaxis]
     variables = _Variables(
@@ -306,7 +306,7 @@ def _of_function(model: FunctionModel, asked: _Asked) -> xr.Dataset:
 
 
 def _answer(
-    value: Floats, effects: Floats, variables: _Variables, asked: _Asked
+    value: Floats, effects: Floats, variables: _Variables, asked: _Options
 ) -> dict[str, np.ndarray]:
     """Every variable of `SCHEMA` for n poses, from `value` (n, m) and `effects` (n, m, v)."""
     law = combine(
@@ -330,7 +330,7 @@ def _compared(
     answer: Mapping[str, np.ndarray],
     effects: Floats,
     variables: _Variables,
-    asked: _Asked,
+    asked: _Options,
     sampled: xr.Dataset,
     numbers: Indices,
 ) -> dict[str, np.ndarray]:

@@ -27,7 +27,7 @@ from truepose.machine import Condition, Machine
 from truepose.probability.domain import Domain
 from truepose.runs.dataset import (
     QUANTITY_UNITS,
-    Rows,
+    DatasetRows,
     Schema,
     Variable,
     assemble,
@@ -35,11 +35,11 @@ from truepose.runs.dataset import (
     sizes,
 )
 from truepose.runs.displacement import at_shifts
-from truepose.runs.first_order import Mover, first_order
+from truepose.runs.first_order import ExactError, first_order
 from truepose.runs.poses import (
     OK,
+    PoseRun,
     Progress,
-    Walk,
     is_path,
     no_pose_left,
     of_band,
@@ -47,8 +47,8 @@ from truepose.runs.poses import (
     required_sources,
 )
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import spread
-from truepose.uncertainty_analysis.corners import Found, worst_vertices
+from truepose.runs.variables import variables_at
+from truepose.uncertainty_analysis.corners import WorstCorners, worst_corners
 from truepose.uncertainty_analysis.functions.dataset import function_dataset
 from truepose.uncertainty_analysis.functions.inputs import Input
 from truepose.uncertainty_analysis.model import FunctionModel
@@ -124,16 +124,16 @@ def _of_machine(
     table = requested_poses(machine, poses)
     sources = required_sources(machine, condition)
     kinds = quantities(machine.components)
-    rows = Rows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
+    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
     endless = Endless()
-    walk = Walk(machine, table, condition, progress, path=poses is None and is_path(machine))
+    walk = PoseRun(machine, table, condition, progress, path=poses is None and is_path(machine))
     for block in walk:
-        moves = spread(machine, block, sources)
+        moves = variables_at(machine, block, sources)
         value, effects, status = first_order(machine, block, moves)
         shifted = at_shifts(machine, block, moves.alone, moves.shift)
         usable = walk.keep(block.indices, shifted, status)
-        found = worst_vertices(
-            _only(usable, Mover(machine, block, moves)),
+        found = worst_corners(
+            _only(usable, ExactError(machine, block, moves)),
             value[usable],
             effects[usable],
             moves.domain,
@@ -173,7 +173,7 @@ def _only(
 
 
 def _values(
-    found: Found,
+    found: WorstCorners,
     value: Floats,
     effects: Floats,
     domain: Domain,
@@ -203,7 +203,7 @@ def _of_function(function: Callable[..., Any], inputs: Any) -> xr.Dataset:
         return outputs, np.where(fine, OK, OK + 1).astype(np.uint8)
 
     domain = Domain.of(model.distributions)
-    found = worst_vertices(evaluate, law.value[np.newaxis], law.effects[np.newaxis], domain)
+    found = worst_corners(evaluate, law.value[np.newaxis], law.effects[np.newaxis], domain)
     if found.status[0] != OK:
         raise RequestError(
             Problem(

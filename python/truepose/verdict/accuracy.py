@@ -23,7 +23,7 @@ from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs.poses import OK, Progress
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import Spread
+from truepose.runs.variables import Variables
 from truepose.verdict import engine
 from truepose.verdict.answer import MET, NOT_MET, UNDECIDED, Answer, Number
 from truepose.verdict.coverage import MOST_POSES, coverage
@@ -233,7 +233,7 @@ def _at_pose(state: State, kind: str, columns: Indices) -> Witness:
     """The farthest machine of a state at one pose."""
     number = int(state.block.indices[0])
     word = STATUS[int(state.status[0])]
-    t, error, size = np.zeros(len(state.spread.names)), None, np.inf
+    t, error, size = np.zeros(len(state.variables.names)), None, np.inf
     if state.status[0] == OK:
         reached = farthest(state, columns)
         t, size = reached.t, reached.size
@@ -246,7 +246,7 @@ def _at_pose(state: State, kind: str, columns: Indices) -> Witness:
         pose=state.block.requested[number],
         number=number,
         joints=state.block.joints[0],
-        spread=state.spread,
+        spread=state.variables,
         t=t,
         error=error,
         size=size,
@@ -324,7 +324,7 @@ def _answer(
     return Answer(kind, name, target, answer, seen, linear, bound, rests_on, witness)
 
 
-def _ends_taken(spread: Spread) -> str:
+def _ends_taken(spread: Variables) -> str:
     """Where distributions without ends are taken to end; empty where all have ends."""
     endless = dict.fromkeys(str(each) for each in spread.distributions if not each.bounded)
     return f"; taken to end there: {'; '.join(endless)}" if endless else ""

@@ -30,10 +30,10 @@ def bounds(state: State, targets: Sequence[float | None], boxes: int) -> tuple[F
     machine, block = state.machine, state.block
     kinds = quantities(machine.components)
     nothing = np.full((block.indices.size, len(kinds)), np.inf)
-    if machine.kernel.overconstrained or not len(state.spread.names):
+    if machine.kernel.overconstrained or not len(state.variables.names):
         return nothing, 0
     limits = np.array([[np.inf if target is None else target for target in targets]])
-    found = proven_bounds(machine, block, state.spread.centred(), boxes, limits)
+    found = proven_bounds(machine, block, state.variables.centred(), boxes, limits)
     proven = found["status"] == PROVEN
     bound = np.where(proven[:, np.newaxis], found["magnitude"], nothing)
     return bound, int(found["boxes"].sum())

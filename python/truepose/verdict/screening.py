@@ -23,12 +23,12 @@ from truepose.machine import Machine
 from truepose.runs.displacement import displacement
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import OK
-from truepose.runs.variables import Spread
-from truepose.sources import Block
+from truepose.runs.variables import Variables
+from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.sampler import Random
 from truepose.verdict.order_statistics import Ranks, ranks
 
-State = tuple[Block, Spread]
+State = tuple[PoseBlock, Variables]
 """Some poses as they are commanded, and what is unknown there."""
 
 WITHIN = 0.1
@@ -67,8 +67,8 @@ class Pose:
     machine: Machine
     number: int
     part: int
-    block: Block
-    spread: Spread
+    block: PoseBlock
+    spread: Variables
     draws: Random
     columns: Indices
 
@@ -99,8 +99,8 @@ class _Part:
     """Some poses of a block: first-order estimates of the quantile with its ends, each (n,)."""
 
     number: int
-    block: Block
-    spread: Spread
+    block: PoseBlock
+    spread: Variables
     draws: Random
     estimate: Floats
     lower: Floats
@@ -186,7 +186,7 @@ class Screen:
         count = int(min(max(wanted, FEWEST[stage]), MOST[stage]))
         return ranks(count, min(self._probability, 1.0 - TAIL[stage] / count), RISK)
 
-    def _part(self, number: int, block: Block, spread: Spread, of: Ranks) -> _Part:
+    def _part(self, number: int, block: PoseBlock, spread: Variables, of: Ranks) -> _Part:
         draws = Random(spread, self._seed)
         t = draws.rows(FIRST, of.count)
         value, effects, status = first_order(self._machine, block, spread)
@@ -245,7 +245,7 @@ def _largest(values: Floats, most: int) -> Indices:
     return np.asarray(np.argsort(-values, kind="stable")[:most], np.intp)
 
 
-def _select(spread: Spread, chosen: Flags) -> Spread:
+def _select(spread: Variables, chosen: Flags) -> Variables:
     return spread if chosen.all() else spread.select(chosen)
 
 

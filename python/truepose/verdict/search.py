@@ -14,7 +14,7 @@ import numpy as np
 from truepose.arrays import Floats, Indices
 from truepose.error_budget.largest import largest
 from truepose.probability.domain import Domain, unit
-from truepose.runs.first_order import Mover, effects_at, first_order
+from truepose.runs.first_order import ExactError, effects_at, first_order
 from truepose.runs.poses import OK
 from truepose.verdict.states import State
 
@@ -49,14 +49,14 @@ def farthest(state: State, columns: Indices) -> Reached:
 
     One that cannot be assembled, or that leaves its branch, is farther than all others.
     """
-    machine, block, spread = state.machine, state.block, state.spread
-    domain = spread.domain
-    value, effects, _ = first_order(machine, block, spread)
+    machine, block, variables = state.machine, state.block, state.variables
+    domain = variables.domain
+    value, effects, _ = first_order(machine, block, variables)
     far = largest(value, effects, domain, [columns])
     u = far.direction[0, 0, : columns.size]
     slopes = effects[0][columns]
     starts = [
-        np.zeros(len(spread.names)),
+        np.zeros(len(variables.names)),
         domain.most_along(u @ slopes),
         domain.most_along(-u @ slopes),
     ]
@@ -86,7 +86,7 @@ class _Tried:
 
 
 def _tried(state: State, columns: Indices, t: Floats) -> _Tried:
-    mover = Mover(state.machine, state.block, state.spread)
+    mover = ExactError(state.machine, state.block, state.variables)
     error, status = mover(np.zeros(len(t), np.intp), t.copy())
     size = np.sqrt(np.square(error[:, columns]).sum(axis=1))
     return _Tried(t, error, np.where(status == OK, size, np.inf), status)
@@ -101,11 +101,14 @@ def _climbed(state: State, columns: Indices, start: Floats) -> Reached:
             break
         u = best.error[columns] / size
         effects, status = effects_at(
-            state.machine, state.block, state.spread, state.spread.parameters_moved(best.t[None])
+            state.machine,
+            state.block,
+            state.variables,
+            state.variables.parameters_moved(best.t[None]),
         )
         if status[0] != OK:
             break
-        further = state.spread.domain.most_along(u @ effects[0][columns])
+        further = state.variables.domain.most_along(u @ effects[0][columns])
         reached = _tried(state, columns, further[np.newaxis]).best()
         if not reached.size > size * (1.0 + GAIN):
             break

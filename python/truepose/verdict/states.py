@@ -1,8 +1,8 @@
 """The two states of a machine: as it is commanded, and as compensation commands it.
 
-A state at some poses is a block, whose joints are what is commanded, and the spread of all sources
-there. All that takes these two serves both states alike: before and after are the same set of
-machines, asked by the same functions, at two commands.
+A state at some poses is a block, whose joints are what is commanded, and the variables of all
+sources there. All that takes these two serves both states alike: before and after are the same set
+of machines, asked by the same functions, at two commands.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from truepose.runs.displacement import at_shifts
 from truepose.runs.poses import (
     BLOCK,
     OK,
+    PoseRun,
     Progress,
-    Walk,
     is_path,
     no_pose_left,
     requested_poses,
     required_sources,
 )
-from truepose.runs.variables import Spread, spread
-from truepose.sources import Block
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import PoseBlock
 
 BEFORE, AFTER = "before compensation", "after compensation"
 STATES = (BEFORE, AFTER)
@@ -41,14 +41,14 @@ class State:
     """One state at n poses.
 
     `block`: its `joints` are what is commanded, its `indices` the numbers of the poses in the run;
-    `spread`: what all sources leave unknown at that command; `status` (n,): the kernel's, ok where
-    the machine can be commanded so.
+    `variables`: what all sources leave unknown at that command; `status` (n,): the kernel's, ok
+    where the machine can be commanded so.
     """
 
     name: str
     machine: Machine
-    block: Block
-    spread: Spread
+    block: PoseBlock
+    variables: Variables
     status: np.ndarray
 
     def select(self, poses: Flags) -> State:
@@ -56,7 +56,7 @@ class State:
         return dataclasses.replace(
             self,
             block=self.block.select(poses),
-            spread=self.spread if poses.all() else self.spread.select(poses),
+            variables=self.variables if poses.all() else self.variables.select(poses),
             status=self.status[poses],
         )
 
@@ -134,11 +134,11 @@ class Population:
             if chosen.any():
                 yield state.select(np.asarray(chosen, np.bool_))
 
-    def _blocks(self) -> Iterator[tuple[Block, Spread]]:
-        walk = Walk(self.machine, self.table, self.condition, self._progress, path=self._path)
+    def _blocks(self) -> Iterator[tuple[PoseBlock, Variables]]:
+        walk = PoseRun(self.machine, self.table, self.condition, self._progress, path=self._path)
         none = True
         for block in walk:
-            moves = spread(self.machine, block, self.sources)
+            moves = variables_at(self.machine, block, self.sources)
             shifted = at_shifts(self.machine, block, moves.alone, moves.shift)
             usable = walk.keep(block.indices, shifted)
             if usable.any():
@@ -147,7 +147,7 @@ class Population:
         if none:
             raise no_pose_left(self.machine, self.table, walk.left_out, of_file=self._of_file)
 
-    def _state(self, name: str, block: Block, moves: Spread) -> State:
+    def _state(self, name: str, block: PoseBlock, moves: Variables) -> State:
         if name == BEFORE:
             fine = np.full(block.indices.size, OK, np.uint8)
             return State(name, self.machine, block, moves, fine)
@@ -157,15 +157,15 @@ class Population:
 
 @dataclass(frozen=True)
 class Blocks:
-    """The blocks of a population in one state with their spreads; iterated as often as asked."""
+    """The blocks of a population in one state with their variables; iterated as often as asked."""
 
     population: Population
     name: str
 
-    def __iter__(self) -> Iterator[tuple[Block, Spread]]:
+    def __iter__(self) -> Iterator[tuple[PoseBlock, Variables]]:
         """All of them."""
         for state in self.population.states(self.name):
-            yield state.block, state.spread
+            yield state.block, state.variables
 
 
 __all__ = ["AFTER", "BEFORE", "STATES", "Blocks", "Population", "State"]

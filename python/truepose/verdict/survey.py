@@ -18,7 +18,7 @@ import numpy as np
 from truepose.arrays import Floats, Indices
 from truepose.compensation.remainder import Remainder
 from truepose.error_budget.largest import Largest, largest
-from truepose.runs.first_order import Mover, first_order
+from truepose.runs.first_order import ExactError, first_order
 from truepose.runs.poses import OK
 from truepose.verdict.states import State
 
@@ -66,8 +66,8 @@ def _part(state: State, start: int) -> np.ndarray:
 
 
 def _surveyed(state: State, quantities: Sequence[Indices]) -> Survey:
-    machine, block, spread = state.machine, state.block, state.spread
-    value, effects, status = first_order(machine, block, spread)
+    machine, block, variables = state.machine, state.block, state.variables
+    value, effects, status = first_order(machine, block, variables)
     status = np.where(state.status == OK, status, state.status)
     fine = np.asarray(status == OK, np.bool_)
     shape = (block.indices.size, len(quantities))
@@ -75,9 +75,9 @@ def _surveyed(state: State, quantities: Sequence[Indices]) -> Survey:
     if fine.any():
         usable = state.select(fine)
         value, effects = value[fine], effects[fine]
-        far = largest(value, effects, spread.domain, quantities)
+        far = largest(value, effects, variables.domain, quantities)
         linear[fine] = far.length
-        beyond = Remainder(machine).bound(usable.block, usable.spread, value, effects)
+        beyond = Remainder(machine).bound(usable.block, usable.variables, value, effects)
         bound[fine] = np.where(beyond.proven[:, np.newaxis], far.length + beyond.norms, np.inf)
         # Both ends: to first order they are alike where nothing is known, and it is rounding that
         # says which of them is the maximiser; exactly they are not alike.
@@ -90,8 +90,8 @@ def _surveyed(state: State, quantities: Sequence[Indices]) -> Survey:
 
 def _reached(state: State, far: Largest, effects: Floats, quantities: Sequence[Indices]) -> Floats:
     """(n, q) sizes of the machines that lie farthest along the directions; inf where none."""
-    mover = Mover(state.machine, state.block, state.spread)
-    maximisers = far.maximiser(effects, state.spread.domain, quantities)
+    mover = ExactError(state.machine, state.block, state.variables)
+    maximisers = far.maximiser(effects, state.variables.domain, quantities)
     sizes = np.empty(far.length.shape)
     every = np.arange(len(sizes))
     for at, columns in enumerate(quantities):

@@ -1,6 +1,6 @@
 """A witness: one machine inside the set, at one pose, solved exactly.
 
-    actual parameters = nominal + shift + sum over columns of swing t[variable]
+    actual parameters = nominal + shift + sum over columns of half_width t[variable]
 
 with one value t of every variable. What is told of it, to people and to programs: which parameter
 stands at which end, from where the force of unknown direction comes, at which pose.
@@ -20,12 +20,12 @@ from truepose.arrays import Floats, Indices
 from truepose.files.dimensions import BY_UNIT, FREEDOMS
 from truepose.files.shown_units import Shown
 from truepose.machine import Machine
-from truepose.runs.displacement import Moved
+from truepose.runs.displacement import ParameterDeviation
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import pose_in_words
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import Spread
-from truepose.sources import Block, acting
+from truepose.runs.variables import Variables
+from truepose.sources import PoseBlock, acting
 from truepose.verdict.states import AFTER, BEFORE
 
 NAMED = 4
@@ -67,10 +67,11 @@ class Witness:
 
     `machine` is the nominal one in the condition of the run; `pose` (n_commanded,), m or rad, and
     its `number` in the run; `joints` (n_joint,) as commanded there; `spread` the variables at this
-    pose alone (`Spread.at`) and `t` (n_variable,) their values. `error` (n_component,), m and rad,
-    is exact, its part `quantity` ("position" or "orientation") of length `size`. Of a machine that
-    cannot be assembled `error` is None, `size` is inf and `status` the kernel's word for why; it is
-    not `commanded` where the machine at its shifts cannot follow the command.
+    pose alone (`Variables.at`) and `t` (n_variable,) their values. `error` (n_component,), m
+    and rad, is exact, its part `quantity` ("position" or "orientation") of length `size`. Of a
+    machine that cannot be assembled `error` is None, `size` is inf and `status` the kernel's
+    word for why; it is not `commanded` where the machine at its shifts cannot follow the
+    command.
     """
 
     state: str
@@ -79,7 +80,7 @@ class Witness:
     pose: Floats
     number: int
     joints: Floats
-    spread: Spread
+    spread: Variables
     t: Floats
     error: Floats | None
     size: float
@@ -87,7 +88,7 @@ class Witness:
     commanded: bool = True
 
     @property
-    def moved(self) -> Moved:
+    def moved(self) -> ParameterDeviation:
         """Parameters (k,), each once, and their deviations (1, k) from nominal."""
         return self.spread.parameters_moved(np.asarray(self.t, np.float64)[np.newaxis])
 
@@ -103,7 +104,7 @@ class Witness:
         found = {name: np.zeros(len(self.machine.parameters)) for name in names}
         for name, (parameters, shift) in zip(names, self.spread.alone, strict=True):
             np.add.at(found[name], parameters, shift[0])
-        moves = self.spread.swing[0] * self.t[self.spread.variables]
+        moves = self.spread.half_width[0] * self.t[self.spread.variables]
         for column, variable in enumerate(self.spread.variables):
             found[self.spread.sources[variable]][self.spread.columns[column]] += moves[column]
         return found
@@ -118,14 +119,14 @@ class Witness:
         return np.asarray(envelope.force * (self.t[members] @ envelope.directions))
 
     @cached_property
-    def block(self) -> Block:
+    def block(self) -> PoseBlock:
         """The pose as sources see it, with the joints commanded."""
         machine = self.machine
         pose = np.asarray(self.pose, np.float64)[np.newaxis]
         _, placements, _ = machine.kernel.place(pose)
         joints = np.asarray(self.joints, np.float64)[np.newaxis]
         first = np.zeros(1, np.intp)
-        return Block(machine, machine.condition, pose, first, joints, placements)
+        return PoseBlock(machine, machine.condition, pose, first, joints, placements)
 
     @cached_property
     def _parts(self) -> Floats:
@@ -161,7 +162,7 @@ class Witness:
     def _cause(self, variable: int, share: float) -> Cause:
         spread, machine = self.spread, self.machine
         columns = np.flatnonzero(spread.variables == variable)
-        source, swing = spread.sources[variable], float(spread.swing[0, columns[0]])
+        source, swing = spread.sources[variable], float(spread.half_width[0, columns[0]])
         parameter = int(spread.columns[columns[0]])
         value = float(self.t[variable])
         same = [

@@ -27,8 +27,8 @@ from truepose.files.dimensions import BY_UNIT
 from truepose.files.writing import replacing, require_writable
 from truepose.machine import Machine, load
 from truepose.machine.temperature_log import TemperatureLog
-from truepose.runs.displacement import at_shifts, displacement, together
-from truepose.runs.poses import OK, REASONS, Walk, pose_in_words
+from truepose.runs.displacement import at_shifts, displacement, sum_deviations
+from truepose.runs.poses import OK, REASONS, PoseRun, pose_in_words
 from truepose.sources import REGISTRY, acting
 from truepose.verdict.one_values import OneValues
 from truepose.verdict.witness import Witness
@@ -218,7 +218,7 @@ class _Writing:
         """Empty where a budget of the file is the witness; else what is not."""
         witness = self._witness
         sources = acting(written, written.condition)
-        walk = Walk(written, written.poses(), written.condition)
+        walk = PoseRun(written, written.poses(), written.condition)
         status, error = "", np.zeros((1, len(written.components)))
         for block in walk:
             deviations = [source.deviation(written, written.condition, block) for source in sources]
@@ -230,8 +230,8 @@ class _Writing:
             if banded:
                 return f"{', '.join(banded)} still has a band"
             alone = [(each.parameters, each.shift) for each in deviations]
-            status = STATUS[at_shifts(written, block, alone, together(alone))[0]]
-            error, _ = displacement(written, block.joints, block.placements, together(alone))
+            status = STATUS[at_shifts(written, block, alone, sum_deviations(alone))[0]]
+            error, _ = displacement(written, block.joints, block.placements, sum_deviations(alone))
         if not status:
             status = REASONS[walk.left_out.status[0][0]]
         if status != witness.status:
@@ -291,7 +291,7 @@ def _known(draft: Machine) -> dict[str, Floats]:
     """(n_parameter,) deviations of a file at its one pose by source, at their shifts."""
     sources = acting(draft, draft.condition)
     found = {source.name: np.zeros(len(draft.parameters)) for source in sources}
-    for block in Walk(draft, draft.poses(), draft.condition):
+    for block in PoseRun(draft, draft.poses(), draft.condition):
         for source in sources:
             deviation = source.deviation(draft, draft.condition, block)
             np.add.at(found[source.name], deviation.parameters, deviation.shift[0])

@@ -15,8 +15,8 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from oracle_cases import case
-from truepose.calibration.acceptance import Candidate, Gate, HeldOut, judge
-from truepose.calibration.acceptance.observability import observability, of_machine, spread
+from truepose.calibration.acceptance import Candidate, Gate, HeldOut, assess
+from truepose.calibration.acceptance.observability import observability, of_machine, row_covariance
 from truepose.calibration.identification.unknowns import Unknowns
 
 Floats = NDArray[np.float64]
@@ -124,7 +124,7 @@ def verdict(kind: str, *, noise: float = NOISE, residual: float = 1.0, **other: 
         "nominal": NOMINAL,
         "candidates": [IN_X_AND_Y],
     } | other
-    return judge(settings.pop("unknowns", unknowns()), jacobian=jacobian, **settings)
+    return assess(settings.pop("unknowns", unknowns()), jacobian=jacobian, **settings)
 
 
 def codes(gate: Gate) -> set[str]:
@@ -146,7 +146,7 @@ def test_figures_of_the_case(kind: str, key: str) -> None:
     found = observability(rows, len(rows.matrix), np.ones(9))
     assert found.singular == pytest.approx(expected["singular_values"], abs=6e-7)
     assert found.condition == pytest.approx(expected["condition_number"], abs=0.06)
-    standard = spread(of_machine(in_file_units / P02["inputs"]["noise_mm"], 9)).standard()
+    standard = row_covariance(of_machine(in_file_units / P02["inputs"]["noise_mm"], 9)).standard()
     assert standard == pytest.approx(list(expected["standard_uncertainty"].values()), abs=6e-6)
     # And in SI, from the gate.
     gate = verdict(kind)
@@ -321,7 +321,7 @@ def test_the_covariance_is_inflated_by_the_birge_ratio() -> None:
 
 def test_as_many_measurements_as_unknowns_check_no_noise() -> None:
     jacobian = rows_of(POSITIONS)[[0, 4, 8, 9, 13, 17, 18, 22, 26]] / NOISE
-    gate = judge(
+    gate = assess(
         unknowns(),
         values=np.zeros(9),
         jacobian=jacobian,
@@ -388,7 +388,7 @@ def test_an_unknown_that_is_not_seen_is_refused_and_named() -> None:
         "by": [POSITIONS],
     }
     moved = np.concatenate([TOOL, np.ones((len(TOOL), 3, 1))], axis=2)
-    gate = judge(more, use_prior=True, tool=moved, **settings)
+    gate = assess(more, use_prior=True, tool=moved, **settings)
     assert codes(gate) == {"not-determined"}
     assert "tower lean a cannot be found by positions in x, y and z" in gate.words
     assert np.isinf(gate.after.position).all()
@@ -397,7 +397,7 @@ def test_an_unknown_that_is_not_seen_is_refused_and_named() -> None:
     assert gate.n_null == 1
     # One that moves nothing does no harm.
     still = np.concatenate([TOOL, np.zeros((len(TOOL), 3, 1))], axis=2)
-    gate = judge(more, use_prior=True, tool=still, **settings)
+    gate = assess(more, use_prior=True, tool=still, **settings)
     assert gate.accepted
     assert [each.kind for each in gate.directions] == ["harmless"]
 
@@ -436,7 +436,7 @@ def test_none_of_the_tried_helps() -> None:
 def _two_unseen(**other: Any) -> Gate:
     jacobian = np.repeat(np.eye(3)[[0]] / 1e-5, 5, axis=0)
     tool = np.ones((4, 1, 3))
-    return judge(
+    return assess(
         unknowns(("stroke", "left foot", "right arm"), np.full(3, 1e-3), ("m",) * 3),
         values=np.zeros(3),
         jacobian=jacobian,
@@ -467,11 +467,11 @@ def test_what_becomes_worse_is_refused_though_something_else_becomes_better() ->
         "components": ("x", "c"),
     }
     wide = unknowns(labels, bands, ("m", "rad", "m", "rad"))
-    gate = judge(wide, use_prior=False, **settings)
+    gate = assess(wide, use_prior=False, **settings)
     assert "no-gain" in codes(gate)
     assert "of the workspace the tool's rotation would be uncertain by 0.17°" in gate.words
     # With the prior it cannot become worse; that it hardly became better is said.
-    gate = judge(wide, use_prior=True, **settings)
+    gate = assess(wide, use_prior=True, **settings)
     assert gate.accepted
     assert "one-sided" in warned(gate)
 
@@ -514,7 +514,7 @@ def hexapod_verdict(*, use_prior: bool, frame: bool, positions: bool = True) -> 
     half = np.array([1e-3] * 24 + [np.inf] * 6)
     kept = slice(None) if frame else slice(24)
     jacobian = jacobian[:, kept]
-    return judge(
+    return assess(
         unknowns(labels[kept], half[kept], (*["m"] * 27, *["rad"] * 3)[kept], 24),
         values=np.zeros(len(half[kept])),
         jacobian=jacobian,
@@ -564,7 +564,7 @@ def test_shapes_that_do_not_fit_are_refused() -> None:
     with pytest.raises(ValueError, match="the tool's sensitivity: shape"):
         verdict(HEIGHTS, tool=TOOL[:, :, :4])
     with pytest.raises(ValueError, match="the Jacobian: not finite"):
-        judge(
+        assess(
             unknowns(),
             values=np.zeros(9),
             jacobian=np.full((11, 9), np.nan),

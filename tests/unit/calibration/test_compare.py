@@ -11,7 +11,7 @@ from scipy import stats
 from machine_texts import HEXAPOD, PLANAR, edited, load_text
 from made_unknowns import PROVENANCE, of_bands, posterior
 from sweeps import thinned
-from truepose.calibration.result.bands import known
+from truepose.calibration.result.bands import tolerance_covariance
 from truepose.calibration.result.compare import ALPHA, chi_square_tail, compare
 from truepose.calibration.result.file import write_calibrated
 from truepose.errors import RequestError
@@ -62,7 +62,7 @@ def test_unchanged_machines_are_told_apart_by_chance_only(tmp_path: Path, name: 
     covariance = posterior(0.1 * deviations, random, 1e-6)
     at_first = random.normal(size=len(deviations)) * deviations
     base = calibrated(tmp_path, path, at_first, covariance)
-    spread = known(base)
+    spread = tolerance_covariance(base)
     none = np.zeros(len(spread.correlation))
 
     def drawn() -> Machine:

@@ -12,10 +12,10 @@ import truepose as tp
 from made_measurements import made_measurements, nominal_values, poses_within
 from truepose.arrays import Floats
 from truepose.calibration.calibrate import Calibration, calibrate
-from truepose.calibration.identification.consider_covariance import considered
+from truepose.calibration.identification.consider_covariance import consider_covariance
 from truepose.calibration.identification.tool_effects import workspace_poses
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.result.bands import known
+from truepose.calibration.result.bands import tolerance_covariance
 from truepose.machine import Machine
 
 MACHINES = Path(__file__).parents[3] / "machines"
@@ -29,7 +29,7 @@ def walking() -> Machine:
 
 def made(machine: Machine, rng: np.random.Generator) -> Machine:
     """A machine within the tolerances."""
-    bands = known(machine)
+    bands = tolerance_covariance(machine)
     off = rng.multivariate_normal(np.zeros(len(bands.correlation)), bands.correlation)
     values = machine.nominal + bands.shift + bands.effects @ off
     return machine.replace(dict(zip(machine.parameters, values.tolist(), strict=True)))
@@ -99,13 +99,13 @@ def test_the_parts_add_up(walking: Machine) -> None:
     data = measured(walking, walking, rng)
     part = calibrate(walking, data, identify=LENGTHS)
     _, joints, placements = workspace_poses(walking, part.poses)
-    found = considered(walking, part.fit, LENGTHS, joints, placements)
+    found = consider_covariance(walking, part.fit, LENGTHS, joints, placements)
     assert found is not None
     assert found.every[: len(found.labels)] != found.labels
     assert (found.alone.position <= found.after.position).all()
     squares = found.alone.position**2 + found.part.position**2
     np.testing.assert_allclose(found.after.position**2, squares, rtol=1e-3)
-    assert considered(walking, part.fit, (), joints, placements) is None
+    assert consider_covariance(walking, part.fit, (), joints, placements) is None
 
 
 @pytest.mark.parametrize("use_prior", [True, False])

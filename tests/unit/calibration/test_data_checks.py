@@ -21,10 +21,16 @@ from made_blunders import (
 )
 from made_measurements import made_measurements, nominal_values, poses_within
 from sweeps import thinned
-from truepose.calibration.data_checks import CODES, Setup, Suspicion, nominal_readings, suspicions
+from truepose.calibration.data_checks import (
+    CODES,
+    Placement,
+    Suspicion,
+    nominal_readings,
+    suspicions,
+)
 from truepose.calibration.data_checks.nominal import turned
 from truepose.calibration.data_checks.too_few import last_digit
-from truepose.calibration.identification.problem import Problem
+from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.instruments import REGISTRY, Frame
 from truepose.calibration.measurements import Measurements
@@ -244,7 +250,7 @@ def test_warm_and_loaded_machines_arouse_no_suspicion(name: str) -> None:
         unknowns = unknowns_of(m, made)
         spread = np.sqrt(np.diagonal(unknowns.prior_covariance))
         values = unknowns.prior_mean + spread * np.random.default_rng(2).uniform(-1, 1, spread.size)
-        shows = Problem(m, made, unknowns).predict(values)
+        shows = IdentificationProblem(m, made, unknowns).predict(values)
         assert suspicions(m, with_noise(made, shows, 2)) == (), kind
 
 
@@ -265,7 +271,7 @@ def test_another_frame_than_stated(name: str) -> None:
     m = machine(name)
     made = made_measurements(m, "position", poses_within(m, COUNT), values="nominal")
     turn = np.array([0.0, 0.0, 0.3]) if len(m.dof) < 6 and "z" not in m.dof else [0.2, -0.1, 0.3]
-    setup = Setup(np.array([0.3, -0.2, 0.0]), turned(np.asarray(turn)), np.zeros(3))
+    setup = Placement(np.array([0.3, -0.2, 0.0]), turned(np.asarray(turn)), np.zeros(3))
     found = first(name, with_noise(made, shown(m, m, made, [setup]), 3))
     assert found.code == "other-frame"
     assert "another frame" in found.sentence
@@ -275,7 +281,7 @@ def test_another_frame_than_stated(name: str) -> None:
 def test_forgotten_target(name: str) -> None:
     m = machine(name)
     made = made_measurements(m, "position", poses_within(m, 40), values="nominal")
-    setup = Setup(np.zeros(3), np.eye(3), np.array([0.01, -0.02, 0.08]))
+    setup = Placement(np.zeros(3), np.eye(3), np.array([0.01, -0.02, 0.08]))
     found = first(name, with_noise(made, shown(m, m, made, [setup]), 3))
     assert found.code == "target-offset"
 

@@ -18,7 +18,7 @@ from made_measurements import made_measurements, poses_within
 from truepose.calibration.calibrate import Calibration, calibrate
 from truepose.calibration.data_checks import Suspicion
 from truepose.calibration.dataset import SCHEMA, answer_of, covariance_of, dataset_of, verdict_of
-from truepose.calibration.identification.problem import Problem
+from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.result.save import save
 from truepose.errors import RequestError
@@ -49,7 +49,7 @@ def hexapod(held_out: bool = False) -> Calibration:
     true = np.zeros(unknowns.count)
     sigma = np.sqrt(np.diagonal(unknowns.prior_covariance)[: unknowns.n_machine])
     true[: unknowns.n_machine] = sigma * rng.normal(size=unknowns.n_machine)
-    shown = Problem(machine, data, unknowns).predict(true)
+    shown = IdentificationProblem(machine, data, unknowns).predict(true)
     noise = data.uncertainty * rng.normal(size=shown.size)
     return calibrate(machine, data.with_values(shown + noise))
 

@@ -88,7 +88,7 @@ def test_readings_are_repeated_only_where_candidates_are_fewer_unless_asked() ->
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_updates_equal_direct_evaluation(criterion: Criterion) -> None:
     candidates = problem(3, count=15, readings=3, unknowns=7)
-    state = exchange.State(candidates, criterion, [1, 4, 9, 12])
+    state = exchange.ExchangeState(candidates, criterion, [1, 4, 9, 12])
     change = state.without(2)
     rest = [1, 4, 12]
     sign = 1.0 if criterion == "tool" else -1.0
@@ -100,7 +100,7 @@ def test_updates_equal_direct_evaluation(criterion: Criterion) -> None:
     ]
     np.testing.assert_allclose(state.gains(change.seen, change.spread), direct, rtol=1e-8)
     state.exchange(2, change, 6)
-    fresh = exchange.State(candidates, criterion, [1, 4, 6, 12])
+    fresh = exchange.ExchangeState(candidates, criterion, [1, 4, 6, 12])
     np.testing.assert_allclose(state.seen, fresh.seen, atol=1e-9)
     np.testing.assert_allclose(state.spread, fresh.spread, atol=1e-9)
     np.testing.assert_allclose(state.covariance, fresh.covariance, atol=1e-9)

@@ -14,7 +14,7 @@ from build_machine import machine_files
 from machine_texts import PLANAR, edited, load_text
 from made_measurements import made_measurements, poses_within, reference_condition
 from truepose.calibration.identification.fit import Fit, fit
-from truepose.calibration.identification.problem import Problem
+from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.robust import outliers
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.calibration.instruments import Frame
@@ -41,7 +41,7 @@ def read_of(
     machine: Machine, data: Measurements, unknowns: Unknowns, truth: np.ndarray, seed: int | None
 ) -> Measurements:
     """What the machine with `truth` shows, with noise where there is a seed."""
-    read = Problem(machine, data, unknowns).predict(truth)
+    read = IdentificationProblem(machine, data, unknowns).predict(truth)
     if seed is not None:
         read += data.uncertainty * np.random.default_rng(seed).standard_normal(read.size)
     return data.with_values(read)
@@ -150,7 +150,7 @@ def test_warm_and_loaded_rows_give_the_cold_and_free_machine() -> None:
     truth = 0.5 * unknowns.half * np.random.default_rng(2).uniform(-1.0, 1.0, unknowns.count)
     read = read_of(machine, data, unknowns, truth, None)
     plain = tracked(machine)
-    shown = Problem(machine, plain, unknowns).predict(truth)
+    shown = IdentificationProblem(machine, plain, unknowns).predict(truth)
     assert np.abs(read.value - shown).max() > 20e-6  # heat and load do show
     warm = fit(machine, read, unknowns, robust=False)
     free = fit(machine, plain.with_values(shown), unknowns, robust=False)
@@ -239,7 +239,7 @@ def test_the_two_signs_of_a_ball_bars_plane_are_both_tried() -> None:
             data, instruments=(dataclasses.replace(instrument, frame=placed_at),)
         )
         unknowns = unknowns_of(machine, data)
-        read = Problem(machine, known, unknowns).predict(np.zeros(unknowns.count))
+        read = IdentificationProblem(machine, known, unknowns).predict(np.zeros(unknowns.count))
         found = fit(machine, data.with_values(read), unknowns)
         assert np.abs(found.before).max() < 1e-3
 
@@ -287,7 +287,7 @@ def test_several_instruments_are_fitted_together() -> None:
         np.diagonal(unknowns.prior_covariance)[: unknowns.n_machine]
     )
     truth[unknowns.names.index("bar.bias.distance")] = 35e-6
-    read = data.with_values(Problem(machine, really, unknowns).predict(truth))
+    read = data.with_values(IdentificationProblem(machine, really, unknowns).predict(truth))
     found = fit(machine, read, unknowns, robust=False)
     assert np.abs(found.residual).max() < 0.2  # nothing but the pull of the tolerances
     assert abs(found.values[unknowns.names.index("bar.bias.distance")] - 35e-6) < 5e-6

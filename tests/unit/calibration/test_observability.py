@@ -65,18 +65,18 @@ def test_rank_does_not_depend_on_units(scale: float) -> None:
     jacobian = drawn(5, 12, 4)
     jacobian[:, 3] = jacobian[:, 0] - jacobian[:, 1]
     jacobian[:, 3] *= scale
-    assert seen.spread(seen.of_machine(jacobian, 4)).rank == 3
+    assert seen.row_covariance(seen.of_machine(jacobian, 4)).rank == 3
     # Both sides of the threshold.
     near = jacobian.copy()
     near[:, 3] += 1e-7 * scale * drawn(6, 12, 1)[:, 0]
-    assert seen.spread(seen.of_machine(near, 4)).rank == 4
+    assert seen.row_covariance(seen.of_machine(near, 4)).rank == 4
     near[:, 3] = jacobian[:, 3] + 1e-11 * scale * drawn(6, 12, 1)[:, 0]
-    assert seen.spread(seen.of_machine(near, 4)).rank == 3
+    assert seen.row_covariance(seen.of_machine(near, 4)).rank == 3
 
 
 def test_instruments_are_projected_out() -> None:
     jacobian = drawn(7, 30, 9)
-    left = seen.spread(seen.of_machine(jacobian, 6))
+    left = seen.row_covariance(seen.of_machine(jacobian, 6))
     whole = np.linalg.inv(jacobian.T @ jacobian)
     assert left.root @ left.root.T == pytest.approx(whole[:6, :6], rel=1e-10)
     assert left.standard() == pytest.approx(np.sqrt(np.diagonal(whole)[:6]))
@@ -85,7 +85,7 @@ def test_instruments_are_projected_out() -> None:
 def test_what_an_instrument_can_imitate_is_not_seen() -> None:
     jacobian = drawn(8, 30, 7)
     jacobian[:, 6] = jacobian[:, 0] + 2.0 * jacobian[:, 1]  # a frame that moves as 0 and 1 do
-    left = seen.spread(seen.of_machine(jacobian, 6))
+    left = seen.row_covariance(seen.of_machine(jacobian, 6))
     assert left.rank == 5
     direction = left.null[0] / left.null[0][0]
     assert direction == pytest.approx([1.0, 2.0, 0.0, 0.0, 0.0, 0.0], abs=1e-9)
@@ -97,14 +97,14 @@ def test_what_an_instrument_can_imitate_is_not_seen() -> None:
 def test_an_unknown_without_effect_is_not_seen() -> None:
     jacobian = drawn(9, 20, 3)
     jacobian[:, 1] *= 1e-16
-    assert np.isinf(seen.spread(seen.of_machine(jacobian, 3)).standard()[1])
+    assert np.isinf(seen.row_covariance(seen.of_machine(jacobian, 3)).standard()[1])
     # Not even with the scale of a prior, where it moves nothing by a millionth of the noise ...
     jacobian[:, 1] *= 1e6
     unit = np.array([1.0, 1e3, 1.0])
-    assert np.isinf(seen.spread(seen.of_machine(jacobian, 3, unit)).standard()[1])
+    assert np.isinf(seen.row_covariance(seen.of_machine(jacobian, 3, unit)).standard()[1])
     # ... but a larger one is seen, however badly.
     unit[1] = 1e8
-    assert np.isfinite(seen.spread(seen.of_machine(jacobian, 3, unit)).standard()[1])
+    assert np.isfinite(seen.row_covariance(seen.of_machine(jacobian, 3, unit)).standard()[1])
 
 
 def test_covariance_with_a_correlated_prior() -> None:
@@ -116,7 +116,7 @@ def test_covariance_with_a_correlated_prior() -> None:
     both = seen.stacked(seen.of_machine(jacobian, 4), seen.prior(covariance))
     information = jacobian.T @ jacobian
     information[:3, :3] += np.linalg.inv(root @ root.T)
-    found = seen.spread(both)
+    found = seen.row_covariance(both)
     assert found.root @ found.root.T == pytest.approx(np.linalg.inv(information), rel=1e-9)
     again = seen.prior_root(covariance)
     assert (again @ again.T)[:3, :3] == pytest.approx(root @ root.T)
@@ -154,6 +154,6 @@ def test_what_instruments_imitate_altogether_is_not_seen() -> None:
     # Every column of the machine is one of the instrument's, but for rounding.
     jacobian = drawn(14, 40, 3)
     jacobian = np.hstack([jacobian @ drawn(15, 3, 3), jacobian])
-    left = seen.spread(seen.of_machine(jacobian, 3))
+    left = seen.row_covariance(seen.of_machine(jacobian, 3))
     assert left.rank == 0
     assert np.isinf(left.standard()).all()

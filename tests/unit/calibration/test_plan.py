@@ -12,7 +12,7 @@ import pytest
 
 import truepose as tp
 from build_machine import MACHINES
-from truepose.calibration.identification.problem import Problem
+from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.instruments import REGISTRY, Frame, Instrument
 from truepose.calibration.planning import poses as planned_poses
 from truepose.calibration.planning.comparison import compare_instruments
@@ -103,7 +103,7 @@ def test_the_uncertainty_told_is_what_simulated_calibrations_show() -> None:
     machine = machine_of("tripod")
     found = plan(machine, tracker(machine, unknown=False), 8)
     measurements = planned(machine, found.instruments, Placed(machine, found.poses))
-    problem = Problem(machine, measurements, found.unknowns)
+    problem = IdentificationProblem(machine, measurements, found.unknowns)
     generator = np.random.default_rng(8)
     factor = np.linalg.cholesky(found.unknowns.prior_covariance)
     truth = found.unknowns.prior_mean + generator.normal(size=(1000, len(factor))) @ factor.T
@@ -168,7 +168,9 @@ def test_the_curve_is_the_covariance_at_the_tool() -> None:
     tool = sensitivity @ found.unknowns.effects
     for count in range(1, 6):
         measurements = planned(machine, found.instruments, Placed(machine, ordered[:count]))
-        rows = Problem(machine, measurements, found.unknowns).jacobian(found.unknowns.prior_mean)
+        rows = IdentificationProblem(machine, measurements, found.unknowns).jacobian(
+            found.unknowns.prior_mean
+        )
         rows = rows / measurements.uncertainty[:, np.newaxis]
         information = rows.T @ rows + np.linalg.inv(found.unknowns.prior_covariance)
         covariance = np.linalg.inv(information)

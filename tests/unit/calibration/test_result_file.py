@@ -16,7 +16,7 @@ from made_unknowns import PROVENANCE, MadeUnknowns, of_bands, posterior
 from sweeps import thinned
 from truepose.arrays import Floats
 from truepose.calibration.identification.properties import properties_of
-from truepose.calibration.result.bands import bands_of, known
+from truepose.calibration.result.bands import bands_of, tolerance_covariance
 from truepose.calibration.result.directions import directions, tilted
 from truepose.calibration.result.file import write_calibrated
 from truepose.errors import MachineFileError, RequestError
@@ -98,13 +98,16 @@ def test_every_machine_comes_back(tmp_path: Path, path: Path, as_shifts: bool) -
     effects = effects_of(machine, unknowns)
     if as_shifts:
         assert np.array_equal(written.nominal, machine.nominal)
-        shift = known(written).shift
+        shift = tolerance_covariance(written).shift
         assert np.allclose(shift, effects @ values, rtol=1e-9, atol=1e-15)
     else:
         _assert_values(machine, written, effects @ values)
-        assert not known(written).shift.any()
+        assert not tolerance_covariance(written).shift.any()
     # A direction counts from its new axis; its two angles together vary as much as before.
-    spread, wanted = np.diagonal(known(written).covariance), effects @ covariance @ effects.T
+    spread, wanted = (
+        np.diagonal(tolerance_covariance(written).covariance),
+        effects @ covariance @ effects.T,
+    )
     for each in directions(machine):
         at = list(each.columns)
         assert spread[at].sum() == pytest.approx(np.diagonal(wanted)[at].sum(), rel=1e-3)
@@ -191,7 +194,9 @@ def test_groups_stay_one_variable(tmp_path: Path) -> None:
     assert np.allclose(again.effects, unknowns.effects[:, order])
     assert np.allclose(after, 0.1 * deviations[order])
     effects = effects_of(machine, unknowns)
-    assert np.allclose(known(written).covariance, effects @ covariance @ effects.T, atol=1e-24)
+    assert np.allclose(
+        tolerance_covariance(written).covariance, effects @ covariance @ effects.T, atol=1e-24
+    )
     assert "# half" in said
     assert "sign = -1" in said
 
@@ -225,8 +230,12 @@ def test_own_tolerances_go_before_patterns_classes_and_shared_ones(tmp_path: Pat
     assert "length" not in found["strut"][1]
     assert found["strut"][1]["base"][0] == 0
     assert found["machine"]["tool"] == pytest.approx([0.3, 0, 0])
-    spread = dict(zip(machine.parameters, np.diagonal(known(written).covariance), strict=True))
-    before = dict(zip(machine.parameters, np.diagonal(known(machine).covariance), strict=True))
+    spread = dict(
+        zip(machine.parameters, np.diagonal(tolerance_covariance(written).covariance), strict=True)
+    )
+    before = dict(
+        zip(machine.parameters, np.diagonal(tolerance_covariance(machine).covariance), strict=True)
+    )
     assert spread["strut.1.length"] == pytest.approx(9e-12)
     assert spread["strut.2.base.y"] == pytest.approx(4e-12)
     assert spread["tool.x"] == 0.0
@@ -373,7 +382,7 @@ def test_a_shift_far_larger_than_its_uncertainty(tmp_path: Path) -> None:
         written, _ = write(
             tmp_path, path, machine, unknowns, [1e-3, 1e-3], covariance, as_shifts=as_shifts
         )
-        spread = known(written).covariance
+        spread = tolerance_covariance(written).covariance
         assert spread[spread != 0.0] == pytest.approx(covariance.ravel(), rel=1e-3)
 
 
@@ -440,7 +449,7 @@ def test_directions_turn_what_is_known_of_them(tmp_path: Path, tilt: tuple[float
         ]
         return np.transpose(moved) @ spread @ np.array(moved)
 
-    found = known(written).covariance[np.ix_(new.columns, new.columns)]
+    found = tolerance_covariance(written).covariance[np.ix_(new.columns, new.columns)]
     assert np.allclose(
         in_space(new, (0.0, 0.0), found), in_space(old, tilt, covariance), rtol=0.0, atol=1e-20
     )
@@ -452,7 +461,7 @@ def test_one_tilt_alone_becomes_a_group_where_both_new_ones_move(tmp_path: Path)
     unknowns = unknown(machine, {"drive.d1.axis.v": 1.0}, {"drive.d1.axis.u": 1.0, "tool.x": 0.5})
     covariance = np.array([[1e-12, 3e-13], [3e-13, 4e-12]])
     written, _ = write(tmp_path, path, machine, unknowns, [1e-2, 1e-2], covariance)
-    spread = known(written).covariance
+    spread = tolerance_covariance(written).covariance
     at = [machine.parameters.index(name) for name in ("tool.x", "drive.d1.axis.u")]
     assert spread[at[0], at[0]] == pytest.approx(1e-12)
     # With the length of strut 1, which keeps its own.
@@ -460,7 +469,7 @@ def test_one_tilt_alone_becomes_a_group_where_both_new_ones_move(tmp_path: Path)
     alone = unknown(machine, {"drive.d1.axis.v": 1.0})
     written, said = write(tmp_path, path, machine, alone, [1e-2], covariance[:1, :1])
     assert said.count('group = "drive.d1.axis.v as calibrated"') == 2
-    assert np.linalg.matrix_rank(known(written).covariance * 1e12, tol=1e-9) == 2
+    assert np.linalg.matrix_rank(tolerance_covariance(written).covariance * 1e12, tol=1e-9) == 2
 
 
 def test_shifts_leave_what_the_controller_has(tmp_path: Path) -> None:

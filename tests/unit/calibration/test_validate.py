@@ -16,7 +16,7 @@ from truepose.calibration.identification.validate import fold_numbers
 from truepose.calibration.instruments import Frame
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.arrays import joined
-from truepose.calibration.result.bands import known
+from truepose.calibration.result.bands import tolerance_covariance
 from truepose.machine import Machine
 
 FILES = {path.stem: path for path in machine_files()}
@@ -27,7 +27,7 @@ FAR = Frame(origin=(2.0, -1.3, 0.7), rotation=(0.1, 0.7, 0.7, 0.1))
 
 def made_wrong(machine: Machine, seed: int) -> Machine:
     """The machine with errors drawn from its tolerances."""
-    of = known(machine)
+    of = tolerance_covariance(machine)
     values, vectors = np.linalg.eigh(of.correlation)
     random = np.random.default_rng(seed).standard_normal(values.size)
     change = of.shift + of.effects @ (vectors @ (np.sqrt(np.maximum(values, 0.0)) * random))

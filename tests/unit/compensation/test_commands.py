@@ -16,7 +16,7 @@ from truepose.compensation import commands
 from truepose.compensation.commands import actual_of_joints, actual_poses, corrected_poses
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
-from truepose.sources import Block, Deviation
+from truepose.sources import Deviation, PoseBlock
 
 OK = _kernel.STATUS.index("ok")
 ROUNDING = 3e-12
@@ -167,7 +167,7 @@ def test_angles_stay_near_those_asked_for(hexapod: Machine, turned: list[float])
 def test_shifts_are_those_of_the_pose_reached(two_slider: Machine) -> None:
     """A deviation that rises steeply with x, so that the pose asked for will not do for it."""
 
-    def rising(block: Block) -> Deviation:
+    def rising(block: PoseBlock) -> Deviation:
         x = block.placements[:, :1]
         return Deviation.of(two_slider.kernel.length_parameters, np.hstack([0.02 * x, -0.02 * x]))
 
@@ -188,7 +188,7 @@ def test_shifts_are_those_of_the_pose_reached(two_slider: Machine) -> None:
 def test_what_jumps_back_and_forth_has_a_status(two_slider: Machine) -> None:
     """Left of x = 0.3 the tool is pushed right, right of it left: it stands at no pose."""
 
-    def fleeing(block: Block) -> Deviation:
+    def fleeing(block: PoseBlock) -> Deviation:
         side = np.where(block.placements[:, :1] < 0.3, 1e-3, -1e-3)
         return Deviation.of(two_slider.kernel.length_parameters, np.hstack([side, -side]))
 

@@ -14,7 +14,7 @@ from made_source import MadeSource, with_sources
 from truepose.compensation.commands import actual_of_joints, corrected_poses
 from truepose.errors import RequestError
 from truepose.runs.displacement import displacement
-from truepose.sources import Block, Deviation
+from truepose.sources import Deviation, PoseBlock
 
 AMPLITUDE, PITCH = 2e-6, 5e-3
 ACTUATOR = 'actuator = { periodic = { amplitude = "2 um", period = 5, phase = "0 deg" } }\n'
@@ -71,7 +71,7 @@ def test_what_is_known_by_the_program_is_known_by_the_command(periodic: tp.Machi
 def test_loads_and_lengths_stay_those_of_the_nominal_command(plain: tp.Machine) -> None:
     seen: list[tuple[np.ndarray, ...]] = []
 
-    def of_block(block: Block) -> Deviation:
+    def of_block(block: PoseBlock) -> Deviation:
         seen.append((block.drive_joints, block.joints, block.lengths, block.tension))
         offset = plain.parameters.index("drive.d1.offset")
         return Deviation.of([offset], 1e-3 + 0.01 * block.drive_joints[:, :1])

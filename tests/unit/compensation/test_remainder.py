@@ -17,8 +17,8 @@ from truepose.compensation.corrected import corrected
 from truepose.compensation.remainder import TURNED, Bounds, Remainder
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.runs.first_order import Mover, first_order
-from truepose.runs.poses import OK, Walk
+from truepose.runs.first_order import ExactError, first_order
+from truepose.runs.poses import OK, PoseRun
 from truepose.sources import Deviation, acting
 
 Floats = NDArray[np.float64]
@@ -48,15 +48,15 @@ def poses_of_conditioning(machine: Machine, low: float, high: float) -> Floats:
     return poses[(found >= low) & (found <= high)]
 
 
-def at(machine: Machine, poses: Floats) -> tuple[Mover, Floats, Bounds]:
+def at(machine: Machine, poses: Floats) -> tuple[ExactError, Floats, Bounds]:
     """Exact errors, the linear reach, and the remainder after compensation."""
     sources = acting(machine, machine.condition)
-    block = next(iter(Walk(machine, poses, machine.condition)))
+    block = next(iter(PoseRun(machine, poses, machine.condition)))
     after, spread, _ = corrected(machine, block, sources)
     value, effects, _ = first_order(machine, after, spread)
     assert np.abs(value).max() < 1e-13
     bounds = Remainder(machine).bound(after, spread, value, effects)
-    return Mover(machine, after, spread), np.abs(effects).sum(axis=2), bounds
+    return ExactError(machine, after, spread), np.abs(effects).sum(axis=2), bounds
 
 
 def test_the_law_holds_near_a_singularity_or_is_not_claimed(above_and_below: Machine) -> None:

@@ -20,9 +20,9 @@ from truepose import _kernel, controllers
 from truepose.controllers.c import Program, program_of
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.displacement import together
-from truepose.runs.poses import Walk
-from truepose.sources import Block, Deviation, acting
+from truepose.runs.displacement import sum_deviations
+from truepose.runs.poses import PoseRun
+from truepose.sources import Deviation, PoseBlock, acting
 
 MACHINE_FOLDER = Path("machines")
 MACHINES = sorted(path.stem for path in MACHINE_FOLDER.glob("*.toml"))
@@ -88,9 +88,9 @@ class Both:
         table = random_poses(machine, count)
         nominal, joints, poses, commanded = [], [], [], []
         sources = [s for s in acting(machine, condition) if s.name not in c.left_out]
-        for block in Walk(machine, table, condition):
+        for block in PoseRun(machine, table, condition):
             deviations = [source.deviation(machine, condition, block) for source in sources]
-            shift = together([(d.parameters, d.shift) for d in deviations])
+            shift = sum_deviations([(d.parameters, d.shift) for d in deviations])
             requested = block.requested[block.indices]
             found, _, status = machine.kernel.corrected(requested, *shift)
             usable = status == 0
@@ -365,7 +365,7 @@ def test_a_law_is_not_believed_of_one_pose(tmp_path: Path) -> None:
 
 
 def test_a_shift_out_of_proportion_to_the_heat_is_refused() -> None:
-    def bending(block: Block) -> Deviation:
+    def bending(block: PoseBlock) -> Deviation:
         return Deviation.of([6], 1e-7 * block.condition.temperature_rise("strut.1") ** 2)
 
     machine = with_sources(machine_of("planar_two_slider"), MadeSource("bending", of_block=bending))

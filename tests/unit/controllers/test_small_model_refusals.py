@@ -27,7 +27,7 @@ from truepose.controllers import controller
 from truepose.controllers._export import options_of
 from truepose.controllers._fit import fit
 from truepose.controllers.klipper import Klipper
-from truepose.controllers.klipper.linear import Linear
+from truepose.controllers.klipper.linear import KlipperLinear
 from truepose.controllers.linuxcnc_genhexkins import LinuxCncGenhexkins
 from truepose.controllers.linuxcnc_genhexkins import _Model as genhexkins
 from truepose.controllers.linuxcnc_lineardelta import LinuxCncLinearDelta
@@ -247,7 +247,7 @@ def test_a_joint_driven_a_little_out_of_travel_is_counted(tmp_path: Path) -> Non
     machine = loaded(tmp_path, text)
     top = machine.inverse(machine.poses()).max() / 1e-3 + 0.1
     machine = loaded(tmp_path, text.replace("travel = [0, 580]", f"travel = [0, {float(top)!r}]"))
-    model = Linear(machine, options_of(Klipper, machine))
+    model = KlipperLinear(machine, options_of(Klipper, machine))
     found = fit(machine, model)
     joints = model.joints(found.values, machine.poses())
     out = int((joints > top * 1e-3).any(axis=1).sum())
@@ -284,7 +284,7 @@ def test_blocks_are_ascii_and_name_their_machine(adapter) -> None:
 
 def test_a_fit_that_does_not_settle_says_so() -> None:
     machine = tp.load(MACHINES / "linear_delta.toml")
-    model = Linear(machine, options_of(Klipper, machine))
+    model = KlipperLinear(machine, options_of(Klipper, machine))
     assert fit(machine, model).settled
     cut = fit(machine, model, most_evaluations=2)
     assert not cut.settled

@@ -18,7 +18,7 @@ from reference_kinematics import Reference, rotation_of_quaternion
 from truepose.error_budget.strain import ABSORBED, strain
 from truepose.errors import RequestError, TrueposeError
 from truepose.machine import Machine
-from truepose.sources import Block, Deviation
+from truepose.sources import Deviation, PoseBlock
 from truepose.sources.clearance import half_clearances
 
 FILE = MACHINES / "overconstrained.toml"
@@ -137,7 +137,7 @@ class Made:
     def acts(self, condition: object) -> bool:
         return True
 
-    def deviation(self, machine: Machine, condition: object, block: Block) -> Deviation:
+    def deviation(self, machine: Machine, condition: object, block: PoseBlock) -> Deviation:
         return self.made
 
 
@@ -288,7 +288,7 @@ def test_half_clearances_add_up_over_both_joints() -> None:
     )
     kernel = both.kernel
     joints, placements, _ = kernel.place(POSES)
-    block = Block(both, both.condition, POSES, np.arange(3), joints, placements)
+    block = PoseBlock(both, both.condition, POSES, np.arange(3), joints, placements)
     np.testing.assert_allclose(half_clearances(block), 8e-6, rtol=1e-12)
 
 

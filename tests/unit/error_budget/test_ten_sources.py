@@ -20,9 +20,9 @@ from build_machine import MACHINES
 from machine_texts import load_text
 from made_source import with_sources
 from truepose.machine import Machine
-from truepose.runs.displacement import Moved, displacement, together
-from truepose.runs.poses import Walk
-from truepose.sources import REGISTRY, Block, Deviation
+from truepose.runs.displacement import ParameterDeviation, displacement, sum_deviations
+from truepose.runs.poses import PoseRun
+from truepose.sources import REGISTRY, Deviation, PoseBlock
 
 EVERY = [source.name for source in REGISTRY]
 
@@ -81,10 +81,10 @@ def budget_of(path: Path) -> xr.Dataset:
     return tp.budget(loaded(path), some_poses(path))
 
 
-def at_poses(path: Path) -> tuple[Machine, Block, dict[str, Deviation]]:
+def at_poses(path: Path) -> tuple[Machine, PoseBlock, dict[str, Deviation]]:
     """The machine, a block of its poses, and what each source does there."""
     machine = loaded(path)
-    (block,) = Walk(machine, np.array(some_poses(path)), machine.condition)
+    (block,) = PoseRun(machine, np.array(some_poses(path)), machine.condition)
     return (
         machine,
         block,
@@ -95,7 +95,7 @@ def at_poses(path: Path) -> tuple[Machine, Block, dict[str, Deviation]]:
     )
 
 
-def linear(machine: Machine, block: Block, moved: Moved) -> np.ndarray:
+def linear(machine: Machine, block: PoseBlock, moved: ParameterDeviation) -> np.ndarray:
     """(n, n_component) the error to first order."""
     columns, values = moved
     sensitivity, status = machine.kernel.sensitivity_at(block.joints, block.placements, columns)
@@ -115,11 +115,11 @@ def test_every_source_that_fits_the_machine_is_there_and_does_something(path: Pa
 def test_the_linear_parts_add_up_to_the_linear_total(path: Path) -> None:
     machine, block, deviations = at_poses(path)
     shifts = {key: (each.parameters, each.shift) for key, each in deviations.items()}
-    parts = np.array([linear(machine, block, together([moved])) for moved in shifts.values()])
-    total = linear(machine, block, together(shifts.values()))
+    parts = np.array([linear(machine, block, sum_deviations([moved])) for moved in shifts.values()])
+    total = linear(machine, block, sum_deviations(shifts.values()))
     assert np.abs(parts.sum(axis=0) - total).max() < 1e-14 * np.abs(parts).sum(axis=0).max()
     # The same total from the exact error: of a part of all deviations, either way, to third order.
-    columns, values = together(shifts.values())
+    columns, values = sum_deviations(shifts.values())
     part = 1e-3
     either = [
         displacement(machine, block.joints, block.placements, (columns, sign * part * values))[0]
@@ -132,7 +132,9 @@ def test_the_linear_parts_add_up_to_the_linear_total(path: Path) -> None:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_what_the_exact_total_has_beyond_the_linear_parts_is_of_second_order(path: Path) -> None:
     machine, block, deviations = at_poses(path)
-    columns, values = together([(each.parameters, each.shift) for each in deviations.values()])
+    columns, values = sum_deviations(
+        [(each.parameters, each.shift) for each in deviations.values()]
+    )
     total = linear(machine, block, (columns, values))
     beyond = []
     for part in (1.0, 0.5):
@@ -161,7 +163,7 @@ def test_a_source_taken_out_changes_its_own_rows_only(path: Path) -> None:
         without = [
             (each.parameters, each.shift) for key, each in deviations.items() if key != removed
         ]
-        total = displacement(machine, block.joints, block.placements, together(without))[0]
+        total = displacement(machine, block.joints, block.placements, sum_deviations(without))[0]
         assert np.abs(found.overall_error.values - total).max() < 1e-15
 
 

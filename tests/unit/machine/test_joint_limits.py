@@ -13,7 +13,7 @@ from machine_texts import PLANAR, edited, load_text
 from truepose import _kernel
 from truepose.errors import PoseError, RequestError
 from truepose.machine import Machine
-from truepose.reporting.workspace_check import reach
+from truepose.reporting.workspace_check import check_workspace
 from truepose.runs.poses import faults_text
 
 LIMIT = _kernel.STATUS.index("joint_limit")
@@ -115,7 +115,7 @@ def test_the_reason_says_which_joint_and_by_how_much(tmp_path: Path) -> None:
 
 def test_the_check_says_so_too(tmp_path: Path) -> None:
     machine = limited(tmp_path, "base_joint", 30.0)
-    found = reach(machine)
+    found = check_workspace(machine)
     (reason,) = found.reasons
     assert reason.count == (found.status == "joint_limit").sum() == 11
     text = reason.text(machine.shown)

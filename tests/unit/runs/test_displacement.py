@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from truepose.runs.displacement import together
+from truepose.runs.displacement import sum_deviations
 
 
 def test_each_parameter_moves_once_by_the_sum() -> None:
-    columns, values = together(
+    columns, values = sum_deviations(
         [
             (np.array([5, 2]), np.array([[1.0, 2.0]])),
             (np.array([2, 9, 2]), np.array([[10.0, 20.0, 100.0], [30.0, 40.0, 300.0]])),
@@ -20,13 +20,13 @@ def test_each_parameter_moves_once_by_the_sum() -> None:
 
 def test_one_cause_that_names_each_parameter_once_is_handed_on() -> None:
     given = (np.array([5, 2]), np.array([[1.0, 2.0]]))
-    columns, values = together([given])
+    columns, values = sum_deviations([given])
     assert dict(zip(columns.tolist(), values[0].tolist(), strict=True)) == {5: 1.0, 2: 2.0}
-    columns, values = together([(np.array([5, 5]), np.array([[1.0, 2.0]]))])
+    columns, values = sum_deviations([(np.array([5, 5]), np.array([[1.0, 2.0]]))])
     assert (columns.tolist(), values.tolist()) == ([5], [[3.0]])
 
 
 def test_no_cause_moves_nothing() -> None:
-    columns, values = together([])
+    columns, values = sum_deviations([])
     assert columns.size == 0
     assert values.shape == (1, 0)

@@ -13,8 +13,8 @@ from build_machine import MACHINES
 from machine_texts import PLANAR, edited, load_text
 from made_source import MadeSource, with_sources
 from truepose.errors import RequestError
-from truepose.runs.poses import Travel, Walk
-from truepose.sources import Block, Deviation
+from truepose.runs.poses import PoseRun, Travel
+from truepose.sources import Deviation, PoseBlock
 
 GOOD = [0.3, 0.2]
 HIGH = [0.3, 0.6]  # carriages at 1 m, travel ends at 0.9 m
@@ -41,7 +41,7 @@ def test_poses_that_cannot_be_used_are_left_out_and_counted(run: object, machine
 
 
 def test_a_pose_that_one_source_makes_unreachable_is_left_out(machine: tp.Machine) -> None:
-    def far_at_the_second(block: Block) -> Deviation:
+    def far_at_the_second(block: PoseBlock) -> Deviation:
         shift = np.where(block.indices == 1, 0.4, 1e-4)[:, np.newaxis]
         return Deviation.of(machine.kernel.length_parameters[:1], -shift)
 
@@ -181,13 +181,13 @@ def test_the_direction_in_which_a_joint_last_moved(machine: tp.Machine) -> None:
 def test_travel_and_times_are_those_of_the_poses_that_are_left(machine: tp.Machine) -> None:
     poses = np.array([GOOD, HIGH, [0.3, 0.25], WIDE, GOOD])
     times = np.arange(5.0)
-    (block,) = Walk(machine, poses, machine.condition, path=True, times=times)
+    (block,) = PoseRun(machine, poses, machine.condition, path=True, times=times)
     assert block.indices.tolist() == [0, 2, 4]
     assert block.travel is not None
     assert block.times is not None
     assert block.times.tolist() == [0.0, 2.0, 4.0]
     assert block.travel.tolist() == [[0, 0], [-1, -1], [-1, -1]], "the way down from HIGH counts"
-    (plain,) = Walk(machine, poses, machine.condition)
+    (plain,) = PoseRun(machine, poses, machine.condition)
     assert plain.travel is None
     assert plain.times is None
 

@@ -14,7 +14,7 @@ import xarray as xr
 import truepose as tp
 from build_machine import MACHINES
 from truepose.compensation import SCHEMA as COMPENSATION
-from truepose.error_budget import SCHEMA as BUDGET
+from truepose.error_budget.evaluate import SCHEMA as BUDGET
 from truepose.error_budget.over_time import SCHEMA as OVER_TIME
 from truepose.error_budget.strain import SCHEMA as STRAIN
 from truepose.machine.temperature_log import TemperatureLog

@@ -12,22 +12,30 @@ import truepose as tp
 from machine_texts import PLANAR, edited, load_text
 from made_source import MadeSource, with_sources
 from truepose.machine import Machine
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import Spread, spread
-from truepose.sources import OWN_GROUP, REGISTRY, TRIANGULAR, UNIFORM, Block, Deviation, Tolerance
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import (
+    OWN_GROUP,
+    REGISTRY,
+    TRIANGULAR,
+    UNIFORM,
+    Deviation,
+    DimensionalTolerance,
+    PoseBlock,
+)
 
 MACHINE = tp.load(Path(__file__).parents[3] / "machines" / "planar_two_slider.toml")
 
 
-def block_of(machine: Machine) -> Block:
-    (block,) = Walk(machine, machine.poses(), machine.condition)
+def block_of(machine: Machine) -> PoseBlock:
+    (block,) = PoseRun(machine, machine.poses(), machine.condition)
     return block
 
 
-def made(*given: Deviation, names: tuple[str, ...] = ("first", "second")) -> Spread:
+def made(*given: Deviation, names: tuple[str, ...] = ("first", "second")) -> Variables:
     sources = [MadeSource(name, each) for name, each in zip(names, given, strict=False)]
     machine = with_sources(MACHINE, *sources)
-    return spread(machine, block_of(machine), sources)
+    return variables_at(machine, block_of(machine), sources)
 
 
 def with_all_sources(tmp_path: Path) -> Machine:
@@ -89,7 +97,7 @@ def test_names_are_told_apart() -> None:
 def test_the_machine_s_own_sources(tmp_path: Path) -> None:
     machine = with_all_sources(tmp_path)
     sources = required_sources(machine, machine.condition)
-    found = spread(machine, block_of(machine), sources)
+    found = variables_at(machine, block_of(machine), sources)
     assert len(set(found.names)) == len(found.names)
     assert "one set-up" in found.names
     assert "tolerance: drive.d1.offset" in found.names
@@ -106,7 +114,7 @@ def test_identities_do_not_hang_on_what_else_acts(tmp_path: Path) -> None:
     machine = with_all_sources(tmp_path)
     block = block_of(machine)
     sources = required_sources(machine, machine.condition)
-    whole = spread(machine, block, sources)
+    whole = variables_at(machine, block, sources)
     identity = dict(
         zip(
             zip(whole.sources, whole.columns[_firsts(whole)].tolist(), strict=True),
@@ -116,14 +124,14 @@ def test_identities_do_not_hang_on_what_else_acts(tmp_path: Path) -> None:
     )
     assert len(set(identity.values())) == len(whole.names)
     for source in sources:
-        alone = spread(machine, block, [source])
+        alone = variables_at(machine, block, [source])
         keys = zip(alone.sources, alone.columns[_firsts(alone)].tolist(), strict=True)
         values = zip(alone.streams.tolist(), alone.numbers.tolist(), strict=True)
         for key, value in zip(keys, values, strict=True):
             assert identity[key] == value
 
 
-def _firsts(found: Spread) -> list[int]:
+def _firsts(found: Variables) -> list[int]:
     """The first column of each variable."""
     return [found.variables.tolist().index(number) for number in range(len(found.names))]
 
@@ -132,8 +140,8 @@ def test_a_pose_of_it_moves_the_parameters_as_the_deviations_say(tmp_path: Path)
     machine = with_all_sources(tmp_path)
     block = block_of(machine)
     sources = required_sources(machine, machine.condition)
-    found = spread(machine, block, sources)
-    assert len(found.swing) == len(found.shift[1]) == block.indices.size
+    found = variables_at(machine, block, sources)
+    assert len(found.half_width) == len(found.shift[1]) == block.indices.size
     t = np.random.default_rng(1).uniform(-1.0, 1.0, (4, len(found.names)))
     at = dict(zip(zip(found.sources, found.numbers.tolist(), strict=True), t.T, strict=True))
     for pose in (0, 7):
@@ -157,7 +165,7 @@ def test_a_pose_of_it_moves_the_parameters_as_the_deviations_say(tmp_path: Path)
 
 def test_all_poses_at_once_have_no_one_deviation(tmp_path: Path) -> None:
     machine = with_all_sources(tmp_path)
-    found = spread(machine, block_of(machine), required_sources(machine, machine.condition))
+    found = variables_at(machine, block_of(machine), required_sources(machine, machine.condition))
     with pytest.raises(ValueError, match="several poses"):
         found.parameters_moved(np.zeros((1, len(found.names))))
 
@@ -165,14 +173,14 @@ def test_all_poses_at_once_have_no_one_deviation(tmp_path: Path) -> None:
 def test_nothing_that_varies_is_no_variable() -> None:
     found = made(Deviation.of([0], shift=1e-4))
     assert found.names == ()
-    assert found.swing.shape == (1, 0)
+    assert found.half_width.shape == (1, 0)
     parameters, values = found.parameters_moved(np.zeros((3, 0)))
     assert parameters.tolist() == [0]
     assert values.tolist() == [[1e-4]] * 3
-    empty: Any = spread(MACHINE, block_of(MACHINE), [])
+    empty: Any = variables_at(MACHINE, block_of(MACHINE), [])
     assert empty.names == ()
 
 
 def test_the_source_of_the_file_comes_first(tmp_path: Path) -> None:
-    assert REGISTRY[0] is Tolerance
+    assert REGISTRY[0] is DimensionalTolerance
     assert made(Deviation.of([0], half=1.0)).streams.tolist() == [len(REGISTRY)]

@@ -14,7 +14,7 @@ import truepose as tp
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk
+from truepose.runs.poses import PoseRun
 from truepose.sources import ARCSINE, TWO_POINT, Deviation, normal
 from two_slider import Floats, displaced
 
@@ -49,7 +49,7 @@ def with_table(folder: Path, csv: str = MEASURED, text: str = PLANAR) -> str:
 
 def deviation_of(machine: Machine, poses: Floats, *, path: bool = False) -> Deviation:
     (source,) = (each for each in machine.sources if each.name == "actuator")
-    (block,) = Walk(machine, poses, machine.condition, path=path)
+    (block,) = PoseRun(machine, poses, machine.condition, path=path)
     return cast("Deviation", cast("Any", source).deviation(machine, machine.condition, block))
 
 

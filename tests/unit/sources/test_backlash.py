@@ -12,7 +12,7 @@ import truepose as tp
 from machine_texts import PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk
+from truepose.runs.poses import PoseRun
 from truepose.sources import UNIFORM, Deviation
 from two_slider import Floats, directions, displaced, tensions
 
@@ -31,7 +31,7 @@ def with_backlash(*edits: tuple[str, str], threshold: str = "") -> str:
 
 def deviation_of(machine: Machine, poses: Floats, *, path: bool = False) -> Deviation:
     (source,) = (each for each in machine.sources if each.name == "backlash")
-    (block,) = Walk(machine, poses, machine.condition, path=path)
+    (block,) = PoseRun(machine, poses, machine.condition, path=path)
     found: Deviation = source.deviation(machine, machine.condition, block)  # type: ignore[attr-defined]
     assert [machine.parameters[c] for c in found.parameters] == [
         "drive.d1.offset",
@@ -118,7 +118,7 @@ def test_a_force_of_unknown_direction_resolves_nothing_but_what_it_cannot_reach(
     most = np.linalg.norm(per_force, axis=2)
     for force in (300.0 / most.max() * 0.999, 300.0 / most.max() * 1.001):
         condition = machine.condition.replace(envelope=force)
-        (block,) = Walk(machine, poses, condition, path=True)
+        (block,) = PoseRun(machine, poses, condition, path=True)
         found = source.deviation(machine, condition, block)  # type: ignore[attr-defined]
         lags = (force * most <= 300.0) & (np.arange(3) > 0)[:, np.newaxis]
         assert np.array_equal(found.shift, np.where(lags, -np.array(PLAYS) / 2, 0.0))
@@ -195,7 +195,7 @@ def test_a_crank_has_a_play_in_angle_and_a_threshold_in_torque(tmp_path: Path) -
     (source,) = (each for each in machine.sources if each.name == "backlash")
     for force in (np.abs(1.5 / torque) * 1.001).tolist():
         condition = machine.condition.replace(force=(force, 0.0, 0.0))
-        (block,) = Walk(machine, machine.poses(), condition)
+        (block,) = PoseRun(machine, machine.poses(), condition)
         found = source.deviation(machine, condition, block)  # type: ignore[attr-defined]
         over = np.abs(force * torque) > 1.5
         expected = np.where(over, np.sign(force * torque) * math.radians(0.1), 0.0)

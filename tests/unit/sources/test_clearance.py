@@ -14,7 +14,7 @@ from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from reference_kinematics import rotation_of, turned_about
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk
+from truepose.runs.poses import PoseRun
 from truepose.sources import UNIFORM, Deviation
 from two_slider import Floats, directions, displaced, tensions
 
@@ -42,7 +42,7 @@ def with_clearance(*edits: tuple[str, str], text: str = PLANAR) -> str:
 def deviation_of(machine: Machine, condition: tp.Condition | None = None) -> Deviation:
     (source,) = (each for each in machine.sources if each.name == "clearance")
     given = machine.condition if condition is None else condition
-    (block,) = Walk(machine, machine.poses(), given)
+    (block,) = PoseRun(machine, machine.poses(), given)
     found: Deviation = source.deviation(machine, given, block)  # type: ignore[attr-defined]
     return found
 

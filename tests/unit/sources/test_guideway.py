@@ -14,7 +14,7 @@ import truepose as tp
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk
+from truepose.runs.poses import PoseRun
 from truepose.sources import UNIFORM, Deviation
 from truepose.sources.guideway import ALONG, SHAPES
 from two_slider import Floats, carriages, tool
@@ -33,7 +33,7 @@ def straight(shape: str, more: str = "", direction: str = "[1, 0, 0]", drive: st
 
 def deviation_of(machine: Machine) -> Deviation:
     (source,) = (each for each in machine.sources if each.name == "guideway")
-    (block,) = Walk(machine, machine.poses(), machine.condition)
+    (block,) = PoseRun(machine, machine.poses(), machine.condition)
     return cast("Deviation", cast("Any", source).deviation(machine, machine.condition, block))
 
 

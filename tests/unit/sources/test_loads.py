@@ -12,7 +12,7 @@ import truepose as tp
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError, TrueposeError
 from truepose.machine import Envelope
-from truepose.sources import ARCSINE, UNIFORM, Block, Deviation, Loads, acting
+from truepose.sources import ARCSINE, UNIFORM, Deviation, Loads, PoseBlock, acting
 
 G = 9.80665
 NO_FORCE = ("force = { x = 1200, y = -1500 }\n", "")
@@ -59,7 +59,7 @@ def deviation_of(machine: tp.Machine, **condition: object) -> Deviation:
     given = machine.condition.replace(**condition)
     poses = machine.poses()
     joints, placements, _ = machine.kernel.place(poses)
-    block = Block(machine, given, poses, np.arange(len(poses)), joints, placements)
+    block = PoseBlock(machine, given, poses, np.arange(len(poses)), joints, placements)
     (source,) = [source for source in machine.sources if isinstance(source, Loads)]
     return source.deviation(machine, given, block)
 

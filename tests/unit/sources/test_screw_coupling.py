@@ -14,7 +14,7 @@ from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from reference_kinematics import Vector, rotation_of, turned_about, vector_of
 from truepose.errors import MachineFileError, TrueposeError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk
+from truepose.runs.poses import PoseRun
 from truepose.sources import Deviation
 from truepose.sources.screw_coupling import PARALLEL
 
@@ -72,7 +72,7 @@ def with_screws(text: str) -> str:
 def deviation_of(machine: Machine, poses: Vector | None = None) -> Deviation:
     (source,) = (each for each in machine.sources if each.name == "screw_coupling")
     at = machine.poses() if poses is None else poses
-    (block,) = Walk(machine, at, machine.condition)
+    (block,) = PoseRun(machine, at, machine.condition)
     found: Deviation = source.deviation(machine, machine.condition, block)  # type: ignore[attr-defined]
     assert not found.half.any()
     return found

@@ -13,7 +13,7 @@ import truepose as tp
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk
+from truepose.runs.poses import PoseRun
 from truepose.sources import UNIFORM, Deviation
 from two_slider import displaced
 
@@ -35,7 +35,7 @@ def with_sensor(given: str, drive: str = "d1", text: str = PLANAR) -> str:
 def deviation_of(machine: Machine) -> Deviation:
     (source,) = (each for each in machine.sources if each.name == "sensor")
     at = [machine.dof.index(name) for name in machine.commanded]
-    (block,) = Walk(machine, machine.home[at][np.newaxis, :], machine.condition)
+    (block,) = PoseRun(machine, machine.home[at][np.newaxis, :], machine.condition)
     return cast("Any", source).deviation(machine, machine.condition, block)
 
 

@@ -19,10 +19,10 @@ EXPANSION = "1.1e-5 1/K"
 
 def shifts(machine: Machine, condition: tp.Condition) -> tuple[np.ndarray, np.ndarray]:
     """Growth of the struts at the home pose by the source, and their lengths there, m."""
-    from truepose.runs.poses import Walk
+    from truepose.runs.poses import PoseRun
 
     at = [machine.dof.index(name) for name in machine.commanded]
-    (block,) = Walk(machine, machine.home[at][np.newaxis, :], condition)
+    (block,) = PoseRun(machine, machine.home[at][np.newaxis, :], condition)
     deviation = Thermal(requested=True).deviation(machine, condition, block)
     assert np.array_equal(deviation.parameters, machine.kernel.length_parameters)
     assert not deviation.half.any()

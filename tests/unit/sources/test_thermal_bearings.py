@@ -18,7 +18,7 @@ import truepose as tp
 from machine_texts import PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError, RequestError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk
+from truepose.runs.poses import PoseRun
 from truepose.sources.thermal import Thermal
 from two_slider import LENGTH, RAILS, tool
 
@@ -116,7 +116,7 @@ def test_a_gradient_in_a_carriage_bends_its_arm(tmp_path: Path) -> None:
     machine = planar(tmp_path, CARRIAGE, arm=True)
     gradient = np.array([30.0, -50.0, 0.0])
     condition = machine.condition.replace(gradient={"carriage.d1": gradient.tolist()})
-    (block,) = Walk(machine, np.array([[0.3, 0.2]]), condition)
+    (block,) = PoseRun(machine, np.array([[0.3, 0.2]]), condition)
     found = Thermal(requested=True).deviation(machine, condition, block)
     shift = {machine.parameters[k]: found.shift[0, i] for i, k in enumerate(found.parameters)}
     arm = np.array(ARM) / 1e3

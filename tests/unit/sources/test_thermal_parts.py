@@ -27,10 +27,10 @@ Floats = NDArray[np.float64]
 
 def deviations(machine: Machine, condition: Condition, poses: ArrayLike) -> dict[str, Floats]:
     """Parameter -> its shift (n,) at poses (n, n_commanded)."""
-    from truepose.runs.poses import Walk
+    from truepose.runs.poses import PoseRun
 
     table = np.atleast_2d(np.asarray(poses, float))
-    (block,) = Walk(machine, table, condition)
+    (block,) = PoseRun(machine, table, condition)
     found = Thermal(requested=True).deviation(machine, condition, block)
     assert not found.half.any()
     assert len(set(found.parameters.tolist())) == found.parameters.size

@@ -14,7 +14,7 @@ from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
 from truepose.sources import OWN_GROUP, TRIANGULAR, UNIFORM, Deviation, normal
-from truepose.sources.tolerance import Tolerance
+from truepose.sources.tolerance import DimensionalTolerance
 from two_slider import displaced
 
 TABLE = "[condition]"
@@ -22,7 +22,7 @@ TABLE = "[condition]"
 
 def bands(machine: Machine) -> Deviation:
     (found,) = (source for source in machine.sources if source.name == "tolerance")
-    return cast("Tolerance", found).bands
+    return cast(DimensionalTolerance, found).bands
 
 
 def with_table(*lines: str, text: str = PLANAR) -> str:

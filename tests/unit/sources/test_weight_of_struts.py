@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 import truepose as tp
 from machine_texts import edited, load_text
-from truepose.controllers.c._known import known_of
+from truepose.controllers.c._known_shifts import known_shifts
 from truepose.errors import RequestError
 from truepose.machine import Joint, Machine, Strut
-from truepose.runs.poses import Walk
-from truepose.sources import Block
+from truepose.runs.poses import PoseRun
+from truepose.sources import PoseBlock
 
 Vector = NDArray[np.float64]
 
@@ -146,7 +146,7 @@ def lumps(mass: float, centre: float) -> tuple[Lump, Lump]:
     return Lump(mass / 2, centre - 0.1), Lump(mass / 2, centre + 0.1)
 
 
-def by_free_bodies(machine: Machine, block: Block) -> Vector:
+def by_free_bodies(machine: Machine, block: PoseBlock) -> Vector:
     """(n, 6) displacement of a hexapod's tool point under its struts' weight, m and rad.
 
     Each strut is a chain from the base joint over a telescopic drive, ten pieces with point masses
@@ -231,8 +231,8 @@ def made(
     )
 
 
-def block_of(machine: Machine, poses: ArrayLike) -> Block:
-    (block,) = Walk(machine, np.asarray(poses, float), machine.condition)
+def block_of(machine: Machine, poses: ArrayLike) -> PoseBlock:
+    (block,) = PoseRun(machine, np.asarray(poses, float), machine.condition)
     return block
 
 
@@ -336,7 +336,7 @@ def test_two_struts_share_a_platform_by_what_they_stretch(tmp_path: Path) -> Non
 
 def test_a_controller_takes_it_where_it_is_the_same_at_every_pose(tmp_path: Path) -> None:
     machine = load_text(tmp_path, edited(STANDING, ('mass = "5 kg"', SOFT_ENDS)))
-    (term,) = known_of(machine).at_reference
+    (term,) = known_shifts(machine).at_reference
     assert machine.parameters[term.parameter] == "drive.d.offset"
     # It stands: the base joint and the drive under all of it, the strut under the mean.
     weight = KILOGRAM * G
@@ -350,4 +350,4 @@ def test_a_controller_refuses_it_where_the_struts_turn(tmp_path: Path) -> None:
     wide = load_text(tmp_path, HEXAPOD, "workspace.poses=[[0,0,0.36,0,0,0],[0,0,0.44,0,0,0]]")
     hung = dataclasses.replace(hung, workspace=wide.workspace)
     with pytest.raises(RequestError, match="loads follows from the pose"):
-        known_of(hung)
+        known_shifts(hung)

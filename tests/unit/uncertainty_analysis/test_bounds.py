@@ -21,9 +21,9 @@ from oracle_cases import case, pose_in_order
 from truepose import _kernel
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import Spread, spread
-from truepose.sources import Block, Deviation
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import Deviation, PoseBlock
 from truepose.uncertainty_analysis.bounds import SCHEMA
 from truepose.uncertainty_analysis.truncation import Ends
 
@@ -59,14 +59,14 @@ class Boxed:
     """A machine at poses, and the box of its deviations."""
 
     machine: Machine
-    block: Block
-    moves: Spread
+    block: PoseBlock
+    moves: Variables
 
     @classmethod
     def of(cls, machine: Machine, poses: Array) -> Boxed:
-        (block,) = Walk(machine, poses, machine.condition)
-        moves = spread(machine, block, required_sources(machine, machine.condition))
-        return cls(machine, block, Ends(3.0).narrowed(moves))
+        (block,) = PoseRun(machine, poses, machine.condition)
+        moves = variables_at(machine, block, required_sources(machine, machine.condition))
+        return cls(machine, block, Ends(3.0).truncated(moves))
 
     def sampled(self, kind: str, count: int, seed: int) -> _kernel.Tallies:
         """Tallies of components, then magnitudes, of uniform or two-point variables."""
@@ -79,7 +79,7 @@ class Boxed:
             shift,
             self.moves.columns,
             self.moves.variables.tolist(),
-            self.moves.swing,
+            self.moves.half_width,
         )
         m = len(self.machine.components)
         kinds = len({name in "xyz" for name in self.machine.components})
@@ -121,7 +121,7 @@ class Boxed:
         values = np.zeros((len(signs), every.size))
         values[:, parameters] = shift
         for column, parameter in enumerate(self.moves.columns):
-            swing = self.moves.swing[:, column]
+            swing = self.moves.half_width[:, column]
             values[:, parameter] += swing * signs[:, self.moves.variables[column]]
         return every, values
 
@@ -137,7 +137,7 @@ class Boxed:
             slopes, _ = self.machine.kernel.sensitivity_moved(
                 self.block.joints, self.block.placements, self.moves.columns, every, values
             )
-            along = np.einsum("c,nck->nk", direction, slopes) * self.moves.swing
+            along = np.einsum("c,nck->nk", direction, slopes) * self.moves.half_width
             effects = np.zeros_like(signs)
             for column, variable in enumerate(self.moves.variables):
                 effects[:, variable] += along[:, column]

@@ -14,8 +14,8 @@ import truepose as tp
 from build_machine import MACHINES
 from machine_texts import load_text
 from truepose.machine import Machine
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import spread
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import variables_at
 from truepose.uncertainty_analysis.truncation import Ends
 
 Array = NDArray[np.float64]
@@ -67,9 +67,9 @@ home = { x = 100, y = 0 }
 
 def bounds_at(machine: Machine, poses: Array, **asked: Any) -> tuple[Array, Array, Array]:
     """Magnitudes (n, n_quantity), status (n,) and boxes (n,)."""
-    (block,) = Walk(machine, poses, machine.condition)
-    moves = spread(machine, block, required_sources(machine, machine.condition))
-    moves = Ends(None).narrowed(moves)
+    (block,) = PoseRun(machine, poses, machine.condition)
+    moves = variables_at(machine, block, required_sources(machine, machine.condition))
+    moves = Ends(None).truncated(moves)
     found = machine.kernel.bounds_at(
         block.joints,
         block.placements,
@@ -77,7 +77,7 @@ def bounds_at(machine: Machine, poses: Array, **asked: Any) -> tuple[Array, Arra
         np.ascontiguousarray(moves.shift[1]),
         moves.columns,
         moves.variables.tolist(),
-        np.ascontiguousarray(moves.swing),
+        np.ascontiguousarray(moves.half_width),
         [members.tolist() for members in moves.directions],
         **asked,
     )

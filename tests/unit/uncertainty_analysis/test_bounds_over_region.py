@@ -17,9 +17,9 @@ from made_source import MadeSource, with_sources
 from truepose import _kernel
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import spread
-from truepose.sources import Block, Deviation
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import variables_at
+from truepose.sources import Deviation, PoseBlock
 from truepose.uncertainty_analysis.bounds_over_region import SCHEMA
 
 Array = NDArray[np.float64]
@@ -56,8 +56,8 @@ def anywhere(region: Region, count: int, seed: int) -> Array:
 
 def assert_encloses(found: xr.Dataset, machine: Machine, poses: Array, samples: int) -> None:
     """Every sample and every vertex, with all sources, at every pose."""
-    (block,) = Walk(machine, poses, machine.condition)
-    moves = spread(machine, block, required_sources(machine, machine.condition))
+    (block,) = PoseRun(machine, poses, machine.condition)
+    moves = variables_at(machine, block, required_sources(machine, machine.condition))
     shifted, shift = moves.shift
     study = _kernel.Study(
         machine.kernel,
@@ -67,7 +67,7 @@ def assert_encloses(found: xr.Dataset, machine: Machine, poses: Array, samples: 
         shift,
         moves.columns,
         moves.variables.tolist(),
-        moves.swing,
+        moves.half_width,
     )
     m, kinds = len(machine.components), found.sizes["quantity"]
     table = np.zeros((len(poses), m + kinds))
@@ -340,7 +340,7 @@ def test_a_source_that_is_not_known_between_poses() -> None:
 def test_a_made_source_that_differs_from_pose_to_pose_is_refused() -> None:
     machine = load("planar_two_slider")
 
-    def by_pose(block: Block) -> Deviation:
+    def by_pose(block: PoseBlock) -> Deviation:
         return Deviation.of([0], shift=1e-4 * block.placements[:, :1])
 
     made = with_sources(machine, MadeSource("of the pose", of_block=by_pose))
@@ -348,7 +348,7 @@ def test_a_made_source_that_differs_from_pose_to_pose_is_refused() -> None:
     assert problem.code == "no-proof"
     assert "of the pose: it differs from pose to pose" in str(problem.found)
 
-    def wider(block: Block) -> Deviation:
+    def wider(block: PoseBlock) -> Deviation:
         return Deviation.of([0], half=1e-4 * block.placements[:, :1])
 
     made = with_sources(machine, MadeSource("of the pose", of_block=wider))

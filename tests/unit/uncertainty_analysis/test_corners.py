@@ -60,7 +60,7 @@ def test_corners_are_all_there_once() -> None:
 
 def test_few_variables_are_looked_at_at_every_corner() -> None:
     bowl = Bowl(1, corners.EVERY_VERTEX, bend=3.0, poses=3)
-    found = corners.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
+    found = corners.worst_corners(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
     assert found.search == "every vertex"
     assert found.evaluated.tolist() == [2**corners.EVERY_VERTEX] * 3
     assert bowl.asked == 3 * 2**corners.EVERY_VERTEX
@@ -71,7 +71,7 @@ def test_few_variables_are_looked_at_at_every_corner() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_directed_search_finds_the_worst_of_what_bends_little(bend: float, seed: int) -> None:
     bowl = Bowl(seed, corners.EVERY_VERTEX + 2, bend, poses=2)
-    found = corners.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
+    found = corners.worst_corners(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
     assert found.search == "directed"
     assert bowl.asked == found.evaluated.sum()
     assert np.allclose(found.most, bowl.worst(), rtol=1e-12)
@@ -80,7 +80,7 @@ def test_a_directed_search_finds_the_worst_of_what_bends_little(bend: float, see
 @pytest.mark.parametrize("seed", range(5))
 def test_a_directed_search_of_what_bends_much_comes_close_and_never_beyond(seed: int) -> None:
     bowl = Bowl(seed, corners.EVERY_VERTEX + 1, bend=1.0)
-    found = corners.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
+    found = corners.worst_corners(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
     reached = found.most / bowl.worst()
     assert reached.max() <= 1.0 + 1e-12
     assert reached.min() > 0.97
@@ -89,14 +89,14 @@ def test_a_directed_search_of_what_bends_much_comes_close_and_never_beyond(seed:
 def test_where_the_effects_are_nothing_the_search_starts_elsewhere() -> None:
     bowl = Bowl(7, corners.EVERY_VERTEX + 1, bend=1.0)
     bowl.slopes[:] = 0.0
-    found = corners.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
+    found = corners.worst_corners(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
     assert (found.most / bowl.worst()).min() > 0.97
 
 
 def test_the_same_search_finds_the_same() -> None:
     first, second = (Bowl(3, 15, 1.0) for _ in range(2))
     found = [
-        corners.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
+        corners.worst_corners(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
         for bowl in (first, second)
     ]
     assert np.array_equal(found[0].most, found[1].most)
@@ -106,17 +106,17 @@ def test_the_same_search_finds_the_same() -> None:
 def test_poses_in_parts_find_what_they_find_together(monkeypatch: pytest.MonkeyPatch) -> None:
     for variables in (4, 14):
         bowl = Bowl(5, variables, 0.3, poses=7)
-        whole = corners.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
+        whole = corners.worst_corners(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
         with monkeypatch.context() as context:
             context.setattr(corners, "AT_ONCE", 100)
-            parts = corners.worst_vertices(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
+            parts = corners.worst_corners(bowl, bowl.centre, bowl.effects, bowl.domain, POSITION)
         assert np.array_equal(parts.most, whole.most)
         assert np.array_equal(parts.evaluated, whole.evaluated)
 
 
 def test_no_variable_leaves_the_centre() -> None:
     centre = np.array([[1.0, -2.0, 2.0]])
-    found = corners.worst_vertices(
+    found = corners.worst_corners(
         Bowl(1, 0, 0.0), centre, np.empty((1, 3, 0)), Domain.of([]), POSITION
     )
     assert found.most.tolist() == [[1.0, -2.0, 2.0, -1.0, 2.0, -2.0, 3.0]]
@@ -132,7 +132,7 @@ def test_a_corner_that_fails_says_which_pose_it_fails_at(variables: int) -> None
         bad = (poses == 1) & (t[:, 0] > 0.0)
         return np.where(bad[:, np.newaxis], np.nan, outputs), np.where(bad, 4, 0).astype(np.uint8)
 
-    found = corners.worst_vertices(failing, bowl.centre, bowl.effects, bowl.domain, POSITION)
+    found = corners.worst_corners(failing, bowl.centre, bowl.effects, bowl.domain, POSITION)
     assert found.status.tolist() == [0, 4, 0]
     worst = bowl.worst()
     assert np.allclose(found.most[[0, 2]], worst[[0, 2]], rtol=1e-12)

@@ -14,7 +14,8 @@ import truepose as tp
 from machine_texts import PLANAR, edited, load_text
 from made_source import MadeSource, random_deviation, with_sources
 from truepose.errors import RequestError
-from truepose.runs.dataset import Variable, function_dataset
+from truepose.runs.dataset import Variable
+from truepose.uncertainty_analysis.functions.dataset import function_dataset
 from truepose.uncertainty_analysis.functions.inputs import Input
 from truepose.uncertainty_analysis.model import PART, FunctionModel, MachineModel, models
 

@@ -17,9 +17,9 @@ from build_machine import MACHINES
 from machine_texts import HEXAPOD, PLANAR, edited, load_text
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.runs.first_order import Mover
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import spread
+from truepose.runs.first_order import ExactError
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import variables_at
 from truepose.uncertainty_analysis import monte_carlo, sampler
 from truepose.uncertainty_analysis.functions.inputs import Input
 from truepose.uncertainty_analysis.model import FunctionModel
@@ -42,10 +42,10 @@ def sampled(name: str) -> tuple[xr.Dataset, Array]:
     machine = load(name)
     poses = machine.poses()[[0, 1, -1]]
     found = tp.monte_carlo(machine, poses, SAMPLES, SEED)
-    (block,) = Walk(machine, poses, machine.condition)
-    moves = spread(machine, block, required_sources(machine, machine.condition))
+    (block,) = PoseRun(machine, poses, machine.condition)
+    moves = variables_at(machine, block, required_sources(machine, machine.condition))
     t = Random(moves, SEED).rows(0, SAMPLES)
-    move = Mover(machine, block, moves)
+    move = ExactError(machine, block, moves)
     each = [move(np.full(SAMPLES, pose), t) for pose in range(3)]
     assert all((status == 0).all() for _, status in each)
     return found, np.stack([errors for errors, _ in each])

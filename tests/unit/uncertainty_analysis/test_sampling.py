@@ -29,10 +29,10 @@ from truepose.probability.distributions import (
     normal,
     student_t,
 )
-from truepose.runs.first_order import Mover
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import Spread, spread
-from truepose.sources import Block
+from truepose.runs.first_order import ExactError
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.sampler import Random
 
 Array = NDArray[np.float64]
@@ -279,15 +279,15 @@ class Studied:
     """A machine at some poses, with sources that move most of its parameters, some in groups."""
 
     machine: Machine
-    block: Block
-    moves: Spread
+    block: PoseBlock
+    moves: Variables
     random: Random
 
     @classmethod
     def of(cls, machine: Machine, poses: Array | None = None) -> Studied:
         given = machine.poses()[:4] if poses is None else poses
-        (block,) = Walk(machine, given, machine.condition)
-        moves = spread(machine, block, required_sources(machine, machine.condition))
+        (block,) = PoseRun(machine, given, machine.condition)
+        moves = variables_at(machine, block, required_sources(machine, machine.condition))
         return cls(machine, block, moves, Random(moves, SEED))
 
     @property
@@ -304,7 +304,7 @@ class Studied:
             shift,
             self.moves.columns,
             self.moves.variables.tolist(),
-            self.moves.swing,
+            self.moves.half_width,
             whitening,
         )
 
@@ -323,7 +323,7 @@ class Studied:
         """(pose, sample, component), and whether there is one."""
         t = self.random.rows(first, count)
         poses = self.block.indices.size
-        move = Mover(self.machine, self.block, self.moves)
+        move = ExactError(self.machine, self.block, self.moves)
         found = [move(np.full(count, pose), t) for pose in range(poses)]
         return np.stack([each for each, _ in found]), np.stack([s == 0 for _, s in found])
 

@@ -15,7 +15,7 @@ from made_source import MadeSource, sizes, with_sources
 from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.runs.poses import Progress
-from truepose.sources import OWN_GROUP, Block, Deviation, normal
+from truepose.sources import OWN_GROUP, Deviation, PoseBlock, normal
 from truepose.uncertainty_analysis.functions.inputs import Input
 from truepose.uncertainty_analysis.shares import (
     CORRELATED,
@@ -200,7 +200,7 @@ def test_ctrl_c_gives_the_poses_done() -> None:
     assert whole.attrs["interrupted"] == 0
     assert (found["total"] == whole["total"].isel(pose=slice(0, 3))).all()
 
-    def at_once(machine: Machine, block: Block) -> Deviation:
+    def at_once(machine: Machine, block: PoseBlock) -> Deviation:
         raise KeyboardInterrupt
 
     never = MadeSource("never", of_block=lambda block: at_once(machine, block))
@@ -213,7 +213,7 @@ def test_what_varies_at_some_poses_only(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr("truepose.runs.poses.BLOCK", 2)
     machine = planar()
 
-    def of_block(block: Block) -> Deviation:
+    def of_block(block: PoseBlock) -> Deviation:
         bands = [1e-4, 0.0] if block.indices[0] == 0 else [0.0, 1e-4]
         columns = [machine.parameters.index(f"strut.{number}.length") for number in (1, 2)]
         return Deviation.of(columns, half=bands)

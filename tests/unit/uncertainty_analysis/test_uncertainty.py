@@ -18,8 +18,8 @@ from build_machine import MACHINES
 from machine_texts import HEXAPOD, PLANAR, edited, load_text
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import spread
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import variables_at
 from truepose.uncertainty_analysis.functions.inputs import Input
 from truepose.uncertainty_analysis.uncertainty import NOT_SAMPLED, SCHEMA, SECOND_ORDER, VALIDATION
 
@@ -66,8 +66,8 @@ def test_sources_add_as_squares(name: str) -> None:
 
 def slopes_of_lengths(machine: Machine, poses: Array) -> Array:
     """(n, n_component, 2) derivatives to both lengths where all sources are at their shift."""
-    (block,) = Walk(machine, poses, machine.condition)
-    moves = spread(machine, block, required_sources(machine, machine.condition))
+    (block,) = PoseRun(machine, poses, machine.condition)
+    moves = variables_at(machine, block, required_sources(machine, machine.condition))
     columns = [machine.parameters.index(f"strut.{i}.length") for i in (1, 2)]
     found, _ = machine.kernel.sensitivity_moved(
         block.joints, block.placements, columns, *moves.shift
@@ -183,8 +183,8 @@ def sampled(model: Any, poses: Any = None, condition: Any = None, **named: Any) 
         drawn, dims, coords = np.stack(outputs, axis=1), ("pose", "component"), {"pose": usable}
     else:
         names = list(poses)
-        spread = {name: random.normal(poses[name].centre, 1.0, count) for name in names}
-        drawn, dims, coords = model(**spread)[:, np.newaxis], ("component",), {}
+        variables_at = {name: random.normal(poses[name].centre, 1.0, count) for name in names}
+        drawn, dims, coords = model(**variables_at)[:, np.newaxis], ("component",), {}
     tail = 0.5 * (1.0 - named["probability"])
     data = {
         "mean": drawn.mean(axis=0),

@@ -18,8 +18,8 @@ from build_machine import MACHINES
 from machine_texts import HEXAPOD, PLANAR, edited, load_text
 from truepose.errors import RequestError
 from truepose.machine import Machine
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import spread
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import variables_at
 from truepose.uncertainty_analysis import corners
 from truepose.uncertainty_analysis.functions.inputs import Input
 from truepose.uncertainty_analysis.worst_case import SCHEMA
@@ -80,8 +80,8 @@ def test_linear_is_the_sum_of_sensitivities_by_half_bands(tmp_path: Path) -> Non
     machine = load_text(tmp_path, BOTH)
     found = tp.worst_case(machine)
     budget = tp.budget(machine)
-    (block,) = Walk(machine, machine.poses(), machine.condition)
-    moves = spread(machine, block, required_sources(machine, machine.condition))
+    (block,) = PoseRun(machine, machine.poses(), machine.condition)
+    moves = variables_at(machine, block, required_sources(machine, machine.condition))
     columns = [machine.parameters.index(f"strut.{i}.length") for i in (1, 2)]
     about_shift, _ = machine.kernel.sensitivity_moved(
         block.joints, block.placements, columns, *moves.shift

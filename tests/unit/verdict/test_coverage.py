@@ -17,10 +17,10 @@ from command_line import call
 from machine_texts import PLANAR, edited, load_text
 from truepose.errors import RequestError
 from truepose.machine import Envelope, Machine
-from truepose.runs.first_order import Mover, first_order
-from truepose.runs.poses import Walk, required_sources
-from truepose.runs.variables import Spread, spread
-from truepose.sources import Block
+from truepose.runs.first_order import ExactError, first_order
+from truepose.runs.poses import PoseRun, required_sources
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.sampler import Random
 from truepose.verdict import coverage as module
 from truepose.verdict import screening
@@ -28,7 +28,7 @@ from truepose.verdict.coverage import CoverageAnswer, coverage
 from two_slider import LENGTH, RAILS, displaced, tool
 
 Floats = NDArray[np.float64]
-State = tuple[Block, Spread]
+State = tuple[PoseBlock, Variables]
 
 P = 0.95
 POSE = np.array([[0.3, 0.2]])
@@ -46,10 +46,10 @@ def states(machine: Machine, poses: Floats | None = None, *, parts: int = 1) -> 
     """Blocks with the nominal command and their spreads, the poses of the file in `parts`."""
     table = machine.poses() if poses is None else poses
     sources = required_sources(machine, machine.condition)
-    (block,) = Walk(machine, table, machine.condition)
+    (block,) = PoseRun(machine, table, machine.condition)
     numbers = np.array_split(np.arange(block.indices.size), parts)
     blocks = [block.select(np.isin(np.arange(block.indices.size), some)) for some in numbers]
-    return [(each, spread(machine, each, sources)) for each in blocks]
+    return [(each, variables_at(machine, each, sources)) for each in blocks]
 
 
 def on_tool(folder: Path, lines: str, more: str = "") -> Machine:
@@ -143,7 +143,7 @@ def test_a_force_of_unknown_direction_has_the_quantile_of_its_circle(tmp_path: P
     block, every = states(pushed, POSE)[0]
     angle = np.linspace(0.0, 2.0 * np.pi, 100_001)[:-1]
     t = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    errors, _ = Mover(pushed, block, every)(np.zeros(len(t), np.intp), t)
+    errors, _ = ExactError(pushed, block, every)(np.zeros(len(t), np.intp), t)
     exact = float(np.quantile(np.linalg.norm(errors, axis=1), P))
     assert between(found, exact)
 
@@ -297,7 +297,7 @@ def test_the_machines_are_those_of_monte_carlo(name: str) -> None:
     pose = machine.poses()[[-1]]
     (state,) = states(machine, pose)
     t = Random(state[1], 5).rows(0, 20_000)
-    errors, _ = Mover(machine, *state)(np.zeros(len(t), np.intp), t)
+    errors, _ = ExactError(machine, *state)(np.zeros(len(t), np.intp), t)
     sampled = tp.monte_carlo(machine, pose, 20_000, 5, P)
     assert not sampled.failed.any()
     for kind, axes in (("position", "xyz"), ("orientation", ("rx", "ry", "rz"))):

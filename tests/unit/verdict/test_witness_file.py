@@ -19,8 +19,8 @@ from truepose._kernel import STATUS
 from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.runs.displacement import displacement
-from truepose.runs.poses import OK, Walk, is_path
-from truepose.runs.variables import spread
+from truepose.runs.poses import OK, PoseRun, is_path
+from truepose.runs.variables import variables_at
 from truepose.sources import Deviation, acting
 from truepose.verdict.witness import AFTER, BEFORE, Witness
 from truepose.verdict.witness_file import write_witness
@@ -34,13 +34,13 @@ def witnesses(machine: Machine, poses: np.ndarray, random: np.random.Generator) 
     found = []
     condition = machine.condition
     sources = acting(machine, condition)
-    (block,) = Walk(machine, poses, condition, path=is_path(machine))
-    moves = spread(machine, block, sources)
+    (block,) = PoseRun(machine, poses, condition, path=is_path(machine))
+    moves = variables_at(machine, block, sources)
     corrected, _, status = machine.kernel.corrected(poses[block.indices], *moves.shift)
     assert (status == OK).all()
     after = dataclasses.replace(block, joints=corrected)
     for state, each in ((BEFORE, block), (AFTER, after)):
-        unknown = spread(machine, each, sources)
+        unknown = variables_at(machine, each, sources)
         for pose in range(block.indices.size):
             of_pose = unknown.at(pose)
             domain = of_pose.domain
@@ -259,8 +259,8 @@ def test_a_machine_that_cannot_be_assembled_has_its_status(tmp_path: Path) -> No
     text = edited(PLANAR, ("length_tolerance = [-0.3, 0.3]", "length_tolerance = [-400, 0.3]"))
     machine = load_text(tmp_path, edited(text, ("[200, 400, 5]", "[200, 200, 1]")))
     poses = machine.poses()[:1]
-    (block,) = Walk(machine, poses, machine.condition)
-    of_pose = spread(machine, block, acting(machine, machine.condition)).at(0)
+    (block,) = PoseRun(machine, poses, machine.condition)
+    of_pose = variables_at(machine, block, acting(machine, machine.condition)).at(0)
     moved = of_pose.parameters_moved(-np.ones((1, 1)))
     _, status = displacement(machine, block.joints, block.placements, moved)
     witness = Witness(
@@ -318,7 +318,7 @@ def test_the_actual_machine_is_the_witness(tmp_path: Path) -> None:
         wanted = np.array(machine.nominal)
         wanted[columns] += values[0]
         found = np.array(written.nominal)
-        (block,) = Walk(written, written.poses(), written.condition)
+        (block,) = PoseRun(written, written.poses(), written.condition)
         for source in acting(written):
             deviation = source.deviation(written, written.condition, block)
             np.add.at(found, deviation.parameters, deviation.shift[0])
@@ -427,8 +427,8 @@ def test_where_a_source_alone_cannot_be_assembled_all_is_one_source(tmp_path: Pa
         ("[200, 400, 5], y = [100, 300, 3]", "[200, 200, 1], y = [100, 100, 1]"),
     )
     machine = load_text(tmp_path, text)
-    (block,) = Walk(machine, machine.poses(), machine.condition)
-    of_pose = spread(machine, block, acting(machine)).at(0)
+    (block,) = PoseRun(machine, machine.poses(), machine.condition)
+    of_pose = variables_at(machine, block, acting(machine)).at(0)
     moved = of_pose.parameters_moved(-np.ones((1, 1)))
     error, status = displacement(machine, block.joints, block.placements, moved)
     assert status[0] == OK

@@ -12,8 +12,8 @@ from truepose.arrays import Floats
 from truepose.calibration.acceptance import sentences
 from truepose.calibration.acceptance.observability import (
     Observability,
-    Rows,
-    Spread,
+    RowCovariance,
+    WhitenedRows,
     decomposed,
     fitted,
     normalised_rms,
@@ -22,11 +22,11 @@ from truepose.calibration.acceptance.observability import (
     prior,
     prior_root,
     prior_rows,
-    spread,
+    row_covariance,
     stacked,
     weighted,
 )
-from truepose.calibration.acceptance.tool_uncertainty import AtTool, Tool
+from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
@@ -68,12 +68,12 @@ class Direction:
 class Outcome:
     """What some rows lead to: (a), (b) and (e) of the verdict."""
 
-    data: Spread
-    used: Spread
+    data: RowCovariance
+    used: RowCovariance
     directions: tuple[Direction, ...]
     sentences: tuple[str, ...]
-    before: AtTool | None
-    after: AtTool
+    before: ToolUncertainty | None
+    after: ToolUncertainty
     relative: bool
     reasons: tuple[Reason, ...]
 
@@ -181,7 +181,7 @@ class Case:
         half = np.asarray(self.unknowns.half, np.float64)[: self.n]
         return np.where(np.isfinite(half), half, np.nan)
 
-    def machine_rows(self, extra: Floats | None) -> Rows:
+    def machine_rows(self, extra: Floats | None) -> WhitenedRows:
         """What the data say of the machine's unknowns, their uncertainties times `birge`."""
         parts = [self.factor] if extra is None else [self.factor, extra]
         if self.use_prior:
@@ -193,8 +193,8 @@ class Case:
     def outcome(self, extra: Floats | None = None) -> Outcome:
         """With `extra` (k, n) whitened rows, or as it is."""
         rows = self.machine_rows(extra)
-        data = spread(rows)
-        used = spread(stacked(rows, prior(self.prior))) if self.use_prior else data
+        data = row_covariance(rows)
+        used = row_covariance(stacked(rows, prior(self.prior))) if self.use_prior else data
         seen = self.observability if extra is None else observability(rows, 0, self.sigma)
         free = self.unknowns.prior_mean.size > self.n
         of_data = self.tool.sort(data, with_gauge=free)
@@ -239,7 +239,7 @@ class Case:
         )  # fmt: skip
 
     def _weak(
-        self, seen: Observability, rows: Rows, tool: Tool, before: AtTool | None
+        self, seen: Observability, rows: WhitenedRows, tool: Tool, before: ToolUncertainty | None
     ) -> tuple[Floats, Floats]:
         """Directions (k, n) that are seen but of which the data say too little.
 
@@ -267,7 +267,7 @@ class Case:
             return right[moving], steps
         return sentences.clustered(right[moving], with_noise[moving]), steps
 
-    def _too_loose(self, data: Spread, still: Floats) -> list[Reason]:
+    def _too_loose(self, data: RowCovariance, still: Floats) -> list[Reason]:
         """(e): what is found is less certain than what was known of it before."""
         # Without the parts in null directions, of which those that matter are a reason of their
         # own, and without those that do nothing at the tool.
@@ -297,13 +297,13 @@ class Case:
             text += f" ({others} less certain than the tolerance, too)"
         return [Reason("less-than-tolerance", text)]
 
-    def reference(self, before: AtTool | None) -> tuple[float | None, float | None]:
+    def reference(self, before: ToolUncertainty | None) -> tuple[float | None, float | None]:
         """What the tool is known to before, position and rotation, at the worst pose."""
         if before is None:
             return self.measured
         return before.position_max, before.rotation_max
 
-    def _no_gain(self, before: AtTool | None, after: AtTool) -> list[Reason]:
+    def _no_gain(self, before: ToolUncertainty | None, after: ToolUncertainty) -> list[Reason]:
         """(b): the tool is not known better than before."""
         found = [
             (name, unit, size, was)
@@ -329,7 +329,7 @@ class Case:
             text += "; but what is asked of the tool is kept without calibration"
         return [Reason("no-gain", text)]
 
-    def is_within(self, before: AtTool | None) -> bool:
+    def is_within(self, before: ToolUncertainty | None) -> bool:
         """Whether the machine as filed keeps what is asked."""
         pairs = [
             (asked, was)
@@ -348,7 +348,9 @@ def _sparse(directions: Floats) -> Floats:
     return sentences.sparse(directions) if len(directions) else directions
 
 
-def both(after: AtTool, before: AtTool | None) -> list[tuple[str, str, float, float | None]]:
+def both(
+    after: ToolUncertainty, before: ToolUncertainty | None
+) -> list[tuple[str, str, float, float | None]]:
     """(name, unit, after, before) of position and rotation at the worst pose."""
     was = (None, None) if before is None else (before.position_max, before.rotation_max)
     return [

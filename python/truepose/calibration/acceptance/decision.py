@@ -20,7 +20,7 @@ from truepose.calibration.acceptance import sentences
 from truepose.calibration.acceptance.assessment import Case, Direction, Outcome, Reason, both
 from truepose.calibration.acceptance.observability import Observability, share
 from truepose.calibration.acceptance.remedy import CALIPER, Candidate, Remedy, directly, remedy_of
-from truepose.calibration.acceptance.tool_uncertainty import AtTool, Tool
+from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
 from truepose.files.shown_units import METRIC, ShownUnits
 
 if TYPE_CHECKING:
@@ -84,8 +84,8 @@ class Gate:
     observability: Observability
     directions: tuple[Direction, ...]
     sentences: tuple[str, ...]
-    before: AtTool | None
-    after: AtTool
+    before: ToolUncertainty | None
+    after: ToolUncertainty
     relative: bool
     rms_before: float
     rms: float
@@ -136,7 +136,7 @@ class Gate:
         return "; ".join([*(texts or ["the unknowns are determined"]), *held[:1]])
 
 
-def judge(
+def assess(
     unknowns: Unknowns,
     *,
     values: ArrayLike,
@@ -371,4 +371,4 @@ def _or_nan(values: ArrayLike | None, n: int) -> Floats:
     return found
 
 
-__all__ = ["Candidate", "Gate", "HeldOut", "Reason", "Remedy", "judge"]
+__all__ = ["Candidate", "Gate", "HeldOut", "Reason", "Remedy", "assess"]

@@ -31,7 +31,7 @@ Scaling = Literal["prior", "column"]
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class WhitenedRows:
     """Whitened rows of the machine's unknowns.
 
     `matrix` (k, n); `lengths` (n,) of its columns before anything was projected out of them, zero
@@ -43,7 +43,7 @@ class Rows:
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class RowCovariance:
     """What rows determine: the covariance is `root @ root.T` off the `null` directions.
 
     `root` (n, r); `null` (k, n): directions that no row sees, in the unknowns' units, orthonormal
@@ -107,7 +107,7 @@ def weighted(jacobian: ArrayLike, weights: ArrayLike | None = None) -> Floats:
     return np.sqrt(np.asarray(weights, np.float64))[:, np.newaxis] * rows
 
 
-def of_machine(rows: ArrayLike, n_machine: int, unit: Floats | None = None) -> Rows:
+def of_machine(rows: ArrayLike, n_machine: int, unit: Floats | None = None) -> WhitenedRows:
     """Rows (m, n) of all unknowns with those after the first `n_machine` projected out.
 
     What is left of the machine's columns is what no change of the instruments' unknowns can
@@ -125,7 +125,7 @@ def of_machine(rows: ArrayLike, n_machine: int, unit: Floats | None = None) -> R
         basis = u[:, found > RANK_TOLERANCE * found.max(initial=0.0)]
         for _ in range(2):  # the second takes away what rounding left of the first
             machine -= basis @ (basis.T @ machine)
-    return Rows(machine, lengths)
+    return WhitenedRows(machine, lengths)
 
 
 def _unseen(lengths: Floats, unit: Floats | None) -> Flags:
@@ -167,19 +167,19 @@ def prior_root(covariance: ArrayLike) -> Floats:
     return root
 
 
-def stacked(*parts: Rows) -> Rows:
+def stacked(*parts: WhitenedRows) -> WhitenedRows:
     """Rows of several sources of knowledge as one."""
     lengths: Floats = np.sqrt(np.sum([part.lengths**2 for part in parts], axis=0))
-    return Rows(np.vstack([part.matrix for part in parts]), lengths)
+    return WhitenedRows(np.vstack([part.matrix for part in parts]), lengths)
 
 
-def prior(covariance: ArrayLike) -> Rows:
+def prior(covariance: ArrayLike) -> WhitenedRows:
     """A prior covariance (n, n) as rows."""
     matrix = prior_rows(covariance)
-    return Rows(matrix, _lengths(matrix))
+    return WhitenedRows(matrix, _lengths(matrix))
 
 
-def spread(rows: Rows) -> Spread:
+def row_covariance(rows: WhitenedRows) -> RowCovariance:
     """Covariance and null directions of whitened rows."""
     # An unknown that no row sees is weighed as the others are: whitened columns are far from one.
     of_seen = rows.lengths[rows.lengths > 0.0]
@@ -189,11 +189,11 @@ def spread(rows: Rows) -> Spread:
     # Where instruments imitate everything, what is left is rounding of columns of length one.
     seen = found > RANK_TOLERANCE * found.max(initial=1.0)
     root: Floats = (right[seen] / found[seen, np.newaxis] / lengths).T
-    return Spread(root, right[~seen] / lengths, lengths)
+    return RowCovariance(root, right[~seen] / lengths, lengths)
 
 
 def observability(
-    rows: Rows, n_observation: int, prior_standard: ArrayLike | None = None
+    rows: WhitenedRows, n_observation: int, prior_standard: ArrayLike | None = None
 ) -> Observability:
     """Rank, singular values and indices O1-O5 of the machine's whitened rows.
 
@@ -210,7 +210,7 @@ def observability(
     standard = np.full(n, np.inf) if prior_standard is None else np.asarray(prior_standard, float)
     by_prior = n > 0 and bool((np.isfinite(standard) & (standard > 0.0)).all())
     inverse = 1.0 / np.where(rows.lengths > 0.0, rows.lengths, 1.0)
-    rank = spread(rows).rank
+    rank = row_covariance(rows).rank
     unit = standard if by_prior else inverse
     singular, right = decomposed(rows.matrix * unit)
     singular[rank:] = 0.0

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.acceptance.observability import Spread, decomposed
+from truepose.calibration.acceptance.observability import RowCovariance, decomposed
 
 POSITION = "xyz"
 ROTATION = "abc"
@@ -19,7 +19,7 @@ SLIGHT = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class AtTool:
+class ToolUncertainty:
     """Standard uncertainty of the tool, base frame, m and rad, inf where it is not determined.
 
     `standard` (n_pose, n_component); `position` and `rotation` (n_pose,): square roots of the sums
@@ -99,7 +99,7 @@ class Tool:
         found: Flags = np.any(self.effects != 0.0, axis=(0, 1))
         return found
 
-    def uncertainty(self, root: Floats, open_directions: Floats) -> AtTool:
+    def uncertainty(self, root: Floats, open_directions: Floats) -> ToolUncertainty:
         """Of a covariance root root^T, `root` (n, r), without limit in `open_directions` (k, n)."""
         # As one product of matrices, which is many times faster than one for each pose.
         n_pose, n_component, n = self.effects.shape
@@ -110,7 +110,7 @@ class Tool:
             effect = np.abs(self.effects @ open_directions.T)
             largest = effect.max(axis=(0, 1), initial=0.0)
             standard = np.where((effect > SLIGHT * largest).any(axis=2), np.inf, standard)
-        return AtTool(
+        return ToolUncertainty(
             self.components,
             standard,
             self._size(standard, POSITION),
@@ -129,7 +129,7 @@ class Tool:
         effect = float(np.linalg.norm(self._flat @ direction))
         return effect > SLIGHT * self._largest(lengths) * float(np.linalg.norm(direction * lengths))
 
-    def sort(self, open_directions: Spread, *, with_gauge: bool) -> Sorted:
+    def sort(self, open_directions: RowCovariance, *, with_gauge: bool) -> Sorted:
         """The null directions by what they do; `with_gauge`: there are unknowns of instruments."""
         null = open_directions.null
         flat = self._flat

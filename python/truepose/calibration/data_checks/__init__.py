@@ -2,9 +2,9 @@
 
 The nominal machine says what each instrument should have read; tolerances, the other error sources
 and noise say how far off it may be. Data that are further off are looked at under one supposition
-after the other (`MENDS`): one that brings them back is named. Other faults show in the data as such
-(`LOOKS`). A kind of blunder is a file and a line here. `docs/calibration_suspicions.md` has the
-rules and their thresholds.
+after the other (`HYPOTHESES`): one that brings them back is named. Other faults show in the data as
+such (`INSPECTIONS`). A kind of blunder is a file and a line here. `docs/calibration_suspicions.md`
+has the rules and their thresholds.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from truepose.calibration.data_checks._base import (
     ALLOWED,
     LESS,
     REDUNDANT,
-    Mend,
+    Hypothesis,
     OfLook,
     OfMend,
     Suspicion,
     View,
 )
-from truepose.calibration.data_checks.expected_residual import allowance
-from truepose.calibration.data_checks.nominal import Geometry, Setup, nominal_readings
+from truepose.calibration.data_checks.expected_residual import expected_residual
+from truepose.calibration.data_checks.nominal import Geometry, Placement, nominal_readings
 from truepose.calibration.data_checks.placement import Readings
 from truepose.calibration.measurements import Measurements
 from truepose.machine import Machine
 
-MENDS: tuple[OfMend, ...] = (
+HYPOTHESES: tuple[OfMend, ...] = (
     swapped.KIND,
     handedness.KIND,
     unit.LENGTH,
@@ -53,7 +53,7 @@ MENDS: tuple[OfMend, ...] = (
     frame.TARGET,
     frame.FRAME,
 )
-LOOKS: tuple[OfLook, ...] = (
+INSPECTIONS: tuple[OfLook, ...] = (
     constant_column.CONSTANT,
     constant_column.COMMAND,
     repeats.DOUBLED,
@@ -62,8 +62,8 @@ LOOKS: tuple[OfLook, ...] = (
     too_few.UNCERTAINTY,
 )
 CODES: dict[str, str] = {
-    **{each.code: each.doc for each in MENDS},
-    **{each.code: each.doc for each in LOOKS},
+    **{each.code: each.doc for each in HYPOTHESES},
+    **{each.code: each.doc for each in INSPECTIONS},
     "far-off": "further from the nominal machine than tolerances allow, and nothing explains it",
 }
 """Every kind of suspicion and what it says."""
@@ -82,7 +82,7 @@ def suspicions(machine: Machine, measurements: Measurements) -> tuple[Suspicion,
     `TrueposeError` where a row's condition asks an error source for what the machine does not say.
     """
     geometry = Geometry.of(machine, measurements.joints, measurements.placements)
-    allowed = allowance(machine, measurements, geometry)
+    allowed = expected_residual(machine, measurements, geometry)
     of = measurements.instrument[measurements.row]
     found: list[Suspicion] = []
     for index, instrument in enumerate(measurements.instruments):
@@ -97,7 +97,7 @@ def suspicions(machine: Machine, measurements: Measurements) -> tuple[Suspicion,
             allowed[at],
         )
         view = View(machine, measurements, instrument, at, geometry, readings)
-        looked = [each for kind in LOOKS for each in kind.look(view)]
+        looked = [each for kind in INSPECTIONS for each in kind.look(view)]
         if any(each.code == "constant-column" for each in looked):
             found += looked  # what else is off follows from it
             continue
@@ -110,12 +110,12 @@ def _supposed(view: View) -> list[Suspicion]:
     """Suspicions from the suppositions that explain the data; far off, where none does."""
     given = view.as_given
     if given.redundancy < REDUNDANT:
-        return list(unexplained.look(view)) if given.size() > 2.0 * ALLOWED else []
+        return list(unexplained.inspect(view)) if given.size() > 2.0 * ALLOWED else []
     if not max(given.size(), given.size(trimmed=False)) > ALLOWED:
         return []
     accepted: list[_Accepted] = []
     for free in (False, True):
-        for place, kind in enumerate(MENDS):
+        for place, kind in enumerate(HYPOTHESES):
             if kind.free != free:
                 continue
             for mend in kind.suppose(view):
@@ -130,7 +130,7 @@ def _supposed(view: View) -> list[Suspicion]:
         if accepted:
             break
     if not accepted:
-        return list(unexplained.look(view))
+        return list(unexplained.inspect(view))
     least = min(each.share for each in accepted)
     by_code: dict[str, list[_Accepted]] = {}
     # Suppositions that explain the same stand in the order of the registry.
@@ -147,7 +147,7 @@ class _Accepted:
     share: float
     place: int
     code: str
-    mend: Mend
+    mend: Hypothesis
 
 
 def _ranked(accepted: list[_Accepted]) -> list[_Accepted]:
@@ -155,14 +155,14 @@ def _ranked(accepted: list[_Accepted]) -> list[_Accepted]:
     return sorted(accepted, key=lambda each: (each.mend.of_command, each.share))
 
 
-def _before(view: View, mend: Mend) -> float:
+def _before(view: View, mend: Hypothesis) -> float:
     """How far off the data are as they stand, over the observations that the mend keeps."""
     if mend.kept is None:
         return view.as_given.size(mend.trimmed)
     return view.judge(kept=mend.kept).size(mend.trimmed)
 
 
-def _told(view: View, code: str, mends: list[Mend]) -> Suspicion:
+def _told(view: View, code: str, mends: list[Hypothesis]) -> Suspicion:
     first = mends[0]
     unit_of = next((c.unit for c in view.columns if c.name in first.where), view.columns[0].unit)
     before = view.rms(view.as_given, first, unit_of)
@@ -190,4 +190,12 @@ def _told(view: View, code: str, mends: list[Mend]) -> Suspicion:
     )
 
 
-__all__ = ["CODES", "LOOKS", "MENDS", "Setup", "Suspicion", "nominal_readings", "suspicions"]
+__all__ = [
+    "CODES",
+    "HYPOTHESES",
+    "INSPECTIONS",
+    "Placement",
+    "Suspicion",
+    "nominal_readings",
+    "suspicions",
+]

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.calibration.data_checks.nominal import Geometry, Setup
-from truepose.calibration.data_checks.placement import Free, Readings, settle
+from truepose.calibration.data_checks.nominal import Geometry, Placement
+from truepose.calibration.data_checks.placement import Free, Readings, fit_instrument
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.observables import OBSERVABLES, UNITS
 
@@ -69,7 +69,7 @@ class Suspicion:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class Misfit:
     """How far readings are from a machine.
 
     `residual` (k,) SI; `quotients` (k,) residual over what is allowed; `column` (k,) number of the
@@ -80,7 +80,7 @@ class Judged:
     quotients: Floats
     column: Indices
     reach: float
-    setup: Setup
+    setup: Placement
     redundancy: int
 
     def size(self, trimmed: bool = True) -> float:
@@ -103,7 +103,7 @@ def _rms(values: Floats, trimmed: bool) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Mend:
+class Hypothesis:
     """A supposition and how far the data are off under it.
 
     `words`: what is supposed, "the readings x and y are exchanged"; `where`: the columns;
@@ -113,7 +113,7 @@ class Mend:
 
     words: str
     where: tuple[str, ...]
-    judged: Judged
+    judged: Misfit
     kept: Indices | None = None
     trimmed: bool = True
     rows: tuple[int, ...] = ()
@@ -121,7 +121,7 @@ class Mend:
 
 
 @dataclass(frozen=True, eq=False)
-class Column:
+class MeasuredColumn:
     """One measured column of an instrument: `at` (m,) its places among the observations."""
 
     name: str
@@ -151,12 +151,12 @@ class View:
     readings: Readings
 
     @cached_property
-    def as_given(self) -> Judged:
+    def as_given(self) -> Misfit:
         """How far the data are off as they are."""
         return self.judge()
 
     @cached_property
-    def columns(self) -> tuple[Column, ...]:
+    def columns(self) -> tuple[MeasuredColumn, ...]:
         """The measured columns, in the order of the observables."""
         key = self.readings.observable * 100_000 + self.readings.strut
         found = []
@@ -164,14 +164,14 @@ class View:
             at = np.flatnonzero(key == each)
             observable = int(self.readings.observable[at[0]])
             strut = int(self.readings.strut[at[0]])
-            found.append(Column(self._name(observable, strut), observable, strut, at))
+            found.append(MeasuredColumn(self._name(observable, strut), observable, strut, at))
         return tuple(found)
 
     def _name(self, observable: int, strut: int) -> str:
         name = OBSERVABLES[observable]
         return name if strut < 0 else f"strut.{self.machine.struts[strut].name}.{name}"
 
-    def column(self, observable: str) -> Column | None:
+    def column(self, observable: str) -> MeasuredColumn | None:
         """The column of an observable that is of no strut."""
         return next((each for each in self.columns if each.name == observable), None)
 
@@ -195,7 +195,7 @@ class View:
         geometry: Geometry | None = None,
         kept: Indices | None = None,
         free: Free | None = None,
-    ) -> Judged:
+    ) -> Misfit:
         """How far other values, other poses, a part of the data or a freer instrument are off."""
         readings = self.readings
         if value is not None:
@@ -206,7 +206,7 @@ class View:
             readings = readings.kept(kept)
         place = self.geometry if geometry is None else geometry
         supposed = value is not None or geometry is not None
-        setup, residual, fitted = settle(
+        setup, residual, fitted = fit_instrument(
             place,
             self.instrument,
             readings,
@@ -217,9 +217,9 @@ class View:
         shown = (readings.value - residual) / readings.scale
         reach = math.sqrt(sum(float(np.var(shown[column == each])) for each in np.unique(column)))
         redundancy = residual.size - fitted
-        return Judged(residual, residual / readings.scale, column, reach, setup, redundancy)
+        return Misfit(residual, residual / readings.scale, column, reach, setup, redundancy)
 
-    def rms(self, judged: Judged, mend: Mend, unit: str) -> float:
+    def rms(self, judged: Misfit, mend: Hypothesis, unit: str) -> float:
         """Of the residuals of one SI unit, of those observations that a mend keeps."""
         observable = self.readings.observable
         residual = judged.residual
@@ -291,7 +291,7 @@ class OfMend:
 
     code: str
     doc: str
-    suppose: Callable[[View], Iterator[Mend]]
+    suppose: Callable[[View], Iterator[Hypothesis]]
     free: bool = False
 
 

@@ -16,8 +16,8 @@ from truepose.calibration.data_checks.placement import difference
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import UNITS
 from truepose.machine import Machine
-from truepose.sources import Block, Deviation, acting
-from truepose.sources.tolerance import Tolerance
+from truepose.sources import Deviation, PoseBlock, acting
+from truepose.sources.tolerance import DimensionalTolerance
 
 MACHINES = 24
 """Machines that are drawn, each tolerance at one of its ends: the spread is known to a seventh."""
@@ -26,7 +26,7 @@ TAKEN = 5e-3
 """Where a file states no tolerance: this share of the machine's size, and this angle in rad."""
 
 
-def allowance(machine: Machine, measurements: Measurements, geometry: Geometry) -> Floats:
+def expected_residual(machine: Machine, measurements: Measurements, geometry: Geometry) -> Floats:
     """(n_observation,) SI: root of the sum of squares of what each cause may do to a reading.
 
     Tolerances by machines drawn at the ends of their bands and solved, so that a reading of a strut
@@ -54,7 +54,7 @@ def _size(machine: Machine, geometry: Geometry) -> float:
 
 
 def _bands(machine: Machine) -> Deviation | None:
-    found = [source for source in machine.sources if isinstance(source, Tolerance)]
+    found = [source for source in machine.sources if isinstance(source, DimensionalTolerance)]
     return found[0].bands if found else None
 
 
@@ -128,11 +128,11 @@ def _by_others(machine: Machine, measurements: Measurements) -> tuple[Floats, Fl
     for key, condition in number.items():
         rows = np.flatnonzero(which == key)
         joints, placements = measurements.joints[rows], measurements.placements[rows]
-        block = Block(machine, condition, poses[rows], np.arange(rows.size), joints, placements)
+        block = PoseBlock(machine, condition, poses[rows], np.arange(rows.size), joints, placements)
         known = np.zeros((rows.size, moves.size))
         squares = np.zeros((rows.size, moves.size))
         for source in acting(machine, condition):
-            if isinstance(source, Tolerance):
+            if isinstance(source, DimensionalTolerance):
                 continue
             moved = source.deviation(machine, condition, block)
             if not moved.parameters.size:

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from truepose.calibration.data_checks._base import Mend, OfMend, View
-from truepose.calibration.data_checks.nominal import Setup
+from truepose.calibration.data_checks._base import Hypothesis, OfMend, View
+from truepose.calibration.data_checks.nominal import Placement
 from truepose.calibration.data_checks.placement import Free
 
 
-def suppose_target(view: View) -> Iterator[Mend]:
+def suppose_target(view: View) -> Iterator[Hypothesis]:
     """The point that is looked at stands off the stated one, along the platform's axes."""
     instrument = view.instrument
     if instrument.target_unknown or not _sees_point(view):
@@ -21,10 +21,10 @@ def suppose_target(view: View) -> Iterator[Mend]:
     off = judged.setup.target - np.array(instrument.target)
     shown = ", ".join(view.amount(float(each), "m") for each in off)
     words = f"the target stands ({shown}) off the stated point, in the platform's axes"
-    yield Mend(words, _columns(view), judged)
+    yield Hypothesis(words, _columns(view), judged)
 
 
-def suppose_frame(view: View) -> Iterator[Mend]:
+def suppose_frame(view: View) -> Iterator[Hypothesis]:
     """The frame stands elsewhere, or is turned, by one rigid motion for all rows."""
     instrument = view.instrument
     if all(instrument.frame.unknown) or not _sees_frame(view):
@@ -34,7 +34,7 @@ def suppose_frame(view: View) -> Iterator[Mend]:
     unknown = (True, True, spatial, spatial, spatial, True)
     free = Free(unknown, instrument.target_unknown, instrument.bias_unknown)
     judged = view.judge(free=free)
-    stated, found = Setup.stated(instrument), judged.setup
+    stated, found = Placement.stated(instrument), judged.setup
     off = float(np.linalg.norm(found.origin - stated.origin))
     trace = float(np.trace(found.rotation @ stated.rotation.T))
     turn = float(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0)))
@@ -42,7 +42,7 @@ def suppose_frame(view: View) -> Iterator[Mend]:
         f"the readings are in another frame than stated: its origin {view.amount(off, 'm')} away, "
         f"turned by {view.amount(turn, 'rad')}"
     )
-    yield Mend(words, _columns(view), judged)
+    yield Hypothesis(words, _columns(view), judged)
 
 
 def _sees_point(view: View) -> bool:

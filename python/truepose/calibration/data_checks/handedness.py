@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from truepose.calibration.data_checks._base import Mend, OfMend, View
+from truepose.calibration.data_checks._base import Hypothesis, OfMend, View
 
 _COORDINATES = ("x", "y", "z", "direction.x", "direction.y", "direction.z")
 
 
-def suppose(view: View) -> Iterator[Mend]:
+def propose(view: View) -> Iterator[Hypothesis]:
     """One coordinate, in all its columns, of the other sign."""
     for observable in _COORDINATES:
         columns = [
@@ -21,7 +21,7 @@ def suppose(view: View) -> Iterator[Mend]:
         for column in columns:
             value[column.at] *= -1.0
         words = f"the {observable[-1]} axis points the other way (a left-handed frame)"
-        yield Mend(words, tuple(column.name for column in columns), view.judge(value))
+        yield Hypothesis(words, tuple(column.name for column in columns), view.judge(value))
 
 
-KIND = OfMend("flipped-axis", "one axis points the other way", suppose)
+KIND = OfMend("flipped-axis", "one axis points the other way", propose)

@@ -53,7 +53,7 @@ class Geometry:
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
+class Placement:
     """Where an instrument stands: frame `origin` (3,), m, `rotation` (3, 3), `target` (3,), m."""
 
     origin: Floats
@@ -61,7 +61,7 @@ class Setup:
     target: Floats
 
     @classmethod
-    def stated(cls, instrument: Instrument) -> Setup:
+    def stated(cls, instrument: Instrument) -> Placement:
         """As the measurements declare it; where something is unknown, where its search starts."""
         frame: Frame = instrument.frame
         rotation = rotation_matrix(frame.rotation)
@@ -71,7 +71,7 @@ class Setup:
 def read(
     geometry: Geometry,
     instrument: Instrument,
-    setup: Setup,
+    setup: Placement,
     row: Indices,
     observable: Indices,
     strut: Indices,
@@ -101,7 +101,7 @@ def read(
 def _of_struts(
     geometry: Geometry,
     instrument: Instrument,
-    setup: Setup,
+    setup: Placement,
     row: Indices,
     observable: Indices,
     strut: Indices,
@@ -128,7 +128,7 @@ def _of_struts(
 def nominal_readings(
     machine: Machine,
     measurements: Measurements,
-    setups: Sequence[Setup] | None = None,
+    setups: Sequence[Placement] | None = None,
     geometry: Geometry | None = None,
 ) -> Floats:
     """(n_observation,) what the instruments read of the nominal machine, SI, at the joints given.
@@ -142,7 +142,7 @@ def nominal_readings(
     of = measurements.instrument[measurements.row]
     for index, instrument in enumerate(measurements.instruments):
         mine = np.flatnonzero(of == index)
-        setup = Setup.stated(instrument) if setups is None else setups[index]
+        setup = Placement.stated(instrument) if setups is None else setups[index]
         value[mine] = read(
             geometry,
             instrument,

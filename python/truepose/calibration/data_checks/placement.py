@@ -19,7 +19,7 @@ from truepose.calibration.data_checks.nominal import (
     LENGTH,
     A,
     Geometry,
-    Setup,
+    Placement,
     X,
     read,
     turned,
@@ -93,14 +93,14 @@ def difference(observable: Indices, left: Floats, right: Floats) -> Floats:
 _ANGULAR = np.array([unit == "rad" for unit in UNITS])
 
 
-def settle(
+def fit_instrument(
     geometry: Geometry,
     instrument: Instrument,
     readings: Readings,
     free: Free,
     *,
     roughly: bool = False,
-) -> tuple[Setup, Floats, int]:
+) -> tuple[Placement, Floats, int]:
     """(setup, residual (k,) read minus predicted, number of unknowns fitted), SI.
 
     `roughly`: only from the likeliest start, and no further than what a supposition needs, most of
@@ -113,15 +113,15 @@ def settle(
     axes = np.flatnonzero(free.frame)
     count = axes.size + 3 * free.target + n_bias
 
-    def setup_of(start: Setup, unknown: Floats) -> Setup:
+    def setup_of(start: Placement, unknown: Floats) -> Placement:
         moved = np.zeros(6)
         moved[axes] = unknown[: axes.size]
         target = start.target
         if free.target:
             target = target + unknown[axes.size : axes.size + 3]
-        return Setup(start.origin + moved[:3], turned(moved[3:]) @ start.rotation, target)
+        return Placement(start.origin + moved[:3], turned(moved[3:]) @ start.rotation, target)
 
-    def residual_of(start: Setup, unknown: Floats) -> Floats:
+    def residual_of(start: Placement, unknown: Floats) -> Floats:
         predicted = read(
             geometry,
             instrument,
@@ -134,7 +134,9 @@ def settle(
         return gap - unknown[count - n_bias :][which] if n_bias else gap
 
     starts = (
-        list(_starts(geometry, instrument, readings, free)) if count else [Setup.stated(instrument)]
+        list(_starts(geometry, instrument, readings, free))
+        if count
+        else [Placement.stated(instrument)]
     )
     if roughly and len(starts) > 1:
         none = np.zeros(count)
@@ -142,7 +144,7 @@ def settle(
             min(starts, key=lambda s: float(np.linalg.norm(residual_of(s, none) / readings.scale)))
         ]
     steps, settled = (ROUGH_STEPS, ROUGH) if roughly else (STEPS, SETTLED)
-    best: tuple[float, Setup, Floats] | None = None
+    best: tuple[float, Placement, Floats] | None = None
     for start in starts:
         over = partial(_over, residual_of, start, readings.scale)
         found = _least_squares(over, count, steps, settled)
@@ -157,7 +159,10 @@ def settle(
 
 
 def _over(
-    residual_of: Callable[[Setup, Floats], Floats], start: Setup, scale: Floats, unknown: Floats
+    residual_of: Callable[[Placement, Floats], Floats],
+    start: Placement,
+    scale: Floats,
+    unknown: Floats,
 ) -> Floats:
     quotients: Floats = residual_of(start, unknown) / scale
     return quotients
@@ -165,13 +170,13 @@ def _over(
 
 def _starts(
     geometry: Geometry, instrument: Instrument, readings: Readings, free: Free
-) -> Iterator[Setup]:
+) -> Iterator[Placement]:
     """Where to search from, the likeliest first; the next only where that one leads nowhere."""
     first = _start(geometry, instrument, readings, free)
     yield first
     if any(free.frame[:3]) and (readings.observable == DISTANCE).any():
         for origin in _trilaterated(geometry, first, readings):
-            yield Setup(
+            yield Placement(
                 np.where(free.frame[:3], origin, first.origin), first.rotation, first.target
             )
     axes = np.flatnonzero(free.frame[3:])
@@ -180,10 +185,10 @@ def _starts(
         for axis in axes:
             for angle in (-TILT, TILT):
                 tilt = turned(angle * np.eye(3)[axis])
-                yield Setup(first.origin, tilt @ first.rotation, first.target)
+                yield Placement(first.origin, tilt @ first.rotation, first.target)
 
 
-def _trilaterated(geometry: Geometry, setup: Setup, readings: Readings) -> Iterator[Floats]:
+def _trilaterated(geometry: Geometry, setup: Placement, readings: Readings) -> Iterator[Floats]:
     """Points (3,) with given distances to the target's: d^2 - P^2 = o^2 - 2 P.o, linear in o, o^2.
 
     And the mirror image behind the plane in which the points most nearly lie.
@@ -208,9 +213,9 @@ def _trilaterated(geometry: Geometry, setup: Setup, readings: Readings) -> Itera
         yield middle + origin - 2.0 * (origin @ axes[2]) * axes[2]
 
 
-def _start(geometry: Geometry, instrument: Instrument, readings: Readings, free: Free) -> Setup:
+def _start(geometry: Geometry, instrument: Instrument, readings: Readings, free: Free) -> Placement:
     """The stated frame, or, where enough of it is unknown, the closed form's."""
-    stated = Setup.stated(instrument)
+    stated = Placement.stated(instrument)
     axes = [axis for axis in range(3) if (readings.observable == X + axis).any()]
     origin_free, rotation_free = free.frame[:3], free.frame[3:]
     spatial = len(axes) == 3 and all(rotation_free)
@@ -232,7 +237,7 @@ def _start(geometry: Geometry, instrument: Instrument, readings: Readings, free:
     rotation[np.ix_(axes, axes)] = (u * proper) @ v
     origin = stated.origin.copy()
     origin[axes] = points.mean(axis=0) - rotation[np.ix_(axes, axes)] @ seen.mean(axis=0)
-    return Setup(origin, rotation, stated.target)
+    return Placement(origin, rotation, stated.target)
 
 
 def _least_squares(

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from truepose.calibration.data_checks._base import Mend, OfMend, View
+from truepose.calibration.data_checks._base import Hypothesis, OfMend, View
 
 
-def suppose_shifted(view: View) -> Iterator[Mend]:
+def suppose_shifted(view: View) -> Iterator[Hypothesis]:
     """Every reading one row later or earlier than it stands; the row without one is left out."""
     table = view.table
     if table is None or len(table) < 4:
@@ -21,10 +21,12 @@ def suppose_shifted(view: View) -> Iterator[Mend]:
         value[into] = view.readings.value[out]
         kept = np.sort(into.ravel())
         said = f"the readings stand {words} beside what was commanded"
-        yield Mend(said, tuple(c.name for c in view.columns), view.judge(value, kept=kept), kept)
+        yield Hypothesis(
+            said, tuple(c.name for c in view.columns), view.judge(value, kept=kept), kept
+        )
 
 
-def suppose_exchanged(view: View) -> Iterator[Mend]:
+def suppose_exchanged(view: View) -> Iterator[Hypothesis]:
     """Each row given the readings that lie nearest to what it should show, if none is given twice.
 
     An outlier has no row of its own that it would fit better, so that it is no exchange.
@@ -44,7 +46,7 @@ def suppose_exchanged(view: View) -> Iterator[Mend]:
     rows = tuple(view.rows[moved].tolist())
     words = f"the readings of {view.named_rows(rows)} stand in each other's place"
     where = tuple(column.name for column in view.columns)
-    yield Mend(words, where, view.judge(mended), trimmed=False, rows=rows)
+    yield Hypothesis(words, where, view.judge(mended), trimmed=False, rows=rows)
 
 
 SHIFTED = OfMend("shifted-rows", "readings stand one row beside their commands", suppose_shifted)

@@ -7,17 +7,17 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from truepose.calibration.data_checks._base import Column, Mend, OfMend, View, listed
+from truepose.calibration.data_checks._base import Hypothesis, MeasuredColumn, OfMend, View, listed
 
 FAMILIES = (("x", "y", "z"), ("a", "b", "c"))
 """Columns whose exchange is no wonder; those of struts go by what they measure."""
 
 
-def suppose(view: View) -> Iterator[Mend]:
+def propose(view: View) -> Iterator[Hypothesis]:
     """Measured columns of one family in another order; two joints; two commanded freedoms."""
     for family in FAMILIES:
         yield from _reordered(view, [c for c in view.columns if c.name in family])
-    of_strut: dict[int, list[Column]] = {}
+    of_strut: dict[int, list[MeasuredColumn]] = {}
     for column in view.columns:
         if column.strut >= 0:
             of_strut.setdefault(column.strut, []).append(column)
@@ -30,13 +30,15 @@ def suppose(view: View) -> Iterator[Mend]:
     yield from _commands(view)
 
 
-def _reordered(view: View, columns: Sequence[Column]) -> Iterator[Mend]:
+def _reordered(view: View, columns: Sequence[MeasuredColumn]) -> Iterator[Hypothesis]:
     for order in permutations(range(len(columns))):
         if order != tuple(range(len(columns))):
             yield from _exchanged(view, columns, order)
 
 
-def _exchanged(view: View, columns: Sequence[Column], order: Sequence[int]) -> Iterator[Mend]:
+def _exchanged(
+    view: View, columns: Sequence[MeasuredColumn], order: Sequence[int]
+) -> Iterator[Hypothesis]:
     moved = [(a, columns[order[k]]) for k, a in enumerate(columns) if order[k] != k]
     if len({column.at.size for pair in moved for column in pair}) != 1:
         return
@@ -47,10 +49,10 @@ def _exchanged(view: View, columns: Sequence[Column], order: Sequence[int]) -> I
         value[at] = view.readings.value[of]
     names = tuple(column.name for column, _ in moved)
     words = f"the readings {listed(names)} stand in each other's place"
-    yield Mend(words, names, view.judge(value))
+    yield Hypothesis(words, names, view.judge(value))
 
 
-def _joints(view: View) -> Iterator[Mend]:
+def _joints(view: View) -> Iterator[Hypothesis]:
     names = view.machine.joints
     for i, j in combinations(range(len(names)), 2):
         joints = view.measurements.joints.copy()
@@ -59,10 +61,10 @@ def _joints(view: View) -> Iterator[Mend]:
         if geometry is not None:
             where = (f"joint.{names[i]}", f"joint.{names[j]}")
             words = f"the joints {names[i]} and {names[j]} stand in each other's place"
-            yield Mend(words, where, view.judge(geometry=geometry), of_command=True)
+            yield Hypothesis(words, where, view.judge(geometry=geometry), of_command=True)
 
 
-def _commands(view: View) -> Iterator[Mend]:
+def _commands(view: View) -> Iterator[Hypothesis]:
     freedoms = view.machine.commanded
     for i, j in combinations(range(len(freedoms)), 2):
         if (freedoms[i] in "xyz") != (freedoms[j] in "xyz"):
@@ -73,7 +75,7 @@ def _commands(view: View) -> Iterator[Mend]:
         if geometry is not None:
             where = (f"command.{freedoms[i]}", f"command.{freedoms[j]}")
             words = f"the commands {freedoms[i]} and {freedoms[j]} stand in each other's place"
-            yield Mend(words, where, view.judge(geometry=geometry), of_command=True)
+            yield Hypothesis(words, where, view.judge(geometry=geometry), of_command=True)
 
 
-KIND = OfMend("swapped-columns", "two or three columns stand in each other's place", suppose)
+KIND = OfMend("swapped-columns", "two or three columns stand in each other's place", propose)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from truepose.calibration.data_checks._base import Column, OfLook, Suspicion, View
+from truepose.calibration.data_checks._base import MeasuredColumn, OfLook, Suspicion, View
 
 BELOW_DIGIT = 20.0
 """A standard uncertainty this many times below the last digit is none: rounding alone has 0.29."""
@@ -43,7 +43,7 @@ def look_uncertainty(view: View) -> Iterator[Suspicion]:
         yield from _overstated(view, column)
 
 
-def _below_digit(view: View, column: Column) -> Iterator[Suspicion]:
+def _below_digit(view: View, column: MeasuredColumn) -> Iterator[Suspicion]:
     digit = last_digit(view.readings.value[column.at], column.unit)
     noise = float(np.median(view.measurements.uncertainty[view.at[column.at]]))
     if digit is not None and digit > BELOW_DIGIT * noise:
@@ -60,7 +60,7 @@ def _below_digit(view: View, column: Column) -> Iterator[Suspicion]:
         )
 
 
-def _overstated(view: View, column: Column) -> Iterator[Suspicion]:
+def _overstated(view: View, column: MeasuredColumn) -> Iterator[Suspicion]:
     noise = view.measurements.uncertainty[view.at[column.at]]
     if column.at.size < SOME or view.as_given.redundancy < SOME:
         return

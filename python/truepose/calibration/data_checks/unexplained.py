@@ -13,7 +13,7 @@ ABSURD = 0.1
 little off, but another one, or other data."""
 
 
-def look(view: View) -> Iterator[Suspicion]:
+def inspect(view: View) -> Iterator[Suspicion]:
     """The data are off and nothing in the registry of suppositions mends them."""
     judged = view.as_given
     size = judged.size()

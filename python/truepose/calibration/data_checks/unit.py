@@ -8,19 +8,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.calibration.data_checks._base import Column, Mend, OfMend, View, listed
+from truepose.calibration.data_checks._base import Hypothesis, MeasuredColumn, OfMend, View, listed
 
 LENGTHS = ((10.0, "10"), (25.4, "25.4, the inch"), (100.0, "100"), (1000.0, "1000"))
 ANGLES = ((180.0 / math.pi, "180/pi"),)
 
 
-def suppose_length(view: View) -> Iterator[Mend]:
+def suppose_length(view: View) -> Iterator[Hypothesis]:
     """All lengths, or one column, too large or too small by a factor; so the commands."""
     yield from _measured(view, [c for c in view.columns if c.unit == "m"], LENGTHS)
     yield from _commanded(view, "m", LENGTHS)
 
 
-def suppose_angle(view: View) -> Iterator[Mend]:
+def suppose_angle(view: View) -> Iterator[Hypothesis]:
     """Degrees declared as radians, or radians as degrees, in angles read or commanded."""
     yield from _measured(view, [c for c in view.columns if c.unit == "rad"], ANGLES)
     yield from _commanded(view, "rad", ANGLES)
@@ -33,8 +33,8 @@ def _factors(factors: Sequence[tuple[float, str]]) -> Iterator[tuple[float, str]
 
 
 def _measured(
-    view: View, columns: Sequence[Column], factors: Sequence[tuple[float, str]]
-) -> Iterator[Mend]:
+    view: View, columns: Sequence[MeasuredColumn], factors: Sequence[tuple[float, str]]
+) -> Iterator[Hypothesis]:
     if not columns:
         return
     sets = [columns, *([column] for column in columns if len(columns) > 1)]
@@ -47,7 +47,7 @@ def _measured(
                 value[at] = _unwrapped(view, at, factor)
             value[at] /= factor
             are = "are" if len(names) > 1 else "is"
-            yield Mend(f"{listed(names)} {are} {word}", names, view.judge(value))
+            yield Hypothesis(f"{listed(names)} {are} {word}", names, view.judge(value))
 
 
 def _unwrapped(view: View, at: Indices, factor: float) -> Floats:
@@ -62,7 +62,7 @@ def _unwrapped(view: View, at: Indices, factor: float) -> Floats:
     return unwrapped
 
 
-def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> Iterator[Mend]:
+def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> Iterator[Hypothesis]:
     machine, joints = view.machine, view.measurements.joints
     parameters = machine.parameters
     # A drive's coordinate has the unit of its offset.
@@ -79,7 +79,7 @@ def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> I
             geometry = view.moved(moved)
             if geometry is not None:
                 where = tuple(f"joint.{machine.joints[k]}" for k in mine)
-                yield Mend(
+                yield Hypothesis(
                     f"the joints are {word}", where, view.judge(geometry=geometry), of_command=True
                 )
         if freedoms:
@@ -89,7 +89,7 @@ def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> I
             if geometry is not None:
                 where = tuple(f"command.{machine.commanded[k]}" for k in freedoms)
                 words = f"the commands {listed(machine.commanded[k] for k in freedoms)} are {word}"
-                yield Mend(words, where, view.judge(geometry=geometry), of_command=True)
+                yield Hypothesis(words, where, view.judge(geometry=geometry), of_command=True)
 
 
 LENGTH = OfMend("wrong-unit", "lengths in another unit than declared", suppose_length)

@@ -23,10 +23,10 @@ from truepose.arrays import Floats, Indices
 from truepose.calibration.acceptance import sentences
 from truepose.calibration.acceptance.assessment import ROUNDING, Reason, both
 from truepose.calibration.acceptance.decision import Gate
-from truepose.calibration.acceptance.observability import of_machine, prior_root, spread
-from truepose.calibration.acceptance.tool_uncertainty import AtTool, Tool
+from truepose.calibration.acceptance.observability import of_machine, prior_root, row_covariance
+from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
 from truepose.calibration.identification.fit import Fit, whitened
-from truepose.calibration.identification.problem import Prior, Problem
+from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.errors import RequestError
@@ -56,15 +56,15 @@ class Considered:
 
     labels: tuple[str, ...]
     every: tuple[str, ...]
-    before: AtTool | None
-    after: AtTool
-    alone: AtTool
-    part: AtTool
+    before: ToolUncertainty | None
+    after: ToolUncertainty
+    alone: ToolUncertainty
+    part: ToolUncertainty
     relative: bool
     shown: ShownUnits = METRIC
 
 
-def considered(
+def consider_covariance(
     machine: Machine, fitted: Fit, identify: Sequence[str], joints: Floats, placements: Floats
 ) -> Considered | None:
     """None where every tolerance was identified.
@@ -80,7 +80,7 @@ def considered(
     values = np.zeros(joint.count)
     values[found] = fitted.values
     rest = np.setdiff1d(np.arange(count), found)
-    problem = Problem(machine, fitted.measurements, joint)
+    problem = IdentificationProblem(machine, fitted.measurements, joint)
     rows = np.sqrt(fitted.weights)[:, np.newaxis] * whitened(problem, values) / fitted.birge
     effects, _ = tool_effects(machine, joint, values, joints, placements)
     components = [_ANGLES.get(name, name) for name in machine.components]
@@ -89,7 +89,7 @@ def considered(
     sigma: Floats = np.sqrt(np.diagonal(prior))
     relative = False
     if joint.count > count:
-        gauge = tool.sort(spread(of_machine(rows, count, sigma)), with_gauge=True).gauge
+        gauge = tool.sort(row_covariance(of_machine(rows, count, sigma)), with_gauge=True).gauge
         relative, tool = len(gauge) > 0, tool.relative(gauge)
     none = np.zeros((0, count))
     before = None
@@ -279,4 +279,4 @@ def _is_within(found: Considered, target: tuple[float | None, float | None]) -> 
     return bool(pairs) and all(size is not None and size <= asked for asked, size in pairs)
 
 
-__all__ = ["Considered", "considered", "with_considered"]
+__all__ = ["Considered", "consider_covariance", "with_considered"]

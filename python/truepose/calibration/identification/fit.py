@@ -18,11 +18,11 @@ from truepose.arrays import Floats
 from truepose.calibration.identification.frames import (
     FAR,
     TURNED,
-    rebased,
-    turned_further,
+    rebase_frame,
+    rotated_starts,
     with_frames_found,
 )
-from truepose.calibration.identification.problem import Prior, Problem
+from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.robust import LOSS_ROUNDS, noise_of, weights_of
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.measurements import Measurements
@@ -72,7 +72,7 @@ class Fit:
     leverage: Floats
     as_filed: Floats
     """(n,) the machine as filed, 0, and where the instruments then are."""
-    problem: Problem
+    problem: IdentificationProblem
     evaluations: int = 0
     noise: float = float("nan")
     """Residuals in stated uncertainties, robust, over their freedom; NaN where there is none."""
@@ -175,7 +175,7 @@ class Equations:
         return rows
 
 
-def whitened(problem: Problem, values: Floats) -> Floats:
+def whitened(problem: IdentificationProblem, values: Floats) -> Floats:
     """(m, n) derivatives of the readings over their uncertainties.
 
     Raises `RequestError` (no-fit) where a pose of the machine with these values cannot be solved.
@@ -183,7 +183,7 @@ def whitened(problem: Problem, values: Floats) -> Floats:
     return _whitened(problem, values, problem.jacobian(values))
 
 
-def _whitened(problem: Problem, values: Floats, jacobian: Floats) -> Floats:
+def _whitened(problem: IdentificationProblem, values: Floats, jacobian: Floats) -> Floats:
     if not np.isfinite(jacobian).all():
         status = problem.status(values)
         rows = np.flatnonzero(status)
@@ -206,7 +206,7 @@ def fit(
     (no-fit) where the search does not settle.
     """
     require_enough(measurements, unknowns, use_prior)
-    problem, as_filed = placed(machine, measurements, unknowns)
+    problem, as_filed = place_instruments(machine, measurements, unknowns)
     known = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
     prior = Prior(known.rows, unknowns.prior_mean)  # without tolerances, where the gauge holds
     values = unknowns.prior_mean
@@ -268,9 +268,9 @@ def fit(
     )
 
 
-def placed(
+def place_instruments(
     machine: Machine, measurements: Measurements, unknowns: Unknowns
-) -> tuple[Problem, Floats]:
+) -> tuple[IdentificationProblem, Floats]:
     """The problem, its instruments where the machine as filed has them, and values (n,) of that.
 
     Of several starts of the frames the one that fits best is taken, one that settles before one
@@ -278,19 +278,19 @@ def placed(
 
     Raises `RequestError` (no-fit) where from no start the readings can be followed.
     """
-    best: tuple[bool, float, Problem, Floats] | None = None
+    best: tuple[bool, float, IdentificationProblem, Floats] | None = None
     refused: RequestError | None = None
     of = measurements.instrument[measurements.row]
     for number in [None, *unknowns.frames]:
         if number is None:
             starts = with_frames_found(machine, measurements)
         elif best is None:
-            starts = turned_further(machine, measurements, number)
+            starts = rotated_starts(machine, measurements, number)
         else:
             # Each instrument on its own: on a machine as filed none depends on another.
             residual = best[2].residual(best[3])[of == number]
             near = not best[0] and float(np.sum(residual**2)) <= FAR**2 * residual.size
-            starts = [] if near else turned_further(machine, best[2].measurements, number)
+            starts = [] if near else rotated_starts(machine, best[2].measurements, number)
         for each in starts:
             try:
                 found = _instruments(machine, each, unknowns.of_instruments)
@@ -306,20 +306,20 @@ def placed(
     standing = best[2].measurements
     turns = [at for own in alone.frames.values() for at in own[3:6] if at is not None]
     if np.abs(values[turns]).max(initial=0.0) > TURNED:
-        standing = rebased(standing, alone, values)
+        standing = rebase_frame(standing, alone, values)
         values = _instruments(machine, standing, alone)[3]
     machine_too = np.concatenate([np.zeros(unknowns.n_machine), values])
-    return Problem(machine, standing, unknowns), machine_too
+    return IdentificationProblem(machine, standing, unknowns), machine_too
 
 
 def _instruments(
     machine: Machine, measurements: Measurements, alone: Unknowns
-) -> tuple[bool, float, Problem, Floats]:
+) -> tuple[bool, float, IdentificationProblem, Floats]:
     """(whether unsettled, cost, problem, values) of the instruments' unknowns alone.
 
     They fit the machine as filed; an infinite cost where a reading is not finite.
     """
-    problem = Problem(machine, measurements, alone)
+    problem = IdentificationProblem(machine, measurements, alone)
     values = np.zeros(alone.count)
     unsettled = False
     if alone.count:
@@ -360,7 +360,7 @@ def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bo
     )
 
 
-def _no_fit(problem: Problem, reason: str, rows: np.ndarray) -> RequestError:
+def _no_fit(problem: IdentificationProblem, reason: str, rows: np.ndarray) -> RequestError:
     measurements = problem.measurements
     line = int(measurements.lines[rows[0]]) if rows.size and measurements.lines[rows[0]] else None
     return RequestError(

@@ -40,7 +40,7 @@ def with_frames_found(machine: Machine, measurements: Measurements) -> list[Meas
     """The measurements with unknown frames set to where the nominal machine says they are.
 
     Usually one; where distances leave two sides of a plane open, one for each. Frames that no
-    closed form finds start where they are declared; see `turned_further`.
+    closed form finds start where they are declared; see `rotated_starts`.
     """
     found = [measurements]
     for number, instrument in enumerate(measurements.instruments):
@@ -49,7 +49,7 @@ def with_frames_found(machine: Machine, measurements: Measurements) -> list[Meas
     return found
 
 
-def turned_further(machine: Machine, measurements: Measurements, number: int) -> list[Measurements]:
+def rotated_starts(machine: Machine, measurements: Measurements, number: int) -> list[Measurements]:
     """The measurements with one frame turned about what is unknown of its rotation; further starts.
 
     About one axis by eighths of a turn, about two by thirds of a half turn in eight directions,
@@ -69,7 +69,7 @@ def turned_further(machine: Machine, measurements: Measurements, number: int) ->
     ]
 
 
-def rebased(measurements: Measurements, unknowns: Unknowns, values: Floats) -> Measurements:
+def rebase_frame(measurements: Measurements, unknowns: Unknowns, values: Floats) -> Measurements:
     """The measurements with unknown frames moved by the values (n,) that were found for them."""
     for number, own in unknowns.frames.items():
         moved = np.array([0.0 if at is None else values[at] for at in own[:6]])

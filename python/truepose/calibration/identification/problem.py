@@ -19,9 +19,9 @@ from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Condition, Machine
-from truepose.runs.displacement import Moved, together
-from truepose.sources import Block, acting
-from truepose.sources.tolerance import Tolerance
+from truepose.runs.displacement import ParameterDeviation, sum_deviations
+from truepose.sources import PoseBlock, acting
+from truepose.sources.tolerance import DimensionalTolerance
 
 TOLERANCES = (1e-16, 1e-10, 1e-13)
 """When a fit has settled: decrease of the cost, step, cosine of the gradient; all relative. What is
@@ -70,7 +70,7 @@ class Solved:
     evaluations: tuple[int, ...]
 
 
-class Problem:
+class IdentificationProblem:
     """What instruments read of a machine, as a function of the unknowns."""
 
     def __init__(self, machine: Machine, measurements: Measurements, unknowns: Unknowns) -> None:
@@ -201,7 +201,9 @@ class Problem:
         return terms, np.hstack(parts)
 
 
-def row_shifts(machine: Machine, measurements: Measurements, unknowns: Unknowns) -> Moved:
+def row_shifts(
+    machine: Machine, measurements: Measurements, unknowns: Unknowns
+) -> ParameterDeviation:
     """Parameters (k,) and how far every row's condition is known to move them (n_row, k).
 
     By every source but the tolerances, whose middles are where unknowns start. A strut whose
@@ -212,7 +214,7 @@ def row_shifts(machine: Machine, measurements: Measurements, unknowns: Unknowns)
         started = each.changed(known, 0.0)
         assert started is not None  # looked at where the unknowns were chosen
         known = started
-    parts: list[tuple[np.ndarray, Moved]] = []
+    parts: list[tuple[np.ndarray, ParameterDeviation]] = []
     for rows, condition in _by_condition(measurements):
         parts.append((rows, _shifts(known, measurements, condition, rows)))
     columns = np.unique(np.concatenate([moved[0] for _, moved in parts])).astype(np.intp)
@@ -225,14 +227,14 @@ def row_shifts(machine: Machine, measurements: Measurements, unknowns: Unknowns)
 
 
 def property_effects(
-    machine: Machine, measurements: Measurements, unknowns: Unknowns, base: Moved
-) -> Iterator[tuple[int, Moved]]:
+    machine: Machine, measurements: Measurements, unknowns: Unknowns, base: ParameterDeviation
+) -> Iterator[tuple[int, ParameterDeviation]]:
     """(number, (parameters, their change (n_row, k) per unit)) of every unknown property."""
     for number, each in unknowns.properties.items():
         changed = each.changed(machine, each.step)
         assert changed is not None
         moved = row_shifts(changed, measurements, unknowns)
-        columns, total = together([moved, (base[0], -base[1])])
+        columns, total = sum_deviations([moved, (base[0], -base[1])])
         slopes = total / each.step
         used = slopes.any(axis=0)
         yield number, (columns[used], slopes[:, used])
@@ -248,20 +250,24 @@ def _by_condition(measurements: Measurements) -> Iterator[tuple[np.ndarray, Cond
 
 def _shifts(
     machine: Machine, measurements: Measurements, condition: Condition, rows: np.ndarray
-) -> Moved:
-    sources = [source for source in acting(machine, condition) if not isinstance(source, Tolerance)]
+) -> ParameterDeviation:
+    sources = [
+        source
+        for source in acting(machine, condition)
+        if not isinstance(source, DimensionalTolerance)
+    ]
     if not sources:
         return np.empty(0, np.intp), np.empty((1, 0))
     joints, placements = measurements.joints[rows], measurements.placements[rows]
     commanded = [machine.dof.index(name) for name in machine.commanded]
     poses = np.ascontiguousarray(machine.kernel.pose_of(placements)[:, commanded])
-    block = Block(machine, condition, poses, np.arange(rows.size), joints, placements)
+    block = PoseBlock(machine, condition, poses, np.arange(rows.size), joints, placements)
     parts = []
     for source in sources:
         deviation = source.deviation(machine, condition, block)
         shifted = deviation.shift.any(axis=0)
         parts.append((deviation.parameters[shifted], deviation.shift[:, shifted]))
-    return together(parts)
+    return sum_deviations(parts)
 
 
-__all__ = ["Prior", "Problem", "Solved", "row_shifts"]
+__all__ = ["IdentificationProblem", "Prior", "Solved", "row_shifts"]

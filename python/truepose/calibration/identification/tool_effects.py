@@ -10,7 +10,11 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Floats
 from truepose.calibration.acceptance import Candidate
 from truepose.calibration.identification.fit import Fit
-from truepose.calibration.identification.problem import Problem, property_effects, row_shifts
+from truepose.calibration.identification.problem import (
+    IdentificationProblem,
+    property_effects,
+    row_shifts,
+)
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.instruments._base import Frame, Instrument
 from truepose.calibration.measurements import Measurements
@@ -130,7 +134,7 @@ def candidates(machine: Machine, fit: Fit) -> list[Candidate]:
 
 def _rows(machine: Machine, fit: Fit, data: Measurements) -> Floats:
     """(m, n) whitened derivatives of other readings, at the fitted values."""
-    problem = Problem(machine, data, fit.unknowns)
+    problem = IdentificationProblem(machine, data, fit.unknowns)
     jacobian: Floats = problem.jacobian(fit.values) / data.uncertainty[:, np.newaxis]
     return jacobian
 

@@ -27,7 +27,7 @@ from truepose.files.units import QuantityError, UnitSystem
 from truepose.files.wording import did_you_mean
 from truepose.machine import Machine
 from truepose.sources import Deviation
-from truepose.sources.tolerance import Tolerance
+from truepose.sources.tolerance import DimensionalTolerance
 
 SCREEN = 1e-9
 """Middles of a group's bands may be this far, of its half band, from moving together."""
@@ -177,7 +177,7 @@ def unknowns_of(
 
 def _bands(machine: Machine) -> Deviation | None:
     for source in machine.sources:
-        if isinstance(source, Tolerance):
+        if isinstance(source, DimensionalTolerance):
             return source.bands
     return None
 

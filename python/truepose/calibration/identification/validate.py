@@ -17,7 +17,7 @@ import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.identification.fit import Fit, fit
-from truepose.calibration.identification.problem import Problem
+from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.calibration.measurements import Measurements
 from truepose.errors import RequestError
@@ -166,7 +166,7 @@ def _predicted(machine: Machine, rows: Measurements, fitted: Fit) -> Floats:
     """
     # The instruments stand where the fit's own rows put them: its values are relative to that.
     standing = dataclasses.replace(rows, instruments=fitted.measurements.instruments)
-    problem = Problem(machine, standing, fitted.unknowns)
+    problem = IdentificationProblem(machine, standing, fitted.unknowns)
     slope = problem.jacobian(fitted.values) / rows.uncertainty[:, np.newaxis]
     promised = np.einsum("ij,jk,ik->i", slope, fitted.covariance, slope)
     found = np.stack([problem.residual(fitted.as_filed), problem.residual(fitted.values), promised])

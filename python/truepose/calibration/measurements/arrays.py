@@ -19,8 +19,8 @@ from truepose.calibration.measurements.declarations import (
 from truepose.calibration.measurements.measurements import Measurements
 from truepose.calibration.measurements.rows import (
     UNCERTAINTY,
-    Reading,
-    Rows,
+    MeasurementRows,
+    ReadingColumn,
     measurements_in,
     reading_columns,
 )
@@ -74,7 +74,7 @@ def measurements_of(
     conditions = maker.conditions(condition, n)
     if problems:
         raise RequestError(*problems)
-    rows = Rows(
+    rows = MeasurementRows(
         instrument=np.zeros(n, np.intp),
         readings=table,
         uncertainties=stated,
@@ -168,7 +168,7 @@ class _Maker:
     machine: Machine
     instrument: Instrument
     problems: list[Problem]
-    known: dict[str, Reading] = field(init=False)
+    known: dict[str, ReadingColumn] = field(init=False)
 
     def __post_init__(self) -> None:
         self.known = reading_columns(self.machine)
@@ -308,7 +308,7 @@ class _Report:
     """Problems of rows, by their number."""
 
     problems: list[Problem]
-    rows: Rows
+    rows: MeasurementRows
 
     def __call__(
         self,

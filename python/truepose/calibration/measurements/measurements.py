@@ -20,7 +20,7 @@ from truepose.calibration.observables import OBSERVABLES
 from truepose.machine.condition import Condition
 
 
-def cold_and_free(condition: Condition) -> Condition:
+def unloaded_at_reference(condition: Condition) -> Condition:
     """The condition of a row that says nothing: at reference throughout, nothing on the tool."""
     return dataclasses.replace(
         condition,

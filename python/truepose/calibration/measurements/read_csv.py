@@ -31,7 +31,7 @@ from truepose.calibration.measurements.measurements import Measurements
 from truepose.calibration.measurements.rows import (
     UNCERTAINTY,
     WRENCH,
-    Rows,
+    MeasurementRows,
     measurements_in,
     reading_columns,
 )
@@ -132,7 +132,7 @@ class _Reading:
         commands = self._stacked(table, "command.", self.machine.commanded)
         joints = self._stacked(table, "joint.", self.machine.joints)
         readings = reading_columns(self.machine)
-        rows = Rows(
+        rows = MeasurementRows(
             instrument=self._instruments(table),
             readings={name: table.numbers[name] for name in table.columns if name in readings},
             uncertainties={

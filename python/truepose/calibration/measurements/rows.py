@@ -17,7 +17,7 @@ from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
-from truepose.calibration.measurements.measurements import Measurements, cold_and_free
+from truepose.calibration.measurements.measurements import Measurements, unloaded_at_reference
 from truepose.calibration.observables import OBSERVABLES
 from truepose.files.data_file import MOST_PROBLEMS
 from truepose.files.wording import counted, one_of
@@ -46,7 +46,7 @@ WRENCH = {f"force.{axis}": "force" for axis in "xyz"} | {
 
 
 @dataclass(frozen=True)
-class Reading:
+class ReadingColumn:
     """A column of readings: what a kind calls it (`length`), its dimension, and which strut."""
 
     word: str
@@ -54,17 +54,17 @@ class Reading:
     strut: int = -1
 
 
-def reading_columns(machine: Machine) -> dict[str, Reading]:
+def reading_columns(machine: Machine) -> dict[str, ReadingColumn]:
     """Every column that readings of a machine can have, in the order of a file."""
-    columns = {word: Reading(word, dimension) for word, dimension in SINGLE.items()}
+    columns = {word: ReadingColumn(word, dimension) for word, dimension in SINGLE.items()}
     for at, strut in enumerate(machine.struts):
         for word, dimension in OF_A_STRUT.items():
-            columns[f"strut.{strut.name}.{word}"] = Reading(word, dimension, at)
+            columns[f"strut.{strut.name}.{word}"] = ReadingColumn(word, dimension, at)
     return columns
 
 
 @dataclass
-class Rows:
+class MeasurementRows:
     """What was given, by columns (n_row,), SI, a blank cell NaN, before anything of it is checked.
 
     Either `commands` (n_row, n_commanded) or `joints` (n_row, n_joint). `instrument`: which, or -1
@@ -122,7 +122,7 @@ class Report(Protocol):
 
 
 def measurements_in(
-    machine: Machine, instruments: Sequence[Instrument], rows: Rows, report: Report
+    machine: Machine, instruments: Sequence[Instrument], rows: MeasurementRows, report: Report
 ) -> Measurements:
     """Measurements from rows; of no use where something was reported on the way."""
     placed = _placed(machine, rows, report)
@@ -164,7 +164,7 @@ class _Table:
 
 
 def _with_frame(
-    machine: Machine, instrument: Instrument, number: int, rows: Rows, table: _Table
+    machine: Machine, instrument: Instrument, number: int, rows: MeasurementRows, table: _Table
 ) -> Instrument:
     """The instrument with what is to be found of its frame, if that is what it reads of one."""
     rule = REGISTRY[instrument.kind].frame
@@ -176,7 +176,7 @@ def _with_frame(
     return dataclasses.replace(instrument, frame=frame)
 
 
-def _placed(machine: Machine, rows: Rows, report: Report) -> tuple[Floats, Floats]:
+def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Floats, Floats]:
     """Joints (n_row, n_joint) and placements (n_row, 7) of the nominal machine."""
     joints = np.full((rows.n_row, len(machine.joints)), math.nan)
     placements = np.full((rows.n_row, 7), math.nan)
@@ -221,7 +221,7 @@ def _placed(machine: Machine, rows: Rows, report: Report) -> tuple[Floats, Float
     return joints, placements
 
 
-def _within_travel(machine: Machine, rows: Rows, good: Flags, report: Report) -> Flags:
+def _within_travel(machine: Machine, rows: MeasurementRows, good: Flags, report: Report) -> Flags:
     assert rows.joints is not None
     within = np.ones(rows.n_row, np.bool_)
     for at, drive in enumerate(machine.drives):
@@ -245,9 +245,9 @@ def _within_travel(machine: Machine, rows: Rows, good: Flags, report: Report) ->
     return within
 
 
-def _conditions(machine: Machine, rows: Rows, report: Report) -> tuple[Condition, ...]:
+def _conditions(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Condition, ...]:
     """(n_row,) the condition of each row; equal ones are the same object."""
-    cold = cold_and_free(machine.condition)
+    cold = unloaded_at_reference(machine.condition)
     for part, values in rows.temperatures.items():
         column = f"temperature.{part}"
         for row in np.flatnonzero((values <= 0.0) & ~rows.spoilt(column)).tolist():
@@ -295,9 +295,9 @@ class _Observations:
         self,
         machine: Machine,
         instruments: Sequence[Instrument],
-        rows: Rows,
+        rows: MeasurementRows,
         report: Report,
-        columns: Mapping[str, Reading],
+        columns: Mapping[str, ReadingColumn],
     ) -> None:
         self.machine = machine
         self.instruments = instruments
@@ -440,7 +440,7 @@ class _Observations:
         return self.report.shown(column, row)
 
     def _require(
-        self, instrument: Instrument, kind: Kind, mine: Flags, own: Mapping[str, Reading]
+        self, instrument: Instrument, kind: Kind, mine: Flags, own: Mapping[str, ReadingColumn]
     ) -> None:
         """Whether every row of the instrument has the readings that its kind must have."""
         if kind.least == 0 or kind.optional:
@@ -501,7 +501,7 @@ class _Observations:
                 expected="a number",
             )
 
-    def _check_signs(self, kind: Kind, mine: Flags, own: Mapping[str, Reading]) -> None:
+    def _check_signs(self, kind: Kind, mine: Flags, own: Mapping[str, ReadingColumn]) -> None:
         for name, reading in own.items():
             values = self.rows.readings.get(name)
             if values is None or kind.reads[reading.word] not in ("length", "distance"):

@@ -179,7 +179,7 @@ def best(
             state = _greedy(candidates, criterion, count, again)
         else:
             drawn = generator.choice(candidates.count, count, replace=again)
-            state = State(candidates, criterion, drawn.tolist())
+            state = ExchangeState(candidates, criterion, drawn.tolist())
         _exchange(state, criterion, again)
         if excursions:
             state = _excursions(state, criterion, again)
@@ -194,7 +194,7 @@ def best(
 def ordered(candidates: Candidates, chosen: ArrayLike, criterion: Criterion = "tool") -> Indices:
     """The same candidates (m,), each the one that helps most after those before it."""
     left = [int(number) for number in np.asarray(chosen, np.intp)]
-    state = State(candidates, criterion, [])
+    state = ExchangeState(candidates, criterion, [])
     while left:
         gains = state.gains(state.seen, state.spread)[left]
         state.add(left.pop(int(np.argmax(gains))))
@@ -208,7 +208,7 @@ def greedy(
     return np.array(_greedy(candidates, criterion, count, repeats).chosen, np.intp)
 
 
-class State:
+class ExchangeState:
     """A set of candidates, and for all candidates what adding each would do.
 
     `seen` (n_candidate, k, k): B C B^T. `spread` (n_candidate, k, k): B C W C B^T.
@@ -263,9 +263,9 @@ class State:
         spread = axes.swapaxes(1, 2) @ self.spread[self.chosen] @ axes
         return np.asarray((np.diagonal(spread, axis1=1, axis2=2) / share).sum(axis=1), np.float64)
 
-    def copy(self) -> State:
+    def copy(self) -> ExchangeState:
         """Another one that starts where this stands."""
-        return State(self._all, self._criterion, self.chosen)
+        return ExchangeState(self._all, self._criterion, self.chosen)
 
     def add(self, number: int) -> None:
         """Add a candidate to the set."""
@@ -341,8 +341,10 @@ class _Change:
     share: float = 1.0
 
 
-def _greedy(candidates: Candidates, criterion: Criterion, count: int, repeats: bool) -> State:
-    state = State(candidates, criterion, [])
+def _greedy(
+    candidates: Candidates, criterion: Criterion, count: int, repeats: bool
+) -> ExchangeState:
+    state = ExchangeState(candidates, criterion, [])
     for _ in range(count):
         gains = state.gains(state.seen, state.spread)
         if not repeats:
@@ -351,7 +353,7 @@ def _greedy(candidates: Candidates, criterion: Criterion, count: int, repeats: b
     return state
 
 
-def _exchange(state: State, criterion: Criterion, repeats: bool) -> None:
+def _exchange(state: ExchangeState, criterion: Criterion, repeats: bool) -> None:
     """Exchange candidates of a set for better ones until no single exchange helps."""
     for _ in range(MOST_PASSES):
         helped = False
@@ -377,7 +379,7 @@ def _exchange(state: State, criterion: Criterion, repeats: bool) -> None:
             return
 
 
-def _excursions(state: State, criterion: Criterion, repeats: bool) -> State:
+def _excursions(state: ExchangeState, criterion: Criterion, repeats: bool) -> ExchangeState:
     """Better sets by adding several candidates before as many are dropped, exchanged in between.
 
     A set in which no single exchange helps may be a poor one (Mitchell's excursions).

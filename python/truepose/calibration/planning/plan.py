@@ -19,7 +19,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.calibration.acceptance.observability import of_machine, spread
+from truepose.calibration.acceptance.observability import of_machine, row_covariance
 from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
@@ -275,18 +275,18 @@ class Field:
 
     def deviations(self, chosen: Indices) -> Floats:
         """(n,) standard uncertainty of each unknown after some candidates, inf if open."""
-        known = Known(self.candidates, chosen)
+        known = CombinationVariance(self.candidates, chosen)
         return np.sqrt(known.variance(np.eye(self.unknowns.count))) * self.candidates.scale
 
     def _at_tool(self, chosen: Indices) -> Floats:
         """(n_pose, n_quantity) variance of position and orientation at the tool, inf if open."""
-        known = Known(self.candidates, chosen)
+        known = CombinationVariance(self.candidates, chosen)
         rows = self.tool * self.candidates.scale
         variance = known.variance(rows.reshape(-1, rows.shape[2])).reshape(rows.shape[:2])
         return np.stack([variance[:, part].sum(axis=1) for part in self._parts], axis=1)
 
 
-class Known:
+class CombinationVariance:
     """What is known of combinations of unknowns after some candidates, scaled as these are.
 
     Unknowns with a prior are always known somehow; of those without, the readings alone decide: the
@@ -368,7 +368,7 @@ def _tool(
         return effects, False
     sigma = np.sqrt(np.diagonal(unknowns.prior_covariance))[:n_machine]
     triangle = np.linalg.qr(blocks.reshape(-1, unknowns.count), mode="r")
-    seen = spread(of_machine(triangle, n_machine, sigma))
+    seen = row_covariance(of_machine(triangle, n_machine, sigma))
     # The tool's rotations are named as angles there.
     names = ["abc"["xyz".index(name[1])] if name[0] == "r" else name for name in machine.components]
     tool = Tool.of(found, names, over.placements[solved, :3])

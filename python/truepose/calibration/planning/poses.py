@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Flags, Floats, Indices
 from truepose.machine import Machine
 from truepose.machine.workspace import GridAxis, Workspace, grid
-from truepose.runs.poses import OK, LeftOut, no_pose_left, requested_poses
+from truepose.runs.poses import OK, SkippedPoses, no_pose_left, requested_poses
 
 MOST_POSES = 1024
 """Poses of a workspace that are looked at, about: a finer grid betters a plan by little."""
@@ -91,7 +91,7 @@ class Placed:
         status = np.where(status == OK, regular, status)
         usable = status == OK
         if not usable.any():
-            left_out = LeftOut()
+            left_out = SkippedPoses()
             left_out.add(np.flatnonzero(~usable), status)
             raise no_pose_left(machine, given, left_out, of_file=of_file)
         self.left_out = int((~usable).sum())

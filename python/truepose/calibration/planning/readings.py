@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.calibration.identification.problem import Problem as Fitted
+from truepose.calibration.identification.problem import IdentificationProblem as Fitted
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.instruments import REGISTRY, Instrument
 from truepose.calibration.instruments._base import moved
-from truepose.calibration.measurements.measurements import Measurements, cold_and_free
+from truepose.calibration.measurements.measurements import Measurements, unloaded_at_reference
 from truepose.calibration.observables import OBSERVABLES, OF_STRUTS
 from truepose.calibration.planning.poses import Placed
 from truepose.errors import Problem, RequestError
@@ -99,7 +99,7 @@ def planned(
     n_pose, n_instrument = len(placed), len(instruments)
     own = np.repeat(np.arange(n_instrument), sizes)
     table = np.tile(one, (n_pose, 1))
-    state = cold_and_free(machine.condition) if condition is None else condition
+    state = unloaded_at_reference(machine.condition) if condition is None else condition
     machine.check_condition(state)
     return Measurements(
         instruments=tuple(instruments),

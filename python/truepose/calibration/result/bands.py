@@ -9,16 +9,18 @@ import numpy as np
 from truepose.arrays import Floats, Indices
 from truepose.machine import Machine
 from truepose.sources.deviation import Deviation
-from truepose.sources.tolerance import Tolerance
+from truepose.sources.tolerance import DimensionalTolerance
 
 
 def bands_of(machine: Machine) -> Deviation | None:
     """The bands of the machine's tolerances; None where its file has none."""
-    return next((each.bands for each in machine.sources if isinstance(each, Tolerance)), None)
+    return next(
+        (each.bands for each in machine.sources if isinstance(each, DimensionalTolerance)), None
+    )
 
 
 @dataclass(frozen=True)
-class Known:
+class ToleranceCovariance:
     """What tolerances say of the n parameters: `shift` (n,), and what varies about it.
 
     `effects` (n, v): +-1 times the standard deviation of each parameter, by the variable that it
@@ -35,19 +37,19 @@ class Known:
         return np.asarray(self.effects @ self.correlation @ self.effects.T)
 
 
-def known(machine: Machine) -> Known:
+def tolerance_covariance(machine: Machine) -> ToleranceCovariance:
     """What the tolerances of a machine's file say of its parameters."""
     count = len(machine.parameters)
     bands = bands_of(machine)
     if bands is None:
-        return Known(np.zeros(count), np.zeros((count, 0)), np.zeros((0, 0)))
+        return ToleranceCovariance(np.zeros(count), np.zeros((count, 0)), np.zeros((0, 0)))
     shift = np.zeros(count)
     np.add.at(shift, bands.parameters, bands.shift[0])
     effects = np.zeros((count, bands.n_variable))
     sigmas = np.array([each.sigmas for each in bands.distribution], np.float64)
     np.add.at(effects, (bands.parameters, bands.variables), bands.signed_half[0] / sigmas)
     correlation = np.eye(bands.n_variable) if bands.correlation is None else bands.correlation
-    return Known(shift, effects, correlation)
+    return ToleranceCovariance(shift, effects, correlation)
 
 
 @dataclass(frozen=True)

@@ -24,13 +24,13 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
-from truepose.calibration.result.bands import known
+from truepose.calibration.result.bands import tolerance_covariance
 from truepose.calibration.result.directions import deviation_of, directions, tilted, turned
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import Shown, ShownUnits
 from truepose.machine import Machine
 from truepose.probability.quantiles import normal_quantile
-from truepose.runs.poses import LeftOut, Walk, no_pose_left, requested_poses
+from truepose.runs.poses import PoseRun, SkippedPoses, no_pose_left, requested_poses
 from truepose.version import version
 
 ALPHA = 0.05
@@ -97,7 +97,7 @@ def compare(old: Machine, new: Machine, poses: ArrayLike | None = None) -> xr.Da
     _require_same(old, new)
     before, after, change = _change(old, new)
     requested = requested_poses(old, poses)
-    walk = Walk(before, requested, old.condition)
+    walk = PoseRun(before, requested, old.condition)
     columns = np.arange(len(old.parameters))
     blocks = []
     for block in walk:
@@ -141,7 +141,7 @@ def _not_same(old: Machine, new: Machine, why: str) -> RequestError:
 
 def _change(old: Machine, new: Machine) -> tuple[Machine, Machine, _Change]:
     """Both machines at their estimates, and what differs, in the old one's axes."""
-    was, found = known(old), known(new)
+    was, found = tolerance_covariance(old), tolerance_covariance(new)
     values = [machine.nominal + what.shift for machine, what in ((old, was), (new, found))]
     names = old.parameters
     before, after = (
@@ -228,7 +228,7 @@ def _dataset(
     new: Machine,
     change: _Change,
     requested: Floats,
-    left_out: LeftOut,
+    left_out: SkippedPoses,
     indices: np.ndarray,
     displacement: Floats,
     spread: Floats,

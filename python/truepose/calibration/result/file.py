@@ -21,7 +21,13 @@ import tomlkit
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property
-from truepose.calibration.result.bands import Banded, Known, banded, bands_of, known
+from truepose.calibration.result.bands import (
+    Banded,
+    ToleranceCovariance,
+    banded,
+    bands_of,
+    tolerance_covariance,
+)
 from truepose.calibration.result.directions import PartDirection, directions, tilted, turned
 from truepose.calibration.result.toml_edits import MachineText, warning_comment
 from truepose.errors import MachineFileError, Problem, RequestError
@@ -365,7 +371,12 @@ def _require_same(
 
 
 def _require_same_bands(path: Path, machine: Machine, result: _Result, written: Machine) -> None:
-    found, old, moved, bands = known(written), known(machine), result.moved, result.bands
+    found, old, moved, bands = (
+        tolerance_covariance(written),
+        tolerance_covariance(machine),
+        result.moved,
+        result.bands,
+    )
     count = len(machine.parameters)
     wanted = np.zeros((count, count))
     wanted[np.ix_(bands.columns, bands.columns)] = (
@@ -389,7 +400,7 @@ def _require_same_bands(path: Path, machine: Machine, result: _Result, written: 
         raise _not_written(path, f"the tolerance of {_first(machine, others, lost)} differs")
 
 
-def _has_band(of: Known) -> np.ndarray:
+def _has_band(of: ToleranceCovariance) -> np.ndarray:
     return np.asarray(of.effects.any(axis=1))
 
 

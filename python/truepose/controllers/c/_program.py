@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from truepose.controllers.c._known import Known, known_of
+from truepose.controllers.c._known_shifts import KnownShifts, known_shifts
 from truepose.machine import Machine
 from truepose.version import version
 
@@ -69,9 +69,9 @@ class Program:
 def program_of(machine: Machine, prefix: str | None = None, without: Sequence[str] = ()) -> Program:
     """The C program of a machine; `prefix` is by default the machine file's name.
 
-    Raises `RequestError` as `known_of`.
+    Raises `RequestError` as `known_shifts`.
     """
-    return _Writer(machine, prefix or _name_of(machine), known_of(machine, without)).program()
+    return _Writer(machine, prefix or _name_of(machine), known_shifts(machine, without)).program()
 
 
 def _name_of(machine: Machine) -> str:
@@ -84,7 +84,7 @@ def _name_of(machine: Machine) -> str:
 class _Writer:
     """Fills the templates for one machine."""
 
-    def __init__(self, machine: Machine, prefix: str, known: Known) -> None:
+    def __init__(self, machine: Machine, prefix: str, known: KnownShifts) -> None:
         self.machine, self.prefix, self.known = machine, prefix, known
         self.control: dict[str, Any] = machine.kernel.control
         self.parts = [part for part, terms in known.per_kelvin.items() if terms]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.compensation.commands import ActualMachine, Known
+from truepose.compensation.commands import ActualMachine, PoseDeviations
 from truepose.runs.poses import OK
 
 
@@ -28,7 +28,7 @@ class Measure:
         """(n,) m and (n,) rad of errors (n, n_component)."""
         return _norm(errors, self._linear), _norm(errors, self._angular)
 
-    def at_joints(self, known: Known, joints: Floats) -> tuple[Floats, Floats]:
+    def at_joints(self, known: PoseDeviations, joints: Floats) -> tuple[Floats, Floats]:
         """The same where `joints` (n, n_joint) take the tool; infinite if they take it nowhere."""
         errors, status = self.actual.error(known, joints)
         position, orientation = self.sizes(errors)
@@ -38,7 +38,7 @@ class Measure:
             orientation[nowhere] = np.inf
         return position, orientation
 
-    def at_commands(self, known: Known, commands: Floats) -> tuple[Floats, Floats]:
+    def at_commands(self, known: PoseDeviations, commands: Floats) -> tuple[Floats, Floats]:
         """The same for commands (n, n_commanded); infinite where they must not be commanded."""
         joints, status = self.actual.machine.kernel.inverse(commands, status=True)
         position, orientation = self.at_joints(known, joints)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.compensation.commands import Known
+from truepose.compensation.commands import PoseDeviations
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,14 +52,14 @@ class Pieces:
 
 
 @dataclass(frozen=True, eq=False)
-class Looked:
+class SamplePoints:
     """Points inside pieces that were accepted: the piece's end node, share, pose, what is known."""
 
     end: Indices
     share: Floats
     weight: Floats
     poses: Floats
-    known: Known | None
+    known: PoseDeviations | None
 
 
 def joined(pieces: list[Pieces]) -> Pieces:
@@ -76,11 +76,13 @@ def joined(pieces: list[Pieces]) -> Pieces:
     )
 
 
-def selected(known: Known, which: Flags) -> Known:
+def selected(known: PoseDeviations, which: Flags) -> PoseDeviations:
     """What is known at some of the poses (n,), all of which have joints."""
     columns, values = known.moved
     moved = values if len(values) == 1 else np.ascontiguousarray(values[which])
-    return Known(known.block.select(which), (columns, moved), known.status[which], known.followed)
+    return PoseDeviations(
+        known.block.select(which), (columns, moved), known.status[which], known.followed
+    )
 
 
-__all__ = ["Looked", "Nodes", "Pieces", "joined", "selected"]
+__all__ = ["Nodes", "Pieces", "SamplePoints", "joined", "selected"]

@@ -29,11 +29,11 @@ from truepose.controllers.gcode.division import (
     Division,
     Interpolation,
     Limits,
+    MachineState,
     Moves,
-    Stand,
 )
 from truepose.controllers.gcode.proof import Proof, Proving, improves
-from truepose.controllers.gcode.tolerance import MOST, Tolerance, least_of, tolerance_for
+from truepose.controllers.gcode.tolerance import MOST, PathTolerance, least_of, tolerance_for
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import one_of
 from truepose.files.writing import replacing, require_writable
@@ -170,10 +170,12 @@ def correct_program(
         return proof
 
 
-def _tolerance(actual: ActualMachine, axes: Axes, program: Path, options: _Options) -> Tolerance:
+def _tolerance(
+    actual: ActualMachine, axes: Axes, program: Path, options: _Options
+) -> PathTolerance:
     """The tolerance that was asked for, or the one that follows from the error before."""
     if options.tolerance is not None:
-        return Tolerance(options.tolerance, "asked")
+        return PathTolerance(options.tolerance, "asked")
     reader = options.reader(program)
 
     def batches() -> Iterator[Moves]:
@@ -196,7 +198,7 @@ class _Session:
         program: Path,
         temporary: Path,
         options: _Options,
-        allowed: Tolerance,
+        allowed: PathTolerance,
     ) -> None:
         self._division = division
         self._program = program
@@ -231,7 +233,7 @@ class _Session:
             self._writing.finish()
         return self._proof(target, count, approach)
 
-    def _start(self) -> Stand:
+    def _start(self) -> MachineState:
         point = np.full(len(AXES), np.nan)
         for letter, value in self._options.start.items():
             point[AXES.index(letter)] = value
@@ -242,7 +244,7 @@ class _Session:
                 self._division.actual.machine, self._division.axes, failure
             ) from None
 
-    def _divide(self, moves: Moves, stand: Stand) -> Divided:
+    def _divide(self, moves: Moves, stand: MachineState) -> Divided:
         division, program = self._division, self._program
         refusal = _refusals.of_uncommanded_axis(division.axes, moves, program)
         if refusal is not None:

@@ -25,12 +25,12 @@ from numpy.typing import NDArray
 
 from truepose._kernel import STATUS
 from truepose.arrays import Codes, Flags, Floats, Indices
-from truepose.compensation.commands import UNMOVED, ActualMachine, Known, blocks
+from truepose.compensation.commands import NO_DEVIATION, ActualMachine, PoseDeviations, blocks
 from truepose.controllers.gcode._axes import MILLIMETRE, Axes
 from truepose.controllers.gcode._measure import Measure
-from truepose.controllers.gcode._pieces import Looked, Nodes, Pieces, joined, selected
-from truepose.controllers.gcode._way import STEP, crossings
-from truepose.runs.displacement import Moved
+from truepose.controllers.gcode._pieces import Nodes, Pieces, SamplePoints, joined, selected
+from truepose.controllers.gcode._singularity_crossings import STEP, singularity_crossings
+from truepose.runs.displacement import ParameterDeviation
 from truepose.runs.poses import BLOCK, OK
 
 RAPID = 0
@@ -119,7 +119,7 @@ class CannotCorrect(Exception):  # noqa: N818 - it is answered with a refusal, a
 
 
 @dataclass(frozen=True, eq=False)
-class Stand:
+class MachineState:
     """Where the machine stands between two batches: the pose `asked`, and `joints` and `command`.
 
     The latter are the corrected ones; `corrected`: whether it was brought there by them. `moved`:
@@ -130,11 +130,11 @@ class Stand:
     command: Floats
     asked: Floats
     corrected: bool
-    moved: Moved
+    moved: ParameterDeviation
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class PathPoints:
     """Points of a batch at which errors are told: on which piece, at which share of it.
 
     `piece` (k,) in the order of writing, `share` (k,), `weight` (k,) of each in a mean over the
@@ -146,7 +146,7 @@ class Points:
     share: Floats
     weight: Floats
     poses: Floats
-    known: Known | None
+    known: PoseDeviations | None
     at_ends: bool
 
 
@@ -164,8 +164,8 @@ class Divided:
     shares: Floats
     move: Indices
     begins_corrected: Flags
-    looked_at: list[Points]
-    stand: Stand
+    looked_at: list[PathPoints]
+    stand: MachineState
 
 
 class Division:
@@ -177,7 +177,7 @@ class Division:
         self.limits = limits
         self.measure = Measure(actual)
 
-    def at_start(self, point: Floats) -> Stand:
+    def at_start(self, point: Floats) -> MachineState:
         """Where a program begins: at a point (9,) to which the controller went uncorrected.
 
         The first move is cut as if it began corrected; what it begins with besides is told apart.
@@ -191,11 +191,11 @@ class Division:
             status = command.status
         if status[0] != OK:
             raise CannotCorrect(0, 0.0, STATUS[status[0]], asked[0], of_program=True)
-        return Stand(
+        return MachineState(
             command.joints[0], command.poses[0], asked[0], corrected=False, moved=known.moved
         )
 
-    def divide(self, moves: Moves, stand: Stand) -> Divided:
+    def divide(self, moves: Moves, stand: MachineState) -> Divided:
         """Cut a batch of moves, the first of which begins at `stand`.
 
         A move that does not begin where the one before it ends begins where the controller went
@@ -211,7 +211,7 @@ class Division:
 class _Batch:
     """The pieces of one batch of moves. Node i is the end of move i; those of starts come next."""
 
-    def __init__(self, division: Division, moves: Moves, stand: Stand) -> None:
+    def __init__(self, division: Division, moves: Moves, stand: MachineState) -> None:
         self.actual, self.axes = division.actual, division.axes
         self.limits, self.measure = division.limits, division.measure
         self.spacing = SPACING * division.actual.machine.characteristic_length
@@ -223,16 +223,18 @@ class _Batch:
         # Of a rapid whose start nobody knows counts what is known, as in `length`.
         self.size = np.fmax(moves.length * MILLIMETRE, turn)
         self.kept = 0
-        self.known: list[tuple[Indices, Known | None]] = []  # numbers of nodes, and what is known
+        self.known: list[
+            tuple[Indices, PoseDeviations | None]
+        ] = []  # numbers of nodes, and what is known
         self.accepted: list[Pieces] = []
-        self.looked: list[Looked] = []
+        self.looked: list[SamplePoints] = []
 
         count = len(moves.line)
         self.count = count
         numbers = np.arange(count)
         # What is known at the moves' ends and starts, if of the same parameters; at the last end.
-        self.moved: Moved | None = None
-        self.at_end: Moved = UNMOVED
+        self.moved: ParameterDeviation | None = None
+        self.at_end: ParameterDeviation = NO_DEVIATION
         self.nodes = self._corrected(numbers, np.ones(count), moves.end, first=0)
         ends = self.known[0][1]
         if len(self.known) == 1 and ends is not None and not ends.followed:
@@ -253,7 +255,7 @@ class _Batch:
                 raise
             self.begin[move] = self._add_stand(there)
 
-    def _add_stand(self, stand: Stand) -> int:
+    def _add_stand(self, stand: MachineState) -> int:
         """Make a node of where the machine stands, and return its number."""
         number = len(self.nodes.move)
         self.moved = _with_row(self.moved, stand.moved, number)
@@ -299,12 +301,12 @@ class _Batch:
             self.known.append((first + np.arange(rows.start, rows.stop), self._keep(known)))
         return Nodes(move, share, points, asked, joints, commands)
 
-    def _keep(self, known: Known) -> Known | None:
+    def _keep(self, known: PoseDeviations) -> PoseDeviations | None:
         """What is known, for the proof, unless there is much of it already."""
         self.kept += known.block.indices.size
         return known if self.kept <= KEPT else None
 
-    def _require(self, known: Known, move: Indices, share: Floats, poses: Floats) -> None:
+    def _require(self, known: PoseDeviations, move: Indices, share: Floats, poses: Floats) -> None:
         """Raise `CannotCorrect` for the first programmed pose that cannot be used."""
         if known.block.indices.size == len(poses):
             return
@@ -380,7 +382,7 @@ class _Batch:
         if within.any():
             known = known if within.all() else selected(known, within)
             self.looked.append(
-                Looked(
+                SamplePoints(
                     end[within],
                     t[within],
                     good.weight[number][within],
@@ -390,7 +392,7 @@ class _Batch:
             )
         return np.asarray(worst)
 
-    def _between(self, begin: Indices, end: Indices) -> Moved | None:
+    def _between(self, begin: Indices, end: Indices) -> ParameterDeviation | None:
         """What is known in the middles of short moves, from their ends (n,); None: it differs."""
         if self.moved is None:
             return None
@@ -443,7 +445,7 @@ class _Batch:
         nodes, move = self.nodes, int(self.nodes.move[end])
         share = np.linspace(0.0, 1.0, int(self._points_in(self.size[[move]])[0]) + 2)
         way = self.axes.poses(self.moves.points(np.full(share.size, move), share))
-        crossing = crossings(self.actual, way[:-1], way[1:])
+        crossing = singularity_crossings(self.actual, way[:-1], way[1:])
         raise CannotCorrect(
             move,
             float(nodes.share[end]),
@@ -471,10 +473,14 @@ class _Batch:
         chosen[-1] = True
         last = np.flatnonzero(chosen)
         first = np.concatenate([[0], last[:-1] + 1])
-        for way in crossings(self.actual, nodes.asked[begins[first]], nodes.asked[ends[last]]):
+        for way in singularity_crossings(
+            self.actual, nodes.asked[begins[first]], nodes.asked[ends[last]]
+        ):
             # A stretch may bend: what counts are its pieces.
             within = slice(first[way], last[way] + 1)
-            each = crossings(self.actual, nodes.asked[begins[within]], nodes.asked[ends[within]])
+            each = singularity_crossings(
+                self.actual, nodes.asked[begins[within]], nodes.asked[ends[within]]
+            )
             if each.size:
                 at = ends[within][each[0]]
                 raise CannotCorrect(
@@ -528,7 +534,7 @@ class _Batch:
         weight = np.zeros(len(nodes.move))
         weight[ends] = pieces.weight
         looked_at = [
-            Points(
+            PathPoints(
                 piece[numbers],
                 np.ones(numbers.size),
                 weight[numbers],
@@ -539,7 +545,9 @@ class _Batch:
             for numbers, known in self.known
         ]
         looked_at += [
-            Points(piece[each.end], each.share, each.weight, each.poses, each.known, at_ends=False)
+            PathPoints(
+                piece[each.end], each.share, each.weight, each.poses, each.known, at_ends=False
+            )
             for each in self.looked
         ]
         last = ends[-1]
@@ -550,7 +558,7 @@ class _Batch:
             move,
             ~np.isin(pieces.begin, self.uncorrected),
             looked_at,
-            Stand(
+            MachineState(
                 nodes.joints[last],
                 nodes.commands[last],
                 nodes.asked[last],
@@ -560,7 +568,9 @@ class _Batch:
         )
 
 
-def _with_row(table: Moved | None, row: Moved, number: int) -> Moved | None:
+def _with_row(
+    table: ParameterDeviation | None, row: ParameterDeviation, number: int
+) -> ParameterDeviation | None:
     """What is known at `number` nodes, and at one more; None where it is of other parameters."""
     if table is None or not np.array_equal(table[0], row[0]):
         return None
@@ -578,7 +588,7 @@ __all__ = [
     "Division",
     "Interpolation",
     "Limits",
+    "MachineState",
     "Moves",
-    "Points",
-    "Stand",
+    "PathPoints",
 ]

@@ -20,8 +20,8 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.controllers.gcode._measure import Measure
-from truepose.controllers.gcode.division import Divided, Division, Moves, Points
-from truepose.controllers.gcode.tolerance import UNFELT, Tolerance
+from truepose.controllers.gcode.division import Divided, Division, Moves, PathPoints
+from truepose.controllers.gcode.tolerance import UNFELT, PathTolerance
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class Proof:
     target: str
     commanded: tuple[str, ...]
     tolerance: float
-    tolerance_from: Tolerance
+    tolerance_from: PathTolerance
     interpolation: str
     start: dict[str, float]
     approach: int | None
@@ -174,7 +174,7 @@ class Proving:
 
     def _compare(
         self,
-        points: Points,
+        points: PathPoints,
         divided: Divided,
         commands: tuple[Floats, Floats],
         joints: tuple[Floats, Floats],

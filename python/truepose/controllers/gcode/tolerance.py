@@ -44,7 +44,7 @@ Reason = Literal["asked", "error", "most", "digits"]
 
 
 @dataclass(frozen=True)
-class Tolerance:
+class PathTolerance:
     """A tolerance, m, and why it is that.
 
     "asked"; "error": a share of the error before, `SHARE` of the smaller of the largest position
@@ -74,19 +74,19 @@ def least_of(division: Division, digits: int) -> float:
     return float(off) / ROUNDING
 
 
-def tolerance_for(division: Division, batches: Iterable[Moves], digits: int) -> Tolerance:
+def tolerance_for(division: Division, batches: Iterable[Moves], digits: int) -> PathTolerance:
     """The tolerance of a program, `batches` of its moves, that is to be written in `digits`."""
     least = least_of(division, digits)
     sizes = error_before(division, batches)
     if not sizes:
-        return Tolerance(MOST, "most") if least >= MOST else Tolerance(least, "digits")
+        return PathTolerance(MOST, "most") if least >= MOST else PathTolerance(least, "digits")
     before = max(sizes)
     share = max(SHARE * min(sizes), UNFELT * before)
     if max(share, least) >= MOST:
-        return Tolerance(MOST, "most", before)
+        return PathTolerance(MOST, "most", before)
     if share <= least:
-        return Tolerance(least, "digits", before)
-    return Tolerance(share, "error", before)
+        return PathTolerance(least, "digits", before)
+    return PathTolerance(share, "error", before)
 
 
 def error_before(division: Division, batches: Iterable[Moves]) -> tuple[float, ...]:
@@ -146,7 +146,7 @@ __all__ = [
     "MOST",
     "SHARE",
     "UNFELT",
-    "Tolerance",
+    "PathTolerance",
     "error_before",
     "least_of",
     "tolerance_for",

@@ -8,7 +8,7 @@ from typing import ClassVar
 from truepose.controllers._delta import SWITCHES
 from truepose.controllers._export import Export, Option
 from truepose.controllers._one_file import in_one_file
-from truepose.controllers.klipper.linear import Linear
+from truepose.controllers.klipper.linear import KlipperLinear
 from truepose.controllers.klipper.rotary import Rotary
 from truepose.machine import Machine
 
@@ -27,7 +27,7 @@ class Klipper:
         Raises `RequestError`: controller-cannot, bad-option, no-workspace, no-pose-left.
         """
         cranks = all(drive.kind == "crank" for drive in machine.drives)
-        model = Rotary(machine, options) if cranks else Linear(machine, options)
+        model = Rotary(machine, options) if cranks else KlipperLinear(machine, options)
         notes = ["Merge into printer.cfg; mm and degrees."]
         return in_one_file(
             machine, model, "Klipper", ending="klipper.cfg", comment="#", notes=notes

@@ -41,7 +41,7 @@ SMALL = 0.01
 STEPPERS = "abc"
 
 
-class Linear(TowerModel):
+class KlipperLinear(TowerModel):
     """A `SmallModel` of ten numbers; stepper_a drives the machine's first drive, and so on."""
 
     def __init__(self, machine: Machine, options: Mapping[str, float | str]) -> None:
@@ -96,4 +96,4 @@ class Linear(TowerModel):
         return lines
 
 
-__all__ = ["Linear"]
+__all__ = ["KlipperLinear"]

@@ -22,7 +22,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.controllers._delta import AROUND, LEAN, Limb, limbs, lowest_z, surrounded, wrapped
-from truepose.controllers._export import cannot
+from truepose.controllers._export import unsupported_machine
 from truepose.controllers._homing import switches
 from truepose.controllers._small_model import (
     INSTEAD,
@@ -57,7 +57,7 @@ class Rotary:
         found = limbs(machine, "klipper", "crank")
         for limb in found:
             if abs(limb.axis[2]) > math.sin(LEAN):
-                raise cannot(
+                raise unsupported_machine(
                     "klipper",
                     machine,
                     f"drive {limb.drive.name}, whose axis is not level",
@@ -89,7 +89,7 @@ class Rotary:
         at_home = [math.atan2(arm[2], arm @ o) for arm, o in zip(arms, outwards, strict=True)]
         start[ENDS] = at_home + self._gain * (self.switches - [limb.home for limb in found])
         if start[RADIUS] <= 0.0:
-            raise cannot(
+            raise unsupported_machine(
                 "klipper",
                 self._machine,
                 f"a shoulder radius less the effector's of {start[RADIUS] / MM:.6g} mm",
@@ -98,7 +98,7 @@ class Rotary:
             )
         if not surrounded(start[ANGLES]):
             shown = ", ".join(f"{angle:.1f}" for angle in np.degrees(start[ANGLES]))
-            raise cannot(
+            raise unsupported_machine(
                 "klipper",
                 self._machine,
                 f"shoulders at {shown} degrees",
@@ -118,7 +118,7 @@ class Rotary:
             self._machine.drives, np.abs(wrapped(back - self._start[ENDS])), strict=True
         ):
             if not off < RETURNED:
-                raise cannot(
+                raise unsupported_machine(
                     "klipper",
                     self._machine,
                     f"drive {drive.name}, whose arm at its switch cannot hold the tool on the axis",

@@ -11,7 +11,7 @@ import numpy as np
 
 from truepose._kernel import STATUS
 from truepose.arrays import Codes, Flags, Floats
-from truepose.controllers._export import cannot
+from truepose.controllers._export import unsupported_machine
 from truepose.controllers.c import Program
 from truepose.controllers.linuxcnc._template import plain
 from truepose.machine import Drive, Guide, Machine, Strut
@@ -51,7 +51,7 @@ class Description:
     def of(cls, machine: Machine, program: Program) -> Description:
         """Raises `RequestError` (controller-cannot) where LinuxCNC has no place for it."""
         if len(machine.joints) > MOST_JOINTS:  # pragma: no cover - the kernel has six freedoms
-            raise cannot(
+            raise unsupported_machine(
                 "linuxcnc",
                 machine,
                 f"{len(machine.joints)} joints",

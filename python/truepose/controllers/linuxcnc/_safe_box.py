@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Flags, Floats
-from truepose.controllers._export import cannot
+from truepose.controllers._export import unsupported_machine
 from truepose.controllers.linuxcnc._description import Description, status_ok
 from truepose.machine.workspace import GridAxis, grid
 
@@ -73,7 +73,7 @@ def safe_box(description: Description, clamp: float) -> Box:
             return Box(low, high, asked, checked, judge.home, float(conditioning.min()))
         asked = False
         low, high = _cut(axes, sound.reshape(shape, order="F"), home)
-    raise cannot(
+    raise unsupported_machine(
         "linuxcnc",
         description.machine,
         "no box of the workspace about home that the machine can be sent to everywhere",
@@ -117,7 +117,7 @@ class _Judge:
         """Raises `RequestError` (controller-cannot)."""
         if self(home[np.newaxis])[0][0]:
             return
-        raise cannot(
+        raise unsupported_machine(
             "linuxcnc",
             self._machine,
             "a home pose that cannot be used, or not with the compensation at its clamp",

@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.controllers._export import Export, Option, cannot
+from truepose.controllers._export import Export, Option, unsupported_machine
 from truepose.controllers._homing import switch_option, switches
 from truepose.controllers._linuxcnc_joints import (
     SCALE,
@@ -155,7 +155,7 @@ def _check(machine: Machine) -> None:
     names = sorted(drive.name for drive in machine.drives)
     if kinds == ["telescopic"] * STRUTS and carried == names and len(machine.commanded) == 6:
         return
-    raise cannot(
+    raise unsupported_machine(
         "linuxcnc-genhexkins",
         machine,
         f"{len(machine.struts)} struts, drives of kind {', '.join(sorted(set(kinds)))}, "

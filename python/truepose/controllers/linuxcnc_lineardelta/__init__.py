@@ -16,7 +16,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.controllers._delta import SWITCHES, TOWERS, tower_order, wrapped
-from truepose.controllers._export import Export, Option, cannot
+from truepose.controllers._export import Export, Option, unsupported_machine
 from truepose.controllers._linear_delta import (
     ANGLES,
     ARMS,
@@ -57,7 +57,7 @@ class _Model:
         off = np.degrees(wrapped(self.delta.nominal[ANGLES] - self._angles))
         if np.abs(off).max() > math.degrees(TURNED):
             places = ", ".join(f"{angle:.1f}" for angle in np.degrees(self.delta.nominal[ANGLES]))
-            raise cannot(
+            raise unsupported_machine(
                 "linuxcnc-lineardelta",
                 machine,
                 f"towers at {places} degrees about z",

@@ -21,7 +21,7 @@ import numpy as np
 
 from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats
-from truepose.compensation.commands import corrected_poses, with_joints
+from truepose.compensation.commands import corrected_poses, has_joints
 from truepose.controllers._export import Export, Option
 from truepose.controllers._fit import Extent, angle_between, extent
 from truepose.controllers._small_model import ascii_only, fixed, stem
@@ -75,7 +75,7 @@ def pose_map(machine: Machine, grid: Grid) -> NodeCorrections:
     """Exact corrections at every node. Raises `RequestError` (no-pose-left) where there is none."""
     nodes = grid.nodes
     commanded, status = corrected_poses(machine, nodes)
-    if not with_joints(status).any():
+    if not has_joints(status).any():
         raise RequestError(
             Problem(
                 "no-pose-left",
@@ -97,7 +97,7 @@ def pose_map(machine: Machine, grid: Grid) -> NodeCorrections:
 
 
 @dataclass(frozen=True)
-class Judged:
+class MapErrors:
     """What interpolation is wrong by, m and rad, over the points.
 
     `commandable`: the same over those points alone whose exact command is within travel; None
@@ -121,7 +121,7 @@ class Commandable:
     points: int
 
 
-def judge(found: NodeCorrections) -> Judged:
+def assess(found: NodeCorrections) -> MapErrors:
     """Compare interpolated with exact corrections between the nodes.
 
     The rms is that over points scattered all over the box. The largest is looked for from the worst
@@ -168,7 +168,7 @@ def judge(found: NodeCorrections) -> Judged:
     if not within.all() and within.any():
         count = len(np.unique(points[within], axis=0))
         commandable = Commandable(over(_POSITION, within), orientation(within), count)
-    return Judged(
+    return MapErrors(
         over(_POSITION, all_of),
         orientation(all_of),
         commandable,
@@ -205,7 +205,7 @@ def _compare(found: NodeCorrections, points: Floats) -> _Compared:
     machine = found.machine
     exact, status = corrected_poses(machine, points)
     added = found.grid.interpolated(found.corrections_si, points)
-    usable = with_joints(status) & np.isfinite(added).all(axis=1)
+    usable = has_joints(status) & np.isfinite(added).all(axis=1)
     at, exact, added = points[usable], exact[usable], points[usable] + added[usable]
     linear = [column for column, name in enumerate(machine.commanded) if name in "xyz"]
     place = machine.kernel.placement_of
@@ -251,7 +251,7 @@ class PoseMap:
         Raises `RequestError`: bad-option, no-workspace, grid-too-large, no-pose-left.
         """
         found = pose_map(machine, grid_of(machine, str(options["count"])))
-        judged = judge(found)
+        judged = assess(found)
         head = _head(found)
         lines = statement(found, judged)
         name = f"{stem(machine)}_pose_map"
@@ -262,7 +262,7 @@ class PoseMap:
         return Export(files, lines)
 
 
-def statement(found: NodeCorrections, judged: Judged) -> tuple[str, ...]:
+def statement(found: NodeCorrections, judged: MapErrors) -> tuple[str, ...]:
     """Lines for the user."""
     machine = found.machine
     count = " x ".join(str(number) for number in found.grid.shape)
@@ -303,12 +303,12 @@ def _sizes(found: NodeCorrections) -> Extent:
 
 
 def _instead(code: int) -> str:
-    if with_joints(np.array([code], np.uint8))[0]:
+    if has_joints(np.array([code], np.uint8))[0]:
         return "corrections, but must not be commanded"
     return "no correction"
 
 
-def _both(machine: Machine, judged: Judged | Commandable) -> str:
+def _both(machine: Machine, judged: MapErrors | Commandable) -> str:
     text = _words(machine, judged.position, "m")
     if judged.orientation is not None:
         text += f"; {_words(machine, judged.orientation, 'rad')}"
@@ -371,7 +371,7 @@ def _csv(found: NodeCorrections, head: Mapping[str, object], lines: tuple[str, .
     return out.getvalue()
 
 
-def _json(found: NodeCorrections, judged: Judged, head: Mapping[str, object]) -> str:
+def _json(found: NodeCorrections, judged: MapErrors, head: Mapping[str, object]) -> str:
     machine = found.machine
     axes = [
         {"name": name, "unit": unit.label, "nodes": [float(f"{v / unit.scale:.12g}") for v in axis]}
@@ -396,7 +396,7 @@ def _json(found: NodeCorrections, judged: Judged, head: Mapping[str, object]) ->
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def _errors(judged: Judged | Commandable) -> dict[str, object]:
+def _errors(judged: MapErrors | Commandable) -> dict[str, object]:
     return {
         "position_m": _plain(judged.position),
         "orientation_rad": None if judged.orientation is None else _plain(judged.orientation),
@@ -408,4 +408,4 @@ def _plain(found: Extent) -> dict[str, object]:
     return {"highest": found.highest, "rms": found.rms, "highest_at": found.at.tolist()}
 
 
-__all__ = ["NodeCorrections", "PoseMap", "judge", "pose_map"]
+__all__ = ["NodeCorrections", "PoseMap", "assess", "pose_map"]

@@ -56,7 +56,7 @@ FIGURES: tuple[ModuleType, ...] = (
 
 
 @dataclass(frozen=True)
-class Drawn:
+class DrawnFigure:
     """One figure with its name (the module's), its title, its caption and the result it needs."""
 
     name: str
@@ -71,13 +71,13 @@ def _there(result: object) -> bool:
     return len(result) > 0 if isinstance(result, tuple) else result is not None
 
 
-def draw(study: Study) -> Iterator[Drawn]:
+def draw(study: Study) -> Iterator[DrawnFigure]:
     """Every registered figure of a study, in the order of the report."""
     for module in FIGURES:
         needed: str | None = getattr(module, "NEEDS", None)
         if needed is not None and not _there(getattr(study, needed)):
             continue
-        yield Drawn(
+        yield DrawnFigure(
             name=module.__name__.rpartition(".")[2],
             title=module.TITLE,
             caption=module.caption(study),

@@ -30,7 +30,7 @@ ROWS = 4096
 
 
 @dataclass(frozen=True)
-class Column:
+class CsvColumn:
     """One column: its header and its values, (n_pose,), or (n_pose, n_source) where they differ.
 
     `overall` (n_pose,) stands in the row of all sources together; None leaves that empty.
@@ -112,7 +112,7 @@ def _over_time(result: Result) -> Iterator[str]:
 
 
 def _interleaved(
-    leading: list[tuple[object, ...]], columns: list[Column], sources: list[str], block: slice
+    leading: list[tuple[object, ...]], columns: list[CsvColumn], sources: list[str], block: slice
 ) -> Iterator[list[object]]:
     """Rows of some poses: one for each source and one for all together, or one where none."""
     values = [column.values[block].tolist() for column in columns]
@@ -131,7 +131,7 @@ def _interleaved(
         yield [*lead, *([OVERALL] if sources else []), *map(_cell, together)]
 
 
-def _columns(result: Result) -> list[Column]:
+def _columns(result: Result) -> list[CsvColumn]:
     """Every variable over poses, its last axis spread over columns."""
     columns = []
     names = result.variables()
@@ -147,7 +147,7 @@ def _columns(result: Result) -> list[Column]:
         rows = 2 if dims[1:2] == ("source",) else 1
         for index, header in enumerate(_headers(result, name, values, rows)):
             columns.append(
-                Column(
+                CsvColumn(
                     header,
                     _spread(values.array, rows)[..., index],
                     None if overall is None else _spread(overall, 1)[..., index],
@@ -244,9 +244,9 @@ def _alone(overall: str) -> str:
     return overall.removeprefix("overall_")
 
 
-def _single(result: Result, name: str) -> Column:
+def _single(result: Result, name: str) -> CsvColumn:
     values = result.values(name)
-    return Column(f"{name} [{values.units[0]}]", values.array)
+    return CsvColumn(f"{name} [{values.units[0]}]", values.array)
 
 
 def _cell(value: object) -> object:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.uncertainty_analysis.model import FunctionModel, Linear
+from truepose.uncertainty_analysis.model import FunctionModel, LinearModel
 
 Function = Callable[[Floats], Floats]
 """Outputs (s, m) of independent variables (s, n) in standard uncertainties."""
@@ -25,7 +25,7 @@ NOISE = 64.0
 """Rounding of a difference, in units of the last place of what is subtracted."""
 
 
-def second_order_uncertainty(model: FunctionModel, law: Linear) -> Floats:
+def second_order_uncertainty(model: FunctionModel, law: LinearModel) -> Floats:
     """(m,) standard uncertainty with the terms of next order; NaN where they are not finite."""
     sigmas = np.array([each.sigmas for each in model.distributions])
     mix = np.eye(sigmas.size)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.compensation.commands import UNMOVED, ActualMachine, blocks
+from truepose.compensation.commands import NO_DEVIATION, ActualMachine, blocks
 from truepose.runs.displacement import displacement
 from truepose.runs.poses import OK
 
@@ -19,7 +19,7 @@ FINER = 32
 """Parts of a step in which it is gone again before it is said to cross a singularity."""
 
 
-def crossings(actual: ActualMachine, begins: Floats, ends: Floats) -> Indices:
+def singularity_crossings(actual: ActualMachine, begins: Floats, ends: Floats) -> Indices:
     """Numbers of the ways, from poses (n, n_commanded) to others, that cross a singularity.
 
     The nominal machine is driven along them, from joints to joints: where the platform does not
@@ -51,7 +51,7 @@ def _arrives(actual: ActualMachine, begins: Floats, ends: Floats) -> Flags:
     kernel = actual.machine.kernel
     from_joints, placements, _ = kernel.place(begins)
     joints, _, _ = kernel.place(ends)
-    moved, status = displacement(actual.machine, joints, placements, UNMOVED)
+    moved, status = displacement(actual.machine, joints, placements, NO_DEVIATION)
     arrived = actual.poses_from(placements, moved, ends)
     off = np.abs((arrived - ends) / actual.unit).max(axis=1)
     # Ways that follow each other share a pose, where it is asked for once.
@@ -74,4 +74,4 @@ def _side(actual: ActualMachine, poses: Floats) -> Floats:
         return np.asarray(np.sign(np.linalg.det(jacobians[:, actual.components])))
 
 
-__all__ = ["crossings"]
+__all__ = ["singularity_crossings"]

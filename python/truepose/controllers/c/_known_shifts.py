@@ -20,14 +20,14 @@ from typing import cast
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.controllers._export import cannot
+from truepose.controllers._export import unsupported_machine
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
 from truepose.machine.parts import Body, Drive, Strut
-from truepose.runs.displacement import Moved, together
-from truepose.runs.poses import Walk
-from truepose.sources import Block, Source
+from truepose.runs.displacement import ParameterDeviation, sum_deviations
+from truepose.runs.poses import PoseRun
+from truepose.sources import PoseBlock, Source
 from truepose.sources._stiffness import lacking
 from truepose.uncertainty_analysis.length_law import law_of_length
 
@@ -61,7 +61,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownShifts:
     """Shifts at the reference, per kelvin of each part, and compliances, term by term.
 
     `left_out`: sources that the machine has, and that were asked to be left out.
@@ -73,7 +73,7 @@ class Known:
     left_out: tuple[str, ...]
 
 
-def known_of(machine: Machine, without: Sequence[str] = ()) -> Known:
+def known_shifts(machine: Machine, without: Sequence[str] = ()) -> KnownShifts:
     """What is known of `machine` in its condition, but for its temperatures and the wrench.
 
     `without`: sources, by name, to leave out. Raises `RequestError`: controller-cannot where a
@@ -102,7 +102,7 @@ def known_of(machine: Machine, without: Sequence[str] = ()) -> Known:
             refused[source.name] = str(failure)
     if refused:
         raise RequestError(*_refusals(machine, refused, without))
-    return Known(
+    return KnownShifts(
         tuple(at_reference),
         {part: tuple(terms) for part, terms in per_kelvin.items()},
         _compliance(block) if len(asked) > len(shifting) else (),
@@ -136,7 +136,7 @@ def _check_names(sources: Sequence[Source], without: Sequence[str]) -> None:
         raise RequestError(*problems)
 
 
-def _probe(machine: Machine, condition: Condition) -> Block:
+def _probe(machine: Machine, condition: Condition) -> PoseBlock:
     """Usable poses of the workspace and scattered about it, so that no law is one of a grid only.
 
     Raises `RequestError`: controller-cannot for too few of them, no-workspace.
@@ -148,9 +148,9 @@ def _probe(machine: Machine, condition: Condition) -> Block:
     low, high = poses.min(axis=0) - margin, poses.max(axis=0) + margin
     random = np.random.default_rng(0)
     scattered = low + (high - low) * random.random((SCATTERED, len(low)))
-    found: list[Block] = list(Walk(machine, np.concatenate([chosen, scattered]), condition))
+    found: list[PoseBlock] = list(PoseRun(machine, np.concatenate([chosen, scattered]), condition))
     if not found or found[0].indices.size < FEWEST:
-        raise cannot(
+        raise unsupported_machine(
             "a controller",
             machine,
             f"{found[0].indices.size if found else 0} usable poses about the workspace",
@@ -167,24 +167,26 @@ def _expanding(machine: Machine) -> Iterator[str]:
     return (part.part for part in parts if part.expansion)
 
 
-def _shift(source: Source, block: Block, condition: Condition) -> Moved:
+def _shift(source: Source, block: PoseBlock, condition: Condition) -> ParameterDeviation:
     """The shift of every parameter that the source touches, at the poses of the block."""
     if not source.acts(condition):
-        return together([])
+        return sum_deviations([])
     deviation = source.deviation(block.machine, condition, replace(block, condition=condition))
-    return together([(deviation.parameters, deviation.shift)])
+    return sum_deviations([(deviation.parameters, deviation.shift)])
 
 
-def _less(moved: Moved, other: Moved) -> Moved:
+def _less(moved: ParameterDeviation, other: ParameterDeviation) -> ParameterDeviation:
     """What is moved more than by `other`."""
-    return together([moved, (other[0], -other[1])])
+    return sum_deviations([moved, (other[0], -other[1])])
 
 
-def _per_kelvin(source: Source, block: Block, cold_shift: Moved, part: str) -> Iterator[Term]:
+def _per_kelvin(
+    source: Source, block: PoseBlock, cold_shift: ParameterDeviation, part: str
+) -> Iterator[Term]:
     """What one kelvin of a part adds, which has to be in proportion to the rise."""
     cold = block.condition
 
-    def added(rise: float) -> Moved:
+    def added(rise: float) -> ParameterDeviation:
         warm = cold.replace(temperature={part: cold.reference_temperature + rise})
         return _less(_shift(source, block, warm), cold_shift)
 
@@ -197,7 +199,7 @@ def _per_kelvin(source: Source, block: Block, cold_shift: Moved, part: str) -> I
     return _terms(block, columns, large / LARGE)
 
 
-def _compliance(block: Block) -> tuple[Term, ...]:
+def _compliance(block: PoseBlock) -> tuple[Term, ...]:
     """Everything that gives way; nothing where the machine does not say how stiff it is."""
     machine = block.machine
     if lacking(machine.drives, machine.struts, ""):
@@ -206,7 +208,7 @@ def _compliance(block: Block) -> tuple[Term, ...]:
     return tuple(_terms(block, columns, values))
 
 
-def _terms(block: Block, columns: Indices, values: Floats) -> Iterator[Term]:
+def _terms(block: PoseBlock, columns: Indices, values: Floats) -> Iterator[Term]:
     of_strut = {int(c): k for k, c in enumerate(block.machine.kernel.length_parameters)}
     for at, column in enumerate(columns.tolist()):
         strut = of_strut.get(column)
@@ -219,7 +221,7 @@ def _terms(block: Block, columns: Indices, values: Floats) -> Iterator[Term]:
             yield Term(column, constant, slope, strut if slope else None)
 
 
-def _require_no_wrench(source: Source, block: Block, unloaded: Moved) -> None:
+def _require_no_wrench(source: Source, block: PoseBlock, unloaded: ParameterDeviation) -> None:
     """Raise `_NoLawError` for a source that shifts otherwise under a load, as play does."""
     size = block.machine.characteristic_length
     for component in block.machine.components:
@@ -239,7 +241,7 @@ def _refusals(machine: Machine, refused: dict[str, str], without: Sequence[str])
     every = ",".join((*without, *refused))
     problems: list[Problem] = []
     for name, why in refused.items():
-        problems += cannot(
+        problems += unsupported_machine(
             "a controller",
             machine,
             f"the source {name} {why}",
@@ -250,4 +252,4 @@ def _refusals(machine: Machine, refused: dict[str, str], without: Sequence[str])
     return problems
 
 
-__all__ = ["Known", "Term", "known_of"]
+__all__ = ["KnownShifts", "Term", "known_shifts"]

@@ -8,7 +8,7 @@ status code in a result, or one `PoseError` for the whole call.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 CATALOGUE: dict[str, str] = {
     # the file as such
@@ -204,6 +204,45 @@ CATALOGUE: dict[str, str] = {
 
 
 @dataclass(frozen=True)
+class Fault:
+    """What is wrong, wherever it stands: a code from `CATALOGUE`, and what to tell people.
+
+    `found` is what stands there, `expected` what should, `hint` what to do about it. With its place
+    it becomes a `Problem`.
+    """
+
+    code: str
+    message: str
+    found: str | None = None
+    expected: str | None = None
+    hint: str | None = None
+
+    def about(self, subject: str | None) -> Fault:
+        """The same with what it is about before the message, if there is anything to name."""
+        return self if subject is None else replace(self, message=f"{subject}: {self.message}")
+
+    def at(
+        self,
+        file: str | None = None,
+        line: int | None = None,
+        path: str | None = None,
+        column: int | None = None,
+    ) -> Problem:
+        """The problem that it is at a place."""
+        return Problem(
+            self.code,
+            self.message,
+            file,
+            line,
+            path,
+            self.found,
+            self.expected,
+            self.hint,
+            column,
+        )
+
+
+@dataclass(frozen=True)
 class Problem:
     """One thing that is wrong with the input, for people (`str`) and for programs (`to_dict`).
 
@@ -224,6 +263,11 @@ class Problem:
     def __post_init__(self) -> None:
         if self.code not in CATALOGUE:
             raise ValueError(f"{self.code!r} is not in truepose.errors.CATALOGUE")
+
+    @property
+    def fault(self) -> Fault:
+        """What is wrong, without its place."""
+        return Fault(self.code, self.message, self.found, self.expected, self.hint)
 
     @property
     def place(self) -> tuple[str, ...]:
@@ -252,7 +296,7 @@ class Problem:
 class ReadingError(ValueError):
     """A value that cannot be read.
 
-    Its parts are those of the `Problem` that it becomes where its place in the file is known.
+    Its `fault` becomes a `Problem` where its place in the file is known.
     """
 
     def __init__(
@@ -270,6 +314,11 @@ class ReadingError(ValueError):
         self.found = found
         self.expected = expected
         self.hint = hint
+
+    @property
+    def fault(self) -> Fault:
+        """What is wrong with the value."""
+        return Fault(self.code, self.message, self.found, self.expected, self.hint)
 
 
 class TrueposeError(Exception):

@@ -23,7 +23,7 @@ from types import MappingProxyType
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.errors import MachineFileError, Problem
+from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.document import Document, Key
 from truepose.files.text_file import FileKind, read_text
@@ -86,22 +86,14 @@ class DataTable:
 
     def problem(
         self,
-        code: str,
-        message: str,
+        fault: Fault,
         *,
         row: int | None = None,
         column: str | None = None,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
     ) -> Problem:
         """A problem that a reader finds in the values, at the line of `row` (from 0)."""
         line = None if row is None else int(self.lines[row])
-        if column is not None:
-            message = f"{column}: {message}"
-        return Problem(
-            code, message, self.file, line, column, found=found, expected=expected, hint=hint
-        )
+        return fault.about(column).at(self.file, line, column)
 
 
 @dataclass(frozen=True)
@@ -160,14 +152,8 @@ class DataFiles:
         """A file that is not there is wrong where it is named; what is in it, where it stands."""
         if problem.line is not None:
             return problem
-        return self.document.problem(
-            problem.code,
-            problem.message,
-            key,
-            found=problem.found,
-            expected=f"{problem.expected}, relative to the machine file",
-            hint=problem.hint,
-        )
+        expected = f"{problem.expected}, relative to the machine file"
+        return self.document.problem(replace(problem.fault, expected=expected), key)
 
 
 class _Reader:
@@ -191,7 +177,9 @@ class _Reader:
         if rows is None:
             return None
         if not rows:
-            self._refuse("no-rows", "the file has no header", found="nothing", expected="a header")
+            self._refuse(
+                Fault("no-rows", "the file has no header", found="nothing", expected="a header")
+            )
             return None
         (line, header), *body = rows
         if not self._separated_by_commas(line, header):
@@ -200,7 +188,7 @@ class _Reader:
         even = [row for row in body if self._is_even(row, len(header))]
         if not body:
             self._refuse(
-                "no-rows", "no row below the header", line, found="nothing", expected="a row"
+                Fault("no-rows", "no row below the header", found="nothing", expected="a row"), line
             )
         lines = np.array([at for at, _ in even], np.intp)
         units: dict[str, FileUnit] = {}
@@ -246,12 +234,14 @@ class _Reader:
                 start = reader.line_num + 1
         except csv.Error as error:
             self._refuse(
-                "not-csv",
-                f"the row cannot be read: {error}",
+                Fault(
+                    "not-csv",
+                    f"the row cannot be read: {error}",
+                    found=lines[start - 1][:80],
+                    expected="cells separated by commas",
+                    hint='a cell that begins with a quotation mark (") must end with one',
+                ),
                 start,
-                found=lines[start - 1][:80],
-                expected="cells separated by commas",
-                hint='a cell that begins with a quotation mark (") must end with one',
             )
             return None
         return rows
@@ -262,11 +252,13 @@ class _Reader:
             for mark, plural in other.items():
                 if mark in header[0]:
                     self._refuse(
-                        "not-csv",
-                        f"the cells are separated by {plural}",
+                        Fault(
+                            "not-csv",
+                            f"the cells are separated by {plural}",
+                            found=shown_value(header[0]),
+                            expected="commas between cells, and points in decimal numbers",
+                        ),
                         line,
-                        found=shown_value(header[0]),
-                        expected="commas between cells, and points in decimal numbers",
                     )
                     return False
         return True
@@ -285,22 +277,28 @@ class _Reader:
                 known = list(self.columns)
                 misspelt.add(nearest(name, known))
                 self._refuse(
-                    "unknown-column",
-                    f"nothing reads column {at + 1}" if name else f"column {at + 1} has no name",
+                    Fault(
+                        "unknown-column",
+                        f"nothing reads column {at + 1}"
+                        if name
+                        else f"column {at + 1} has no name",
+                        found=shown_value(cell),
+                        expected=one_of(known),
+                        hint=did_you_mean(name, known),
+                    ),
                     line,
                     name or None,
-                    found=shown_value(cell),
-                    expected=one_of(known),
-                    hint=did_you_mean(name, known),
                 )
             elif name in first:
                 self._refuse(
-                    "doubled-column",
-                    "the column is there twice",
+                    Fault(
+                        "doubled-column",
+                        "the column is there twice",
+                        found=f"{shown_value(first[name])} and {shown_value(cell)}",
+                        expected="every column once",
+                    ),
                     line,
                     name,
-                    found=f"{shown_value(first[name])} and {shown_value(cell)}",
-                    expected="every column once",
                 )
             else:
                 first[name] = cell
@@ -308,11 +306,13 @@ class _Reader:
         for column in self.columns.values():
             if column.required and column.name not in first and column.name not in misspelt:
                 self._refuse(
-                    "missing-column",
-                    f"there is no column {column.name}",
+                    Fault(
+                        "missing-column",
+                        f"there is no column {column.name}",
+                        found=one_of([cell.strip() for cell in header]).removeprefix("one of "),
+                        expected=self._header_of(column),
+                    ),
                     line,
-                    found=one_of([cell.strip() for cell in header]).removeprefix("one of "),
-                    expected=self._header_of(column),
                 )
         return placed
 
@@ -321,12 +321,14 @@ class _Reader:
         if column.dimension is None:
             if written is not None:
                 self._refuse(
-                    "wrong-dimension",
-                    "a column of words has no unit",
+                    Fault(
+                        "wrong-dimension",
+                        "a column of words has no unit",
+                        found=f"({written})",
+                        expected=column.name,
+                    ),
                     line,
                     column.name,
-                    found=f"({written})",
-                    expected=column.name,
                 )
             return None
         wanted = DIMENSIONS[column.dimension]
@@ -335,26 +337,21 @@ class _Reader:
             return FileUnit("1")
         if not text:
             self._refuse(
-                "no-unit",
-                f"the header names no unit for {wanted.plural}",
+                Fault(
+                    "no-unit",
+                    f"the header names no unit for {wanted.plural}",
+                    found=shown_value(column.name),
+                    expected=self._header_of(column),
+                ),
                 line,
                 column.name,
-                found=shown_value(column.name),
-                expected=self._header_of(column),
             )
             return None
         try:
             return unit_of("1" + text if text.startswith("/") else text, wanted)
         except QuantityError as error:
-            self._refuse(
-                error.code,
-                error.message,
-                line,
-                column.name,
-                found=error.found,
-                expected=f"{wanted.phrase}, such as {self._header_of(column)}",
-                hint=error.hint,
-            )
+            expected = f"{wanted.phrase}, such as {self._header_of(column)}"
+            self._refuse(replace(error.fault, expected=expected), line, column.name)
             return None
 
     def _header_of(self, column: Column) -> str:
@@ -369,12 +366,14 @@ class _Reader:
             return True
         few = "few" if len(cells) < wanted else "many"
         self._refuse(
-            "ragged-row",
-            f"the row has too {few} cells",
+            Fault(
+                "ragged-row",
+                f"the row has too {few} cells",
+                found=counted(len(cells), "cell"),
+                expected=f"{counted(wanted, 'cell')}, as in the header",
+                hint="a decimal number has a point, not a comma" if len(cells) > wanted else None,
+            ),
             line,
-            found=counted(len(cells), "cell"),
-            expected=f"{counted(wanted, 'cell')}, as in the header",
-            hint="a decimal number has a point, not a comma" if len(cells) > wanted else None,
         )
         return False
 
@@ -399,7 +398,9 @@ class _Reader:
     def _no_number(self, name: str, cell: str, line: int) -> None:
         if not cell:
             self._refuse(
-                "empty-cell", "the cell is empty", line, name, found="nothing", expected="a number"
+                Fault("empty-cell", "the cell is empty", found="nothing", expected="a number"),
+                line,
+                name,
             )
             return
         try:
@@ -416,23 +417,27 @@ class _Reader:
         elif re.match(r"[+-]?[\d.]+\s*[^\d\s._]", cell):
             hint = "a unit stands in the header, not with the number"
         self._refuse(
-            "not-a-number",
-            "the cell is not a number",
+            Fault(
+                "not-a-number",
+                "the cell is not a number",
+                found=shown_value(cell),
+                expected="a number",
+                hint=hint,
+            ),
             line,
             name,
-            found=shown_value(cell),
-            expected="a number",
-            hint=hint,
         )
 
     def _not_finite(self, name: str, cell: str, line: int) -> None:
         self._refuse(
-            "not-finite",
-            "the number is not finite",
+            Fault(
+                "not-finite",
+                "the number is not finite",
+                found=shown_value(cell),
+                expected="a finite number",
+            ),
             line,
             name,
-            found=shown_value(cell),
-            expected="a finite number",
         )
 
     def _words(self, column: Column, cells: list[str], lines: Indices) -> tuple[str, ...]:
@@ -443,40 +448,36 @@ class _Reader:
             unreadable[at] = not cell or bool(column.words and cell not in column.words)
             if not cell:
                 self._refuse(
-                    "empty-cell",
-                    "the cell is empty",
+                    Fault(
+                        "empty-cell",
+                        "the cell is empty",
+                        found="nothing",
+                        expected=one_of(column.words) if column.words else "a word",
+                    ),
                     line,
                     column.name,
-                    found="nothing",
-                    expected=one_of(column.words) if column.words else "a word",
                 )
             elif column.words and cell not in column.words:
                 self._refuse(
-                    "unknown-choice",
-                    f"{shown_value(cell)} is none of the words that the column takes",
+                    Fault(
+                        "unknown-choice",
+                        f"{shown_value(cell)} is none of the words that the column takes",
+                        found=shown_value(cell),
+                        expected=one_of(column.words),
+                        hint=did_you_mean(cell, column.words),
+                    ),
                     line,
                     column.name,
-                    found=shown_value(cell),
-                    expected=one_of(column.words),
-                    hint=did_you_mean(cell, column.words),
                 )
         return tuple(cells)
 
     def _refuse(
         self,
-        code: str,
-        message: str,
+        fault: Fault,
         line: int | None = None,
         column: str | None = None,
-        *,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
     ) -> None:
-        if column is not None:
-            message = f"{column}: {message}"
-        problem = Problem(code, message, self.file, line, column, found, expected, hint)
-        self._problems.append(problem)
+        self._problems.append(fault.about(column).at(self.file, line, column))
 
 
 def cut_short(problems: Iterable[Problem]) -> list[Problem]:

@@ -6,12 +6,12 @@ import hashlib
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from truepose._kernel import toml_lines
-from truepose.errors import MachineFileError, Problem
+from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.text_file import FileKind, read_text
 
 Key = tuple[str | int, ...]
@@ -112,34 +112,15 @@ class Document:
         """Whether the file (or a setting) writes the key that `path` names."""
         return self.value(self.key(path)) is not None
 
-    def problem(
-        self,
-        code: str,
-        message: str,
-        key: Key = (),
-        *,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> Problem:
+    def problem(self, fault: Fault, key: Key = ()) -> Problem:
         """A problem at `key`, with its line, or with the setting that caused it."""
         key = self.written(key)
         path = self.path(key) or None
         setting = self.setting(key)
-        if path is not None:
-            message = f"{path}: {message}"
+        fault = fault.about(path)
         if setting is not None:
-            message += f" (given by --set {setting})"
-        return Problem(
-            code,
-            message,
-            self.file,
-            self.line(key),
-            path,
-            found=found,
-            expected=expected,
-            hint=hint,
-        )
+            fault = replace(fault, message=f"{fault.message} (given by --set {setting})")
+        return fault.at(self.file, self.line(key), path)
 
 
 def _item(value: Any, part: str | int) -> Any:

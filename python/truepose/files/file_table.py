@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from truepose.errors import Fault
 from truepose.files.dimensions import FREEDOMS
 from truepose.files.quantity import refuse
 from truepose.files.units import shown_value
@@ -20,10 +21,12 @@ class FileTable(BaseModel):
 def _one_line(value: str) -> str:
     if not value.strip() or "\n" in value:
         refuse(
-            "bad-name",
-            "a name is one line that is not empty",
-            found=shown_value(value),
-            expected='a name, such as "1" or "left"',
+            Fault(
+                "bad-name",
+                "a name is one line that is not empty",
+                found=shown_value(value),
+                expected='a name, such as "1" or "left"',
+            )
         )
     return value
 
@@ -31,10 +34,12 @@ def _one_line(value: str) -> str:
 def _no_pattern(value: str) -> str:
     if any(mark in value for mark in ".*="):
         refuse(
-            "bad-name",
-            "a part's name holds no point, star or equals sign, which mean something in paths",
-            found=shown_value(value),
-            expected='a name, such as "1" or "left"',
+            Fault(
+                "bad-name",
+                "a part's name holds no point, star or equals sign, which mean something in paths",
+                found=shown_value(value),
+                expected='a name, such as "1" or "left"',
+            )
         )
     return value
 
@@ -43,18 +48,22 @@ def _in_order(value: list[str]) -> list[str]:
     doubled = sorted({freedom for freedom in value if value.count(freedom) > 1})
     if doubled:
         refuse(
-            "duplicate-name",
-            f"{', '.join(doubled)} is there more than once",
-            found=shown_value(value),
-            expected="every freedom once",
+            Fault(
+                "duplicate-name",
+                f"{', '.join(doubled)} is there more than once",
+                found=shown_value(value),
+                expected="every freedom once",
+            )
         )
     if value != sorted(value, key=list(FREEDOMS).index):
         refuse(
-            "freedom-order",
-            "the freedoms are not in their order",
-            found=shown_value(value),
-            expected=f"the order {' '.join(FREEDOMS)}",
-            hint="poses list their coordinates in this order",
+            Fault(
+                "freedom-order",
+                "the freedoms are not in their order",
+                found=shown_value(value),
+                expected=f"the order {' '.join(FREEDOMS)}",
+                hint="poses list their coordinates in this order",
+            )
         )
     return value
 

@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import PydanticCustomError, core_schema
 
+from truepose.errors import Fault
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.tolerance import TABLE_KEYS, Tolerance, read_tolerance
 from truepose.files.tolerance_standards import designations
@@ -22,20 +23,10 @@ from truepose.files.units import QuantityError, UnitSystem, shown_value, type_ph
 
 Sign = Literal["any", "positive", "not negative"]
 
-_MESSAGE = "{message}"
 
-
-def refuse(
-    code: str,
-    message: str,
-    *,
-    found: str | None = None,
-    expected: str | None = None,
-    hint: str | None = None,
-) -> NoReturn:
-    """Refuse a value inside a pydantic validator, with the fields of a `Problem`."""
-    parts = {"message": message, "found": found, "expected": expected, "hint": hint}
-    raise PydanticCustomError(code, _MESSAGE, parts)
+def refuse(fault: Fault) -> NoReturn:
+    """Refuse a value inside a pydantic validator; the fault stands in the error's context."""
+    raise PydanticCustomError(fault.code, "{message}", {"message": fault.message, "fault": fault})
 
 
 def _units(info: ValidationInfo) -> UnitSystem:
@@ -72,13 +63,7 @@ class FileType:
             try:
                 return self.of(info).read(value, _units(info))
             except QuantityError as error:
-                refuse(
-                    error.code,
-                    error.message,
-                    found=error.found,
-                    expected=error.expected,
-                    hint=error.hint,
-                )
+                refuse(error.fault)
 
         return core_schema.with_info_plain_validator_function(validate)
 
@@ -337,10 +322,12 @@ def list_of(count: int) -> BeforeValidator:
         if not isinstance(value, list) or len(value) != count:
             found = f"a list of {len(value)}" if isinstance(value, list) else type_phrase(value)
             refuse(
-                "wrong-type",
-                f"expected a list of {count}, found {found}",
-                found=shown_value(value),
-                expected=f"a list of {count}",
+                Fault(
+                    "wrong-type",
+                    f"expected a list of {count}, found {found}",
+                    found=shown_value(value),
+                    expected=f"a list of {count}",
+                )
             )
         return tuple(value)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import Any, TypeVar
 
 from truepose.files import tolerance_standards
@@ -440,6 +440,4 @@ def _designation(text: str, dimension: str) -> str:
     try:
         return tolerance_standards.canonical(text, dimension)
     except tolerance_standards.ToleranceClassError as error:
-        raise QuantityError(
-            error.code, error.message, found=error.found, expected=error.expected, hint=error.hint
-        ) from None
+        raise QuantityError(**asdict(error.fault)) from None

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from truepose.errors import Problem, RequestError
+from truepose.errors import Fault, RequestError
 from truepose.files.wording import one_of
 
 
@@ -22,44 +22,54 @@ def require_writable(path: Path, endings: Collection[str], inputs: Collection[Pa
     folder = Path(os.path.realpath(path)).parent
     if ending not in endings:
         raise _refusal(
-            "output-ending",
-            "the ending of the output file does not say what to write",
+            Fault(
+                "output-ending",
+                "the ending of the output file does not say what to write",
+                found=ending or "no ending",
+                expected=one_of(sorted(endings)),
+            ),
             path,
-            found=ending or "no ending",
-            expected=one_of(sorted(endings)),
         )
     if not folder.is_dir():
         raise _refusal(
-            "output-not-writable",
-            "the folder of the output file does not exist",
+            Fault(
+                "output-not-writable",
+                "the folder of the output file does not exist",
+                found=str(folder),
+                expected="a folder that exists",
+                hint=f"create it first: mkdir -p {folder}",
+            ),
             path,
-            found=str(folder),
-            expected="a folder that exists",
-            hint=f"create it first: mkdir -p {folder}",
         )
     if any(path.exists() and source.exists() and path.samefile(source) for source in inputs):
         raise _refusal(
-            "output-is-input",
-            "the output would write over the machine file",
+            Fault(
+                "output-is-input",
+                "the output would write over the machine file",
+                found=str(path),
+                expected="another file",
+            ),
             path,
-            found=str(path),
-            expected="another file",
         )
     if path.is_dir():
         raise _refusal(
-            "output-not-writable",
-            "the output path is a folder",
+            Fault(
+                "output-not-writable",
+                "the output path is a folder",
+                found="a folder",
+                expected="a file name",
+            ),
             path,
-            found="a folder",
-            expected="a file name",
         )
     if not os.access(folder, os.W_OK | os.X_OK):
         raise _refusal(
-            "output-not-writable",
-            "nothing may be written into the folder of the output file",
+            Fault(
+                "output-not-writable",
+                "nothing may be written into the folder of the output file",
+                found=f"no write permission for {folder}",
+                expected="a folder that you may write into",
+            ),
             path,
-            found=f"no write permission for {folder}",
-            expected="a folder that you may write into",
         )
 
 
@@ -67,12 +77,14 @@ def require_new(path: Path) -> None:
     """Refuse a path where something stands. Raises `RequestError` (code `output-exists`)."""
     if path.exists() or path.is_symlink():
         raise _refusal(
-            "output-exists",
-            "there is such a file already, and it is not touched",
+            Fault(
+                "output-exists",
+                "there is such a file already, and it is not touched",
+                found=str(path),
+                expected="a name that is free",
+                hint="give another name: --output FILE",
+            ),
             path,
-            found=str(path),
-            expected="a name that is free",
-            hint="give another name: --output FILE",
         )
 
 
@@ -85,30 +97,36 @@ def require_folder(path: Path, names: Collection[str] = ()) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as failure:
         raise _refusal(
-            "output-not-writable",
-            "the output folder cannot be made",
+            Fault(
+                "output-not-writable",
+                "the output folder cannot be made",
+                found="a file, or a link to nothing"
+                if isinstance(failure, FileExistsError)
+                else failure.strerror or str(failure),
+                expected="a folder that you may write into, or a name that is free",
+            ),
             path,
-            found="a file, or a link to nothing"
-            if isinstance(failure, FileExistsError)
-            else failure.strerror or str(failure),
-            expected="a folder that you may write into, or a name that is free",
         ) from failure
     if not os.access(path, os.W_OK | os.X_OK):
         raise _refusal(
-            "output-not-writable",
-            "nothing may be written into the output folder",
+            Fault(
+                "output-not-writable",
+                "nothing may be written into the output folder",
+                found="no write permission",
+                expected="a folder that you may write into",
+            ),
             path,
-            found="no write permission",
-            expected="a folder that you may write into",
         )
     for name in names:
         if (path / name).is_dir():
             raise _refusal(
-                "output-not-writable",
-                "a folder stands where a file is to be written",
+                Fault(
+                    "output-not-writable",
+                    "a folder stands where a file is to be written",
+                    found="a folder",
+                    expected="a file, or a name that is free",
+                ),
                 path / name,
-                found="a folder",
-                expected="a file, or a name that is free",
             )
 
 
@@ -128,20 +146,18 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.replace(target)
     except OSError as failure:
         raise _refusal(
-            "output-not-writable",
-            "the output file could not be written",
+            Fault(
+                "output-not-writable",
+                "the output file could not be written",
+                found=failure.strerror or str(failure),
+                expected="a place with room that you may write to",
+            ),
             path,
-            found=failure.strerror or str(failure),
-            expected="a place with room that you may write to",
         ) from failure
     finally:
         with suppress(OSError):
             temporary.unlink()
 
 
-def _refusal(
-    code: str, message: str, path: Path, *, found: str, expected: str, hint: str | None = None
-) -> RequestError:
-    return RequestError(
-        Problem(code, message, file=str(path), found=found, expected=expected, hint=hint)
-    )
+def _refusal(fault: Fault, path: Path) -> RequestError:
+    return RequestError(fault.at(str(path)))

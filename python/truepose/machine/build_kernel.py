@@ -10,7 +10,7 @@ import numpy as np
 
 from truepose._kernel import KernelError
 from truepose._kernel import Machine as KernelMachine
-from truepose.errors import CATALOGUE, MachineFileError, Problem
+from truepose.errors import CATALOGUE, Fault, MachineFileError, Problem
 from truepose.files.document import Document
 from truepose.files.units import UnitSystem, shown_value
 from truepose.machine.compliances import compliances
@@ -66,10 +66,12 @@ def _built(document: Document, description: dict[str, Any]) -> KernelMachine:
         value = document.value(key)
         raise MachineFileError(
             document.problem(
-                code if code in CATALOGUE else "not-buildable",
-                message,
+                Fault(
+                    code if code in CATALOGUE else "not-buildable",
+                    message,
+                    found=None if isinstance(value, dict) else shown_value(value),
+                ),
                 key,
-                found=None if isinstance(value, dict) else shown_value(value),
             )
         ) from None
 
@@ -145,32 +147,40 @@ def _rigid(described: Described, machine: KernelMachine) -> Iterable[Problem]:
         base = any(yielding.get(f"{strut.part}.base.{axis}") for axis in "xyz")
         if not (own or base or of_drive.get(strut.drive or "")):
             yield described.document.problem(
-                "no-stiffness",
-                f"the machine has more closures than freedoms, but nothing says how stiff strut "
-                f"{strut.name} is",
+                Fault(
+                    "no-stiffness",
+                    "the machine has more closures than freedoms, but nothing says how stiff "
+                    f"strut {strut.name} is",
+                    found="a rigid limb",
+                    expected="section_area and modulus (or material), or an outright axial "
+                    "stiffness",
+                    hint="where not all closures fit, the limbs share the misfit by their "
+                    "stiffness",
+                ),
                 ("strut", index),
-                found="a rigid limb",
-                expected="section_area and modulus (or material), or an outright axial stiffness",
-                hint="where not all closures fit, the limbs share the misfit by their stiffness",
             )
     for index, guide in enumerate(described.guides):
         yield described.document.problem(
-            "no-stiffness",
-            f"the machine has more closures than freedoms, and guide {guide.name} is rigid",
+            Fault(
+                "no-stiffness",
+                f"the machine has more closures than freedoms, and guide {guide.name} is rigid",
+                found="a guide, which has no stiffness",
+                expected="as many closures as freedoms where there are guides",
+                hint="leave a guide or a strut away, or let a strut do what the guide does",
+            ),
             ("guide", index),
-            found="a guide, which has no stiffness",
-            expected="as many closures as freedoms where there are guides",
-            hint="leave a guide or a strut away, or let a strut do what the guide does",
         )
     # With a rigid guide nothing can be placed, wherever home is.
     if not described.guides and not np.isfinite(_home_lengths(machine)).all():
         yield described.document.problem(
-            "home-unreachable",
-            "the machine has more closures than freedoms and cannot be placed at home, "
-            "where its stiffness is taken",
+            Fault(
+                "home-unreachable",
+                "the machine has more closures than freedoms and cannot be placed at home, "
+                "where its stiffness is taken",
+                found="home out of reach",
+                expected="a [workspace] home that the machine reaches",
+            ),
             ("workspace",),
-            found="home out of reach",
-            expected="a [workspace] home that the machine reaches",
         )
 
 
@@ -183,12 +193,14 @@ def _loose(described: Described, machine: KernelMachine, free: np.ndarray) -> Pr
     units = described.validated.units
     motions = "; ".join(_motion(twist, machine.characteristic_length, units) for twist in free)
     return described.document.problem(
-        "loose-platform",
-        "the guides do not hold what the struts leave free",
+        Fault(
+            "loose-platform",
+            "the guides do not hold what the struts leave free",
+            found=f"at home the platform can still move: {motions}",
+            expected="closures that hold every freedom of the platform",
+            hint=f"look at where {names} point and stand; two closures may hold the same motion",
+        ),
         ("guide", 0),
-        found=f"at home the platform can still move: {motions}",
-        expected="closures that hold every freedom of the platform",
-        hint=f"look at where {names} point and stand; two closures may hold the same motion",
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.errors import Problem
+from truepose.errors import Fault, Problem
 from truepose.files.data_file import Column, DataFiles
 from truepose.files.dimensions import FREEDOMS
 from truepose.files.document import Document, Key
@@ -66,11 +66,13 @@ def too_large(document: Document, size: float, key: Key) -> Problem | None:
     if size <= LARGEST_GRID:
         return None
     return document.problem(
-        "grid-too-large",
-        "more poses than are allowed",
+        Fault(
+            "grid-too-large",
+            "more poses than are allowed",
+            found=f"{size:.3g} poses" if size < 1e300 else "more than 1e300 poses",
+            expected=f"at most {LARGEST_GRID:.0e} poses".replace("e+0", "e"),
+        ),
         key,
-        found=f"{size:.3g} poses" if size < 1e300 else "more than 1e300 poses",
-        expected=f"at most {LARGEST_GRID:.0e} poses".replace("e+0", "e"),
     )
 
 
@@ -187,16 +189,7 @@ class _Making:
                 try:
                     result[row, column] = self.validated.units.read(value, FREEDOMS[freedom])
                 except QuantityError as error:
-                    self.problems.append(
-                        self.document.problem(
-                            error.code,
-                            error.message,
-                            (*key, row, column),
-                            found=error.found,
-                            expected=error.expected,
-                            hint=error.hint,
-                        )
-                    )
+                    self.problems.append(self.document.problem(error.fault, (*key, row, column)))
         return result if len(self.problems) == before else None
 
     def _path(self, table: PathTable | None) -> Floats | None:
@@ -244,11 +237,8 @@ class _Making:
     def _refuse_path(self, key: str, found: str, expected: str) -> None:
         self.problems.append(
             self.document.problem(
-                "missing-key",
-                "the path lacks something",
+                Fault("missing-key", "the path lacks something", found=found, expected=expected),
                 ("workspace", "path", key),
-                found=found,
-                expected=expected,
             )
         )
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from truepose.errors import Problem
+from truepose.errors import Fault, Problem
 from truepose.files.dimensions import FREEDOMS
 from truepose.files.document import ARRAY_TABLES, Document, Key, named_rows
 from truepose.files.units import shown_value
@@ -71,11 +71,13 @@ def _distinct_names(document: Document, validated: Validated) -> Iterator[Proble
             line = document.line(first[name])
             there = f" in line {line}" if line is not None else ""
             yield document.problem(
-                "duplicate-name",
-                f'two {table}s are named "{name}"',
+                Fault(
+                    "duplicate-name",
+                    f'two {table}s are named "{name}"',
+                    found=f'"{name}", already taken{there}',
+                    expected=f"a name of its own for every {table}",
+                ),
                 key,
-                found=f'"{name}", already taken{there}',
-                expected=f"a name of its own for every {table}",
             )
 
 
@@ -89,22 +91,26 @@ def _drives_of_struts(document: Document, validated: Validated) -> Iterator[Prob
         used.add(drive)
         if drive not in names:
             yield document.problem(
-                "unknown-drive",
-                f'there is no drive "{drive}"',
+                Fault(
+                    "unknown-drive",
+                    f'there is no drive "{drive}"',
+                    found=shown_value(drive),
+                    expected=one_of(f'"{name}"' for name in names) if names else "a [[drive]]",
+                    hint=did_you_mean(drive, names),
+                ),
                 ("strut", index, "drive"),
-                found=shown_value(drive),
-                expected=one_of(f'"{name}"' for name in names) if names else "a [[drive]]",
-                hint=did_you_mean(drive, names),
             )
     if used and used <= set(names):
         for index, name in named_rows(document.data, "drive"):
             if name not in used:
                 yield document.problem(
-                    "unused-drive",
-                    "no strut is on this drive",
+                    Fault(
+                        "unused-drive",
+                        "no strut is on this drive",
+                        found="no strut",
+                        expected=f'a strut with drive = "{name}"',
+                    ),
                     ("drive", index),
-                    found="no strut",
-                    expected=f'a strut with drive = "{name}"',
                 )
 
 
@@ -126,22 +132,26 @@ def _strut_lengths(document: Document, validated: Validated) -> Iterator[Problem
         sets_length = kind is not None and kinds[kind].sets_length
         if sets_length and "length" in row:
             yield document.problem(
-                "unwanted-length",
-                f"the length of this strut is the coordinate of its {kind} drive",
+                Fault(
+                    "unwanted-length",
+                    f"the length of this strut is the coordinate of its {kind} drive",
+                    found=shown_value(row["length"]),
+                    expected="no length",
+                    hint=f'its length at coordinate 0 is the offset of drive "{drive}"',
+                ),
                 ("strut", index, "length"),
-                found=shown_value(row["length"]),
-                expected="no length",
-                hint=f'its length at coordinate 0 is the offset of drive "{drive}"',
             )
             continue
         key: Key = ("strut", index, "length")
         if not sets_length and "length" not in row and key not in validated.misspelt:
             yield document.problem(
-                "missing-key",
-                "missing",
+                Fault(
+                    "missing-key",
+                    "missing",
+                    found="nothing",
+                    expected="the key length: the distance of the strut's joint centres",
+                ),
                 key,
-                found="nothing",
-                expected="the key length: the distance of the strut's joint centres",
             )
 
 
@@ -154,12 +164,14 @@ def _rings(document: Document, validated: Validated) -> Iterator[Problem]:
         key: Key = ("strut", index, lacking)
         if given in row and lacking not in row and key not in validated.misspelt:
             yield document.problem(
-                "missing-key",
-                f"a ring has a radius and an axis, but there is only {given}",
+                Fault(
+                    "missing-key",
+                    f"a ring has a radius and an axis, but there is only {given}",
+                    found=f"no {lacking}",
+                    expected=f"{lacking} as well, such as {such}",
+                    hint=f"without a ring, leave {given} away",
+                ),
                 ("strut", index, given),
-                found=f"no {lacking}",
-                expected=f"{lacking} as well, such as {such}",
-                hint=f"without a ring, leave {given} away",
             )
 
 
@@ -176,13 +188,15 @@ def _telescopic_travel(document: Document, validated: Validated) -> Iterator[Pro
         if min(ends) <= 0.0:
             unit = validated.units.shown()["length"]
             yield document.problem(
-                "not-positive",
-                "the strut's length reaches zero within the travel",
+                Fault(
+                    "not-positive",
+                    "the strut's length reaches zero within the travel",
+                    found=f"lengths from {unit.to_file(ends[0]):g} to {unit.to_file(ends[1]):g} "
+                    f"{unit.label} (scale * travel + offset)",
+                    expected="lengths above zero",
+                    hint="offset is the strut's length where the coordinate is 0",
+                ),
                 ("drive", index, "travel"),
-                found=f"lengths from {unit.to_file(ends[0]):g} to {unit.to_file(ends[1]):g} "
-                f"{unit.label} (scale * travel + offset)",
-                expected="lengths above zero",
-                hint="offset is the strut's length where the coordinate is 0",
             )
 
 
@@ -200,13 +214,15 @@ def _carriages(document: Document, validated: Validated) -> Iterator[Problem]:
         if "carriage" not in row or not known or _has_carriage(row):
             continue
         yield document.problem(
-            "unwanted-carriage",
-            f"a {row['kind']} drive moves no carriage",
+            Fault(
+                "unwanted-carriage",
+                f"a {row['kind']} drive moves no carriage",
+                found=f'carriage, and kind = "{row["kind"]}"',
+                expected="no carriage",
+                hint="the expansion of a crank is that of its arm, that of a telescopic strut the "
+                "strut's",
+            ),
             ("drive", index, "carriage"),
-            found=f'carriage, and kind = "{row["kind"]}"',
-            expected="no carriage",
-            hint="the expansion of a crank is that of its arm, that of a telescopic strut the "
-            "strut's",
         )
 
 
@@ -229,39 +245,47 @@ def _counts(document: Document, validated: Validated) -> Iterator[Problem]:
         guides = len(_rows(document, "guide"))
         listed = counted(struts, "strut") + (f" and {counted(guides, 'guide')}" if guides else "")
         yield document.problem(
-            "closure-count",
-            f"too {'few' if few else 'many'} closures for the platform's freedoms",
+            Fault(
+                "closure-count",
+                f"too {'few' if few else 'many'} closures for the platform's freedoms",
+                found=f"{listed} ({counted(closures, 'closure')}) for "
+                f"{counted(len(dof), 'freedom')} ({' '.join(dof)})",
+                expected=counted(len(dof), "closure")
+                if few
+                else f"{counted(len(dof), 'closure')}; at most {MOST_CLOSURES}",
+                hint="each strut is one closure and takes one freedom; guides take the others",
+            ),
             ("machine", "dof"),
-            found=f"{listed} ({counted(closures, 'closure')}) for "
-            f"{counted(len(dof), 'freedom')} ({' '.join(dof)})",
-            expected=counted(len(dof), "closure")
-            if few
-            else f"{counted(len(dof), 'closure')}; at most {MOST_CLOSURES}",
-            hint="each strut is one closure and takes one freedom; guides take the others",
         )
     where: Key = ("machine", "dof" if everything else "commanded")
     beyond = [freedom for freedom in commanded if freedom not in dof]
     if beyond:
         yield document.problem(
-            "unknown-freedom",
-            "commanded freedoms that the platform does not have",
+            Fault(
+                "unknown-freedom",
+                "commanded freedoms that the platform does not have",
+                found=" ".join(beyond),
+                expected=one_of(dof),
+            ),
             where,
-            found=" ".join(beyond),
-            expected=one_of(dof),
         )
     if everything and few:
         return  # dof is wrong, and everything is commanded: one mistake
     if "drive" in document.data and drives != len(commanded):
         yield document.problem(
-            "drive-count",
-            f"too {'few' if drives < len(commanded) else 'many'} drives for the commanded freedoms",
+            Fault(
+                "drive-count",
+                f"too {'few' if drives < len(commanded) else 'many'} drives for the commanded "
+                "freedoms",
+                found=f"{counted(drives, 'drive')} for "
+                f"{counted(len(commanded), 'commanded freedom')} "
+                f"({' '.join(commanded)})",
+                expected=counted(len(commanded), "drive"),
+                hint="commanded names the freedoms that the drives decide, if not all of dof"
+                if drives < len(commanded)
+                else None,
+            ),
             where,
-            found=f"{counted(drives, 'drive')} for {counted(len(commanded), 'commanded freedom')} "
-            f"({' '.join(commanded)})",
-            expected=counted(len(commanded), "drive"),
-            hint="commanded names the freedoms that the drives decide, if not all of dof"
-            if drives < len(commanded)
-            else None,
         )
 
 
@@ -281,30 +305,36 @@ def _workspace_freedoms(document: Document, validated: Validated) -> Iterator[Pr
         table = workspace.get(name)
         if name == "box" and isinstance(table, dict) and not FREEDOMS.keys() & table.keys():
             yield document.problem(
-                "missing-key",
-                "the box names no freedom",
+                Fault(
+                    "missing-key",
+                    "the box names no freedom",
+                    found=", ".join(table) or "{}",
+                    expected="a range, such as x = [200, 400]",
+                    hint="for one pose write poses = [[...]]",
+                ),
                 ("workspace", name),
-                found=", ".join(table) or "{}",
-                expected="a range, such as x = [200, 400]",
-                hint="for one pose write poses = [[...]]",
             )
         if name == "cylinder" and table is not None and not {"x", "y"} <= set(commanded):
             yield document.problem(
-                "unknown-freedom",
-                "a cylinder needs x and y, which are not both commanded",
+                Fault(
+                    "unknown-freedom",
+                    "a cylinder needs x and y, which are not both commanded",
+                    found=" ".join(commanded),
+                    expected="x and y among the commanded freedoms",
+                    hint="box fills other freedoms",
+                ),
                 ("workspace", name),
-                found=" ".join(commanded),
-                expected="x and y among the commanded freedoms",
-                hint="box fills other freedoms",
             )
         for freedom in table if isinstance(table, dict) else ():
             if freedom in FREEDOMS and freedom not in allowed:
                 yield document.problem(
-                    "unknown-freedom",
-                    f"{freedom} is {said}",
+                    Fault(
+                        "unknown-freedom",
+                        f"{freedom} is {said}",
+                        found=freedom,
+                        expected=one_of(allowed),
+                    ),
                     ("workspace", name, freedom),
-                    found=freedom,
-                    expected=one_of(allowed),
                 )
 
 
@@ -315,12 +345,14 @@ def _grid_size(document: Document, validated: Validated) -> Iterator[Problem]:
         return
     if not grid:
         yield document.problem(
-            "missing-key",
-            "the grid names no freedom",
+            Fault(
+                "missing-key",
+                "the grid names no freedom",
+                found="{}",
+                expected="a range, such as x = [200, 400, 5]",
+                hint="for one pose write poses = [[...]]",
+            ),
             ("workspace", "grid"),
-            found="{}",
-            expected="a range, such as x = [200, 400, 5]",
-            hint="for one pose write poses = [[...]]",
         )
     # From the raw counts, so that it is said along with what is wrong with the ends.
     counts = [
@@ -355,20 +387,21 @@ def _pose_rows(document: Document, validated: Validated) -> Iterator[Problem]:
             continue
         if not rows:
             yield document.problem(
-                "missing-key",
-                "no pose in the list",
+                Fault(
+                    "missing-key", "no pose in the list", found="[]", expected="at least one pose"
+                ),
                 key,
-                found="[]",
-                expected="at least one pose",
             )
         for index, pose in enumerate(rows):
             if len(pose) != len(commanded):
                 yield document.problem(
-                    "wrong-type",
-                    f"a pose of {counted(len(pose), 'number')}",
+                    Fault(
+                        "wrong-type",
+                        f"a pose of {counted(len(pose), 'number')}",
+                        found=shown_value(pose),
+                        expected=f"{counted(len(commanded), 'number')}: {', '.join(commanded)}",
+                    ),
                     (*key, index),
-                    found=shown_value(pose),
-                    expected=f"{counted(len(commanded), 'number')}: {', '.join(commanded)}",
                 )
 
 
@@ -394,14 +427,16 @@ def _parts_with_temperatures(document: Document, validated: Validated) -> Iterat
         for part in given or ():
             if part not in known:
                 yield document.problem(
-                    "unknown-part",
-                    f'there is no part "{part}"'
-                    if part not in BODIES
-                    else f"a {key} along the {part} is not known",
+                    Fault(
+                        "unknown-part",
+                        f'there is no part "{part}"'
+                        if part not in BODIES
+                        else f"a {key} along the {part} is not known",
+                        found=shown_value(part),
+                        expected=one_of(known),
+                        hint=did_you_mean(part, known),
+                    ),
                     document.key(f"condition.{key}.{part}"),
-                    found=shown_value(part),
-                    expected=one_of(known),
-                    hint=did_you_mean(part, known),
                 )
 
 
@@ -413,13 +448,15 @@ def _gradients(document: Document, validated: Validated) -> Iterator[Problem]:
         value = document.value(key)
         if isinstance(value, list) != is_body(part):
             yield document.problem(
-                "wrong-type",
-                f"{part} has a gradient along each of its axes"
-                if is_body(part)
-                else f"{part} has one gradient, along itself",
+                Fault(
+                    "wrong-type",
+                    f"{part} has a gradient along each of its axes"
+                    if is_body(part)
+                    else f"{part} has one gradient, along itself",
+                    found=shown_value(value),
+                    expected="[x, y, z]" if is_body(part) else "one temperature gradient",
+                ),
                 key,
-                found=shown_value(value),
-                expected="[x, y, z]" if is_body(part) else "one temperature gradient",
             )
 
 
@@ -439,11 +476,13 @@ def _accuracy_asked(document: Document, validated: Validated) -> Iterator[Proble
     ):
         if value is not None and kind not in kinds:
             yield document.problem(
-                "unknown-freedom",
-                f"an accuracy of the {what}",
+                Fault(
+                    "unknown-freedom",
+                    f"an accuracy of the {what}",
+                    found=f"a platform that moves in {' '.join(freedoms[0])}",
+                    expected=f"no {key}, or {names} in dof",
+                ),
                 ("accuracy", key),
-                found=f"a platform that moves in {' '.join(freedoms[0])}",
-                expected=f"no {key}, or {names} in dof",
             )
 
 
@@ -454,11 +493,13 @@ def _materials_and_outright(document: Document, validated: Validated) -> Iterato
             continue
         if row.section_area is not None and row.modulus is None and row.material is None:
             yield document.problem(
-                "missing-key",
-                "a section area, but neither modulus nor material",
+                Fault(
+                    "missing-key",
+                    "a section area, but neither modulus nor material",
+                    found="nothing",
+                    expected="modulus or material, or an outright stiffness in place of the area",
+                ),
                 ("strut", index, "modulus"),
-                found="nothing",
-                expected="modulus or material, or an outright stiffness in place of the area",
             )
 
 

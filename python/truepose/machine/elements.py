@@ -13,6 +13,7 @@ from typing import Annotated, Any
 from pydantic import Field, ValidatorFunctionWrapHandler, WrapValidator, create_model
 
 from truepose._kernel import elements
+from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import (
     Angle,
@@ -66,11 +67,13 @@ def _ascending(value: Any, read: ValidatorFunctionWrapHandler) -> tuple[float, f
     start, stop = read(value)
     if not start < stop:
         refuse(
-            "travel-reversed",
-            "the travel ends where it starts or below",
-            found=shown_value(value),
-            expected="[from, to] with to above from",
-            hint="swap the two" if start > stop else None,
+            Fault(
+                "travel-reversed",
+                "the travel ends where it starts or below",
+                found=shown_value(value),
+                expected="[from, to] with to above from",
+                hint="swap the two" if start > stop else None,
+            )
         )
     return start, stop
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from truepose.errors import MachineFileError, Problem
+from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.data_file import DataFiles
 from truepose.files.document import Document, read
 from truepose.files.settings import apply
@@ -78,14 +78,16 @@ def _require_schema(document: Document) -> None:
         )
     raise MachineFileError(
         document.problem(
-            "unsupported-schema",
-            "this version reads no such machine file",
+            Fault(
+                "unsupported-schema",
+                "this version reads no such machine file",
+                found=shown_value(schema),
+                expected=str(SCHEMA),
+                hint="a newer version of truepose may read it"
+                if isinstance(schema, int) and schema > SCHEMA
+                else None,
+            ),
             ("schema",),
-            found=shown_value(schema),
-            expected=str(SCHEMA),
-            hint="a newer version of truepose may read it"
-            if isinstance(schema, int) and schema > SCHEMA
-            else None,
         )
     )
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Collection, Mapping, Sequence
 
-from truepose.errors import Problem
+from truepose.errors import Fault, Problem
 from truepose.files.document import ARRAY_TABLES, Document, Key
 from truepose.files.settings import apply
 from truepose.files.units import shown_value, type_phrase
@@ -67,12 +67,14 @@ def problems(document: Document) -> list[Problem]:
             known = table in ARRAY_TABLES
             found.append(
                 document.problem(
-                    "unknown-key",
-                    f"there is no [[{table}]] whose rows could share keys",
+                    Fault(
+                        "unknown-key",
+                        f"there is no [[{table}]] whose rows could share keys",
+                        found=table,
+                        expected=f"a [[{table}]] too" if known else one_of(ARRAY_TABLES),
+                        hint=None if known else did_you_mean(table, ARRAY_TABLES),
+                    ),
                     key,
-                    found=table,
-                    expected=f"a [[{table}]] too" if known else one_of(ARRAY_TABLES),
-                    hint=None if known else did_you_mean(table, ARRAY_TABLES),
                 )
             )
         elif not isinstance(common, dict):
@@ -80,11 +82,13 @@ def problems(document: Document) -> list[Problem]:
         elif "name" in common:
             found.append(
                 document.problem(
-                    "unknown-key",
-                    f"the {table}s cannot share a name",
+                    Fault(
+                        "unknown-key",
+                        f"the {table}s cannot share a name",
+                        found=shown_value(common["name"]),
+                        expected=f"a name of its own in every [[{table}]]",
+                    ),
                     (*key, "name"),
-                    found=shown_value(common["name"]),
-                    expected=f"a name of its own in every [[{table}]]",
                 )
             )
     return found
@@ -92,9 +96,11 @@ def problems(document: Document) -> list[Problem]:
 
 def _not_tables(document: Document, key: Key, value: object) -> Problem:
     return document.problem(
-        "wrong-type",
-        f"expected a table, found {type_phrase(value)}",
+        Fault(
+            "wrong-type",
+            f"expected a table, found {type_phrase(value)}",
+            found=shown_value(value),
+            expected=" or ".join(f"[{EACH}.{table}]" for table in ARRAY_TABLES),
+        ),
         key,
-        found=shown_value(value),
-        expected=" or ".join(f"[{EACH}.{table}]" for table in ARRAY_TABLES),
     )

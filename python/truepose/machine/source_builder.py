@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol, TypeAlias, TypeVar
 from pydantic import BaseModel
 
 from truepose._kernel import Machine as KernelMachine
-from truepose.errors import Problem, ReadingError
+from truepose.errors import Fault, Problem
 from truepose.files.data_file import Column, DataFiles, DataTable
 from truepose.files.document import Document
 from truepose.files.tolerance import Band, Tolerance, read_tolerance
@@ -87,7 +87,7 @@ class SourceBuilder:
         try:
             return read_tolerance(value, dimension, self._units)
         except QuantityError as error:
-            self._refuse_reading(error, path)
+            self.refuse(error.fault, path)
             return None
 
     def band(self, tolerance: Tolerance, nominal: float, path: str) -> Band | None:
@@ -95,7 +95,7 @@ class SourceBuilder:
         try:
             return tolerance.band(nominal)
         except ToleranceClassError as error:
-            self._refuse_reading(error, path)
+            self.refuse(error.fault, path)
             return None
 
     def data_file(self, name: str, columns: Sequence[Column], path: str) -> DataTable | None:
@@ -104,7 +104,7 @@ class SourceBuilder:
         `columns` are those that it may have; `path` is the key that names the file, as in
         `drive.d1.actuator.table`. None, and every problem of the file with its line, where it is
         not good. What only the source can judge (an order, a range) it says afterwards with
-        `parts.problems.append(table.problem(code, message, row=..., column=..., ...))`.
+        `parts.problems.append(table.problem(Fault(...), row=..., column=...))`.
 
             columns = (
                 Column("position", "length"),
@@ -120,31 +120,13 @@ class SourceBuilder:
         """
         return self._data_files.read(name, columns, self._document.key(path))
 
-    def _refuse_reading(self, error: ReadingError, path: str) -> None:
-        self.refuse(
-            error.code,
-            error.message,
-            path,
-            found=error.found,
-            expected=error.expected,
-            hint=error.hint,
-        )
-
-    def refuse(
-        self,
-        code: str,
-        message: str,
-        path: str,
-        *,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
+    def refuse(self, fault: Fault, path: str) -> None:
         """Record a problem at `path`; the load fails after every source was asked."""
-        key = self._document.key(path)
-        self.problems.append(
-            self._document.problem(code, message, key, found=found, expected=expected, hint=hint)
-        )
+        self.problems.append(self._document.problem(fault, self._document.key(path)))
+
+    def record(self, problem: Problem) -> None:
+        """Record a problem that a source also raises when a condition given later brings it up."""
+        self.refuse(problem.fault, problem.path or "")
 
     def suggest(self, word: str, possible: Iterable[str]) -> str | None:
         """`did you mean "..."?`, or None where nothing is near."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.errors import Problem, RequestError
+from truepose.errors import Fault, Problem, RequestError
 from truepose.files.data_file import Column, DataFiles, DataTable
 from truepose.files.document import Document, Key
 from truepose.files.units import FileUnit
@@ -154,10 +154,12 @@ def read_temperature_log(
     if len(table.columns) == 1:
         found.append(
             table.problem(
-                "missing-column",
-                "the log has no temperature",
-                found="the column time alone",
-                expected='a column for a part, such as "strut.1 (degC)" or "default (degC)"',
+                Fault(
+                    "missing-column",
+                    "the log has no temperature",
+                    found="the column time alone",
+                    expected='a column for a part, such as "strut.1 (degC)" or "default (degC)"',
+                )
             )
         )
     data_files.problems += found
@@ -176,12 +178,16 @@ def _not_ascending(table: DataTable) -> Iterable[Problem]:
     for row in (np.flatnonzero(np.diff(times) <= 0.0) + 1).tolist():
         before = table.shown(TIME, row - 1)
         yield table.problem(
-            "time-backwards",
-            "the time stands still" if times[row] == times[row - 1] else "the time goes backwards",
+            Fault(
+                "time-backwards",
+                "the time stands still"
+                if times[row] == times[row - 1]
+                else "the time goes backwards",
+                found=f"{table.shown(TIME, row)} after {before} in line {table.lines[row - 1]}",
+                expected=f"a time after {before}",
+            ),
             row=row,
             column=TIME,
-            found=f"{table.shown(TIME, row)} after {before} in line {table.lines[row - 1]}",
-            expected=f"a time after {before}",
         )
 
 
@@ -191,12 +197,14 @@ def _too_cold(table: DataTable) -> Iterable[Problem]:
             continue
         for row in np.flatnonzero(temperatures <= 0.0).tolist():
             yield table.problem(
-                "not-positive",
-                "a temperature is above absolute zero",
+                Fault(
+                    "not-positive",
+                    "a temperature is above absolute zero",
+                    found=table.shown(part, row),
+                    expected="a temperature above absolute zero",
+                ),
                 row=row,
                 column=part,
-                found=table.shown(part, row),
-                expected="a temperature above absolute zero",
             )
 
 
@@ -214,20 +222,24 @@ def _default_is_set(document: Document) -> bool:
 def _twice(document: Document, part: str, name: str) -> Problem:
     whose = "every other part" if part == DEFAULT_PART else part
     return document.problem(
-        "excluding-keys",
-        f"the temperature of {whose} is given twice",
+        Fault(
+            "excluding-keys",
+            f"the temperature of {whose} is given twice",
+            found=f"a temperature, and the column {part} of {name}",
+            expected="one of them",
+        ),
         document.key(f"condition.temperature.{part}"),
-        found=f"a temperature, and the column {part} of {name}",
-        expected="one of them",
     )
 
 
 def _time_outside(document: Document, log: TemperatureLog, time: float, unit: FileUnit) -> Problem:
     first, last, asked = (f"{float(unit.to_file(t)):.10g} {unit.label}" for t in (*log.span, time))
     return document.problem(
-        "outside-log",
-        "the temperature log does not reach to this time",
+        Fault(
+            "outside-log",
+            "the temperature log does not reach to this time",
+            found=asked,
+            expected=f"a time from {first} to {last}",
+        ),
         ("condition", "time"),
-        found=asked,
-        expected=f"a time from {first} to {last}",
     )

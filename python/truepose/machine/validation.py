@@ -8,7 +8,7 @@ from typing import Any, TypeVar, cast, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from truepose.errors import CATALOGUE, Problem
+from truepose.errors import CATALOGUE, Fault, Problem
 from truepose.files.document import SEVERAL, Document, Key
 from truepose.files.file_table import FileTable
 from truepose.files.units import FileUnit, UnitSystem, shown_value, type_phrase
@@ -184,12 +184,14 @@ def _unknown_kind(
         return []  # missing, or of a wrong type: the table's own model says so
     return [
         document.problem(
-            "unknown-choice",
-            f"there is no {key[0]} of kind {shown_value(row['kind'])}",
+            Fault(
+                "unknown-choice",
+                f"there is no {key[0]} of kind {shown_value(row['kind'])}",
+                found=shown_value(row["kind"]),
+                expected=one_of(f'"{kind}"' for kind in kinds),
+                hint=did_you_mean(row["kind"], kinds),
+            ),
             (*key, "kind"),
-            found=shown_value(row["kind"]),
-            expected=one_of(f'"{kind}"' for kind in kinds),
-            hint=did_you_mean(row["kind"], kinds),
         )
     ]
 
@@ -299,41 +301,40 @@ def _problem(
 ) -> Problem:
     kind, value, context = entry["type"], entry["input"], entry.get("ctx", {})
     if kind in CATALOGUE:
-        return document.problem(
-            kind,
-            context["message"],
-            key,
-            found=context["found"],
-            expected=context["expected"],
-            hint=context["hint"],
-        )
+        return document.problem(context["fault"], key)
     if kind == "missing" and isinstance(entry["loc"][-1], str):
         return document.problem(
-            "missing-key",
-            "missing",
+            Fault(
+                "missing-key",
+                "missing",
+                found="nothing",
+                expected=f"the key {key[-1]}{_described(model, entry['loc'])}",
+            ),
             key,
-            found="nothing",
-            expected=f"the key {key[-1]}{_described(model, entry['loc'])}",
         )
     if kind == "extra_forbidden":
         return _unknown_key(document, key, _keys_beside(model, entry["loc"]))
     if kind == "literal_error":
         return document.problem(
-            "unknown-choice",
-            f"{shown_value(value)} is none of the words that it takes",
+            Fault(
+                "unknown-choice",
+                f"{shown_value(value)} is none of the words that it takes",
+                found=shown_value(value),
+                expected=context["expected"],
+            ),
             key,
-            found=shown_value(value),
-            expected=context["expected"],
         )
     if kind in ("missing", "too_short", "too_long"):
         return _wrong_count(document, key, value, context)
     expected = _TYPES.get(kind, entry["msg"])
     return document.problem(
-        "wrong-type",
-        f"expected {expected}, found {type_phrase(value)}",
+        Fault(
+            "wrong-type",
+            f"expected {expected}, found {type_phrase(value)}",
+            found=shown_value(value),
+            expected=expected,
+        ),
         key,
-        found=shown_value(value),
-        expected=expected,
     )
 
 
@@ -342,11 +343,15 @@ def _wrong_count(document: Document, key: Key, value: Any, context: Mapping[str,
     if wanted is None and "min_length" in context:
         wanted = f"{context['min_length']} or more"
     return document.problem(
-        "wrong-type",
-        f"a list of {len(value)}" if isinstance(value, list | tuple) else "a list of another size",
+        Fault(
+            "wrong-type",
+            f"a list of {len(value)}"
+            if isinstance(value, list | tuple)
+            else "a list of another size",
+            found=shown_value(value),
+            expected="a list of more entries" if wanted is None else f"a list of {wanted}",
+        ),
         key,
-        found=shown_value(value),
-        expected="a list of more entries" if wanted is None else f"a list of {wanted}",
     )
 
 
@@ -386,35 +391,41 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
 def _unknown_key(document: Document, key: Key, known: Iterable[str]) -> Problem:
     word, known = str(key[-1]), sorted(known)
     return document.problem(
-        "unknown-key",
-        "unknown key",
+        Fault(
+            "unknown-key",
+            "unknown key",
+            found=word,
+            expected=one_of(known),
+            hint=did_you_mean(word, known),
+        ),
         key,
-        found=word,
-        expected=one_of(known),
-        hint=did_you_mean(word, known),
     )
 
 
 def _not_a_table(document: Document, key: Key, value: Any) -> Problem:
     name = key[-1]
     return document.problem(
-        "wrong-type",
-        f"expected a table, found {type_phrase(value)}",
+        Fault(
+            "wrong-type",
+            f"expected a table, found {type_phrase(value)}",
+            found=shown_value(value),
+            expected=f"[{name}]",
+            hint=f"[[{name}]] begins one of several; there is only one [{name}]"
+            if isinstance(value, list)
+            else None,
+        ),
         key,
-        found=shown_value(value),
-        expected=f"[{name}]",
-        hint=f"[[{name}]] begins one of several; there is only one [{name}]"
-        if isinstance(value, list)
-        else None,
     )
 
 
 def _not_an_array(document: Document, table: str, value: Any) -> Problem:
     return document.problem(
-        "wrong-type",
-        f"expected one table per {table}, found {type_phrase(value)}",
+        Fault(
+            "wrong-type",
+            f"expected one table per {table}, found {type_phrase(value)}",
+            found=shown_value(value),
+            expected=f"[[{table}]]",
+            hint=f"write [[{table}]], with two brackets" if isinstance(value, dict) else None,
+        ),
         (table,),
-        found=shown_value(value),
-        expected=f"[[{table}]]",
-        hint=f"write [[{table}]], with two brackets" if isinstance(value, dict) else None,
     )

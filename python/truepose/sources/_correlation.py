@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from truepose.arrays import Floats
+from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.wording import counted
 from truepose.probability.semidefinite import clash
@@ -63,11 +64,13 @@ def read_correlation(parts: SourceBuilder, bands: Deviation) -> Floats | None:
         if doubled:
             one, other = (names.of_variable[number] for number in doubled[0])
             parts.refuse(
-                "correlation-twice",
-                f"{one} and {other} are given a correlation twice",
+                Fault(
+                    "correlation-twice",
+                    f"{one} and {other} are given a correlation twice",
+                    found=f"in {path} and in {given[doubled[0]]}",
+                    expected="one coefficient for each pair",
+                ),
                 path,
-                found=f"in {path} and in {given[doubled[0]]}",
-                expected="one coefficient for each pair",
             )
         given |= dict.fromkeys(pairs, path)
         for (i, j), coefficient in pairs.items():
@@ -77,14 +80,7 @@ def read_correlation(parts: SourceBuilder, bands: Deviation) -> Floats | None:
     problem = clash(names.of_variable, matrix)
     if problem is None:
         return matrix
-    parts.refuse(
-        problem.code,
-        problem.message,
-        "correlation",
-        found=problem.found,
-        expected=problem.expected,
-        hint=problem.hint,
-    )
+    parts.refuse(problem.fault, "correlation")
     return None
 
 
@@ -98,11 +94,13 @@ def _coefficients(
     if (row.coefficient is None) == (row.matrix is None):
         given = row.coefficient is not None
         parts.refuse(
-            "excluding-keys" if given else "missing-key",
-            "a correlation is given by one coefficient or by a matrix of them",
+            Fault(
+                "excluding-keys" if given else "missing-key",
+                "a correlation is given by one coefficient or by a matrix of them",
+                found="coefficient and matrix" if given else "neither",
+                expected="coefficient or matrix",
+            ),
             path,
-            found="coefficient and matrix" if given else "neither",
-            expected="coefficient or matrix",
         )
         return {}
     if row.coefficient is not None:
@@ -131,11 +129,13 @@ def _require_coefficients(
     for each in coefficients:
         if not -1.0 <= each <= 1.0:
             parts.refuse(
-                "bad-correlation",
-                f"{where}a correlation coefficient is from -1 to 1",
+                Fault(
+                    "bad-correlation",
+                    f"{where}a correlation coefficient is from -1 to 1",
+                    found=f"{each:g}",
+                    expected="a number from -1 to 1",
+                ),
                 path,
-                found=f"{each:g}",
-                expected="a number from -1 to 1",
             )
             return
 
@@ -154,12 +154,14 @@ def _require_shape(
         shown = counted(found[row], "coefficient")
         message = f"row {row + 1} ({between[row + 1]}) has {shown}"
     parts.refuse(
-        "correlation-matrix-shape",
-        message,
+        Fault(
+            "correlation-matrix-shape",
+            message,
+            found=shown,
+            expected=f"{counted(len(wanted), 'row')} of 1, 2, ... coefficients: each name after "
+            "the first with all before it",
+        ),
         path,
-        found=shown,
-        expected=f"{counted(len(wanted), 'row')} of 1, 2, ... coefficients: each name after the "
-        "first with all before it",
     )
 
 
@@ -192,23 +194,27 @@ class _Names:
             doubled = next((number for number in found if number in taken), None)
             if doubled is not None:
                 self._parts.refuse(
-                    "correlation-twice",
-                    f"{taken[doubled]!r} and {word!r} are one variable: "
-                    f"{self.of_variable[doubled]}",
+                    Fault(
+                        "correlation-twice",
+                        f"{taken[doubled]!r} and {word!r} are one variable: "
+                        f"{self.of_variable[doubled]}",
+                        found=f"{taken[doubled]}, {word}",
+                        expected="each variable once; a group is one",
+                    ),
                     f"{path}.between",
-                    found=f"{taken[doubled]}, {word}",
-                    expected="each variable once; a group is one",
                 )
             fine = fine and bool(found) and doubled is None
             taken |= dict.fromkeys(found, word)
         if fine and len(taken) < 2:
             self._parts.refuse(
-                "correlation-too-few",
-                "a correlation is between two variables or more",
+                Fault(
+                    "correlation-too-few",
+                    "a correlation is between two variables or more",
+                    found=f"{counted(len(taken), 'variable')}: "
+                    f"{', '.join(self.of_variable[number] for number in taken)}",
+                    expected="two parameters or more that vary by themselves, or groups",
+                ),
                 f"{path}.between",
-                found=f"{counted(len(taken), 'variable')}: "
-                f"{', '.join(self.of_variable[number] for number in taken)}",
-                expected="two parameters or more that vary by themselves, or groups",
             )
         return sorted(taken) if fine and len(taken) > 1 else []
 
@@ -219,11 +225,13 @@ class _Names:
         for word in between:
             if word not in self._groups and word not in self._variable:
                 self._parts.refuse(
-                    "correlation-pattern",
-                    f"{word!r} is a pattern, and a matrix has its names in their order",
+                    Fault(
+                        "correlation-pattern",
+                        f"{word!r} is a pattern, and a matrix has its names in their order",
+                        found=word,
+                        expected="full names of parameters, or groups",
+                    ),
                     f"{path}.between",
-                    found=word,
-                    expected="full names of parameters, or groups",
                 )
         return [self._groups.get(word, self._variable.get(word, -1)) for word in between]
 
@@ -238,15 +246,18 @@ class _Names:
             return list(dict.fromkeys(self._variable[name] for name in matching))
         without = [name for name in self._parameters if name == word or fnmatchcase(name, word)]
         self._parts.refuse(
-            "correlation-matches-nothing",
-            f"{without[0]} has no tolerance"
-            if without
-            else f"no tolerance is of, or is grouped as, {word!r}",
+            Fault(
+                "correlation-matches-nothing",
+                f"{without[0]} has no tolerance"
+                if without
+                else f"no tolerance is of, or is grouped as, {word!r}",
+                found=word,
+                expected="a parameter that has a tolerance, a pattern over such, or a group of "
+                "them",
+                hint=None
+                if without
+                else self._parts.suggest(word, [*self._groups, *self._variable, *self._parameters]),
+            ),
             f"{path}.between",
-            found=word,
-            expected="a parameter that has a tolerance, a pattern over such, or a group of them",
-            hint=None
-            if without
-            else self._parts.suggest(word, [*self._groups, *self._variable, *self._parameters]),
         )
         return []

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truepose.errors import Problem
+from truepose.errors import Fault, Problem
 from truepose.files.data_file import DataTable
 
 if TYPE_CHECKING:
@@ -29,12 +29,15 @@ def uncovered(drive: Drive, table: DataTable, column: str) -> list[Problem]:
     wanted = " to ".join(f"{float(unit.to_file(end)):.10g}" for end in (start, stop))
     return [
         table.problem(
-            "travel-not-covered",
-            f"the table does not reach over the travel of drive {drive.name}",
+            Fault(
+                "travel-not-covered",
+                f"the table does not reach over the travel of drive {drive.name}",
+                found=f"{table.shown(column, first)} to {table.shown(column, last)}",
+                expected=f"the whole travel, {wanted} {unit.label}",
+                hint="nothing is guessed beyond the last position: measure on, or shorten the "
+                "travel",
+            ),
             row=first if short else last,
             column=column,
-            found=f"{table.shown(column, first)} to {table.shown(column, last)}",
-            expected=f"the whole travel, {wanted} {unit.label}",
-            hint="nothing is guessed beyond the last position: measure on, or shorten the travel",
         )
     ]

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.errors import Problem
+from truepose.errors import Fault, Problem
 from truepose.files.data_file import Column, DataTable
 from truepose.sources._coverage import uncovered
 
@@ -101,15 +101,18 @@ def _too_few(table: DataTable, targets: Floats, runs: np.ndarray) -> list[Proble
         more = f", and at {short.size - 1} more" if short.size > 1 else ""
         problems.append(
             table.problem(
-                "too-few-runs",
-                f"too few runs in direction {word} at the target "
-                f"{table.shown('target', row)}{more}",
+                Fault(
+                    "too-few-runs",
+                    f"too few runs in direction {word} at the target "
+                    f"{table.shown('target', row)}{more}",
+                    found=f"{count} in direction {word}",
+                    expected=f"{FEWEST_RUNS} or more in each direction, 5 by ISO 230-2",
+                    hint="a row for each run: the same target, and what was measured there"
+                    if count
+                    else "approach every target in both directions: their difference is the "
+                    "reversal",
+                ),
                 row=row,
-                found=f"{count} in direction {word}",
-                expected=f"{FEWEST_RUNS} or more in each direction, 5 by ISO 230-2",
-                hint="a row for each run: the same target, and what was measured there"
-                if count
-                else "approach every target in both directions: their difference is the reversal",
             )
         )
     return problems

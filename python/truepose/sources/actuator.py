@@ -21,6 +21,7 @@ import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from truepose.arrays import Floats
+from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import (
     Angle,
@@ -83,17 +84,21 @@ class ActuatorTable(FileTable):
         given = [key for key in _OF_THE_SCREW if getattr(self, key) is not None]
         if not given and self.table is None:
             refuse(
-                "missing-key",
-                "an actuator of no error",
-                found="none of lead_error, periodic and table",
-                expected='lead_error = "20 um / 300 mm", periodic, or table = "d1.csv"',
+                Fault(
+                    "missing-key",
+                    "an actuator of no error",
+                    found="none of lead_error, periodic and table",
+                    expected='lead_error = "20 um / 300 mm", periodic, or table = "d1.csv"',
+                )
             )
         if given and self.table is not None:
             refuse(
-                "excluding-keys",
-                "a measured table has all of the actuator's errors in it",
-                found=" and ".join([*given, "table"]),
-                expected="table, or what is known of the screw",
+                Fault(
+                    "excluding-keys",
+                    "a measured table has all of the actuator's errors in it",
+                    found=" and ".join([*given, "table"]),
+                    expected="table, or what is known of the screw",
+                )
             )
         return self
 
@@ -166,23 +171,27 @@ def _actuation(parts: SourceBuilder, joint: int, drive: Drive, row: ActuatorTabl
     for key in _OF_THE_SCREW:
         if drive.feedback == "direct" and getattr(row, key) is not None:
             parts.refuse(
-                "unwanted-lead-error",
-                "a drive that is measured directly on its carriage has no such error to see",
+                Fault(
+                    "unwanted-lead-error",
+                    "a drive that is measured directly on its carriage has no such error to see",
+                    found=f'{key}, and feedback = "direct"',
+                    expected=f'no {key}, or feedback = "motor"',
+                    hint="the errors of a direct scale are those of sensor",
+                ),
                 f"{path}.{key}",
-                found=f'{key}, and feedback = "direct"',
-                expected=f'no {key}, or feedback = "motor"',
-                hint="the errors of a direct scale are those of sensor",
             )
     found = None
     if row.table is not None:
         for key in _IN_A_TABLE:
             if parts.has(f"{drive.part}.{key}"):
                 parts.refuse(
-                    "excluding-keys",
-                    f"the measured positions have the drive's {key} in them",
+                    Fault(
+                        "excluding-keys",
+                        f"the measured positions have the drive's {key} in them",
+                        found=f"actuator.table and {key}",
+                        expected="one of them",
+                    ),
                     f"{path}.table",
-                    found=f"actuator.table and {key}",
-                    expected="one of them",
                 )
         found = read_positioning(parts, drive, row.table, f"{path}.table")
     return Actuation(

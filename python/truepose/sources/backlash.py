@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from pydantic import BaseModel, Field
 
+from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import NonNegativeCoordinate, NonNegativeDriveLoad
 from truepose.sources._play import pressed
@@ -102,10 +103,12 @@ class Backlash:
 
 def _refuse_direct(parts: SourceBuilder, drive: Drive) -> None:
     parts.refuse(
-        "unwanted-backlash",
-        "a drive that is measured directly on its carriage has no backlash to see",
+        Fault(
+            "unwanted-backlash",
+            "a drive that is measured directly on its carriage has no backlash to see",
+            found='backlash, and feedback = "direct"',
+            expected='no backlash, or feedback = "motor"',
+            hint="the control closes its loop round the play",
+        ),
         f"{drive.part}.backlash",
-        found='backlash, and feedback = "direct"',
-        expected='no backlash, or feedback = "motor"',
-        hint="the control closes its loop round the play",
     )

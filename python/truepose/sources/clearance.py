@@ -19,6 +19,7 @@ import numpy as np
 from pydantic import Field
 
 from truepose.arrays import Floats
+from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import quantity
 from truepose.sources._directions import of_base_side
@@ -75,11 +76,13 @@ class Clearance:
                 found.append(JointOfStrut(index, end))
                 if joint.kind == "revolute" and joint.axis is None:
                     parts.refuse(
-                        "missing-key",
-                        "a revolute joint has play across its axis, which is not given",
+                        Fault(
+                            "missing-key",
+                            "a revolute joint has play across its axis, which is not given",
+                            found="nothing",
+                            expected="axis, three plain numbers such as [0, 0, 1]",
+                        ),
                         f"{strut.part}.{_ENDS[end]}.axis",
-                        found="nothing",
-                        expected="axis, three plain numbers such as [0, 0, 1]",
                     )
         if not found and table is None:
             return None

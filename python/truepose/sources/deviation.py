@@ -32,7 +32,6 @@ from truepose.probability.domain import Domain
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from truepose.errors import Problem
     from truepose.machine import Condition, Machine, SourceBuilder
     from truepose.sources.pose_block import PoseBlock
 
@@ -277,18 +276,6 @@ class Source(Protocol):
         ...
 
 
-def refuse(parts: SourceBuilder, problem: Problem) -> None:
-    """Record a problem that a source also raises when a condition given later brings it up."""
-    parts.refuse(
-        problem.code,
-        problem.message,
-        problem.path or "",
-        found=problem.found,
-        expected=problem.expected,
-        hint=problem.hint,
-    )
-
-
 __all__ = [
     "ARCSINE",
     "OWN_GROUP",
@@ -299,5 +286,4 @@ __all__ = [
     "Distribution",
     "Source",
     "normal",
-    "refuse",
 ]

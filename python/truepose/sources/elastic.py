@@ -18,7 +18,7 @@ import numpy as np
 
 from truepose.errors import TrueposeError
 from truepose.sources._stiffness import lacking
-from truepose.sources.deviation import Deviation, refuse
+from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Elastic:
         problems = lacking(parts.drives, parts.struts, _CAUSE)
         if np.any(parts.condition.wrench != 0.0):
             for problem in problems:
-                refuse(parts, problem)
+                parts.record(problem)
         known = len(problems) < len(parts.struts)
         return cls(requested=known and any(map(parts.has, _ASKED_BY)))
 

@@ -20,6 +20,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, WithJsonSchema, model_validator
 
 from truepose.arrays import Floats
+from truepose.errors import Fault
 from truepose.files.data_file import Column
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import Direction, Length, PositiveLength, refuse
@@ -67,17 +68,21 @@ class StraightnessTable(FileTable):
     def _fits(self) -> StraightnessTable:
         if self.period is not None and self.shape != "sine":
             refuse(
-                "excluding-keys",
-                "only a sine has a period",
-                found=f'period and shape = "{self.shape}"',
-                expected='shape = "sine", or no period',
+                Fault(
+                    "excluding-keys",
+                    "only a sine has a period",
+                    found=f'period and shape = "{self.shape}"',
+                    expected='shape = "sine", or no period',
+                )
             )
         if not self.known and self.amplitude < 0.0:
             refuse(
-                "negative",
-                "a bound of the amplitude is zero or more",
-                found="an amplitude below zero that is not known",
-                expected="an amplitude of zero or more, or known = true",
+                Fault(
+                    "negative",
+                    "a bound of the amplitude is zero or more",
+                    found="an amplitude below zero that is not known",
+                    expected="an amplitude of zero or more, or known = true",
+                )
             )
         return self
 
@@ -94,10 +99,12 @@ class LeanTable(FileTable):
     def _round(self) -> LeanTable:
         if self.direction is None and self.band.shift != 0.0:
             refuse(
-                "missing-key",
-                "the limits are not alike, so the direction between them counts",
-                found="two limits, and no direction",
-                expected='one half band, or { band = ["0 um/m", "20 um/m"], direction = ... }',
+                Fault(
+                    "missing-key",
+                    "the limits are not alike, so the direction between them counts",
+                    found="two limits, and no direction",
+                    expected='one half band, or { band = ["0 um/m", "20 um/m"], direction = ... }',
+                )
             )
         return self
 
@@ -144,24 +151,30 @@ class GuidewayTable(FileTable):
             if self.table is None:
                 given, lacking = lacking, given
             refuse(
-                "missing-key",
-                "a table needs a direction for each of its columns",
-                found=f"{given}, but no {lacking}",
-                expected='table = "rail1.csv" and directions = { horizontal = [1, 0, 0] }',
+                Fault(
+                    "missing-key",
+                    "a table needs a direction for each of its columns",
+                    found=f"{given}, but no {lacking}",
+                    expected='table = "rail1.csv" and directions = { horizontal = [1, 0, 0] }',
+                )
             )
         if self.directions is not None and (not self.directions or _POSITION in self.directions):
             refuse(
-                "bad-name",
-                "directions are named by the columns of deviations",
-                found=f"the name {_POSITION}" if self.directions else "no direction",
-                expected="a name and direction for each column of deviations",
+                Fault(
+                    "bad-name",
+                    "directions are named by the columns of deviations",
+                    found=f"the name {_POSITION}" if self.directions else "no direction",
+                    expected="a name and direction for each column of deviations",
+                )
             )
         if not (self.straightness or self.table or self.squareness or self.parallelism):
             refuse(
-                "missing-key",
-                "a guideway of no error",
-                found="none of straightness, table, squareness and parallelism",
-                expected='one of them, such as squareness = "20 um/m"',
+                Fault(
+                    "missing-key",
+                    "a guideway of no error",
+                    found="none of straightness, table, squareness and parallelism",
+                    expected='one of them, such as squareness = "20 um/m"',
+                )
             )
         return self
 
@@ -241,12 +254,14 @@ class Guideway:
                 continue
             if drive.kind != _SLIDER:
                 parts.refuse(
-                    "unwanted-guideway",
-                    "only a carriage runs on a guideway",
+                    Fault(
+                        "unwanted-guideway",
+                        "only a carriage runs on a guideway",
+                        found=f'kind = "{drive.kind}"',
+                        expected=f'kind = "{_SLIDER}", or no guideway',
+                        hint="what else a drive's axis and position may be off, [tolerance] says",
+                    ),
                     f"{drive.part}.guideway",
-                    found=f'kind = "{drive.kind}"',
-                    expected=f'kind = "{_SLIDER}", or no guideway',
-                    hint="what else a drive's axis and position may be off, [tolerance] says",
                 )
                 continue
             rails.append(_rail(parts, joint, drive, row.guideway))
@@ -335,13 +350,15 @@ def _across(
     along = float(given @ axis)
     if abs(along) > ALONG:
         parts.refuse(
-            "direction-along-guideway",
-            "a direction that is not across the guideway"
-            + ("" if number is None else f", in entry {number + 1}"),
+            Fault(
+                "direction-along-guideway",
+                "a direction that is not across the guideway"
+                + ("" if number is None else f", in entry {number + 1}"),
+                found=f"{math.degrees(math.acos(min(abs(along), 1.0))):.4g} deg to the axis",
+                expected=f"a direction at right angles to the axis {axis.tolist()}",
+                hint="errors along the guideway are those of sensor and actuator",
+            ),
             path,
-            found=f"{math.degrees(math.acos(min(abs(along), 1.0))):.4g} deg to the axis",
-            expected=f"a direction at right angles to the axis {axis.tolist()}",
-            hint="errors along the guideway are those of sensor and actuator",
         )
         return direction
     across = given - along * axis
@@ -369,13 +386,15 @@ def _profiles(
         at = int(order[doubled[0] + 1])
         parts.problems.append(
             table.problem(
-                "doubled-position",
-                "the position is there twice",
+                Fault(
+                    "doubled-position",
+                    "the position is there twice",
+                    found=table.shown(_POSITION, at),
+                    expected="every position once",
+                    hint="of repeated runs, write the mean",
+                ),
                 row=at,
                 column=_POSITION,
-                found=table.shown(_POSITION, at),
-                expected="every position once",
-                hint="of repeated runs, write the mean",
             )
         )
     parts.problems.extend(uncovered(drive, table, _POSITION))

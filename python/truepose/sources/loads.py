@@ -28,7 +28,7 @@ import numpy as np
 
 from truepose.errors import Problem, TrueposeError
 from truepose.sources._stiffness import lacking
-from truepose.sources.deviation import ARCSINE, OWN_GROUP, UNIFORM, Deviation, refuse
+from truepose.sources.deviation import ARCSINE, OWN_GROUP, UNIFORM, Deviation
 from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
@@ -63,12 +63,12 @@ class Loads:
         source = cls(weighs=any(mass > 0.0 for mass in masses))
         condition = parts.condition
         if not source.weighs and condition.gravity > 0.0 and parts.has("condition.gravity"):
-            refuse(parts, _no_mass("gravity", "a mass of [platform], a [[strut]] or a [[drive]]"))
+            parts.record(_no_mass("gravity", "a mass of [platform], a [[strut]] or a [[drive]]"))
         if np.any(condition.acceleration) and parts.platform.mass == 0.0:
-            refuse(parts, _no_mass("acceleration", "a mass of [platform]"))
+            parts.record(_no_mass("acceleration", "a mass of [platform]"))
         elif source.acts(condition):
             for problem in lacking(parts.drives, parts.struts, _CAUSE):
-                refuse(parts, problem)
+                parts.record(problem)
         return source
 
     def acts(self, condition: Condition) -> bool:

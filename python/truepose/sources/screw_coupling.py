@@ -20,11 +20,11 @@ from pydantic import BaseModel, Field
 
 from truepose._kernel import STATUS
 from truepose.arrays import Floats
-from truepose.errors import Problem, TrueposeError
+from truepose.errors import Fault, Problem, TrueposeError
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import Direction, Length
 from truepose.machine.parts import Vector
-from truepose.sources.deviation import Deviation, refuse
+from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock, rotations_of
 
 if TYPE_CHECKING:
@@ -105,12 +105,14 @@ class ScrewCoupling:
                 continue
             if not _driven(parts.kernel, index):
                 parts.refuse(
-                    "screw-not-driven",
-                    "a screw on a strut whose length no drive sets",
+                    Fault(
+                        "screw-not-driven",
+                        "a screw on a strut whose length no drive sets",
+                        found="a strut of fixed length",
+                        expected="a strut of a telescopic drive",
+                        hint="a drive's own screw that turns with nothing needs no such table",
+                    ),
                     f"strut.{parts.struts[index].name}.screw",
-                    found="a strut of fixed length",
-                    expected="a strut of a telescopic drive",
-                    hint="a drive's own screw that turns with nothing needs no such table",
                 )
                 continue
             axes = (row.screw.base_axis, row.screw.platform_axis)
@@ -120,15 +122,17 @@ class ScrewCoupling:
         source = cls(tuple(screws))
         placed = _home(parts.kernel)
         if placed is None:
-            refuse(parts, _NO_HOME)
+            parts.record(_NO_HOME)
             return source
         for number, end in np.argwhere(source._turns(*placed)[1][0] < PARALLEL):
             parts.refuse(
-                "screw-axis-parallel",
-                "the axis lies along the strut at home: how far the screw turns is not defined",
+                Fault(
+                    "screw-axis-parallel",
+                    "the axis lies along the strut at home: how far the screw turns is not defined",
+                    found="an axis parallel to the strut",
+                    expected="the universal joint's axis, across or oblique to the strut",
+                ),
                 f"strut.{parts.struts[screws[number].strut].name}.screw.{_ENDS[end]}",
-                found="an axis parallel to the strut",
-                expected="the universal joint's axis, across or oblique to the strut",
             )
         return source
 

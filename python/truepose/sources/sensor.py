@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import BaseModel, Field, model_validator
 
+from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import Coordinate, NonNegativeCoordinate, refuse
 from truepose.files.ratio import RatioWithin
@@ -46,10 +47,12 @@ class SensorTable(FileTable):
     def _says_something(self) -> SensorTable:
         if self.resolution is None and self.scale_error is None:
             refuse(
-                "missing-key",
-                "a sensor of no error",
-                found="neither resolution nor scale_error",
-                expected='resolution = "1 um", or scale_error = "12 ppm", or both',
+                Fault(
+                    "missing-key",
+                    "a sensor of no error",
+                    found="neither resolution nor scale_error",
+                    expected='resolution = "1 um", or scale_error = "12 ppm", or both',
+                )
             )
         return self
 

@@ -24,7 +24,7 @@ from truepose.errors import TrueposeError
 from truepose.machine.parts import Body, Drive, Strut
 from truepose.sources._expansion import ASKED_BY, located, silent, twice
 from truepose.sources._growth import Growth, along_line
-from truepose.sources.deviation import Deviation, refuse
+from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
@@ -51,9 +51,9 @@ class Thermal:
         """Always there, for a condition given later may have temperatures that the file has not."""
         bodies = (parts.platform, parts.frame, parts.tool, *parts.carriages)
         for problem in silent(parts.condition, parts.drives, parts.struts, bodies):
-            refuse(parts, located(parts, problem))
+            parts.record(located(parts, problem))
         for problem in twice(parts.kernel, parts.drives, parts.struts):
-            refuse(parts, problem)
+            parts.record(problem)
         every: tuple[Drive | Strut | Body, ...] = (*parts.drives, *parts.struts, *bodies)
         known = any(part.expansion is not None for part in every)
         return cls(requested=known and any(map(parts.has, ASKED_BY)))

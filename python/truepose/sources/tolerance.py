@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from truepose.errors import Fault
 from truepose.files.data_file import Column
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.quantity import LengthTolerance
@@ -138,11 +139,13 @@ def _mixed_groups(parts: SourceBuilder, entries: Iterable[_Stated]) -> bool:
         if other.distribution != each.distribution:
             refused.add(each.path)
             parts.refuse(
-                "group-distributions",
-                f"the members of group {group!r} vary together, but have two distributions",
+                Fault(
+                    "group-distributions",
+                    f"the members of group {group!r} vary together, but have two distributions",
+                    found=f"{each.distribution}, and {other.distribution} of {other.path}",
+                    expected="one distribution in one group",
+                ),
                 each.path,
-                found=f"{each.distribution}, and {other.distribution} of {other.path}",
-                expected="one distribution in one group",
             )
     return bool(refused)
 
@@ -218,14 +221,16 @@ def _is_one_kind(parts: SourceBuilder, key: str, matches: list[int], value: obje
     if not matches:
         nested = isinstance(value, dict) and not _WILDCARDS & set(key) and "." not in key
         parts.refuse(
-            "tolerance-matches-nothing",
-            f"no parameter of this machine matches {key!r}",
+            Fault(
+                "tolerance-matches-nothing",
+                f"no parameter of this machine matches {key!r}",
+                found=key,
+                expected='a parameter name, or a pattern such as "strut.*.base.x"',
+                hint='a name with points stands in quotation marks: "strut.1.base.x" = 0.05'
+                if nested
+                else parts.suggest(key, _patterns(names) if "*" in key else names),
+            ),
             path,
-            found=key,
-            expected='a parameter name, or a pattern such as "strut.*.base.x"',
-            hint='a name with points stands in quotation marks: "strut.1.base.x" = 0.05'
-            if nested
-            else parts.suggest(key, _patterns(names) if "*" in key else names),
         )
         return False
     kinds: dict[str, str] = {}
@@ -233,12 +238,14 @@ def _is_one_kind(parts: SourceBuilder, key: str, matches: list[int], value: obje
         kinds.setdefault(BY_UNIT[parts.kernel.units[column]], names[column])
     if len(kinds) > 1:
         parts.refuse(
-            "tolerance-mixes-kinds",
-            f"{key!r} matches {' and '.join(DIMENSIONS[kind].plural for kind in kinds)}",
+            Fault(
+                "tolerance-mixes-kinds",
+                f"{key!r} matches {' and '.join(DIMENSIONS[kind].plural for kind in kinds)}",
+                found=", ".join(kinds.values()),
+                expected="one tolerance for parameters of one kind",
+                hint='a pattern for each kind, such as "drive.*.offset"',
+            ),
             path,
-            found=", ".join(kinds.values()),
-            expected="one tolerance for parameters of one kind",
-            hint='a pattern for each kind, such as "drive.*.offset"',
         )
         return False
     return True
@@ -250,13 +257,15 @@ def _is_twice(parts: SourceBuilder, key: str, columns: list[int], taken: Mapping
     for column in doubled[:1]:
         more = f", as are {len(doubled) - 1} more" if len(doubled) > 1 else ""
         parts.refuse(
-            "tolerance-twice",
-            f"parameter {parts.kernel.parameters[column]} is given a tolerance twice{more}",
+            Fault(
+                "tolerance-twice",
+                f"parameter {parts.kernel.parameters[column]} is given a tolerance twice{more}",
+                found=f"tolerance.{key} and {taken[column]}",
+                expected="one tolerance for one parameter",
+                hint="a full parameter name goes before a pattern, "
+                "and a pattern that names a part before one that does not",
+            ),
             f"tolerance.{key}",
-            found=f"tolerance.{key} and {taken[column]}",
-            expected="one tolerance for one parameter",
-            hint="a full parameter name goes before a pattern, "
-            "and a pattern that names a part before one that does not",
         )
     return bool(doubled)
 
@@ -328,11 +337,13 @@ def _listed(parts: SourceBuilder, tolerance: file_tolerance.Tolerance, path: str
         return discrete(tolerance.values, tolerance.probabilities)
     except ValueError as error:
         parts.refuse(
-            "bad-distribution",
-            f"these values and probabilities are no distribution: {error}",
+            Fault(
+                "bad-distribution",
+                f"these values and probabilities are no distribution: {error}",
+                found=", ".join(f"{each:g}" for each in tolerance.probabilities),
+                expected="a probability from 0 to 1 of each value, their sum 1",
+            ),
             path,
-            found=", ".join(f"{each:g}" for each in tolerance.probabilities),
-            expected="a probability from 0 to 1 of each value, their sum 1",
         )
         return None
 

@@ -26,7 +26,7 @@ from truepose._kernel import toml_lines
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument, Kind
 from truepose.calibration.instruments._base import Quaternion, Vector
 from truepose.calibration.observables import OBSERVABLES, UNITS
-from truepose.errors import Problem
+from truepose.errors import Fault, Problem
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.document import Document, Key
 from truepose.files.units import QuantityError, UnitSystem, shown_value, type_phrase
@@ -543,7 +543,7 @@ class _Reader:
         hint: str | None = None,
     ) -> None:
         self.header.problems.append(
-            self.document.problem(code, message, key, found=found, expected=expected, hint=hint)
+            self.document.problem(Fault(code, message, found, expected, hint), key)
         )
 
 

@@ -35,7 +35,7 @@ from truepose.calibration.measurements.rows import (
     measurements_in,
     reading_columns,
 )
-from truepose.errors import MachineFileError, Problem, RequestError
+from truepose.errors import Fault, MachineFileError, Problem, RequestError
 from truepose.files.data_file import Column, DataTable, ReadTable, cut_short, read_table
 from truepose.files.dimensions import FREEDOMS
 from truepose.files.text_file import FileKind, read_text
@@ -344,14 +344,16 @@ class _Reading:
             if word and declared and word not in declared:
                 self.problems.append(
                     table.problem(
-                        "unknown-instrument",
-                        "the instrument is not declared",
+                        Fault(
+                            "unknown-instrument",
+                            "the instrument is not declared",
+                            found=word,
+                            expected=one_of(declared),
+                            hint=did_you_mean(word, declared)
+                            or f'declare it above: "#: [instrument.{word[:40]}]"',
+                        ),
                         row=row,
                         column=INSTRUMENT,
-                        found=word,
-                        expected=one_of(declared),
-                        hint=did_you_mean(word, declared)
-                        or f'declare it above: "#: [instrument.{word[:40]}]"',
                     )
                 )
         return np.array([numbers.get(word, -1) for word in words], np.intp)
@@ -387,7 +389,7 @@ class _Report:
         if code == "missing-column" and self.misnamed:
             return
         problem = self.table.problem(
-            code, message, row=row, column=column, found=found, expected=expected, hint=hint
+            Fault(code, message, found, expected, hint), row=row, column=column
         )
         if row is None:
             problem = replace(problem, line=self.table.header_line)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
+from truepose.errors import Fault
 from truepose.files.file_table import FileTable, Name
 from truepose.files.quantity import refuse
 from truepose.files.units import shown_value
@@ -17,10 +18,12 @@ _HASH = re.compile(r"[0-9a-f]{64}")
 def _sha256(value: str) -> str:
     if not _HASH.fullmatch(value):
         refuse(
-            "bad-hash",
-            "a hash is the SHA-256 of a file's bytes",
-            found=shown_value(value),
-            expected="64 digits among 0-9 and a-f",
+            Fault(
+                "bad-hash",
+                "a hash is the SHA-256 of a file's bytes",
+                found=shown_value(value),
+                expected="64 digits among 0-9 and a-f",
+            )
         )
     return value
 
@@ -28,10 +31,12 @@ def _sha256(value: str) -> str:
 def _rms(value: float) -> float:
     if not 0.0 <= value < float("inf"):
         refuse(
-            "negative" if value < 0.0 else "not-finite",
-            "the rms of residuals is a number of zero or more",
-            found=shown_value(value),
-            expected="a plain number of zero or more",
+            Fault(
+                "negative" if value < 0.0 else "not-finite",
+                "the rms of residuals is a number of zero or more",
+                found=shown_value(value),
+                expected="a plain number of zero or more",
+            )
         )
     return value
 
@@ -39,10 +44,12 @@ def _rms(value: float) -> float:
 def _count(value: int) -> int:
     if value < 0:
         refuse(
-            "negative",
-            "a number of observations is zero or more",
-            found=shown_value(value),
-            expected="a whole number of zero or more",
+            Fault(
+                "negative",
+                "a number of observations is zero or more",
+                found=shown_value(value),
+                expected="a whole number of zero or more",
+            )
         )
     return value
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
+from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import (
     GradientValue,
@@ -120,17 +121,21 @@ class ConditionTable(FileTable):
         given = [key for key in _FORCES if getattr(self, key) is not None]
         if len(given) > 1:
             refuse(
-                "excluding-keys",
-                f"the force on the tool is given {'twice' if len(given) == 2 else 'thrice'}, "
-                f"by {' and by '.join(given)}",
-                found=" and ".join(given),
-                expected="one of them",
+                Fault(
+                    "excluding-keys",
+                    f"the force on the tool is given {'twice' if len(given) == 2 else 'thrice'}, "
+                    f"by {' and by '.join(given)}",
+                    found=" and ".join(given),
+                    expected="one of them",
+                )
             )
         if self.time is not None and self.temperature_log is None:
             refuse(
-                "missing-key",
-                "a time, but no temperature_log to look it up in",
-                found="no temperature_log",
-                expected='temperature_log = "file.csv"',
+                Fault(
+                    "missing-key",
+                    "a time, but no temperature_log to look it up in",
+                    found="no temperature_log",
+                    expected='temperature_log = "file.csv"',
+                )
             )
         return self

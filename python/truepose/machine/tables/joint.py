@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import Direction, NonNegativeLength, PositiveAngle, Stiffness, refuse
 
@@ -38,17 +39,21 @@ class JointTable(FileTable):
     def _fits_its_kind(self) -> JointTable:
         if self.kind == "flexure" and (self.clearance or self.axial_clearance):
             refuse(
-                "unwanted-clearance",
-                "a flexure is of one piece and has no play",
-                found="a clearance on a flexure",
-                expected="no clearance, or a joint of another kind",
+                Fault(
+                    "unwanted-clearance",
+                    "a flexure is of one piece and has no play",
+                    found="a clearance on a flexure",
+                    expected="no clearance, or a joint of another kind",
+                )
             )
         if self.axial_clearance and self.kind != "revolute":
             refuse(
-                "unwanted-clearance",
-                f"a {self.kind} joint has no axis along which to have play",
-                found=f"axial_clearance on a {self.kind} joint",
-                expected="clearance, or a revolute joint",
+                Fault(
+                    "unwanted-clearance",
+                    f"a {self.kind} joint has no axis along which to have play",
+                    found=f"axial_clearance on a {self.kind} joint",
+                    expected="clearance, or a revolute joint",
+                )
             )
         for wants, given in (
             ("angle_limit", self.angle_limit is not None),
@@ -56,9 +61,11 @@ class JointTable(FileTable):
         ):
             if given and self.axis is None:
                 refuse(
-                    "missing-key",
-                    f"{wants} without the axis that it is about",
-                    found="no axis",
-                    expected="axis, three plain numbers such as [0, 0, 1]",
+                    Fault(
+                        "missing-key",
+                        f"{wants} without the axis that it is about",
+                        found="no axis",
+                        expected="axis, three plain numbers such as [0, 0, 1]",
+                    )
                 )
         return self

@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, WithJsonSchema
 
+from truepose.errors import Fault
 from truepose.files.quantity import refuse
 from truepose.files.units import shown_value
 from truepose.files.wording import did_you_mean, one_of
@@ -15,11 +16,13 @@ from truepose.machine.materials import MATERIALS
 def _known_material(value: str) -> str:
     if value not in MATERIALS:
         refuse(
-            "unknown-material",
-            f"unknown material {shown_value(value)}",
-            found=shown_value(value),
-            expected=one_of(f'"{name}"' for name in MATERIALS),
-            hint=did_you_mean(value, MATERIALS) or "give modulus and expansion outright",
+            Fault(
+                "unknown-material",
+                f"unknown material {shown_value(value)}",
+                found=shown_value(value),
+                expected=one_of(f'"{name}"' for name in MATERIALS),
+                hint=did_you_mean(value, MATERIALS) or "give modulus and expansion outright",
+            )
         )
     return value
 

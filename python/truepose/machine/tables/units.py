@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from pydantic import Field, GetJsonSchemaHandler, create_model
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
+from truepose.errors import Fault
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import refuse
@@ -36,21 +37,18 @@ class _DeclaredUnit:
         wanted = DIMENSIONS[self.dimension]
         if not isinstance(value, str):
             refuse(
-                "wrong-type",
-                f"expected the name of a unit, found {type_phrase(value)}",
-                found=shown_value(value),
-                expected=f'the unit of {wanted.phrase}, such as "{wanted.si}"',
+                Fault(
+                    "wrong-type",
+                    f"expected the name of a unit, found {type_phrase(value)}",
+                    found=shown_value(value),
+                    expected=f'the unit of {wanted.phrase}, such as "{wanted.si}"',
+                )
             )
         try:
             return unit_of(value, wanted)
         except QuantityError as error:
-            refuse(
-                error.code,
-                error.message,
-                found=error.found,
-                expected=f'the unit of {wanted.phrase}, such as "{wanted.si}"',
-                hint=error.hint,
-            )
+            expected = f'the unit of {wanted.phrase}, such as "{wanted.si}"'
+            refuse(replace(error.fault, expected=expected))
 
 
 def _field(dimension: str) -> Any:

@@ -17,6 +17,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import core_schema
 
+from truepose.errors import Fault
 from truepose.files.dimensions import FREEDOMS
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import Angle, Length, PositiveAngle, PositiveLength, list_of, refuse
@@ -28,27 +29,33 @@ def _range(value: Any, read: ValidatorFunctionWrapHandler) -> tuple[float, float
     if not isinstance(value, list) or len(value) != 3:
         found = f"a list of {len(value)}" if isinstance(value, list) else type_phrase(value)
         refuse(
-            "wrong-type",
-            f"expected [from, to, count], found {found}",
-            found=shown_value(value),
-            expected="[from, to, count], such as [200, 400, 5]",
+            Fault(
+                "wrong-type",
+                f"expected [from, to, count], found {found}",
+                found=shown_value(value),
+                expected="[from, to, count], such as [200, 400, 5]",
+            )
         )
     count = value[2]
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         refuse(
-            "grid-count",
-            "a grid count is a whole number of one or more",
-            found=shown_value(count),
-            expected="a whole number of one or more",
-            hint="for one value write [value, value, 1]",
+            Fault(
+                "grid-count",
+                "a grid count is a whole number of one or more",
+                found=shown_value(count),
+                expected="a whole number of one or more",
+                hint="for one value write [value, value, 1]",
+            )
         )
     start, stop, count = read(tuple(value))
     if count == 1 and start != stop:
         refuse(
-            "grid-ends",
-            "a grid of one value has two different ends",
-            found=shown_value(value),
-            expected="equal ends, or a count of two or more",
+            Fault(
+                "grid-ends",
+                "a grid of one value has two different ends",
+                found=shown_value(value),
+                expected="equal ends, or a count of two or more",
+            )
         )
     return start, stop, count
 
@@ -128,11 +135,13 @@ def _require_steps(
         wide = [name for name in names if (span := getattr(table, name)) and span[0] != span[1]]
         if wide and getattr(table, key) is None:
             refuse(
-                "missing-key",
-                f"{key} is missing",
-                found=f"{', '.join(wide)} without {key}",
-                expected=f'{key} = "{"20 mm" if key == "step" else "5 deg"}", the largest '
-                "distance of two neighbours",
+                Fault(
+                    "missing-key",
+                    f"{key} is missing",
+                    found=f"{', '.join(wide)} without {key}",
+                    expected=f'{key} = "{"20 mm" if key == "step" else "5 deg"}", the largest '
+                    "distance of two neighbours",
+                )
             )
 
 
@@ -251,17 +260,21 @@ class WorkspaceTable(FileTable):
         given = [key for key in WAYS if getattr(self, key) is not None]
         if len(given) > 1:
             refuse(
-                "excluding-keys",
-                f"the poses are given {'twice' if len(given) == 2 else f'{len(given)} times'}, "
-                f"by {' and by '.join(given)}",
-                found=" and ".join(given),
-                expected="one of them",
+                Fault(
+                    "excluding-keys",
+                    f"the poses are given {'twice' if len(given) == 2 else f'{len(given)} times'}, "
+                    f"by {' and by '.join(given)}",
+                    found=" and ".join(given),
+                    expected="one of them",
+                )
             )
         if not given:
             refuse(
-                "missing-key",
-                f"none of {', '.join(WAYS)}",
-                found="no poses",
-                expected="grid, box, cylinder, poses or path",
+                Fault(
+                    "missing-key",
+                    f"none of {', '.join(WAYS)}",
+                    found="no poses",
+                    expected="grid, box, cylinder, poses or path",
+                )
             )
         return self

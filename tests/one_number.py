@@ -90,10 +90,10 @@ def drawn_inside(state: State, columns: NDArray[np.intp], count: int, seed: int 
     From the distributions of all sources, those without ends cut at their stated sigmas: so each
     is inside the set. A machine that cannot be assembled is infinitely far off.
     """
-    t = Random(state.spread, seed).rows(0, count)
-    domain = state.spread.domain
+    t = Random(state.variables, seed).rows(0, count)
+    domain = state.variables.domain
     t = np.clip(t, domain.lower, domain.upper)
-    mover = ExactError(state.machine, state.block, state.spread)
+    mover = ExactError(state.machine, state.block, state.variables)
     error, status = mover(np.zeros(count, np.intp), t)
     size = np.linalg.norm(error[:, columns], axis=1)
     return np.where(status == OK, size, np.inf)
@@ -101,7 +101,7 @@ def drawn_inside(state: State, columns: NDArray[np.intp], count: int, seed: int 
 
 def has_ends(state: State) -> bool:
     """Whether every distribution has ends, so that no sample lies beyond the set."""
-    return all(each.bounded for each in state.spread.distributions)
+    return all(each.bounded for each in state.variables.distributions)
 
 
 __all__ = [

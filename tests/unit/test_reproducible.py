@@ -17,12 +17,12 @@ RUN = """
 import hashlib, sys
 import numpy as np
 import truepose
-from truepose.runs.poses import Walk
+from truepose.runs.poses import PoseRun
 from truepose.sources import acting
 machine = truepose.load(sys.argv[1], ["frame.material=steel"])
 poses = machine.poses()[:16]
 state = hashlib.sha256()
-for block in Walk(machine, poses, machine.condition):
+for block in PoseRun(machine, poses, machine.condition):
     for source in acting(machine):
         moved = source.deviation(machine, machine.condition, block)
         state.update(np.ascontiguousarray(moved.parameters))

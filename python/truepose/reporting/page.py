@@ -86,7 +86,7 @@ def write(study: Study, path: Path, machine_text: str = "") -> None:
 
 
 def _resource(name: str) -> str:
-    return files("truepose.report").joinpath(name).read_text(encoding="utf-8")
+    return files("truepose.reporting").joinpath(name).read_text(encoding="utf-8")
 
 
 def _embedded(name: str, figure: go.Figure) -> str:

@@ -253,8 +253,7 @@ class _Writing:
             size += f"it cannot be assembled ({witness.status.replace('_', ' ')})"
         settings = "".join(f", {key}={value}" for key, value in machine.settings.items())
         lines = [
-            "A witness: one machine inside the tolerances, written by truepose "
-            f"{version('truepose')}.",
+            f"A witness: one machine inside the tolerances, written by truepose {version()}.",
             f"Of {machine.file}{settings} (SHA-256 {machine.file_hash}).",
             f"State: {witness.state}. Pose {witness.number}: "
             f"{pose_in_words(machine, witness.pose)}.",

@@ -7,6 +7,7 @@ import pytest
 
 from truepose.error_budget import comparison
 from truepose.machine import Accuracy
+from truepose.runs.quantities import quantities
 
 POSITION = {"position": np.arange(3)}
 BOTH = {"position": np.arange(3), "orientation": np.arange(3, 6)}
@@ -17,12 +18,12 @@ def column(*values: float) -> np.ndarray:
 
 
 def test_components_fall_into_position_and_orientation() -> None:
-    kinds = comparison.quantities(("x", "y", "rz"))
+    kinds = quantities(("x", "y", "rz"))
     assert {kind: at.tolist() for kind, at in kinds.items()} == {
         "position": [0, 1],
         "orientation": [2],
     }
-    assert list(comparison.quantities(("x", "y"))) == ["position"]
+    assert list(quantities(("x", "y"))) == ["position"]
 
 
 def test_highest_passes_over_what_is_missing() -> None:

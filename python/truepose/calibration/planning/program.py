@@ -151,7 +151,7 @@ def _lines(
     yield f"; {_plain(machine.name)}: {total} poses to measure" + (
         f" with {_plain(names)}" if names else ""
     )
-    yield f"; planned by truepose {version('truepose')} for {_plain(machine.file)}"
+    yield f"; planned by truepose {version()} for {_plain(machine.file)}"
     yield "; in machine coordinates: without work offsets and tool length"
     yield f"; G4 P is in seconds; the machine rests {dwell:g} s at every pose"
     yield "; begins and ends at home" + (

@@ -15,9 +15,9 @@ Counted, comments and blank lines nowhere:
   (`function_item`, `function_signature_item`, `struct_item`, `enum_item`, `union_item`,
   `impl_item`, `trait_item`, `mod_item`, `foreign_mod_item`, `use_declaration`,
   `extern_crate_declaration`, `const_item`, `static_item`, `type_item`, `associated_type`,
-  `macro_definition`, `macro_invocation`), `let_declaration`, `expression_statement`, and the expression that a block
-  ends in. Fields, variants and match arms are none, and what stands in a macro's brackets is none:
-  to tree-sitter it is tokens.
+  `macro_definition`, `macro_invocation`), `let_declaration`, `expression_statement`, and the
+  expression that a block ends in. Fields, variants and match arms are none, and what stands in a
+  macro's brackets is none: to tree-sitter it is tokens.
 * Docstrings: their characters, quotes and comment marks included, and in per cent of all characters
   of the files. In Rust: comments that start with `///`, `//!`, `/**` or `/*!`.
 * Names that say nothing: where `each` and `found` are bound in python/truepose, by an assignment,

@@ -6,13 +6,16 @@ Everything is read from the files as they stand; nothing is imported and no layo
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "python" / "truepose"
+
+COMPILED = frozenset({"truepose._kernel"})
+"""Modules that no Python file is."""
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Scope = Function | ast.Lambda
@@ -30,6 +33,11 @@ class Import:
     """Under `if TYPE_CHECKING:`, so that it is never run."""
     in_function: bool
     """Run when a function is called, not when the module is imported."""
+
+    def module(self, every: Collection[str]) -> str:
+        """The module that is meant: of `from package import name` the name itself, if it is one."""
+        whole = f"{self.target}.{self.name}"
+        return whole if whole in every or whole in COMPILED else self.target
 
 
 @dataclass(frozen=True)
@@ -60,8 +68,27 @@ class Module:
         return self.name.rpartition(".")[2]
 
     def imports(self) -> Iterator[Import]:
-        """What it imports, whatever the depth; `import_module("a.b")` of a literal name too."""
+        """What it imports, whatever the depth."""
         yield from _imports(self.tree, self, for_types=False, in_function=False)
+
+    def modules_named(self) -> Iterator[str]:
+        """Strings `a.b` or `a.b:name` that may name a module, as registries do: all of them.
+
+        But for the argument of `importlib.resources.files`, which names a package for its data.
+        """
+        data = {
+            id(argument)
+            for node in ast.walk(self.tree)
+            if isinstance(node, ast.Call) and _last_word(node.func) == "files"
+            for argument in node.args
+        }
+        for node in ast.walk(self.tree):
+            if id(node) in data:
+                continue
+            if isinstance(node, ast.Constant) and isinstance(node.value, str):
+                module, _, name = node.value.partition(":")
+                if "." in module and f"{module}.{name}".replace(".", "").isidentifier():
+                    yield module
 
     def classes(self) -> Iterator[ast.ClassDef]:
         """Classes of the module itself, not those inside functions or classes."""
@@ -132,12 +159,8 @@ def _imports(
         target = _absolute(node, module)
         for alias in node.names:
             yield Import(target, alias.name, node.lineno, for_types, in_function)
-    elif isinstance(node, ast.Call) and _called(node) == "import_module" and node.args:
-        name = node.args[0]
-        if isinstance(name, ast.Constant) and isinstance(name.value, str):
-            yield Import(name.value, None, node.lineno, for_types, in_function)
     inside = in_function or isinstance(node, Scope)
-    if isinstance(node, ast.If) and _called(node.test) == "TYPE_CHECKING":
+    if isinstance(node, ast.If) and _last_word(node.test) == "TYPE_CHECKING":
         for statement in node.body:
             yield from _imports(statement, module, for_types=True, in_function=inside)
         for statement in node.orelse:
@@ -155,9 +178,8 @@ def _absolute(node: ast.ImportFrom, module: Module) -> str:
     return ".".join([*kept, node.module] if node.module else kept)
 
 
-def _called(node: ast.expr) -> str:
-    """The last word of `a.b.word` or `word(...)`."""
-    inner = node.func if isinstance(node, ast.Call) else node
-    if isinstance(inner, ast.Attribute):
-        return inner.attr
-    return inner.id if isinstance(inner, ast.Name) else ""
+def _last_word(node: ast.expr) -> str:
+    """Of `word` or `a.b.word`."""
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    return node.id if isinstance(node, ast.Name) else ""

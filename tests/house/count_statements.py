@@ -30,16 +30,14 @@ from __future__ import annotations
 import argparse
 import ast
 import sys
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from source_tree import docstrings, modules
+from source_tree import EMPTY_NAMES, docstrings, empty_names, modules
 
 ROOT = Path(__file__).parents[2]
-NAMES = ("each", "found")
 BODIES = ("source_file", "block", "declaration_list")
 NO_STATEMENTS = ("line_comment", "block_comment", "attribute_item", "inner_attribute_item", "label")
 SKIPPED = {"target", "__pycache__", ".venv"}
@@ -138,16 +136,6 @@ def rust_rows(root: Path, by_folder: bool, parser: Any) -> dict[str, Count]:
     return rows
 
 
-def names_bound(root: Path) -> dict[str, Counter[str]]:
-    """Name that says nothing -> how often it is bound, by kind."""
-    bound: dict[str, Counter[str]] = {name: Counter() for name in NAMES}
-    for module in modules(root / "python" / "truepose").values():
-        for binding in module.bindings():
-            if binding.name in NAMES:
-                bound[binding.name][binding.kind] += 1
-    return bound
-
-
 def print_table(rows: dict[str, Count]) -> None:
     print(f"{'':32}{'files':>7}{'lines':>9}{'characters':>12}{'statements':>12}{'docstrings':>12}")
     for name, count in rows.items():
@@ -169,12 +157,8 @@ def main() -> int:
         rows |= rust_rows(asked.root, asked.by_folder, parser)
     print_table(rows)
     print()
-    for name, kinds in names_bound(asked.root).items():
-        counted = kinds["assigned"] + kinds["argument"]
-        print(
-            f"`{name}` bound {counted} times ({kinds['assigned']} assigned, "
-            f"{kinds['argument']} arguments); fields, not counted: {kinds['field']}"
-        )
+    bound = empty_names(modules(asked.root / "python" / "truepose").values())
+    print(", ".join(f"`{name}` is bound {bound[name]} times" for name in EMPTY_NAMES))
     if parser is None:
         print("crates/ not counted: pip install tree-sitter tree-sitter-rust", file=sys.stderr)
         return 1

@@ -42,6 +42,11 @@ def crates() -> list[Path]:
     return sorted(path.parent for path in CRATES.glob("*/Cargo.toml"))
 
 
+def without_comments(text: str) -> str:
+    """Rust without its comments, texts and characters."""
+    return _COMMENTS_AND_TEXT.sub(" ", text)
+
+
 def rust_imports(crate: Path) -> dict[str, set[str]]:
     """File -> files of the same crate that it imports, as paths below crates/."""
     source = crate / "src"
@@ -66,8 +71,7 @@ def _module_of(path: Path) -> Path_:
 
 
 def _read(path: Path, module: Path_, modules: set[Path_]) -> RustFile:
-    text = _COMMENTS_AND_TEXT.sub(" ", path.read_text(encoding="utf-8"))
-    text = _without_tests(text)
+    text = _without_tests(without_comments(path.read_text(encoding="utf-8")))
     used: list[Path_] = []
     exported: dict[str, Path_] = {}
     code = _MODULE.sub(" ", _USE.sub(" ", text))

@@ -6,9 +6,10 @@ Everything is read from the files as they stand; nothing is imported and no layo
 from __future__ import annotations
 
 import ast
-from collections.abc import Collection, Iterator
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -16,6 +17,9 @@ PACKAGE = ROOT / "python" / "truepose"
 
 COMPILED = frozenset({"truepose._kernel"})
 """Modules that no Python file is."""
+
+EMPTY_NAMES = ("each", "found")
+"""Names that say nothing of what they are of."""
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 Scope = Function | ast.Lambda
@@ -121,6 +125,7 @@ class Module:
                 yield Binding(node.name, node.lineno, "assigned")
 
 
+@cache
 def modules(package: Path = PACKAGE) -> dict[str, Module]:
     """Every module of the package by its full name, `__init__` by that of its folder."""
     every = {}
@@ -130,6 +135,16 @@ def modules(package: Path = PACKAGE) -> dict[str, Module]:
         name = ".".join(parts[:-1] if is_package else parts)
         every[name] = Module(name, path, is_package, path.read_text(encoding="utf-8"))
     return every
+
+
+def empty_names(every: Iterable[Module]) -> Counter[str]:
+    """How often each of `EMPTY_NAMES` is bound, but for fields of classes."""
+    return Counter(
+        binding.name
+        for module in every
+        for binding in module.bindings()
+        if binding.name in EMPTY_NAMES and binding.kind != "field"
+    )
 
 
 def docstrings(tree: ast.AST) -> Iterator[ast.Expr]:

@@ -14,7 +14,7 @@ from house.source_tree import ROOT
 
 CRATES = ROOT / "crates"
 
-Path_ = tuple[str, ...]
+RustPath = tuple[str, ...]
 """A path in a crate without the leading `crate`: ("kinematics", "forward", "chord")."""
 
 _COMMENTS_AND_TEXT = re.compile(
@@ -31,10 +31,10 @@ class RustFile:
     """A file of a crate as a module."""
 
     path: Path
-    module: Path_
-    used: tuple[Path_, ...]
+    module: RustPath
+    used: tuple[RustPath, ...]
     """Absolute paths that its own code uses."""
-    exported: dict[str, Path_] = field(hash=False)
+    exported: dict[str, RustPath] = field(hash=False)
     """Names that it passes on by `pub use` -> the path behind each; "*" is not followed."""
 
 
@@ -48,32 +48,27 @@ def without_comments(text: str) -> str:
 
 
 def rust_imports(crate: Path) -> dict[str, set[str]]:
-    """File -> files of the same crate that it imports, as paths below crates/."""
+    """File -> files of the same crate that it imports, as paths below the crate's parent."""
     source = crate / "src"
     paths = {_module_of(path.relative_to(source)): path for path in sorted(source.rglob("*.rs"))}
     files = {module: _read(path, module, set(paths)) for module, path in paths.items()}
+    shown = {module: path.relative_to(crate.parent).as_posix() for module, path in paths.items()}
     graph = {}
-    for file in files.values():
-        targets = {_resolved(path, files) for path in file.used} - {None, file.module}
-        graph[_shown(file.path)] = {
-            _shown(files[target].path) for target in targets if target is not None
-        }
+    for module, file in files.items():
+        targets = {_resolved(path, files) for path in file.used} - {module}
+        graph[shown[module]] = {shown[target] for target in targets if target is not None}
     return graph
 
 
-def _shown(path: Path) -> str:
-    return path.relative_to(CRATES).as_posix()
-
-
-def _module_of(path: Path) -> Path_:
+def _module_of(path: Path) -> RustPath:
     parts = path.with_suffix("").parts
     return parts[:-1] if parts[-1] in ("mod", "lib", "main") else parts
 
 
-def _read(path: Path, module: Path_, modules: set[Path_]) -> RustFile:
+def _read(path: Path, module: RustPath, modules: set[RustPath]) -> RustFile:
     text = _without_tests(without_comments(path.read_text(encoding="utf-8")))
-    used: list[Path_] = []
-    exported: dict[str, Path_] = {}
+    used: list[RustPath] = []
+    exported: dict[str, RustPath] = {}
     code = _MODULE.sub(" ", _USE.sub(" ", text))
     for use in _USE.finditer(text):
         for name, written in _leaves(use["tree"]):
@@ -103,7 +98,7 @@ def _without_tests(text: str) -> str:
     return text
 
 
-def _leaves(tree: str) -> Iterator[tuple[str, Path_]]:
+def _leaves(tree: str) -> Iterator[tuple[str, RustPath]]:
     """`a::{b, c::d as e}` -> (b, a::b), (e, a::c::d): the name that is bound, and its path."""
     tree = tree.strip().removesuffix("::self")
     head, brace, rest = tree.partition("{")
@@ -125,7 +120,7 @@ def _leaves(tree: str) -> Iterator[tuple[str, Path_]]:
         item += letter
 
 
-def _absolute(written: Path_, module: Path_, modules: set[Path_]) -> Path_ | None:
+def _absolute(written: RustPath, module: RustPath, modules: set[RustPath]) -> RustPath | None:
     """The path from the crate's root, or None where it leads out of the crate."""
     if written[0] == "crate":
         return written[1:]
@@ -140,7 +135,7 @@ def _absolute(written: Path_, module: Path_, modules: set[Path_]) -> Path_ | Non
     return base + rest if (*base, rest[0]) in modules else None
 
 
-def _resolved(path: Path_, files: dict[Path_, RustFile]) -> Path_ | None:
+def _resolved(path: RustPath, files: dict[RustPath, RustFile]) -> RustPath | None:
     """The module whose file defines what the path names, re-exports followed."""
     for _ in range(8):  # re-exports of re-exports
         module = next((path[:n] for n in range(len(path), -1, -1) if path[:n] in files), None)

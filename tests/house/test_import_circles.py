@@ -18,6 +18,7 @@ A circle is a set of files of which each leads to each other one. What counts as
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 import pytest
 
@@ -169,3 +170,57 @@ def test_a_circle_is_found() -> None:
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": {"e"}, "e": {"d"}, "f": {"a"}}
     assert circles(graph) == {("a", "b", "c"), ("d", "e")}
     assert circles({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == set()
+
+
+def test_python_imports_are_seen(tmp_path: Path) -> None:
+    sources = {
+        "__init__": "NAMES = {'c': 'truepose.c:Thing'}\n",
+        "a": "from truepose import b\nfrom importlib.resources import files\nfiles('truepose.e')\n",
+        "b": "def late():\n    from truepose.c import thing\n    from . import d, unknown\n",
+        "c": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import truepose.a\n",
+        "d": "import truepose.c\nimport numpy\n",
+        "e": "",
+    }
+    written(tmp_path / "truepose", {f"{name}.py": text for name, text in sources.items()})
+    graph = python_graph(modules(tmp_path / "truepose"))
+    assert graph == {
+        "truepose": {"truepose.c"},
+        "truepose.a": {"truepose.b"},
+        "truepose.b": {"truepose", "truepose.c", "truepose.d"},
+        "truepose.c": set(),
+        "truepose.d": {"truepose.c"},
+        "truepose.e": set(),
+    }
+
+
+def test_rust_imports_are_seen(tmp_path: Path) -> None:
+    sources = {
+        "lib.rs": "mod a; mod b; pub mod deep; pub use a::Thing; pub use b::other;\n"
+        "fn f() { other() }\n",
+        "a.rs": "use crate::deep::{self, inner::{Deep, Second as S}, Passed}; // crate::b\n",
+        "b.rs": "use super::Thing;\n#[cfg(test)]\nmod tests { use crate::deep; }\n",
+        "deep/mod.rs": 'mod inner; mod last; pub use inner::Passed; const TEXT: &str = "crate::b";',
+        "deep/inner.rs": "use std::fmt; fn f() -> super::last::Last { self::g() }",
+        "deep/last.rs": "use crate::b::other as another;",
+    }
+    written(tmp_path / "kernel" / "src", sources)
+    inside = "kernel/src/"
+    graph = {
+        name.removeprefix(inside): {target.removeprefix(inside) for target in targets}
+        for name, targets in rust_imports(tmp_path / "kernel").items()
+    }
+    assert graph == {
+        "lib.rs": {"b.rs"},
+        "a.rs": {"deep/mod.rs", "deep/inner.rs"},
+        "b.rs": {"a.rs"},
+        "deep/mod.rs": set(),
+        "deep/inner.rs": {"deep/last.rs"},
+        "deep/last.rs": {"b.rs"},
+    }
+
+
+def written(folder: Path, sources: Mapping[str, str]) -> None:
+    for name, text in sources.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")

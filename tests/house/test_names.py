@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from pathlib import Path
 
 import pytest
 
 import truepose
 from house.glossary import glossary, standing
-from house.source_tree import EMPTY_NAMES, empty_names, modules
+from house.source_tree import EMPTY_NAMES, Module, empty_names, modules
 
 AT_FIRST = {"each": 377, "found": 442}
 """How often each was bound before the renames; the sum is to come down by 80 %."""
@@ -57,3 +58,15 @@ def test_no_subpackage_bears_the_name_of_a_public_function() -> None:
     """Importing it would put the module in the function's place."""
     below = {name.split(".")[1] for name in modules() if name.count(".") == 1}
     assert sorted(below & set(truepose.__all__) - PUBLIC_MODULES) == []
+
+
+def test_bindings_are_counted() -> None:
+    text = (
+        "class A:\n    found: str\n\n"
+        "def f(found, *each):\n"
+        "    for each, (found, a) in []:\n        found = found + each\n"
+        "    with a as each: pass\n"
+        "    return [each for each in a if (found := each)], found.each\n"
+    )
+    module = Module("truepose.a", Path("a.py"), False, text)
+    assert empty_names([module]) == {"found": 4, "each": 4}

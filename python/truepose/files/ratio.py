@@ -88,7 +88,7 @@ class _Ratio(FileType):
     """A ratio that is known, or known within limits; an error, so less than the whole."""
 
     def read(self, value: Any, units: UnitSystem) -> Band:
-        return read_within(value, lambda each: _read_error(each, units), "a ratio", known=True)
+        return read_within(value, lambda limit: _read_error(limit, units), "a ratio", known=True)
 
     def json_schema(self) -> JsonSchemaValue:
         return one_or_limits(self.dimension) | {"x-known": True}
@@ -99,7 +99,7 @@ class _Slope(FileType):
     """An angle between straight lines, as a tolerance."""
 
     def read(self, value: Any, units: UnitSystem) -> Band:
-        return read_within(value, lambda each: read_slope(each, units), "a slope", known=False)
+        return read_within(value, lambda limit: read_slope(limit, units), "a slope", known=False)
 
     def json_schema(self) -> JsonSchemaValue:
         return one_or_limits(self.dimension) | {"x-slope": True}

@@ -66,10 +66,10 @@ def meant(values: ArrayLike, offset: float = 0.0) -> Floats:
     power = 10.0 ** np.where(usual, np.abs(places), 0)
     digits = np.rint(np.where(places >= 0, size * power, size / power))
     few = np.copysign(np.where(places >= 0, digits / power, digits * power), given)
-    found: Floats = np.where(
+    values_meant: Floats = np.where(
         usual & (np.abs(few - given) <= ROUNDED * np.maximum(size, abs(offset))), few, given
     )
-    return found
+    return values_meant
 
 
 @dataclass(frozen=True)

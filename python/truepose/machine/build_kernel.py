@@ -51,10 +51,10 @@ def kernel(described: Described) -> KernelMachine:
 
 def problems(described: Described, machine: KernelMachine) -> list[Problem]:
     """What is wrong with the machine as a whole: rigid limbs that strain, motions left free."""
-    found = list(_rigid(described, machine)) if machine.overconstrained else []
+    problems = list(_rigid(described, machine)) if machine.overconstrained else []
     if described.guides and (free := _free_motions(machine)) is not None and len(free):
-        found.append(_loose(described, machine, free))
-    return found
+        problems.append(_loose(described, machine, free))
+    return problems
 
 
 def _built(document: Document, description: dict[str, Any]) -> KernelMachine:

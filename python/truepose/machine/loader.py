@@ -177,13 +177,13 @@ def _condition(
 ) -> Condition:
     """The condition with its temperature log."""
     table = validated.table(ConditionTable)
-    found = build_parts.condition(table)
+    condition = build_parts.condition(table)
     if table is None or table.temperature_log is None:
-        return found
+        return condition
     carriages = [drive.carriage.part for drive in drives if drive.carriage is not None]
     rows = [*(drive.part for drive in drives), *(strut.part for strut in struts)]
     parts = [*rows, *carriages, *BODIES]
     log = read_temperature_log(
-        data_files, table.temperature_log, parts, table.time, found.part_temperatures
+        data_files, table.temperature_log, parts, table.time, condition.part_temperatures
     )
-    return found if log is None else found.replace(temperature_log=log)
+    return condition if log is None else condition.replace(temperature_log=log)

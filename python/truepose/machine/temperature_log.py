@@ -147,12 +147,12 @@ def read_temperature_log(
     table = data_files.read(name, columns, _KEY)
     if table is None:
         return None
-    found = [*_not_ascending(table), *_too_cold(table)]
+    problems = [*_not_ascending(table), *_too_cold(table)]
     document = data_files.document
     given = [*fixed, DEFAULT_PART] if _default_is_set(document) else fixed
-    found += [_twice(document, part, name) for part in given if part in table.numbers]
+    problems += [_twice(document, part, name) for part in given if part in table.numbers]
     if len(table.columns) == 1:
-        found.append(
+        problems.append(
             table.problem(
                 Fault(
                     "missing-column",
@@ -162,8 +162,8 @@ def read_temperature_log(
                 )
             )
         )
-    data_files.problems += found
-    if found:
+    data_files.problems += problems
+    if problems:
         return None
     times = table.numbers[TIME]
     log = TemperatureLog(times, {n: v for n, v in table.numbers.items() if n != TIME}, name)

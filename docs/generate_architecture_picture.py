@@ -10,8 +10,8 @@ import ast
 import re
 import textwrap
 import tomllib
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from xml.sax.saxutils import escape
 
 ROOT = Path(__file__).parent.parent
@@ -39,8 +39,7 @@ STYLE = """\
     .head { fill: #4a5a68 }"""
 
 
-@dataclass(frozen=True)
-class Room:
+class Room(NamedTuple):
     """What a box shows: a module, package or crate, and its own first words."""
 
     name: str
@@ -107,9 +106,8 @@ def drawn(layers: list[list[Room]], kind: str, top: int) -> tuple[list[str], int
         height = 2 * PAD + down + LINE * max(map(len, texts)) - 2
         for place, (one, lines) in enumerate(zip(layer, texts, strict=True)):
             x = left + place * (width + GAP)
-            parts.append(
-                f'  <rect class="{kind}" x="{x}" y="{top}" width="{width}" height="{height}" rx="5"/>'
-            )
+            size = f'width="{width}" height="{height}" rx="5"'
+            parts.append(f'  <rect class="{kind}" x="{x}" y="{top}" {size}/>')
             parts.append(text("name", x + PAD, top + PAD + 13, one.name))
             for number, line in enumerate(lines):
                 y = top + PAD + down + 13 + LINE * number

@@ -29,27 +29,6 @@ DECISIONS = ROOT / "docs" / "decisions"
 
 PYTHON_CIRCLES: dict[tuple[str, ...], str] = {
     ("truepose.calibration.calibrate", "truepose.calibration.result.save"): "",
-    (
-        "truepose",
-        "truepose.controllers",
-        "truepose.controllers._fit",
-        "truepose.controllers._linuxcnc_joints",
-        "truepose.controllers._one_file",
-        "truepose.controllers.c",
-        "truepose.controllers.c._program",
-        "truepose.controllers.klipper",
-        "truepose.controllers.linuxcnc",
-        "truepose.controllers.linuxcnc._compensation",
-        "truepose.controllers.linuxcnc._configuration",
-        "truepose.controllers.linuxcnc._description",
-        "truepose.controllers.linuxcnc._module",
-        "truepose.controllers.linuxcnc._safe_box",
-        "truepose.controllers.linuxcnc_genhexkins",
-        "truepose.controllers.linuxcnc_lineardelta",
-        "truepose.controllers.marlin",
-        "truepose.controllers.pose_map",
-        "truepose.controllers.reprap",
-    ): "",
 }
 """Modules of a circle, in order of their names -> the page of docs/decisions that explains it.
 

@@ -36,7 +36,6 @@ def test_no_name_of_the_old_language_is_left() -> None:
     assert not left, "\n".join(left)
 
 
-@pytest.mark.xfail(strict=True, reason="the renames follow")
 def test_a_class_name_has_one_home() -> None:
     homes = defaultdict(list)
     for module in modules().values():
@@ -53,7 +52,6 @@ def test_names_that_say_nothing_are_rare() -> None:
     assert bound.total() <= 0.2 * sum(AT_FIRST.values()), dict(bound)
 
 
-@pytest.mark.xfail(strict=True, reason="the package of budgets is moved later")
 def test_no_subpackage_bears_the_name_of_a_public_function() -> None:
     """Importing it would put the module in the function's place."""
     below = {name.split(".")[1] for name in modules() if name.count(".") == 1}

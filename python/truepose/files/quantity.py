@@ -149,10 +149,10 @@ class _Stiffness(_Quantity):
         if units.read(value, self.dimension) == 0.0:
             raise QuantityError(
                 "not-positive",
-                "a stiffness of zero would carry nothing",
+                "a stiffness of zero cannot carry a load",
                 found=shown_value(value),
                 expected=f"{DIMENSIONS[self.dimension].phrase} above zero",
-                hint="leave the key away for what is rigid; what carries nothing is no strut",
+                hint="leave the key out where the strut is rigid",
             )
         return super().read(value, units)
 

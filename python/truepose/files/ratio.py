@@ -56,7 +56,7 @@ def _read_error(value: object, units: UnitSystem) -> float:
     if abs(ratio) >= 1.0:
         raise QuantityError(
             "not-a-fraction",
-            "an error as large as what it is an error of",
+            "an error as large as the quantity itself",
             found=shown_value(value),
             expected='a ratio between -1 and 1, such as "12 ppm"',
             hint="a bare number is a plain ratio, neither ppm nor um/m",

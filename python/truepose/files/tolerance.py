@@ -255,7 +255,7 @@ def _distribution(table: Mapping[str, Any]) -> str:
     if word not in DISTRIBUTIONS:
         raise QuantityError(
             "unknown-choice" if isinstance(word, str) else "wrong-type",
-            f"distribution: {shown_value(word)} is none of the words that it takes",
+            f"distribution: {shown_value(word)} is not one of the allowed words",
             found=shown_value(word),
             expected=one_of(f'"{name}"' for name in DISTRIBUTIONS),
             hint=did_you_mean(word, DISTRIBUTIONS) if isinstance(word, str) else None,
@@ -412,7 +412,7 @@ def _group(table: Mapping[str, Any]) -> tuple[str | None, float]:
     if isinstance(sign, bool) or sign not in (-1, 1):
         raise QuantityError(
             "unknown-choice",
-            f"sign: {shown_value(sign)} is no sign",
+            f"sign: {shown_value(sign)} is not a sign",
             found=shown_value(sign),
             expected="1 or -1",
         )

@@ -145,7 +145,7 @@ class UnitSystem:
         if abs(result) > LARGEST:
             raise QuantityError(
                 "too-large",
-                f"expected {wanted.phrase}, found a number of no size that anything has",
+                f"expected {wanted.phrase}, found a number far too large for any machine",
                 found=shown_value(value),
                 expected=f"a number of at most {LARGEST:g} in SI units: {_expected(wanted)}",
             )

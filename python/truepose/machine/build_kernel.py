@@ -195,7 +195,7 @@ def _loose(described: Described, machine: KernelMachine, free: np.ndarray) -> Pr
     return described.document.problem(
         Fault(
             "loose-platform",
-            "the guides do not hold what the struts leave free",
+            "the struts leave motions free that the guides do not hold",
             found=f"at home the platform can still move: {motions}",
             expected="closures that hold every freedom of the platform",
             hint=f"look at where {names} point and stand; two closures may hold the same motion",

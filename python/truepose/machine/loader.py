@@ -80,7 +80,7 @@ def _require_schema(document: Document) -> None:
         document.problem(
             Fault(
                 "unsupported-schema",
-                "this version reads no such machine file",
+                "this version of truepose does not read such a machine file",
                 found=shown_value(schema),
                 expected=str(SCHEMA),
                 hint="a newer version of truepose may read it"

@@ -111,7 +111,7 @@ def _bad(found: str, expected: str) -> RequestError:
     return RequestError(
         Problem(
             "bad-condition",
-            "this is no temperature log",
+            "this is not a temperature log",
             path="condition.temperature_log",
             found=found,
             expected=expected,
@@ -123,7 +123,7 @@ def _outside(log: TemperatureLog, time: float) -> Problem:
     first, last = log.span
     return Problem(
         "outside-log",
-        "the temperature log does not reach to this time",
+        "the temperature log does not cover this time",
         path="condition.time",
         found=f"{time:.10g} s",
         expected=f"a time from {first:.10g} s to {last:.10g} s",
@@ -237,7 +237,7 @@ def _time_outside(document: Document, log: TemperatureLog, time: float, unit: Fi
     return document.problem(
         Fault(
             "outside-log",
-            "the temperature log does not reach to this time",
+            "the temperature log does not cover this time",
             found=asked,
             expected=f"a time from {first} to {last}",
         ),

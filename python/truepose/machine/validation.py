@@ -318,7 +318,7 @@ def _problem(
         return document.problem(
             Fault(
                 "unknown-choice",
-                f"{shown_value(value)} is none of the words that it takes",
+                f"{shown_value(value)} is not one of the allowed words",
                 found=shown_value(value),
                 expected=context["expected"],
             ),

@@ -117,7 +117,7 @@ CASES = [
     bad("not-positive", "210 GPa", "0 GPa", "0 GPa", "a stress above zero"),
     bad("not-positive", "temperature = 35", "temperature = -300", "-300", "above absolute zero"),
     bad("not-positive", '"0.5 mm"', '"0 mm"', '"0 mm"', "accuracy.target",
-        "leave the key away where nothing is asked"),
+        "leave the key out where nothing is asked"),
     bad("not-positive", *said("angle_target", '"0 deg"', ASKED), "0 deg", "without error"),
     bad("negative", "[-0.3, 0.3]", "-0.3", "length_tolerance", "a half band is zero or more"),
     bad("zero-direction", "axis = [0, 1, 0]", "axis = [0, 0, 0]", "axis = [0, 0", "not zero"),
@@ -177,7 +177,7 @@ CASES = [
     bad("missing-key", GRID, "grid = {}", "grid", "names no freedom"),
     # stiffnesses, joints and masses
     bad("not-positive", *said("stiffness", '"0 N/um"'), "stiffness", "cannot carry a load",
-        "leave the key away"),
+        "leave the key out"),
     bad("not-positive", *said("stiffness", '"-3 N/um"'), "stiffness", "a stiffness above zero"),
     bad("not-positive", *said("stiffness", '{ nut = "9 N/um", screw = "0 N/um" }', DRIVE),
         "stiffness", "screw: a stiffness of zero cannot carry a load"),

@@ -339,7 +339,7 @@ def quantity(dimension: str, *, sign: Sign = "any") -> Any:
     return Annotated[float, _Quantity(dimension, sign)]
 
 
-_NO_ERROR = "no machine is without error; leave the key away where nothing is asked"
+_NO_ERROR = "no machine is without error; leave the key out where nothing is asked"
 
 Length = Annotated[float, _Quantity("length")]
 PositiveLength = Annotated[float, _Quantity("length", "positive")]

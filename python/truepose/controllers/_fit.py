@@ -207,10 +207,10 @@ def fit(machine: Machine, model: SmallModel, *, most_evaluations: int = 1000) ->
         suited, _ = _solved(as_designed, model, chosen, FEW)
         designed, _ = _assess(as_designed, model, suited, poses)
         _require_alike(machine, designed, poses)
-    found, solution = _solved(actual, model, chosen, most_evaluations)
-    printed = model.printed(found)
-    values = model.taken(printed)
-    before, _ = _assess(actual, model, model.taken(model.printed(start)), poses)
+    fitted, solution = _solved(actual, model, chosen, most_evaluations)
+    printed = model.format(fitted)
+    values = model.parse(printed)
+    before, _ = _assess(actual, model, model.parse(model.format(start)), poses)
     after, joints = _assess(actual, model, values, poses)
     return ModelFit(
         printed,
@@ -341,8 +341,8 @@ class _FitProblem:
 
     def values(self, change: Floats) -> Floats:
         """The model's numbers, SI."""
-        found: Floats = self._start + self._size * change
-        return found
+        values: Floats = self._start + self._size * change
+        return values
 
     def residual(self, change: Floats) -> Floats:
         joints = self._model.joints(self.values(change), self._poses)
@@ -366,8 +366,8 @@ class _FitProblem:
         step = np.zeros(joints.shape[1])
         step[at] = self._joint_steps[at]
         ahead, behind = self._error(joints + step), self._error(joints - step)
-        found: Floats = (ahead - behind) / (2.0 * step[at])
-        return found
+        slope: Floats = (ahead - behind) / (2.0 * step[at])
+        return slope
 
     def _error(self, joints: Floats) -> Floats:
         """(n, n_row) error of the commanded freedoms, weighed; NaN where the tool is nowhere."""
@@ -375,8 +375,8 @@ class _FitProblem:
             return np.full((len(joints), len(self._rows)), np.nan)
         error, status = self._actual.error(self._known, np.ascontiguousarray(joints))
         error[status != OK] = np.nan
-        found: Floats = error[:, self._rows] * self._unit
-        return found
+        residual: Floats = error[:, self._rows] * self._unit
+        return residual
 
 
 def _usable(machine: Machine, actual: ActualMachine) -> tuple[Floats, int]:
@@ -415,7 +415,7 @@ def _assess(
     machine = actual.machine
     parts = [_errors(actual, model, values, poses[rows]) for rows in blocks(len(poses))]
     position, orientation, parasitic, joints = (
-        np.concatenate(each) for each in zip(*parts, strict=True)
+        np.concatenate(columns) for columns in zip(*parts, strict=True)
     )
     turns = any(name in "abc" for name in machine.commanded)
     can_turn = any(name not in "xyz" for name in machine.components)
@@ -504,8 +504,8 @@ def _condition(machine: Machine) -> str:
     known = machine.condition
 
     def vector(name: str, values: Sequence[float], dimension: str) -> list[str]:
-        each = [in_file_units(machine, value, dimension) for value in values]
-        return [f"{name} {', '.join(each)}"] if any(values) else []
+        shown = [in_file_units(machine, value, dimension) for value in values]
+        return [f"{name} {', '.join(shown)}"] if any(values) else []
 
     def degrees(kelvin: float) -> str:
         return in_file_units(machine, kelvin, "temperature")

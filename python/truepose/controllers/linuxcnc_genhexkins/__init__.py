@@ -77,23 +77,25 @@ class _Model:
             for axis in "xyz"
         ]
         names += [f"length {strut}" for strut in range(STRUTS)]
-        return tuple(Parameter(*each) for each in zip(names, self._start.tolist(), strict=True))
+        return tuple(
+            Parameter(*parameter) for parameter in zip(names, self._start.tolist(), strict=True)
+        )
 
     def joints(self, values: Floats, poses: Floats) -> Floats:
         """(n, 6) joint coordinates, m, in the order of the drives, for poses (n, 6), m, rad."""
         longer = self.lengths(values, poses) - values[2 * COORDINATES :]
-        found: Floats = self.switches + longer / self._gain
-        return found
+        joints: Floats = self.switches + longer / self._gain
+        return joints
 
     def lengths(self, values: Floats, poses: Floats) -> Floats:
         """(n, 6) lengths of the struts, m: LinuxCNC's joint values."""
         base = values[:COORDINATES].reshape(STRUTS, 3)
         platform = values[COORDINATES : 2 * COORDINATES].reshape(STRUTS, 3)
         turned = np.einsum("nij,kj->nki", euler_to_matrix(poses[:, 3:]), platform)
-        found: Floats = np.linalg.norm(poses[:, np.newaxis, :3] + turned - base, axis=2)
-        return found
+        lengths: Floats = np.linalg.norm(poses[:, np.newaxis, :3] + turned - base, axis=2)
+        return lengths
 
-    def printed(self, values: Floats) -> Printed:
+    def format(self, values: Floats) -> Printed:
         """Pins, and HOME_OFFSET of the joints, in the block's unit."""
         words = [
             f"{PINS}.{end}.{strut}.{axis}"
@@ -105,7 +107,7 @@ class _Model:
         scale, digits = SCALE[self.unit], digits_of(self.machine, self.unit)
         return {word: fixed(v / scale, digits) for word, v in zip(words, values, strict=True)}
 
-    def taken(self, printed: Printed) -> Floats:
+    def parse(self, printed: Printed) -> Floats:
         """(42,) the model's values, m, of printed numbers."""
         return np.array([float(text) for text in printed.values()]) * SCALE[self.unit]
 

@@ -38,6 +38,7 @@ from truepose.files.wording import counted
 from truepose.machine import Machine
 from truepose.machine.condition import STANDARD_GRAVITY
 from truepose.runs.poses import OK, PoseRun, no_pose_left, pose_in_words
+from truepose.spatial import angle_between
 from truepose.version import version
 
 MOST_FITTED = 2000
@@ -460,23 +461,12 @@ def _errors(
     linear = [at for at, name in enumerate(actual.machine.commanded) if name in "xyz"]
     position = np.linalg.norm((reached - poses)[:, linear], axis=1)
     kernel = actual.machine.kernel
-    orientation = angle_between(kernel.placement_of(poses), kernel.placement_of(reached))
+    asked_for, got = kernel.placement_of(poses), kernel.placement_of(reached)
+    orientation = angle_between(asked_for[:, 3:], got[:, 3:])
     known = actual.known(poses)
     error, _ = actual.error(known, joints)
     turning = [at for at, name in enumerate(actual.machine.components) if name not in "xyz"]
     return position, orientation, np.linalg.norm(error[:, turning], axis=1), joints
-
-
-def angle_between(one: Floats, other: Floats) -> Floats:
-    """(n,) angle, rad, between the unit quaternions of placements (n, 7).
-
-    By the chord between them, which keeps its digits where the angle is small.
-    """
-    a, b = one[:, 3:], other[:, 3:]
-    side = np.where(np.sum(a * b, axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    chord = np.linalg.norm(a - side * b, axis=1)
-    angles: Floats = 4.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
-    return angles
 
 
 def extent(values: Floats, poses: Floats, even: Flags | None = None) -> Extent:
@@ -575,4 +565,4 @@ def _highest(extent: Extent | None) -> float:
     return 0.0 if extent is None else extent.highest
 
 
-__all__ = ["Error", "Extent", "ModelFit", "angle_between", "extent", "fit", "heading"]
+__all__ = ["Error", "Extent", "ModelFit", "extent", "fit", "heading"]

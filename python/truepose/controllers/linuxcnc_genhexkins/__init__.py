@@ -35,6 +35,7 @@ from truepose.controllers._small_model import (
     vector,
 )
 from truepose.machine import Machine
+from truepose.spatial import euler_to_matrix
 
 PINS = "genhexkins"
 STRUTS = 6
@@ -88,7 +89,7 @@ class _Model:
         """(n, 6) lengths of the struts, m: LinuxCNC's joint values."""
         base = values[:COORDINATES].reshape(STRUTS, 3)
         platform = values[COORDINATES : 2 * COORDINATES].reshape(STRUTS, 3)
-        turned = np.einsum("nij,kj->nki", _rotations(poses[:, 3:]), platform)
+        turned = np.einsum("nij,kj->nki", euler_to_matrix(poses[:, 3:]), platform)
         found: Floats = np.linalg.norm(poses[:, np.newaxis, :3] + turned - base, axis=2)
         return found
 
@@ -163,17 +164,6 @@ def _check(machine: Machine) -> None:
         "a hexapod: six telescopic struts and x y z a b c commanded",
         INSTEAD,
     )
-
-
-def _rotations(angles: Floats) -> Floats:
-    """(n, 3, 3) R = Rz(c) Ry(b) Rx(a) of angles (n, 3), rad."""
-    (ca, cb, cc), (sa, sb, sc) = np.cos(angles.T), np.sin(angles.T)
-    rows = [
-        [cb * cc, sa * sb * cc - ca * sc, ca * sb * cc + sa * sc],
-        [cb * sc, sa * sb * sc + ca * cc, ca * sb * sc - sa * cc],
-        [-sb, sa * cb, ca * cb],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
 
 
 __all__ = ["LinuxCncGenhexkins"]

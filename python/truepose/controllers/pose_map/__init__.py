@@ -23,7 +23,7 @@ from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats
 from truepose.compensation.commands import corrected_poses, has_joints
 from truepose.controllers._export import Export, Option
-from truepose.controllers._fit import Extent, angle_between, extent
+from truepose.controllers._fit import Extent, extent
 from truepose.controllers._small_model import ascii_only, fixed, stem
 from truepose.controllers.pose_map.grid import COUNT, Grid, grid_of
 from truepose.errors import Problem, RequestError
@@ -32,6 +32,7 @@ from truepose.files.wording import counted
 from truepose.machine import Machine
 from truepose.runs.dataset import provenance
 from truepose.runs.poses import OK, pose_in_words
+from truepose.spatial import angle_between
 
 FINEST = 1e-10
 """m and rad to which corrections are written, and finer."""
@@ -212,7 +213,7 @@ def _compare(found: NodeCorrections, points: Floats) -> _Compared:
     return _Compared(
         at,
         np.linalg.norm((added - exact)[:, linear], axis=1),
-        angle_between(place(added), place(exact)),
+        angle_between(place(added)[:, 3:], place(exact)[:, 3:]),
         status[usable] == OK,
         int((~usable).sum()),
     )

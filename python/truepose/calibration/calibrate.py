@@ -62,7 +62,7 @@ class Calibration:
     @property
     def accepted(self) -> bool:
         """Whether the calibrated machine may be used."""
-        return self.gate.accepted and not any(each.refuses for each in self.suspicions)
+        return self.gate.accepted and not any(suspicion.refuses for suspicion in self.suspicions)
 
     def calibrated(self) -> Machine:
         """The machine with the values found for its parameters; its bands are the file's still."""
@@ -161,11 +161,15 @@ def _suspected(machine: Machine, whole: Measurements, unknowns: Unknowns) -> tup
         standing = place_instruments(machine, whole, unknowns)[0].measurements
     except RequestError:
         return suspicions(machine, whole)
-    found = suspicions(machine, standing)
-    if standing.instruments == whole.instruments or all(each.code != "far-off" for each in found):
-        return found
-    declared = suspicions(machine, whole)
-    return found if any(each.code == "far-off" for each in declared) else declared
+    as_placed = suspicions(machine, standing)
+    if standing.instruments == whole.instruments or all(
+        suspicion.code != "far-off" for suspicion in as_placed
+    ):
+        return as_placed
+    as_declared = suspicions(machine, whole)
+    return (
+        as_placed if any(suspicion.code == "far-off" for suspicion in as_declared) else as_declared
+    )
 
 
 def _nothing_to_fit(whole: Measurements) -> RequestError:
@@ -182,10 +186,10 @@ def _nothing_to_fit(whole: Measurements) -> RequestError:
 
 def _with_suspicions(failure: RequestError, suspected: Sequence[Suspicion]) -> RequestError:
     """What stopped the fit, with what the measurements look like in the place of the hint."""
-    said = "; ".join(each.sentence for each in suspected if each.refuses)
-    if not said or any(each.code != "no-fit" for each in failure.problems):
+    sentences = "; ".join(suspicion.sentence for suspicion in suspected if suspicion.refuses)
+    if not sentences or any(problem.code != "no-fit" for problem in failure.problems):
         return failure
-    return RequestError(*(replace(each, hint=said) for each in failure.problems))
+    return RequestError(*(replace(problem, hint=sentences) for problem in failure.problems))
 
 
 def _judged(
@@ -231,7 +235,7 @@ def _held_out(fitted: Fit, checked: Validation | None) -> tuple[HeldOut, ...]:
 
 def phrases(machine: Machine, measurements: Measurements) -> list[str]:
     """How each instrument says where the machine is: "by heights alone"."""
-    found = []
+    texts = []
     for number, instrument in enumerate(measurements.instruments):
         read = measurements.observables(number)
         if not read:
@@ -241,23 +245,23 @@ def phrases(machine: Machine, measurements: Measurements) -> list[str]:
         heights = measurements.placements[rows, 2]
         if read == ("z",) and np.ptp(heights) < 1e-3 * machine.characteristic_length:
             phrase = "by a flat bed"
-        found.append(phrase)
-    return list(dict.fromkeys(found))
+        texts.append(phrase)
+    return list(dict.fromkeys(texts))
 
 
 def _nominal(machine: Machine, fitted: Fit) -> Floats:
     """(n_machine,) the parameter that an unknown moves alone; NaN for groups and properties."""
     unknowns = fitted.unknowns
-    found = np.full(unknowns.n_machine, np.nan)
+    nominal = np.full(unknowns.n_machine, np.nan)
     for number in range(unknowns.n_machine):
-        moved = np.flatnonzero(unknowns.effects[:, number])
-        values = machine.nominal[unknowns.columns[moved]]
+        rows = np.flatnonzero(unknowns.effects[:, number])
+        values = machine.nominal[unknowns.columns[rows]]
         # Rods that are equal are one number for people, coordinates that move apart are not.
-        same = np.ptp(values) <= 1e-9 * np.abs(values).max() if moved.size else False
-        equal = moved.size and (unknowns.effects[moved, number] == 1.0).all()
+        same = np.ptp(values) <= 1e-9 * np.abs(values).max() if rows.size else False
+        equal = rows.size and (unknowns.effects[rows, number] == 1.0).all()
         if same and equal:
-            found[number] = values[0]
-    return found
+            nominal[number] = values[0]
+    return nominal
 
 
 __all__ = ["Calibration", "calibrate", "phrases"]

@@ -97,7 +97,7 @@ def least_squares(
         raise ValueError(f"the first radius is {first_radius}, expected a number above zero")
     values = np.array(start, np.float64).reshape(-1)
     with np.errstate(all="ignore"):  # a value out of reach is looked at, not warned of
-        found = solve_least_squares(
+        solution = solve_least_squares(
             residual,
             jacobian,
             values,
@@ -109,7 +109,7 @@ def least_squares(
             most_evaluations=most_evaluations,
             first_radius=first_radius,
         )
-    return Solution(*found)
+    return Solution(*solution)
 
 
 def covariance(
@@ -133,28 +133,28 @@ def covariance(
     columns = _column_norms(slope)
     columns[columns == 0.0] = 1.0
     factor = np.linalg.qr(slope / columns, mode="r")
-    _, found, right = np.linalg.svd(factor, full_matrices=True)
+    _, singular_values, right = np.linalg.svd(factor, full_matrices=True)
     singular = np.zeros(slope.shape[1])
-    singular[: found.size] = found
+    singular[: singular_values.size] = singular_values
     seen = singular > rank_tolerance * max(float(singular.max(initial=0.0)), EPSILON)
     rows = right[seen] / singular[seen, np.newaxis] / columns
     return variance * (rows.T @ rows), right[~seen]
 
 
 def _weights(weights: ArrayLike) -> Floats:
-    given = np.asarray(weights, np.float64)
-    if not (np.isfinite(given) & (given >= 0.0)).all():
+    array = np.asarray(weights, np.float64)
+    if not (np.isfinite(array) & (array >= 0.0)).all():
         raise ValueError("the weights are not all finite and zero or more")
-    if given.ndim != 1:
-        raise ValueError(f"weights of shape {given.shape}, expected (m,)")
-    return given
+    if array.ndim != 1:
+        raise ValueError(f"weights of shape {array.shape}, expected (m,)")
+    return array
 
 
 def _scale(scale: ArrayLike, size: int) -> Floats:
-    given = np.asarray(scale, np.float64)
-    if given.shape != (size,) or not (np.isfinite(given) & (given > 0.0)).all():
+    array = np.asarray(scale, np.float64)
+    if array.shape != (size,) or not (np.isfinite(array) & (array > 0.0)).all():
         raise ValueError("a finite scale above zero is wanted for every value")
-    return given
+    return array
 
 
 def _column_norms(matrix: Floats) -> Floats:

@@ -124,9 +124,9 @@ class Case:
             "the weights": (weights.shape, residual.shape),
             "the tool's sensitivity": (tool.effects.shape[2:], (n_machine,)),
         }
-        for name, (found, expected) in shapes.items():
-            if found != expected:
-                raise ValueError(f"{name}: shape {found}, expected {expected}")
+        for name, (shape, expected) in shapes.items():
+            if shape != expected:
+                raise ValueError(f"{name}: shape {shape}, expected {expected}")
         for name, array in (("the Jacobian", jacobian), ("the residuals", residual)):
             if not np.isfinite(array).all():
                 raise ValueError(f"{name}: not finite")
@@ -185,9 +185,9 @@ class Case:
         """What the data say of the machine's unknowns, their uncertainties times `birge`."""
         parts = [self.factor] if extra is None else [self.factor, extra]
         if self.use_prior:
-            other = self.prior_rows.copy()  # what is known of the instruments beforehand
-            other = other[np.any(other[:, self.n :] != 0.0, axis=1)]
-            parts.append(other)
+            of_instruments = self.prior_rows.copy()  # what is known of the instruments beforehand
+            of_instruments = of_instruments[np.any(of_instruments[:, self.n :] != 0.0, axis=1)]
+            parts.append(of_instruments)
         return of_machine(np.vstack(parts), self.n, self.sigma)
 
     def outcome(self, extra: Floats | None = None) -> Outcome:
@@ -215,10 +215,12 @@ class Case:
         )
         directions = tuple(
             Direction(
-                kind, each * unit, tuple(self.unknowns.names[i] for i in sentences.members(each))
+                kind,
+                direction * unit,
+                tuple(self.unknowns.names[i] for i in sentences.members(direction)),
             )
             for kind, group in groups
-            for each in group
+            for direction in group
         )
         not_seen = sentences.cannot_tell(unseen, self.labels, self.by)
         within = seen.scaling == "prior"
@@ -285,8 +287,8 @@ class Case:
             known = f"its tolerance is {sentences.stated(half, unit, units)}"
         else:
             known = f"its tolerance alone by {sentences.quantity(sigma, unit, units=units)}"
-        found = sentences.quantity(own[at], unit, units=units)
-        text = f"the data leave {self.labels[at]} uncertain by {found}, {known}"
+        uncertainty = sentences.quantity(own[at], unit, units=units)
+        text = f"the data leave {self.labels[at]} uncertain by {uncertainty}, {known}"
         if np.isfinite(half) and own[at] > NOTHING * half:
             tolerance = sentences.stated(half, unit, units)
             text = (
@@ -305,18 +307,18 @@ class Case:
 
     def _no_gain(self, before: ToolUncertainty | None, after: ToolUncertainty) -> list[Reason]:
         """(b): the tool is not known better than before."""
-        found = [
+        compared = [
             (name, unit, size, was)
             for (name, unit, size, _), was in zip(
                 both(after, None), self.reference(before), strict=True
             )
             if was is not None and (was > 0.0 or size > 0.0)
         ]
-        worse = [each for each in found if each[2] > (1.0 + ROUNDING) * each[3]]
-        gained = any(size <= self.margin * was for _, _, size, was in found)
-        if not found or (gained and not worse):
+        worse = [row for row in compared if row[2] > (1.0 + ROUNDING) * row[3]]
+        gained = any(size <= self.margin * was for _, _, size, was in compared)
+        if not compared or (gained and not worse):
             return []
-        shown, units = worse or found, self.unknowns.shown
+        shown, units = worse or compared, self.unknowns.shown
         whose = "of the machine as filed" if before is not None else "measured before"
         texts = [
             f"{name} by {sentences.quantity(size, unit, units=units)}, against "
@@ -338,10 +340,10 @@ class Case:
         ]
         return bool(pairs) and all(was is not None and was <= asked for asked, was in pairs)
 
-    def is_enough(self, found: Outcome) -> bool:
+    def is_enough(self, outcome: Outcome) -> bool:
         """Whether the only thing missing is a gain that nobody asked for."""
-        only = {reason.code for reason in found.reasons} == {"no-gain"}
-        return only and self.is_within(found.before)
+        only = {reason.code for reason in outcome.reasons} == {"no-gain"}
+        return only and self.is_within(outcome.before)
 
 
 def _sparse(directions: Floats) -> Floats:

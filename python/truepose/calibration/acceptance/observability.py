@@ -61,9 +61,9 @@ class RowCovariance:
 
     def standard(self) -> Floats:
         """Standard uncertainty (n,), inf where a null direction has a part in the unknown."""
-        found: Floats = np.sqrt(np.einsum("ij,ij->i", self.root, self.root))
+        deviations: Floats = np.sqrt(np.einsum("ij,ij->i", self.root, self.root))
         touched = (np.abs(self.null * self.lengths) > TOUCHED).any(axis=0)
-        return np.where(touched, np.inf, found)
+        return np.where(touched, np.inf, deviations)
 
 
 @dataclass(frozen=True)
@@ -114,15 +114,17 @@ def of_machine(rows: ArrayLike, n_machine: int, unit: Floats | None = None) -> W
     imitate: the Schur complement of the normal equations. `unit` (n_machine,): prior standard
     deviations, inf where there is none.
     """
-    both = np.asarray(rows, np.float64)
-    machine, other = both[:, :n_machine].copy(), both[:, n_machine:]
+    whole = np.asarray(rows, np.float64)
+    machine, of_instruments = whole[:, :n_machine].copy(), whole[:, n_machine:]
     lengths = _lengths(machine)
     lengths[_unseen(lengths, unit)] = 0.0
     machine[:, lengths == 0.0] = 0.0
-    if other.shape[1]:
-        sizes = _lengths(other)
-        u, found, _ = np.linalg.svd(other / np.where(sizes > 0.0, sizes, 1.0), full_matrices=False)
-        basis = u[:, found > RANK_TOLERANCE * found.max(initial=0.0)]
+    if of_instruments.shape[1]:
+        sizes = _lengths(of_instruments)
+        u, singular, _ = np.linalg.svd(
+            of_instruments / np.where(sizes > 0.0, sizes, 1.0), full_matrices=False
+        )
+        basis = u[:, singular > RANK_TOLERANCE * singular.max(initial=0.0)]
         for _ in range(2):  # the second takes away what rounding left of the first
             machine -= basis @ (basis.T @ machine)
     return WhitenedRows(machine, lengths)
@@ -185,10 +187,10 @@ def row_covariance(rows: WhitenedRows) -> RowCovariance:
     of_seen = rows.lengths[rows.lengths > 0.0]
     usual = float(np.median(of_seen)) if of_seen.size else 1.0
     lengths = np.where(rows.lengths > 0.0, rows.lengths, usual)
-    found, right = decomposed(rows.matrix / lengths)
+    singular, right = decomposed(rows.matrix / lengths)
     # Where instruments imitate everything, what is left is rounding of columns of length one.
-    seen = found > RANK_TOLERANCE * found.max(initial=1.0)
-    root: Floats = (right[seen] / found[seen, np.newaxis] / lengths).T
+    seen = singular > RANK_TOLERANCE * singular.max(initial=1.0)
+    root: Floats = (right[seen] / singular[seen, np.newaxis] / lengths).T
     return RowCovariance(root, right[~seen] / lengths, lengths)
 
 
@@ -233,11 +235,11 @@ def share(after: ArrayLike, prior_standard: ArrayLike, *, use_prior: bool) -> Fl
     posterior = np.asarray(after, np.float64)
     before = np.asarray(prior_standard, np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = 1.0 - (posterior / before) ** 2
+        shares = 1.0 - (posterior / before) ** 2
     determined = np.isfinite(posterior).astype(np.float64)
     if not use_prior:
         return determined
-    return np.where(np.isfinite(before), np.clip(found, 0.0, 1.0), determined)
+    return np.where(np.isfinite(before), np.clip(shares, 0.0, 1.0), determined)
 
 
 def decomposed(matrix: Floats) -> tuple[Floats, Floats]:
@@ -247,9 +249,9 @@ def decomposed(matrix: Floats) -> tuple[Floats, Floats]:
         matrix = np.asarray(np.linalg.qr(matrix, mode="r"), np.float64)
     if matrix.shape[0] == 0 or n == 0:
         return np.zeros(n), np.eye(n)
-    _, found, right = np.linalg.svd(matrix, full_matrices=True)
+    _, values, right = np.linalg.svd(matrix, full_matrices=True)
     singular = np.zeros(n)
-    singular[: found.size] = found
+    singular[: values.size] = values
     return singular, right
 
 
@@ -259,10 +261,12 @@ def fitted(rows: Floats, held: Floats) -> float:
     `held` (k, n): rows of the prior. Without it the rank; with it the trace of the matrix that
     turns measurements into fitted ones.
     """
-    both = np.vstack([rows, held])
-    lengths = _lengths(both)
-    u, found, _ = np.linalg.svd(both / np.where(lengths > 0.0, lengths, 1.0), full_matrices=False)
-    seen = u[: len(rows), found > RANK_TOLERANCE * found.max(initial=0.0)]
+    equations = np.vstack([rows, held])
+    lengths = _lengths(equations)
+    u, singular, _ = np.linalg.svd(
+        equations / np.where(lengths > 0.0, lengths, 1.0), full_matrices=False
+    )
+    seen = u[: len(rows), singular > RANK_TOLERANCE * singular.max(initial=0.0)]
     return float(np.sum(seen**2))
 
 

@@ -77,34 +77,34 @@ class Tool:
     @classmethod
     def of(cls, effects: ArrayLike, components: Sequence[str], positions: ArrayLike | None) -> Tool:
         """Raises `ValueError` for shapes that do not fit."""
-        found = np.asarray(effects, np.float64)
-        if found.ndim != 3 or found.shape[1] != len(components):
+        array = np.asarray(effects, np.float64)
+        if array.ndim != 3 or array.shape[1] != len(components):
             raise ValueError(
-                f"the tool's sensitivity has shape {found.shape}, "
+                f"the tool's sensitivity has shape {array.shape}, "
                 f"expected (n_pose, {len(components)}, n_machine)"
             )
-        where = None if positions is None else np.asarray(positions, np.float64)
-        if where is not None and where.shape != (found.shape[0], 3):
+        points = None if positions is None else np.asarray(positions, np.float64)
+        if points is not None and points.shape != (array.shape[0], 3):
             raise ValueError(
-                f"the positions have shape {where.shape}, expected ({found.shape[0]}, 3)"
+                f"the positions have shape {points.shape}, expected ({array.shape[0]}, 3)"
             )
         length = 1.0
-        if where is not None and where.size:
-            length = _rms(np.linalg.norm(where - where.mean(axis=0), axis=1)) or 1.0
-        return cls(tuple(components), found, where, length)
+        if points is not None and points.size:
+            length = _rms(np.linalg.norm(points - points.mean(axis=0), axis=1)) or 1.0
+        return cls(tuple(components), array, points, length)
 
     @cached_property
     def moved(self) -> Flags:
         """(n,): unknowns that move the tool at all."""
-        found: Flags = np.any(self.effects != 0.0, axis=(0, 1))
-        return found
+        flags: Flags = np.any(self.effects != 0.0, axis=(0, 1))
+        return flags
 
     def uncertainty(self, root: Floats, open_directions: Floats) -> ToolUncertainty:
         """Of a covariance root root^T, `root` (n, r), without limit in `open_directions` (k, n)."""
         # As one product of matrices, which is many times faster than one for each pose.
         n_pose, n_component, n = self.effects.shape
-        moved = self.effects.reshape(-1, n) @ root
-        standard: Floats = np.sqrt(np.einsum("ij,ij->i", moved, moved))
+        of_root = self.effects.reshape(-1, n) @ root
+        standard: Floats = np.sqrt(np.einsum("ij,ij->i", of_root, of_root))
         standard = standard.reshape(n_pose, n_component)
         if len(open_directions):
             effect = np.abs(self.effects @ open_directions.T)
@@ -150,14 +150,14 @@ class Tool:
         if len(gauge) == 0:
             return self
         flat = self._flat
-        basis, found, _ = np.linalg.svd(flat @ gauge.T, full_matrices=False)
-        basis = basis[:, found > SLIGHT * found.max(initial=0.0)]
+        basis, singular, _ = np.linalg.svd(flat @ gauge.T, full_matrices=False)
+        basis = basis[:, singular > SLIGHT * singular.max(initial=0.0)]
         left = flat - basis @ (basis.T @ flat)
         effects = left.reshape(self.effects.shape) / self._weights()[:, np.newaxis]
         return Tool(self.components, effects, self.positions, self.length)
 
     def _weights(self) -> Floats:
-        return np.array([1.0 if each in POSITION else self.length for each in self.components])
+        return np.array([1.0 if name in POSITION else self.length for name in self.components])
 
     @cached_property
     def _flat(self) -> Floats:
@@ -187,11 +187,11 @@ class Tool:
                 fields[:, index, 3:] = turns[:, :, axis]
             else:
                 fields[:, index, 3 + ROTATION.index(component)] = self.length
-        basis, found, _ = np.linalg.svd(fields.reshape(-1, 6), full_matrices=False)
-        return np.asarray(basis[:, found > SLIGHT * found.max(initial=0.0)], np.float64)
+        basis, singular, _ = np.linalg.svd(fields.reshape(-1, 6), full_matrices=False)
+        return np.asarray(basis[:, singular > SLIGHT * singular.max(initial=0.0)], np.float64)
 
     def _size(self, values: Floats, components: str) -> Floats:
-        chosen = [index for index, each in enumerate(self.components) if each in components]
+        chosen = [index for index, name in enumerate(self.components) if name in components]
         size: Floats = np.sqrt((values[:, chosen] ** 2).sum(axis=1))
         return size
 

@@ -101,9 +101,9 @@ class Fit:
     @property
     def deviations(self) -> Floats:
         """(n,) standard uncertainties; infinite where an unknown is not determined."""
-        found: Floats = np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0))
+        deviations: Floats = np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0))
         open_ = (np.abs(self.null_space) > 1e-6).any(axis=0)
-        return np.where(open_, np.inf, found)
+        return np.where(open_, np.inf, deviations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,18 +133,18 @@ class Equations:
         nothing = norms <= ROUNDING * norms.max(initial=0.0)
         norms[nothing], equations[:, nothing] = 0.0, 0.0
         variances = np.diagonal(unknowns.prior_covariance)
-        known = np.isfinite(variances)
+        has_prior = np.isfinite(variances)
         scale = np.where(norms > 0.0, 1.0 / np.where(norms > 0.0, norms, 1.0), 1.0)
-        scale[known] = np.sqrt(variances[known])
+        scale[has_prior] = np.sqrt(variances[has_prior])
         count = unknowns.count
         scaled = equations * scale
         if left_out is not None and len(left_out):
             basis = np.linalg.qr((left_out / scale).T)[0].T
             scaled = scaled - scaled @ basis.T @ basis
         factor = np.linalg.qr(scaled, mode="r")
-        _, found, directions = np.linalg.svd(factor, full_matrices=True)
+        _, values, directions = np.linalg.svd(factor, full_matrices=True)
         singular = np.zeros(count)
-        singular[: found.size] = found
+        singular[: values.size] = values
         return cls(scale, singular, directions)
 
     @property
@@ -291,14 +291,14 @@ def place_instruments(
             residual = best[2].residual(best[3])[of == number]
             near = not best[0] and float(np.sum(residual**2)) <= FAR**2 * residual.size
             starts = [] if near else rotated_starts(machine, best[2].measurements, number)
-        for each in starts:
+        for start in starts:
             try:
-                found = _instruments(machine, each, unknowns.of_instruments)
+                placed = _instruments(machine, start, unknowns.of_instruments)
             except RequestError as failure:
                 refused = failure
                 continue
-            if best is None or found[:2] < best[:2]:
-                best = found
+            if best is None or placed[:2] < best[:2]:
+                best = placed
     if best is None:
         assert refused is not None
         raise refused
@@ -308,8 +308,8 @@ def place_instruments(
     if np.abs(values[turns]).max(initial=0.0) > TURNED:
         standing = rebase_frame(standing, alone, values)
         values = _instruments(machine, standing, alone)[3]
-    machine_too = np.concatenate([np.zeros(unknowns.n_machine), values])
-    return IdentificationProblem(machine, standing, unknowns), machine_too
+    of_all = np.concatenate([np.zeros(unknowns.n_machine), values])
+    return IdentificationProblem(machine, standing, unknowns), of_all
 
 
 def _instruments(
@@ -343,8 +343,8 @@ def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bo
     if lacking <= 0:
         return
     rows = max(measurements.n_row, 1)
-    each = max(measurements.n_observation // rows, 1)
-    more = -(-lacking // each)
+    readings_a_row = max(measurements.n_observation // rows, 1)
+    more = -(-lacking // readings_a_row)
     raise RequestError(
         Refused(
             "too-few-measurements",

@@ -48,11 +48,15 @@ def with_frames_found(machine: Machine, measurements: Measurements) -> list[Meas
     Usually one; where distances leave two sides of a plane open, one for each. Frames that no
     closed form finds start where they are declared; see `rotated_starts`.
     """
-    found = [measurements]
+    alternatives = [measurements]
     for number, instrument in enumerate(measurements.instruments):
         starts = _closed_forms(machine, measurements, number) or [instrument.frame]
-        found = [_replaced(each, number, start) for each in found for start in starts]
-    return found
+        alternatives = [
+            _replaced(alternative, number, start)
+            for alternative in alternatives
+            for start in starts
+        ]
+    return alternatives
 
 
 def rotated_starts(machine: Machine, measurements: Measurements, number: int) -> list[Measurements]:
@@ -78,14 +82,14 @@ def rotated_starts(machine: Machine, measurements: Measurements, number: int) ->
 def rebase_frame(measurements: Measurements, unknowns: Unknowns, values: Floats) -> Measurements:
     """The measurements with unknown frames moved by the values (n,) that were found for them."""
     for number, own in unknowns.frames.items():
-        moved = np.array([0.0 if at is None else values[at] for at in own[:6]])
+        change = np.array([0.0 if at is None else values[at] for at in own[:6]])
         frame = measurements.instruments[number].frame
         # The kernel's rotation unknowns: the quaternion (1, turn / 2), not of length 1.
-        quaternion = np.concatenate([[1.0], 0.5 * moved[_ROTATION]])
+        quaternion = np.concatenate([[1.0], 0.5 * change[_ROTATION]])
         turn = quaternion_to_matrix(quaternion / np.linalg.norm(quaternion))
         frame = dataclasses.replace(
             frame,
-            origin=tuple((np.array(frame.origin) + moved[_ORIGIN]).tolist()),
+            origin=tuple((np.array(frame.origin) + change[_ORIGIN]).tolist()),
             rotation=matrix_to_quaternion(turn @ quaternion_to_matrix(frame.rotation)),
         )
         measurements = _replaced(measurements, number, frame)
@@ -95,21 +99,21 @@ def rebase_frame(measurements: Measurements, unknowns: Unknowns, values: Floats)
 def _turns(axes: np.ndarray) -> list[Floats]:
     """Rotations (3, 3) about the base axes of these numbers, none of them the identity."""
     if axes.size == 3:
-        found: list[Floats] = []
+        cubes: list[Floats] = []
         for order in itertools.permutations(range(3)):
             for signs in itertools.product((1.0, -1.0), repeat=3):
                 cube = np.eye(3)[list(order)] * np.array(signs)
                 if np.linalg.det(cube) > 0.0 and np.trace(cube) < 2.5:
-                    found.append(cube)
-        return found
+                    cubes.append(cube)
+        return cubes
     if axes.size == 1:
         eighths = np.arange(1, 8)[:, np.newaxis] * np.pi / 4.0
         return list(vector_to_matrix(eighths * np.eye(3)[axes[0]]))
     first, second = np.eye(3)[axes]
     return [
-        vector_to_matrix(angle * (np.cos(way) * first + np.sin(way) * second))
+        vector_to_matrix(angle * (np.cos(azimuth) * first + np.sin(azimuth) * second))
         for angle in (np.pi / 3.0, np.pi / 1.5, np.pi)
-        for way in np.arange(8) * np.pi / 4.0
+        for azimuth in np.arange(8) * np.pi / 4.0
     ]
 
 
@@ -179,15 +183,15 @@ def _with_origin(frame: Frame, rotation: Floats, points: Floats, read: dict[str,
 
 def _table(measurements: Measurements, number: int) -> dict[str, Floats]:
     """What an instrument read of the platform by row, NaN where it did not; by observable."""
-    mine = measurements.instrument[measurements.row] == number
+    own = measurements.instrument[measurements.row] == number
     rows = np.flatnonzero(measurements.instrument == number)
-    place = np.searchsorted(rows, measurements.row[mine])
+    place = np.searchsorted(rows, measurements.row[own])
     table: dict[str, Floats] = {}
-    for what in np.unique(measurements.observable[mine]).tolist():
-        chosen = measurements.observable[mine] == what
+    for code in np.unique(measurements.observable[own]).tolist():
+        of_code = measurements.observable[own] == code
         values = np.full(rows.size, np.nan)
-        values[place[chosen]] = measurements.value[mine][chosen]
-        table[OBSERVABLES[what]] = values
+        values[place[of_code]] = measurements.value[own][of_code]
+        table[OBSERVABLES[code]] = values
     return table
 
 
@@ -268,16 +272,16 @@ def _by_distances(frame: Frame, points: Floats, distances: Floats) -> list[Frame
 
 def _of_directions(machine: Machine, measurements: Measurements, number: int) -> Floats | None:
     """(3, 3) sum of the directions that nominal struts have times those that a camera read."""
-    mine = np.flatnonzero(measurements.instrument[measurements.row] == number)
+    own = np.flatnonzero(measurements.instrument[measurements.row] == number)
     centres = machine.kernel.joint_centres(measurements.joints, measurements.placements)
     along = centres[:, :, 1] - centres[:, :, 0]
     along /= np.linalg.norm(along, axis=2, keepdims=True)
     read: dict[tuple[int, int], dict[int, float]] = {}
-    for at in mine.tolist():
-        what = int(measurements.observable[at]) - _NUMBER["direction.x"]
-        key = int(measurements.row[at]), int(measurements.strut[at])
-        if 0 <= what < 3:
-            read.setdefault(key, {})[what] = float(measurements.value[at])
+    for observation in own.tolist():
+        axis = int(measurements.observable[observation]) - _NUMBER["direction.x"]
+        key = int(measurements.row[observation]), int(measurements.strut[observation])
+        if 0 <= axis < 3:
+            read.setdefault(key, {})[axis] = float(measurements.value[observation])
     product = np.zeros((3, 3))
     count = 0
     for (row, strut), seen in read.items():

@@ -100,4 +100,4 @@ class Property:
 def properties_of(machine: Machine) -> dict[str, Property]:
     """Every property that could be identified, by name."""
     every = (Property(kind, index) for kind in PROPERTIES for index in range(len(machine.struts)))
-    return {each.name(machine): each for each in every}
+    return {identifiable.name(machine): identifiable for identifiable in every}

@@ -95,7 +95,7 @@ def outliers(
     size[~kept] = fit.standardised
     if checked is not None:
         size[kept] = checked.standardised[kept]
-    found = []
+    odd = []
     for at in np.flatnonzero(np.abs(size) >= OUTLIER).tolist():
         row = int(data.row[at])
         what = OBSERVABLES[int(data.observable[at])]
@@ -103,5 +103,5 @@ def outliers(
             what = f"strut.{machine.struts[int(data.strut[at])].name}.{what}"
         name = data.instruments[int(data.instrument[row])].name
         line, sigmas = int(data.lines[row]), float(size[at])
-        found.append(Outlier(row, line, name, what, sigmas, bool(kept[at])))
-    return tuple(sorted(found, key=lambda each: -abs(each.sigmas)))
+        odd.append(Outlier(row, line, name, what, sigmas, bool(kept[at])))
+    return tuple(sorted(odd, key=lambda outlier: -abs(outlier.sigmas)))

@@ -145,30 +145,30 @@ def unknowns_of(
                 hint='--identify "strut.*.length"',
             )
         )
-    columns = sorted({column for each in wanted for column in each.effects})
+    columns = sorted({column for unknown in wanted for column in unknown.effects})
     place = {column: at for at, column in enumerate(columns)}
     instruments = _of_instruments(machine, measurements, len(wanted))
     count = len(wanted) + len(instruments.names)
     effects = np.zeros((len(columns), count))
     covariance = np.diag(np.full(count, np.inf))
-    for number, each in enumerate(wanted):
-        for column, effect in each.effects.items():
+    for number, unknown in enumerate(wanted):
+        for column, effect in unknown.effects.items():
             effects[place[column], number] = effect
-        covariance[number, number] = each.sigma**2
+        covariance[number, number] = unknown.sigma**2
     if bands is not None and bands.correlation is not None:
         _correlate(covariance, wanted, bands)
     extra = len(instruments.names)
     return Unknowns(
-        tuple(each.name for each in wanted) + tuple(instruments.names),
-        tuple(each.unit for each in wanted) + tuple(instruments.units),
-        tuple(each.label for each in wanted) + tuple(instruments.labels),
+        tuple(unknown.name for unknown in wanted) + tuple(instruments.names),
+        tuple(unknown.unit for unknown in wanted) + tuple(instruments.units),
+        tuple(unknown.label for unknown in wanted) + tuple(instruments.labels),
         len(wanted),
         np.array(columns, np.intp),
         effects,
-        np.array([each.mean for each in wanted] + [0.0] * extra),
+        np.array([unknown.mean for unknown in wanted] + [0.0] * extra),
         covariance,
-        np.array([each.half for each in wanted] + [np.inf] * extra),
-        {at: each.property for at, each in enumerate(wanted) if each.property is not None},
+        np.array([unknown.half for unknown in wanted] + [np.inf] * extra),
+        {at: unknown.property for at, unknown in enumerate(wanted) if unknown.property is not None},
         instruments.frames,
         instruments.biases,
         machine.shown,
@@ -186,13 +186,13 @@ def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
     """One unknown for each variable that has a band, in the order of the parameters."""
     if bands is None:
         return []
-    found = []
-    swing, shift = bands.signed_half[0], bands.shift[0]
+    unknowns = []
+    half_width, shift = bands.signed_half[0], bands.shift[0]
     for variable in dict.fromkeys(bands.variables[bands.banded].tolist()):
         members = np.flatnonzero(bands.variables == variable)
-        leader = members[np.argmax(np.abs(swing[members]))]
-        half = float(abs(swing[leader]))
-        effects = swing[members] / half
+        leader = members[np.argmax(np.abs(half_width[members]))]
+        half = float(abs(half_width[leader]))
+        effects = half_width[members] / half
         group = bands.group_names.get(int(bands.groups[leader]))
         mean = float(shift[leader] * np.sign(effects[members == leader][0]))
         if np.abs(shift[members] - effects * mean).max() > SCREEN * half:
@@ -208,7 +208,7 @@ def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
             )
         parameter = int(bands.parameters[leader])
         name = machine.parameters[parameter] if group is None else group
-        found.append(
+        unknowns.append(
             _Wanted(
                 name,
                 machine.units[parameter],
@@ -220,7 +220,7 @@ def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
                 int(variable),
             )
         )
-    return found
+    return unknowns
 
 
 def _wanted(
@@ -233,14 +233,16 @@ def _wanted(
         machine.parameters, machine.units, range(len(machine.parameters)), strict=True
     ):
         known[name] = _Wanted(name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf)
-    for name, each in properties_of(machine).items():
-        unit, label = each.unit, each.label(machine)
-        known[name] = _Wanted(name, unit, label, {}, 0.0, np.inf, np.inf, None, each)
+    for name, identifiable in properties_of(machine).items():
+        unit, label = identifiable.unit, identifiable.label(machine)
+        known[name] = _Wanted(name, unit, label, {}, 0.0, np.inf, np.inf, None, identifiable)
     # A member of a group stands for its group: one cannot move without the other.
     of_group = {
-        machine.parameters[column]: each.name for each in tolerated for column in each.effects
+        machine.parameters[column]: unknown.name
+        for unknown in tolerated
+        for column in unknown.effects
     }
-    known |= {each.name: each for each in tolerated}
+    known |= {unknown.name: unknown for unknown in tolerated}
     chosen: dict[str, _Wanted] = {}
     problems = []
     for text in identify:
@@ -272,8 +274,10 @@ def _wanted(
                 problems.append(_no_stiffness(machine, name))
     if problems:
         raise RequestError(*problems)
-    order = {name: at for at, name in enumerate([each.name for each in tolerated] + list(known))}
-    return sorted(chosen.values(), key=lambda each: order[each.name])
+    order = {
+        name: at for at, name in enumerate([unknown.name for unknown in tolerated] + list(known))
+    }
+    return sorted(chosen.values(), key=lambda unknown: order[unknown.name])
 
 
 _DIMENSION_OF_UNIT = {"m": "length", "rad": "angle", "1/K": "expansion", "1": "ratio"}
@@ -315,11 +319,11 @@ def _no_stiffness(machine: Machine, name: str) -> Problem:
 
 def _correlate(covariance: Floats, wanted: Sequence[_Wanted], bands: Deviation) -> None:
     assert bands.correlation is not None
-    for i, one in enumerate(wanted):
-        for j, other in enumerate(wanted):
-            if i != j and one.variable is not None and other.variable is not None:
-                coefficient = bands.correlation[one.variable, other.variable]
-                covariance[i, j] = coefficient * one.sigma * other.sigma
+    for i, first in enumerate(wanted):
+        for j, second in enumerate(wanted):
+            if i != j and first.variable is not None and second.variable is not None:
+                coefficient = bands.correlation[first.variable, second.variable]
+                covariance[i, j] = coefficient * first.sigma * second.sigma
 
 
 @dataclass
@@ -333,45 +337,47 @@ class _OfInstruments:
 
 def _of_instruments(machine: Machine, measurements: Measurements, first: int) -> _OfInstruments:
     """Unknowns of the instruments that measured anything, numbered from `first` on."""
-    found = _OfInstruments([], [], [], {}, {})
+    unknowns = _OfInstruments([], [], [], {}, {})
 
-    def take(name: str, unit: str, label: str) -> int:
-        found.names.append(name)
-        found.units.append(unit)
-        found.labels.append(label)
-        return first + len(found.names) - 1
+    def add(name: str, unit: str, label: str) -> int:
+        unknowns.names.append(name)
+        unknowns.units.append(unit)
+        unknowns.labels.append(label)
+        return first + len(unknowns.names) - 1
 
     by = measurements.instrument[measurements.row]
     for number, instrument in enumerate(measurements.instruments):
-        mine = by == number
-        if not mine.any():
+        own = by == number
+        if not own.any():
             continue
-        found.frames[number] = _frame_and_target(instrument, take)
+        unknowns.frames[number] = _frame_and_target(instrument, add)
         if not instrument.bias_unknown:
             continue
-        read = zip(measurements.observable[mine], measurements.strut[mine], strict=True)
-        for observable, strut in sorted({(int(one), int(other)) for one, other in read}):
+        read = zip(measurements.observable[own], measurements.strut[own], strict=True)
+        for observable, strut in sorted(
+            {(int(code), int(strut_number)) for code, strut_number in read}
+        ):
             what = OBSERVABLES[observable]
             part = f"strut.{machine.struts[strut].name}." if what in OF_STRUTS else ""
-            found.biases[number, observable, strut] = take(
+            unknowns.biases[number, observable, strut] = add(
                 f"{instrument.name}.bias.{part}{what}",
                 UNITS[observable],
                 f"constant that {instrument.name} adds to {part}{what}",
             )
-    return found
+    return unknowns
 
 
-def _frame_and_target(instrument: Instrument, take: object) -> tuple[int | None, ...]:
-    assert callable(take)
+def _frame_and_target(instrument: Instrument, add: object) -> tuple[int | None, ...]:
+    assert callable(add)
     own: list[int | None] = []
     named = [(f"frame.{axis}", "m", f"origin {axis}") for axis in "xyz"]
     named += [(f"frame.r{axis}", "rad", f"rotation about {axis}") for axis in "xyz"]
     for (key, unit, what), unknown in zip(named, instrument.frame.unknown, strict=True):
         name, label = f"{instrument.name}.{key}", f"frame of {instrument.name}, {what}"
-        own.append(take(name, unit, label) if unknown else None)
+        own.append(add(name, unit, label) if unknown else None)
     for axis in "xyz":
         name, label = f"{instrument.name}.target.{axis}", f"target of {instrument.name}, {axis}"
-        own.append(take(name, "m", label) if instrument.target_unknown else None)
+        own.append(add(name, "m", label) if instrument.target_unknown else None)
     return tuple(own)
 
 

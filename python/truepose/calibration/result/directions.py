@@ -36,22 +36,22 @@ class PartDirection:
 def directions(machine: Machine) -> Iterator[PartDirection]:
     """All directions of a machine whose deviations are parameters, in the parameters' order."""
     parts: tuple[Drive | Guide, ...] = (*machine.drives, *machine.guides)
-    rows = {each.part: each for each in parts}
+    rows = {part.part: part for part in parts}
     names = machine.parameters
     for column, name in enumerate(names):
         if not name.endswith(_FIRST):
             continue
         path, _, key = name.removesuffix(_FIRST).rpartition(".")
         table, _, part = path.partition(".")
-        other = names.index(name.removesuffix(_FIRST) + _SECOND)
+        second = names.index(name.removesuffix(_FIRST) + _SECOND)
         axis = np.array(rows[path].fields[key], np.float64)
-        yield PartDirection(table, part, key, (column, other), axis / np.linalg.norm(axis))
+        yield PartDirection(table, part, key, (column, second), axis / np.linalg.norm(axis))
 
 
 def tilted(axis: ArrayLike, deviation: ArrayLike) -> Floats:
     """(3,) the unit vector at the deviations (2,) `u`, `v` from the unit `axis` (3,)."""
-    moved: Floats = np.asarray(axis, np.float64) + np.asarray(deviation) @ tangents(axis)
-    return moved / np.linalg.norm(moved)
+    along: Floats = np.asarray(axis, np.float64) + np.asarray(deviation) @ tangents(axis)
+    return along / np.linalg.norm(along)
 
 
 def deviation_of(axis: ArrayLike, direction: ArrayLike) -> Floats:
@@ -60,8 +60,8 @@ def deviation_of(axis: ArrayLike, direction: ArrayLike) -> Floats:
     The two are at less than a right angle.
     """
     unit, along = np.asarray(axis, np.float64), np.asarray(direction, np.float64)
-    found: Floats = (tangents(unit) @ along) / (unit @ along)
-    return found
+    ratios: Floats = (tangents(unit) @ along) / (unit @ along)
+    return ratios
 
 
 def turned(axis: ArrayLike, deviation: ArrayLike, new_axis: ArrayLike) -> Floats:
@@ -73,6 +73,6 @@ def turned(axis: ArrayLike, deviation: ArrayLike, new_axis: ArrayLike) -> Floats
     along = np.asarray(axis, np.float64) + np.asarray(deviation) @ across
     length = np.linalg.norm(along)
     along /= length
-    moved = (across - np.outer(across @ along, along)) / length
+    slopes = (across - np.outer(across @ along, along)) / length
     seen = deviation_of(unit, along)
-    return np.asarray((tangents(unit) - np.outer(seen, unit)) @ moved.T / (unit @ along))
+    return np.asarray((tangents(unit) - np.outer(seen, unit)) @ slopes.T / (unit @ along))

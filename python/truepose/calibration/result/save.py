@@ -38,14 +38,14 @@ def save(
 
     Raises `RequestError` (calibration-refused, and what `write_calibrated` raises).
     """
-    said = verdict_of(calibration)
+    verdict = verdict_of(calibration)
     if not (calibration.accepted or force):
         raise RequestError(
             Problem(
                 "calibration-refused",
                 "this calibration must not be used as it is",
                 str(path),
-                found=said,
+                found=verdict,
                 expected="a calibration that the gate accepts",
                 hint="force=True writes it with the warning inside",
             )
@@ -75,7 +75,7 @@ def save(
         coverage=coverage,
         as_shifts=as_shifts,
         warnings=(
-            *(() if calibration.accepted else (said,)),
+            *(() if calibration.accepted else (verdict,)),
             *_of_properties(calibration, covariance),
         ),
     )
@@ -117,7 +117,7 @@ def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
     root, none = prior_root(covariance), np.zeros((0, unknowns.n_machine))
     components = calibration.gate.after.components
     whole, known = (
-        Tool.of(each, components, None).uncertainty(root, none) for each in (effects, stated)
+        Tool.of(slopes, components, None).uncertainty(root, none) for slopes in (effects, stated)
     )
     names = sentences.listed(
         sentences.collapsed(

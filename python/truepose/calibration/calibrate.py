@@ -134,7 +134,7 @@ def calibrate(
         raise _with_suspicions(failure, suspected) from failure
     checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
-    gate = _judged(machine, fitted, checked, effects, placements[usable, :3], margin)
+    gate = _assessed(machine, fitted, checked, effects, placements[usable, :3], margin)
     rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
     gate = with_considered(gate, rest, (machine.accuracy.target, machine.accuracy.angle_target))
     return Calibration(
@@ -192,7 +192,7 @@ def _with_suspicions(failure: RequestError, suspected: Sequence[Suspicion]) -> R
     return RequestError(*(replace(problem, hint=sentences) for problem in failure.problems))
 
 
-def _judged(
+def _assessed(
     machine: Machine,
     fitted: Fit,
     checked: Validation | None,

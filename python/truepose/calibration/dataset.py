@@ -121,9 +121,9 @@ def dataset_of(calibration: Calibration) -> xr.Dataset:
     """Everything that a calibration found, SI; `docs/results.md` has the schema."""
     machine = calibration.machine
     values = {
-        **_of_unknowns(calibration),
-        **_of_observations(calibration),
-        **_of_tool(calibration),
+        **_unknown_values(calibration),
+        **_observation_values(calibration),
+        **_tool_values(calibration),
     }
     coords = {
         **_unknown_coords(calibration),
@@ -175,7 +175,7 @@ def answer_of(calibration: Calibration) -> str:
 # --- values --------------------------------------------------------------------------------------
 
 
-def _of_unknowns(calibration: Calibration) -> dict[str, Floats]:
+def _unknown_values(calibration: Calibration) -> dict[str, Floats]:
     fit, gate = calibration.fit, calibration.gate
     unknowns = fit.unknowns
     n = unknowns.n_machine
@@ -257,7 +257,7 @@ def _nominal(calibration: Calibration) -> Floats:
     return nominal
 
 
-def _of_observations(calibration: Calibration) -> dict[str, Floats]:
+def _observation_values(calibration: Calibration) -> dict[str, Floats]:
     fit, data = calibration.fit, calibration.measurements
     fitted = _fitted(data)
     sigma = data.uncertainty
@@ -290,7 +290,7 @@ def _fitted(data: Measurements) -> Flags:
     return flags
 
 
-def _of_tool(calibration: Calibration) -> dict[str, Floats]:
+def _tool_values(calibration: Calibration) -> dict[str, Floats]:
     gate = calibration.gate
     usable = calibration.usable
     values: dict[str, Floats] = {}

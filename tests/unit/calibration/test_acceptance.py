@@ -16,7 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from oracle_cases import case
 from truepose.calibration.acceptance import Candidate, Gate, HeldOut, assess
-from truepose.calibration.acceptance.observability import observability, of_machine, row_covariance
+from truepose.calibration.acceptance.observability import (
+    observability,
+    project_out_instruments,
+    row_covariance,
+)
 from truepose.calibration.identification.unknowns import Unknowns
 
 Floats = NDArray[np.float64]
@@ -142,11 +146,13 @@ def warned(gate: Gate) -> set[str]:
 def test_figures_of_the_case(kind: str, key: str) -> None:
     expected = P02["outputs"][key]
     in_file_units = rows_of(kind) * 1e3 / TO_FILE
-    rows = of_machine(in_file_units, 9)
+    rows = project_out_instruments(in_file_units, 9)
     found = observability(rows, len(rows.matrix), np.ones(9))
     assert found.singular == pytest.approx(expected["singular_values"], abs=6e-7)
     assert found.condition == pytest.approx(expected["condition_number"], abs=0.06)
-    standard = row_covariance(of_machine(in_file_units / P02["inputs"]["noise_mm"], 9)).standard()
+    standard = row_covariance(
+        project_out_instruments(in_file_units / P02["inputs"]["noise_mm"], 9)
+    ).standard()
     assert standard == pytest.approx(list(expected["standard_uncertainty"].values()), abs=6e-6)
     # And in SI, from the gate.
     gate = verdict(kind)

@@ -14,15 +14,15 @@ from truepose.calibration.acceptance.observability import (
     Observability,
     RowCovariance,
     WhitenedRows,
-    decomposed,
     fitted,
     normalised_rms,
     observability,
-    of_machine,
     prior,
     prior_root,
     prior_rows,
+    project_out_instruments,
     row_covariance,
+    singular_decomposition,
     stacked,
     weighted,
 )
@@ -172,7 +172,7 @@ class Case:
     @cached_property
     def observability(self) -> Observability:
         """Of the data as their uncertainties are stated."""
-        rows = of_machine(self.rows, self.n, self.sigma)
+        rows = project_out_instruments(self.rows, self.n, self.sigma)
         return observability(rows, int(np.count_nonzero(self.weights > 0.0)), self.sigma)
 
     @cached_property
@@ -188,7 +188,7 @@ class Case:
             of_instruments = self.prior_rows.copy()  # what is known of the instruments beforehand
             of_instruments = of_instruments[np.any(of_instruments[:, self.n :] != 0.0, axis=1)]
             parts.append(of_instruments)
-        return of_machine(np.vstack(parts), self.n, self.sigma)
+        return project_out_instruments(np.vstack(parts), self.n, self.sigma)
 
     def outcome(self, extra: Floats | None = None) -> Outcome:
         """With `extra` (k, n) whitened rows, or as it is."""
@@ -222,12 +222,12 @@ class Case:
             for kind, group in groups
             for direction in group
         )
-        not_seen = sentences.cannot_tell(unseen, self.labels, self.by)
+        not_seen = sentences.undetermined(unseen, self.labels, self.by)
         within = seen.scaling == "prior"
-        hardly = sentences.cannot_tell(weak, self.labels, self.by, within_tolerances=within)
+        hardly = sentences.undetermined(weak, self.labels, self.by, within_tolerances=within)
         reasons = []
         if len(moving):
-            text = "; ".join(sentences.cannot_tell(_sparse(moving / unit), self.labels, self.by))
+            text = "; ".join(sentences.undetermined(_sparse(moving / unit), self.labels, self.by))
             reasons.append(Reason("not-determined", text))
         if hardly and not self.use_prior:
             reasons.append(Reason("not-told-apart", "; ".join(hardly)))
@@ -247,7 +247,7 @@ class Case:
 
         Those that move the tool, scaled and sparse; and standard uncertainties along the others.
         """
-        with_noise, right = decomposed(rows.matrix * seen.unit)
+        with_noise, right = singular_decomposition(rows.matrix * seen.unit)
         lengths = 1.0 / seen.unit
         kept = range(seen.rank)
         if seen.scaling == "prior":
@@ -310,7 +310,7 @@ class Case:
         compared = [
             (name, unit, size, was)
             for (name, unit, size, _), was in zip(
-                both(after, None), self.reference(before), strict=True
+                at_worst_pose(after, None), self.reference(before), strict=True
             )
             if was is not None and (was > 0.0 or size > 0.0)
         ]
@@ -327,11 +327,11 @@ class Case:
         ]
         texts[0] = texts[0].replace(" by ", " would be uncertain by ", 1)
         text = f"at the worst pose of the workspace {', and '.join(texts)}"
-        if self.is_within(before):
+        if self.keeps_target(before):
             text += "; but what is asked of the tool is kept without calibration"
         return [Reason("no-gain", text)]
 
-    def is_within(self, before: ToolUncertainty | None) -> bool:
+    def keeps_target(self, before: ToolUncertainty | None) -> bool:
         """Whether the machine as filed keeps what is asked."""
         pairs = [
             (asked, was)
@@ -340,17 +340,17 @@ class Case:
         ]
         return bool(pairs) and all(was is not None and was <= asked for asked, was in pairs)
 
-    def is_enough(self, outcome: Outcome) -> bool:
+    def lacks_only_gain(self, outcome: Outcome) -> bool:
         """Whether the only thing missing is a gain that nobody asked for."""
         only = {reason.code for reason in outcome.reasons} == {"no-gain"}
-        return only and self.is_within(outcome.before)
+        return only and self.keeps_target(outcome.before)
 
 
 def _sparse(directions: Floats) -> Floats:
     return sentences.sparse(directions) if len(directions) else directions
 
 
-def both(
+def at_worst_pose(
     after: ToolUncertainty, before: ToolUncertainty | None
 ) -> list[tuple[str, str, float, float | None]]:
     """(name, unit, after, before) of position and rotation at the worst pose."""

@@ -17,9 +17,21 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.assessment import Case, Direction, Outcome, Reason, both
+from truepose.calibration.acceptance.assessment import (
+    Case,
+    Direction,
+    Outcome,
+    Reason,
+    at_worst_pose,
+)
 from truepose.calibration.acceptance.observability import Observability, share
-from truepose.calibration.acceptance.remedy import CALIPER, Candidate, Remedy, directly, remedy_of
+from truepose.calibration.acceptance.remedy import (
+    CALIPER,
+    Candidate,
+    Remedy,
+    cheapest_remedy,
+    direct_candidates,
+)
 from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
 from truepose.files.shown_units import METRIC, ShownUnits
 
@@ -118,7 +130,7 @@ class Gate:
 
     def _gain(self) -> str:
         texts = []
-        for name, unit, after, before in both(self.after, self.before):
+        for name, unit, after, before in at_worst_pose(self.after, self.before):
             if after == 0.0 and not before:
                 continue
             known = sentences.quantity(after, unit, units=self.shown)
@@ -193,13 +205,13 @@ def assess(
     )
     outcome = case.outcome()
     held = tuple(held_out)
-    reasons = [*outcome.reasons, *_of_held_out(held, margin, unknowns.shown)]
-    reasons += _of_values(case, outcome)
-    reasons += _of_noise(case)
+    reasons = [*outcome.reasons, *_not_confirmed(held, margin, unknowns.shown)]
+    reasons += _absurd_values(case, outcome)
+    reasons += _contradicts_noise(case)
     warnings = _warnings(case, outcome)
     remedy = None
-    if outcome.reasons and not case.is_enough(outcome):
-        remedy = remedy_of(case, [*candidates, *directly(unknowns, direct)])
+    if outcome.reasons and not case.lacks_only_gain(outcome):
+        remedy = cheapest_remedy(case, [*candidates, *direct_candidates(unknowns, direct)])
     first = np.asarray(before, np.float64)
     return Gate(
         accepted=not reasons,
@@ -230,7 +242,7 @@ def assess(
     )
 
 
-def _of_held_out(held: Iterable[HeldOut], margin: float, units: ShownUnits) -> list[Reason]:
+def _not_confirmed(held: Iterable[HeldOut], margin: float, units: ShownUnits) -> list[Reason]:
     """(c): poses that were not fitted do not confirm what the fit claims."""
     reasons = []
     for check in held:
@@ -254,7 +266,7 @@ def _of_held_out(held: Iterable[HeldOut], margin: float, units: ShownUnits) -> l
     return reasons
 
 
-def _of_values(case: Case, outcome: Outcome) -> list[Reason]:
+def _absurd_values(case: Case, outcome: Outcome) -> list[Reason]:
     """(d): values far outside of what was made."""
     n = case.n
     off = case.values[:n] - np.asarray(case.unknowns.prior_mean, np.float64)[:n]
@@ -267,14 +279,14 @@ def _of_values(case: Case, outcome: Outcome) -> list[Reason]:
     at = [int(i) for i in np.argsort(-ratio, kind="stable") if beyond[i]]
     if not at:
         return []
-    text = _absurd(case, at[0], float(off[at[0]]))
+    text = _absurd_sentence(case, at[0], float(off[at[0]]))
     more = sentences.collapsed([case.labels[i] for i in sorted(at[1:])], case.labels)
     if more:
         text += f"; {sentences.listed(more)} would be off likewise"
     return [Reason("absurd-value", text)]
 
 
-def _absurd(case: Case, at: int, off: float) -> str:
+def _absurd_sentence(case: Case, at: int, off: float) -> str:
     unit, units = case.unknowns.units[at], case.unknowns.shown
     nominal, half = float(case.nominal[at]), float(case.half[at])
     would = ""
@@ -288,7 +300,7 @@ def _absurd(case: Case, at: int, off: float) -> str:
     )
 
 
-def _of_noise(case: Case) -> list[Reason]:
+def _contradicts_noise(case: Case) -> list[Reason]:
     if not case.rms > CONTRADICTED:
         return []
     return [
@@ -334,11 +346,11 @@ def _warnings(case: Case, outcome: Outcome) -> list[Reason]:
             "nothing shows that the machine becomes better"
         )
         warnings.append(Reason("nothing-to-compare", text))
-    if case.is_within(outcome.before) and not case.is_enough(outcome):
+    if case.keeps_target(outcome.before) and not case.lacks_only_gain(outcome):
         text = "what is asked of the tool is kept without calibration: it is not needed"
         warnings.append(Reason("not-needed", text))
     if not outcome.reasons:
-        pairs = zip(both(outcome.after, None), case.reference(outcome.before), strict=True)
+        pairs = zip(at_worst_pose(outcome.after, None), case.reference(outcome.before), strict=True)
         units = case.unknowns.shown
         for (name, unit, size, _), was in pairs:
             if was is not None and was > 0.0 and size > case.margin * was:

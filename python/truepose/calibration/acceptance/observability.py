@@ -107,7 +107,9 @@ def weighted(jacobian: ArrayLike, weights: ArrayLike | None = None) -> Floats:
     return np.sqrt(np.asarray(weights, np.float64))[:, np.newaxis] * rows
 
 
-def of_machine(rows: ArrayLike, n_machine: int, unit: Floats | None = None) -> WhitenedRows:
+def project_out_instruments(
+    rows: ArrayLike, n_machine: int, unit: Floats | None = None
+) -> WhitenedRows:
     """Rows (m, n) of all unknowns with those after the first `n_machine` projected out.
 
     What is left of the machine's columns is what no change of the instruments' unknowns can
@@ -187,7 +189,7 @@ def row_covariance(rows: WhitenedRows) -> RowCovariance:
     of_seen = rows.lengths[rows.lengths > 0.0]
     usual = float(np.median(of_seen)) if of_seen.size else 1.0
     lengths = np.where(rows.lengths > 0.0, rows.lengths, usual)
-    singular, right = decomposed(rows.matrix / lengths)
+    singular, right = singular_decomposition(rows.matrix / lengths)
     # Where instruments imitate everything, what is left is rounding of columns of length one.
     seen = singular > RANK_TOLERANCE * singular.max(initial=1.0)
     root: Floats = (right[seen] / singular[seen, np.newaxis] / lengths).T
@@ -214,7 +216,7 @@ def observability(
     inverse = 1.0 / np.where(rows.lengths > 0.0, rows.lengths, 1.0)
     rank = row_covariance(rows).rank
     unit = standard if by_prior else inverse
-    singular, right = decomposed(rows.matrix * unit)
+    singular, right = singular_decomposition(rows.matrix * unit)
     singular[rank:] = 0.0
     seen = singular[:rank]
     o1 = o2 = o3 = o4 = o5 = 0.0
@@ -242,7 +244,7 @@ def share(after: ArrayLike, prior_standard: ArrayLike, *, use_prior: bool) -> Fl
     return np.where(np.isfinite(before), np.clip(shares, 0.0, 1.0), determined)
 
 
-def decomposed(matrix: Floats) -> tuple[Floats, Floats]:
+def singular_decomposition(matrix: Floats) -> tuple[Floats, Floats]:
     """Singular values (n,), zeros added where there are fewer rows, and right vectors (n, n)."""
     n = matrix.shape[1]
     if matrix.shape[0] > n:

@@ -60,7 +60,7 @@ class Remedy:
         return bool(self.names)
 
 
-def directly(unknowns: Unknowns, uncertainty: Mapping[str, float]) -> list[Candidate]:
+def direct_candidates(unknowns: Unknowns, uncertainty: Mapping[str, float]) -> list[Candidate]:
     """Measuring each unknown of the machine by itself, and each family as a whole.
 
     `uncertainty`: standard, by unit; unknowns in other units cannot be measured by themselves.
@@ -98,7 +98,7 @@ def directly(unknowns: Unknowns, uncertainty: Mapping[str, float]) -> list[Candi
     return candidates
 
 
-def remedy_of(case: Case, candidates: Sequence[Candidate]) -> Remedy:
+def cheapest_remedy(case: Case, candidates: Sequence[Candidate]) -> Remedy:
     """The cheapest candidate with which nothing is left open, else the cheapest pair.
 
     Among equally cheap ones it is the one that leaves the tool least uncertain.

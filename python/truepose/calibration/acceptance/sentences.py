@@ -307,7 +307,7 @@ def _family_name(label: str, every: Sequence[str]) -> str:
     return head if len(all_members) > 1 else label
 
 
-def cannot_tell(
+def undetermined(
     directions: ArrayLike,
     labels: Sequence[str],
     by: str,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.acceptance.observability import RowCovariance, decomposed
+from truepose.calibration.acceptance.observability import RowCovariance, singular_decomposition
 
 POSITION = "xyz"
 ROTATION = "abc"
@@ -48,7 +48,7 @@ class ToolUncertainty:
 
 
 @dataclass(frozen=True, eq=False)
-class Sorted:
+class SortedDirections:
     """Directions (k, n) that rows do not see, by what they do at the tool.
 
     `moving`: the tool moves. `gauge`: it moves as a rigid body over the whole workspace, together
@@ -129,21 +129,21 @@ class Tool:
         effect = float(np.linalg.norm(self._flat @ direction))
         return effect > SLIGHT * self._largest(lengths) * float(np.linalg.norm(direction * lengths))
 
-    def sort(self, open_directions: RowCovariance, *, with_gauge: bool) -> Sorted:
+    def sort(self, open_directions: RowCovariance, *, with_gauge: bool) -> SortedDirections:
         """The null directions by what they do; `with_gauge`: there are unknowns of instruments."""
         null = open_directions.null
         flat = self._flat
         none = np.zeros((0, flat.shape[1]))
         if len(null) == 0:
-            return Sorted(none, none, none)
+            return SortedDirections(none, none, none)
         slight = SLIGHT * self._largest(open_directions.lengths)
         harmless, rest = _split(flat @ null.T, null, slight)
         if not with_gauge or self.positions is None or len(rest) == 0:
-            return Sorted(rest, none, harmless)
+            return SortedDirections(rest, none, harmless)
         fields = self._rigid_fields()
         effect = flat @ rest.T
         gauge, moving = _split(effect - fields @ (fields.T @ effect), rest, slight)
-        return Sorted(moving, gauge, harmless)
+        return SortedDirections(moving, gauge, harmless)
 
     def relative(self, gauge: Floats) -> Tool:
         """The same without what the `gauge` directions (k, n) do."""
@@ -198,7 +198,7 @@ class Tool:
 
 def _split(effect: Floats, directions: Floats, slight: float) -> tuple[Floats, Floats]:
     """`directions` (k, n) as those whose `effect` (N, k) is slight, and the others."""
-    sizes, right = decomposed(effect)
+    sizes, right = singular_decomposition(effect)
     turned = right @ directions
     return turned[sizes <= slight], turned[sizes > slight]
 

@@ -21,9 +21,13 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.assessment import ROUNDING, Reason, both
+from truepose.calibration.acceptance.assessment import ROUNDING, Reason, at_worst_pose
 from truepose.calibration.acceptance.decision import Gate
-from truepose.calibration.acceptance.observability import of_machine, prior_root, row_covariance
+from truepose.calibration.acceptance.observability import (
+    prior_root,
+    project_out_instruments,
+    row_covariance,
+)
 from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
 from truepose.calibration.identification.fit import Fit, whitened
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
@@ -72,7 +76,7 @@ def consider_covariance(
     `identify`: as it was asked; `joints`, `placements`: of the poses at which the tool counts, all
     of them within reach of the calibrated machine.
     """
-    every = _with_the_rest(machine, fitted, identify)
+    every = _with_unidentified(machine, fitted, identify)
     if every is None:
         return None
     count = every.n_machine
@@ -89,7 +93,9 @@ def consider_covariance(
     sigma: Floats = np.sqrt(np.diagonal(prior))
     relative = False
     if every.count > count:
-        gauge = tool.sort(row_covariance(of_machine(rows, count, sigma)), with_gauge=True).gauge
+        gauge = tool.sort(
+            row_covariance(project_out_instruments(rows, count, sigma)), with_gauge=True
+        ).gauge
         relative, tool = len(gauge) > 0, tool.relative(gauge)
     none = np.zeros((0, count))
     before = None
@@ -112,7 +118,7 @@ def consider_covariance(
     )
 
 
-def _with_the_rest(machine: Machine, fitted: Fit, identify: Sequence[str]) -> Unknowns | None:
+def _with_unidentified(machine: Machine, fitted: Fit, identify: Sequence[str]) -> Unknowns | None:
     """What was identified, and all tolerances that were not; None where there are none."""
     if not identify:
         return None
@@ -178,7 +184,7 @@ def with_considered(
     if considered is None or any(reason.code == "not-determined" for reason in gate.reasons):
         return gate
     reasons = [reason for reason in gate.reasons if reason.code != "no-gain"]
-    within = _is_within(considered, target)
+    within = _keeps_target(considered, target)
     reasons += _no_gain(considered, gate.margin, within=within)
     codes = {reason.code for reason in reasons}
     warnings = [
@@ -190,7 +196,7 @@ def with_considered(
     if not codes & set(_OF_GAIN):
         warnings += _one_sided(considered, gate.margin)
     if "not-identified" not in codes:
-        warnings += _heed(considered)
+        warnings += _unidentified_warning(considered)
     remedy = gate.remedy if codes & (set(_OF_GAIN) - {"not-identified"}) else None
     return replace(
         gate,
@@ -208,7 +214,7 @@ def _pairs(considered: Considered) -> list[tuple[str, str, float, float]]:
     """(name, unit, after, before) of what had an uncertainty."""
     return [
         (name, unit, size, was)
-        for name, unit, size, was in both(considered.after, considered.before)
+        for name, unit, size, was in at_worst_pose(considered.after, considered.before)
         if was is not None and (was > 0.0 or size > 0.0)
     ]
 
@@ -239,7 +245,11 @@ def _no_gain(considered: Considered, margin: float, *, within: bool) -> list[Rea
 
 def _is_source(considered: Considered) -> bool:
     """Whether the tolerances that were not identified are what makes the tool uncertain."""
-    pairs = zip(both(considered.part, None), both(considered.after, None), strict=True)
+    pairs = zip(
+        at_worst_pose(considered.part, None),
+        at_worst_pose(considered.after, None),
+        strict=True,
+    )
     return any(size > 0.0 and part >= SOURCE * size for (*_, part, _), (*_, size, _) in pairs)
 
 
@@ -255,9 +265,15 @@ def _one_sided(considered: Considered, margin: float) -> list[Reason]:
     ]
 
 
-def _heed(considered: Considered) -> list[Reason]:
+def _unidentified_warning(considered: Considered) -> list[Reason]:
     """What the tolerances that were not identified add, where it is more than slight."""
-    pairs = list(zip(both(considered.after, None), both(considered.alone, None), strict=True))
+    pairs = list(
+        zip(
+            at_worst_pose(considered.after, None),
+            at_worst_pose(considered.alone, None),
+            strict=True,
+        )
+    )
     more = [
         f"{name} would be known to {sentences.quantity(less, unit, units=considered.shown)} in "
         f"place of {sentences.quantity(size, unit, units=considered.shown)}"
@@ -277,7 +293,7 @@ def _named(considered: Considered) -> str:
     return sentences.listed(sentences.collapsed(considered.labels, considered.every))
 
 
-def _is_within(considered: Considered, target: tuple[float | None, float | None]) -> bool:
+def _keeps_target(considered: Considered, target: tuple[float | None, float | None]) -> bool:
     """Whether the machine as filed keeps what is asked."""
     before = considered.before
     was = (None, None) if before is None else (before.position_max, before.rotation_max)

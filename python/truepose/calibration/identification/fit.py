@@ -18,9 +18,9 @@ from truepose.arrays import Floats
 from truepose.calibration.identification.frames import (
     FAR,
     TURNED,
+    frame_starts,
     rebase_frame,
     rotated_starts,
-    with_frames_found,
 )
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.robust import LOSS_ROUNDS, noise_of, weights_of
@@ -168,7 +168,7 @@ class Equations:
         covariance: Floats = rows.T @ rows
         return covariance
 
-    def holding(self) -> Floats:
+    def gauge_rows(self) -> Floats:
         """(k, n) rows that hold what is not determined."""
         firmness = HELD * float(self.singular.max(initial=1.0))
         rows: Floats = firmness * self.null_space / self.scale
@@ -217,7 +217,7 @@ def fit(
     evaluations, same = 0, True
     freed, left_out = np.empty((0, unknowns.count)), None
     for _ in range(LOSS_ROUNDS):
-        held = prior.with_rows(equations.holding())
+        held = prior.with_rows(equations.gauge_rows())
         solved = problem.solve(prior=held, weights=weights / scale**2, start=values)
         evaluations += solved.evaluations[0]
         # Readings that fit to the last digit leave nothing that a step could be judged by.
@@ -283,7 +283,7 @@ def place_instruments(
     of = measurements.instrument[measurements.row]
     for number in [None, *unknowns.frames]:
         if number is None:
-            starts = with_frames_found(machine, measurements)
+            starts = frame_starts(machine, measurements)
         elif best is None:
             starts = rotated_starts(machine, measurements, number)
         else:
@@ -293,7 +293,7 @@ def place_instruments(
             starts = [] if near else rotated_starts(machine, best[2].measurements, number)
         for start in starts:
             try:
-                placed = _instruments(machine, start, unknowns.of_instruments)
+                placed = _fit_instruments(machine, start, unknowns.of_instruments)
             except RequestError as failure:
                 refused = failure
                 continue
@@ -307,12 +307,12 @@ def place_instruments(
     turns = [at for own in alone.frames.values() for at in own[3:6] if at is not None]
     if np.abs(values[turns]).max(initial=0.0) > TURNED:
         standing = rebase_frame(standing, alone, values)
-        values = _instruments(machine, standing, alone)[3]
+        values = _fit_instruments(machine, standing, alone)[3]
     of_all = np.concatenate([np.zeros(unknowns.n_machine), values])
     return IdentificationProblem(machine, standing, unknowns), of_all
 
 
-def _instruments(
+def _fit_instruments(
     machine: Machine, measurements: Measurements, alone: Unknowns
 ) -> tuple[bool, float, IdentificationProblem, Floats]:
     """(whether unsettled, cost, problem, values) of the instruments' unknowns alone.
@@ -324,7 +324,7 @@ def _instruments(
     unsettled = False
     if alone.count:
         none = Prior.none(alone.count)
-        held = none.with_rows(Equations.of(whitened(problem, values), none, alone).holding())
+        held = none.with_rows(Equations.of(whitened(problem, values), none, alone).gauge_rows())
         solved = problem.solve(prior=held, start=values)
         values = solved.values[0]
         unsettled = solved.ending[0] not in SETTLED

@@ -42,7 +42,7 @@ _ALONG = 1.0 - 1e-6
 """Cosine from which two axes are one."""
 
 
-def with_frames_found(machine: Machine, measurements: Measurements) -> list[Measurements]:
+def frame_starts(machine: Machine, measurements: Measurements) -> list[Measurements]:
     """The measurements with unknown frames set to where the nominal machine says they are.
 
     Usually one; where distances leave two sides of a plane open, one for each. Frames that no
@@ -52,7 +52,7 @@ def with_frames_found(machine: Machine, measurements: Measurements) -> list[Meas
     for number, instrument in enumerate(measurements.instruments):
         starts = _closed_forms(machine, measurements, number) or [instrument.frame]
         alternatives = [
-            _replaced(alternative, number, start)
+            _with_frame(alternative, number, start)
             for alternative in alternatives
             for start in starts
         ]
@@ -70,12 +70,12 @@ def rotated_starts(machine: Machine, measurements: Measurements, number: int) ->
     axes = np.flatnonzero(frame.unknown[_ROTATION])
     if not axes.size or _closed_forms(machine, measurements, number):
         return []
-    points, _ = _looked_at(measurements, number)
+    points, _ = _target_points(measurements, number)
     read = _table(measurements, number)
     rotation = quaternion_to_matrix(frame.rotation)
     return [
-        _replaced(measurements, number, _with_origin(frame, turn @ rotation, points, read))
-        for turn in _turns(axes)
+        _with_frame(measurements, number, _with_origin(frame, turn @ rotation, points, read))
+        for turn in _start_rotations(axes)
     ]
 
 
@@ -92,11 +92,11 @@ def rebase_frame(measurements: Measurements, unknowns: Unknowns, values: Floats)
             origin=tuple((np.array(frame.origin) + change[_ORIGIN]).tolist()),
             rotation=matrix_to_quaternion(turn @ quaternion_to_matrix(frame.rotation)),
         )
-        measurements = _replaced(measurements, number, frame)
+        measurements = _with_frame(measurements, number, frame)
     return measurements
 
 
-def _turns(axes: np.ndarray) -> list[Floats]:
+def _start_rotations(axes: np.ndarray) -> list[Floats]:
     """Rotations (3, 3) about the base axes of these numbers, none of them the identity."""
     if axes.size == 3:
         cubes: list[Floats] = []
@@ -117,13 +117,13 @@ def _turns(axes: np.ndarray) -> list[Floats]:
     ]
 
 
-def _replaced(measurements: Measurements, number: int, frame: Frame) -> Measurements:
+def _with_frame(measurements: Measurements, number: int, frame: Frame) -> Measurements:
     instruments = list(measurements.instruments)
     instruments[number] = dataclasses.replace(instruments[number], frame=frame)
     return dataclasses.replace(measurements, instruments=tuple(instruments))
 
 
-def _looked_at(measurements: Measurements, number: int) -> tuple[Floats, Floats]:
+def _target_points(measurements: Measurements, number: int) -> tuple[Floats, Floats]:
     """Target points (n, 3) in the base frame and rotations (n, 3, 3) of an instrument's rows."""
     rows = np.flatnonzero(measurements.instrument == number)
     rotations = quaternion_to_matrix(measurements.placements[rows, 3:])
@@ -138,17 +138,17 @@ def _closed_forms(machine: Machine, measurements: Measurements, number: int) -> 
     if not unknown.any():
         return [frame]
     read = _table(measurements, number)
-    points, rotations = _looked_at(measurements, number)
+    points, rotations = _target_points(measurements, number)
     if "distance" in read and unknown[_ORIGIN].any():
-        return _by_distances(frame, points, read["distance"])
+        return _trilaterate(frame, points, read["distance"])
     if not unknown[_ROTATION].any():
         return [_with_origin(frame, quaternion_to_matrix(frame.rotation), points, read)]
     if any(f"direction.{axis}" in read for axis in "xyz"):
-        product = _of_directions(machine, measurements, number)
+        product = _direction_product(machine, measurements, number)
     elif all(angle in read for angle in "abc"):
-        product = _of_angles(rotations, read)
+        product = _angle_product(rotations, read)
     else:
-        product = _of_points(frame, points, read)
+        product = _point_product(frame, points, read)
     rotation = None if product is None else _rotation_by(frame, product)
     return [] if rotation is None else [_with_origin(frame, rotation, points, read)]
 
@@ -195,7 +195,7 @@ def _table(measurements: Measurements, number: int) -> dict[str, Floats]:
     return table
 
 
-def _of_points(frame: Frame, points: Floats, read: dict[str, Floats]) -> Floats | None:
+def _point_product(frame: Frame, points: Floats, read: dict[str, Floats]) -> Floats | None:
     """(3, 3) sum over points of (in the base frame) (as read)^T, both from their means.
 
     None where they do not fix the rotation. About one axis alone what is read across it does.
@@ -213,13 +213,13 @@ def _of_points(frame: Frame, points: Floats, read: dict[str, Floats]) -> Floats 
         seen[:, at] = read["xyz"[at]]
     whole = np.isfinite(seen).all(axis=1)
     points, seen = points[whole], seen[whole]
-    if len(points) < 2 or (about.size > 1 and not _spread_out(seen)):
+    if len(points) < 2 or (about.size > 1 and not _are_off_a_line(seen)):
         return None
     product: Floats = (points - points.mean(axis=0)).T @ (seen - seen.mean(axis=0))
     return product if product.any() else None
 
 
-def _of_angles(rotations: Floats, read: dict[str, Floats]) -> Floats | None:
+def _angle_product(rotations: Floats, read: dict[str, Floats]) -> Floats | None:
     """(3, 3) sum of the platform's rotations (n, 3, 3), each with its reading taken back."""
     angles = np.stack([read[angle] for angle in "abc"], axis=1)
     whole = np.isfinite(angles).all(axis=1)
@@ -229,7 +229,7 @@ def _of_angles(rotations: Floats, read: dict[str, Floats]) -> Floats | None:
     return product
 
 
-def _spread_out(points: Floats) -> bool:
+def _are_off_a_line(points: Floats) -> bool:
     """Whether points fix a rotation: they are not on a line."""
     if len(points) < 3:
         return False
@@ -237,7 +237,7 @@ def _spread_out(points: Floats) -> bool:
     return bool(singular[1] > 1e-3 * singular[0])
 
 
-def _by_distances(frame: Frame, points: Floats, distances: Floats) -> list[Frame]:
+def _trilaterate(frame: Frame, points: Floats, distances: Floats) -> list[Frame]:
     """Trilateration: differences of squared distances are linear in the centre.
 
     Points in a plane leave the centre's height over it, up to its sign: both are starts.
@@ -270,7 +270,7 @@ def _by_distances(frame: Frame, points: Floats, distances: Floats) -> list[Frame
     return frames
 
 
-def _of_directions(machine: Machine, measurements: Measurements, number: int) -> Floats | None:
+def _direction_product(machine: Machine, measurements: Measurements, number: int) -> Floats | None:
     """(3, 3) sum of the directions that nominal struts have times those that a camera read."""
     own = np.flatnonzero(measurements.instrument[measurements.row] == number)
     centres = machine.kernel.joint_centres(measurements.joints, measurements.placements)

@@ -70,7 +70,7 @@ def tool_effects(
     )
     effects += slopes @ unknowns.effects[:, : unknowns.n_machine]
     if unknowns.properties:
-        rows = _plain(joints, placements, (machine.condition,) * len(joints))
+        rows = _without_readings(joints, placements, (machine.condition,) * len(joints))
         base = row_shifts(machine, rows, unknowns)
         for number, (own, amounts) in property_effects(machine, rows, unknowns, base):
             sensitivity, _ = machine.kernel.sensitivity_at(joints, placements, own)
@@ -79,7 +79,9 @@ def tool_effects(
     return effects[usable], usable
 
 
-def _plain(joints: Floats, placements: Floats, conditions: tuple[Condition, ...]) -> Measurements:
+def _without_readings(
+    joints: Floats, placements: Floats, conditions: tuple[Condition, ...]
+) -> Measurements:
     """Rows without a reading."""
     count = len(joints)
     nothing = np.empty(0, np.intp)
@@ -111,13 +113,13 @@ def candidates(machine: Machine, fit: Fit) -> list[Candidate]:
         missing = [axis for axis in "xyz" if axis not in read and axis in machine.components]
         if instrument.kind == "coordinate" and missing:
             what = " and ".join(missing)
-            rows = _added(machine, fit, number, missing)
+            rows = _more_coordinates(machine, fit, number, missing)
             additions.append(
                 Candidate(f"{instrument.name}: {what}", len(rows), f"probe in {what} too", rows)
             )
     for number, instrument in enumerate(data.instruments):
         for count in FURTHER:
-            more = _further(machine, fit, number, count)
+            more = _more_poses(machine, fit, number, count)
             if more is not None:
                 sentence = (
                     f"measure {count} more poses over the whole workspace with {instrument.name}"
@@ -126,7 +128,7 @@ def candidates(machine: Machine, fit: Fit) -> list[Candidate]:
                 additions.append(Candidate(name, len(more), sentence, more))
     axes = [axis for axis in "xyz" if axis in machine.components]
     if not any(set(axes) <= set(data.observables(at)) for at in range(len(data.instruments))):
-        rows = _tracked(machine, fit, axes)
+        rows = _tracker_rows(machine, fit, axes)
         sentence = f"measure {', '.join(axes)} of the tool at these poses, as a laser tracker does"
         additions.append(Candidate("tracker", 2 * len(rows), sentence, rows))
     return [candidate for candidate in additions if np.isfinite(candidate.rows).all()]
@@ -157,18 +159,20 @@ def _observing(
     )
 
 
-def _typical(data: Measurements, number: int) -> float:
+def _typical_uncertainty(data: Measurements, number: int) -> float:
     own = data.instrument[data.row] == number
     return float(np.median(data.uncertainty[own])) if own.any() else 1e-5
 
 
-def _added(machine: Machine, fit: Fit, number: int, axes: list[str]) -> Floats:
+def _more_coordinates(machine: Machine, fit: Fit, number: int, axes: list[str]) -> Floats:
     data = fit.measurements
     rows = np.flatnonzero(data.instrument == number)
-    return _rows(machine, fit, _observing(data, rows, axes, _typical(data, number), number))
+    return _rows(
+        machine, fit, _observing(data, rows, axes, _typical_uncertainty(data, number), number)
+    )
 
 
-def _further(machine: Machine, fit: Fit, number: int, count: int) -> Floats | None:
+def _more_poses(machine: Machine, fit: Fit, number: int, count: int) -> Floats | None:
     """More rows of one instrument, of the kind that it has most, over the workspace."""
     data = fit.measurements
     own = np.flatnonzero(data.instrument == number)
@@ -200,7 +204,7 @@ def _further(machine: Machine, fit: Fit, number: int, count: int) -> Floats | No
     return _rows(machine, fit, more) if total else None
 
 
-def _tracked(machine: Machine, fit: Fit, axes: list[str]) -> Floats:
+def _tracker_rows(machine: Machine, fit: Fit, axes: list[str]) -> Floats:
     """Coordinates of the tool point in the base frame at every row, to 10 um."""
     data = fit.measurements
     tracker = Instrument("tracker", "position", Frame())

@@ -105,7 +105,7 @@ class Unknowns:
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _MachineUnknown:
     """One unknown of the machine, before all are put together."""
 
     name: str
@@ -132,8 +132,8 @@ def unknowns_of(
     Raises `RequestError` (unknown-parameter, no-unknowns, bad-band, no-stiffness, bad-prior).
     """
     bands = _bands(machine)
-    tolerated = _of_tolerances(machine, bands)
-    wanted = _wanted(machine, tolerated, identify)
+    tolerated = _tolerance_unknowns(machine, bands)
+    wanted = _chosen_unknowns(machine, tolerated, identify)
     if not wanted:
         raise RequestError(
             Problem(
@@ -147,7 +147,7 @@ def unknowns_of(
         )
     columns = sorted({column for unknown in wanted for column in unknown.effects})
     place = {column: at for at, column in enumerate(columns)}
-    instruments = _of_instruments(machine, measurements, len(wanted))
+    instruments = _instrument_unknowns(machine, measurements, len(wanted))
     count = len(wanted) + len(instruments.names)
     effects = np.zeros((len(columns), count))
     covariance = np.diag(np.full(count, np.inf))
@@ -182,7 +182,7 @@ def _bands(machine: Machine) -> Deviation | None:
     return None
 
 
-def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
+def _tolerance_unknowns(machine: Machine, bands: Deviation | None) -> list[_MachineUnknown]:
     """One unknown for each variable that has a band, in the order of the parameters."""
     if bands is None:
         return []
@@ -209,7 +209,7 @@ def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
         parameter = int(bands.parameters[leader])
         name = machine.parameters[parameter] if group is None else group
         unknowns.append(
-            _Wanted(
+            _MachineUnknown(
                 name,
                 machine.units[parameter],
                 label_of(name) if group is None else group,
@@ -223,19 +223,23 @@ def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
     return unknowns
 
 
-def _wanted(
-    machine: Machine, tolerated: Sequence[_Wanted], identify: Sequence[str]
-) -> list[_Wanted]:
+def _chosen_unknowns(
+    machine: Machine, tolerated: Sequence[_MachineUnknown], identify: Sequence[str]
+) -> list[_MachineUnknown]:
     if not identify:
         return list(tolerated)
-    known: dict[str, _Wanted] = {}
+    known: dict[str, _MachineUnknown] = {}
     for name, unit, column in zip(
         machine.parameters, machine.units, range(len(machine.parameters)), strict=True
     ):
-        known[name] = _Wanted(name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf)
+        known[name] = _MachineUnknown(
+            name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf
+        )
     for name, identifiable in properties_of(machine).items():
         unit, label = identifiable.unit, identifiable.label(machine)
-        known[name] = _Wanted(name, unit, label, {}, 0.0, np.inf, np.inf, None, identifiable)
+        known[name] = _MachineUnknown(
+            name, unit, label, {}, 0.0, np.inf, np.inf, None, identifiable
+        )
     # A member of a group stands for its group: one cannot move without the other.
     of_group = {
         machine.parameters[column]: unknown.name
@@ -243,7 +247,7 @@ def _wanted(
         for column in unknown.effects
     }
     known |= {unknown.name: unknown for unknown in tolerated}
-    chosen: dict[str, _Wanted] = {}
+    chosen: dict[str, _MachineUnknown] = {}
     problems = []
     for text in identify:
         pattern, _, band = (part.strip() for part in text.partition("="))
@@ -283,7 +287,7 @@ def _wanted(
 _DIMENSION_OF_UNIT = {"m": "length", "rad": "angle", "1/K": "expansion", "1": "ratio"}
 
 
-def _with_band(machine: Machine, wanted: _Wanted, band: str) -> _Wanted:
+def _with_band(machine: Machine, wanted: _MachineUnknown, band: str) -> _MachineUnknown:
     """The unknown with a half band of its own, uniform. Raises `QuantityError`."""
     if not band:
         return wanted
@@ -317,7 +321,7 @@ def _no_stiffness(machine: Machine, name: str) -> Problem:
     )
 
 
-def _correlate(covariance: Floats, wanted: Sequence[_Wanted], bands: Deviation) -> None:
+def _correlate(covariance: Floats, wanted: Sequence[_MachineUnknown], bands: Deviation) -> None:
     assert bands.correlation is not None
     for i, first in enumerate(wanted):
         for j, second in enumerate(wanted):
@@ -327,7 +331,7 @@ def _correlate(covariance: Floats, wanted: Sequence[_Wanted], bands: Deviation) 
 
 
 @dataclass
-class _OfInstruments:
+class _InstrumentUnknowns:
     names: list[str]
     units: list[str]
     labels: list[str]
@@ -335,9 +339,11 @@ class _OfInstruments:
     biases: dict[tuple[int, int, int], int]
 
 
-def _of_instruments(machine: Machine, measurements: Measurements, first: int) -> _OfInstruments:
+def _instrument_unknowns(
+    machine: Machine, measurements: Measurements, first: int
+) -> _InstrumentUnknowns:
     """Unknowns of the instruments that measured anything, numbered from `first` on."""
-    unknowns = _OfInstruments([], [], [], {}, {})
+    unknowns = _InstrumentUnknowns([], [], [], {}, {})
 
     def add(name: str, unit: str, label: str) -> int:
         unknowns.names.append(name)

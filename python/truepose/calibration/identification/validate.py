@@ -116,7 +116,7 @@ def validate(
     if whole.held_out.any():
         kept = whole.select(whole.held_out)
         predicted[:, whole.held_out[whole.row]] = _predicted(machine, kept, fitted)
-        checked = _counted(STATED, 1, whole, predicted, fitted)
+        checked = _validation_of(STATED, 1, whole, predicted, fitted)
         if checked is not None:
             return checked
     rows = int(fitting.sum())
@@ -138,10 +138,10 @@ def validate(
         except RequestError:  # what is left does not say enough: the others still do
             continue
         predicted[:, left_out[whole.row]] = _predicted(machine, whole.select(left_out), others)
-    return _counted(FOLDS, count, whole, predicted, fitted)
+    return _validation_of(FOLDS, count, whole, predicted, fitted)
 
 
-def _counted(
+def _validation_of(
     kind: str, folds: int, whole: Measurements, predicted: Floats, fitted: Fit
 ) -> Validation | None:
     """Of (3, m) residuals before and after and promised variances; None where all are NaN."""

@@ -25,7 +25,12 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.calibration.result.bands import tolerance_covariance
-from truepose.calibration.result.directions import deviation_of, directions, tilted, turned
+from truepose.calibration.result.directions import (
+    deviation_jacobian,
+    deviation_of,
+    direction_at,
+    directions,
+)
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import Shown, ShownUnits
 from truepose.machine import Machine
@@ -155,11 +160,13 @@ def _change(old: Machine, new: Machine) -> tuple[Machine, Machine, _Change]:
         at = list(was_along.columns)
         if np.array_equal(was_along.axis, now_along.axis):
             continue
-        along = tilted(now_along.axis, new_values[at])
+        along = direction_at(now_along.axis, new_values[at])
         if was_along.axis @ along < _TURNED:
             where = f"{was_along.table}.{was_along.part}.{was_along.key}"
             raise _not_same(old, new, f"{where} points quite another way")
-        effects[at] = turned(now_along.axis, new_values[at], was_along.axis) @ effects[at]
+        effects[at] = (
+            deviation_jacobian(now_along.axis, new_values[at], was_along.axis) @ effects[at]
+        )
         new_values[at] = deviation_of(was_along.axis, along)
     after_covariance = effects @ now.correlation @ effects.T
     return before, after, _tested(old_values, new_values, was.covariance, after_covariance)

@@ -48,7 +48,7 @@ def directions(machine: Machine) -> Iterator[PartDirection]:
         yield PartDirection(table, part, key, (column, second), axis / np.linalg.norm(axis))
 
 
-def tilted(axis: ArrayLike, deviation: ArrayLike) -> Floats:
+def direction_at(axis: ArrayLike, deviation: ArrayLike) -> Floats:
     """(3,) the unit vector at the deviations (2,) `u`, `v` from the unit `axis` (3,)."""
     along: Floats = np.asarray(axis, np.float64) + np.asarray(deviation) @ tangents(axis)
     return along / np.linalg.norm(along)
@@ -64,7 +64,7 @@ def deviation_of(axis: ArrayLike, direction: ArrayLike) -> Floats:
     return ratios
 
 
-def turned(axis: ArrayLike, deviation: ArrayLike, new_axis: ArrayLike) -> Floats:
+def deviation_jacobian(axis: ArrayLike, deviation: ArrayLike, new_axis: ArrayLike) -> Floats:
     """(2, 2) change of the `u`, `v` about `new_axis` for one of those about `axis`.
 
     Where the direction is at the deviation (2,) from `axis`.

@@ -28,7 +28,12 @@ from truepose.calibration.result.bands import (
     bands_of,
     tolerance_covariance,
 )
-from truepose.calibration.result.directions import PartDirection, directions, tilted, turned
+from truepose.calibration.result.directions import (
+    PartDirection,
+    deviation_jacobian,
+    direction_at,
+    directions,
+)
 from truepose.calibration.result.toml_edits import MachineText, warning_comment
 from truepose.errors import MachineFileError, Problem, RequestError
 from truepose.files.writing import replacing, require_writable
@@ -215,9 +220,9 @@ class _Result:
             at = list(direction.columns)
             if not nominal[at].any():
                 continue
-            axis = tilted(direction.axis, nominal[at])
+            axis = direction_at(direction.axis, nominal[at])
             if moved[at].any():
-                effects[at] = turned(direction.axis, nominal[at], axis) @ effects[at]
+                effects[at] = deviation_jacobian(direction.axis, nominal[at], axis) @ effects[at]
                 if as_shifts:
                     deviation[at] = effects[at] @ values
                 moved[at] = True

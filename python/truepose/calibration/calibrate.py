@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, assess
+from truepose.calibration.acceptance.tool_uncertainty import tool_components
 from truepose.calibration.data_checks import Suspicion, suspicions
 from truepose.calibration.identification.consider_covariance import (
     consider_covariance,
@@ -34,8 +35,6 @@ from truepose.machine import Machine
 
 if TYPE_CHECKING:
     import xarray as xr
-
-_ANGLES = {"rx": "a", "ry": "b", "rz": "c"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,11 +209,11 @@ def _assessed(
         before=fitted.before,
         use_prior=fitted.use_prior,
         tool=effects,
-        components=[_ANGLES.get(name, name) for name in machine.components],
+        components=tool_components(machine),
         positions=positions,
         weights=fitted.weights,
         by=phrases(machine, fitted.measurements),
-        nominal=_nominal(machine, fitted),
+        nominal=unknowns.nominal_sizes(machine),
         held_out=_held_out(fitted, checked),
         target=(accuracy.target, accuracy.angle_target),
         candidates=candidates(machine, fitted),
@@ -247,21 +246,6 @@ def phrases(machine: Machine, measurements: Measurements) -> list[str]:
             phrase = "by a flat bed"
         texts.append(phrase)
     return list(dict.fromkeys(texts))
-
-
-def _nominal(machine: Machine, fitted: Fit) -> Floats:
-    """(n_machine,) the parameter that an unknown moves alone; NaN for groups and properties."""
-    unknowns = fitted.unknowns
-    nominal = np.full(unknowns.n_machine, np.nan)
-    for number in range(unknowns.n_machine):
-        rows = np.flatnonzero(unknowns.effects[:, number])
-        values = machine.nominal[unknowns.columns[rows]]
-        # Rods that are equal are one number for people, coordinates that move apart are not.
-        same = np.ptp(values) <= 1e-9 * np.abs(values).max() if rows.size else False
-        equal = rows.size and (unknowns.effects[rows, number] == 1.0).all()
-        if same and equal:
-            nominal[number] = values[0]
-    return nominal
 
 
 __all__ = ["Calibration", "calibrate", "phrases"]

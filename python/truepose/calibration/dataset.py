@@ -17,7 +17,7 @@ from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import sentences
 from truepose.calibration.identification.fit import Equations
 from truepose.calibration.identification.problem import Prior
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.calibration.observables import UNITS, column_name
 from truepose.machine import Machine
 from truepose.runs.dataset import (
     Schema,
@@ -179,7 +179,11 @@ def _unknown_values(calibration: Calibration) -> dict[str, Floats]:
     fit, gate = calibration.fit, calibration.gate
     unknowns = fit.unknowns
     n = unknowns.n_machine
-    nominal = _nominal(calibration)
+    machine = calibration.machine
+    nominal = unknowns.nominal_sizes(machine)
+    for number, identified in unknowns.properties.items():
+        if identified.kind == "expansion":
+            nominal[number] = machine.struts[identified.strut].expansion or 0.0
     covariance = covariance_of(calibration)
     open_ = ~np.isfinite(np.diagonal(covariance))
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)
@@ -190,7 +194,7 @@ def _unknown_values(calibration: Calibration) -> dict[str, Floats]:
     correlation[open_, :] = correlation[:, open_] = np.nan
     np.fill_diagonal(correlation, 1.0)
     columns = unknowns.columns
-    before = calibration.machine.nominal[columns]
+    before = machine.nominal[columns]
     effects = unknowns.effects[:, :n]
     parameter = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", effects, covariance, effects), 0.0))
     parameter[(effects[:, open_] != 0.0).any(axis=1)] = np.inf
@@ -235,26 +239,6 @@ def determined_covariance(calibration: Calibration) -> Floats:
     rows = np.sqrt(fit.weights)[:, np.newaxis] * fit.jacobian / calibration.gate.birge
     covariance: Floats = Equations.of(rows, prior, unknowns).covariance[:n, :n]
     return covariance
-
-
-def _nominal(calibration: Calibration) -> Floats:
-    """(n_machine,) the size that an unknown changes: one parameter, equal ones, or a property.
-
-    NaN for what moves several that differ, such as the coordinates of a radius.
-    """
-    machine, unknowns = calibration.machine, calibration.fit.unknowns
-    nominal = np.full(unknowns.n_machine, np.nan)
-    for number in range(unknowns.n_machine):
-        effects = unknowns.effects[:, number]
-        rows = np.flatnonzero(effects)
-        sizes = machine.nominal[unknowns.columns[rows]]
-        alike = rows.size and (effects[rows] == 1.0).all()
-        if alike and np.ptp(sizes) <= 1e-9 * np.abs(sizes).max():
-            nominal[number] = sizes[0]
-        identified = unknowns.properties.get(number)
-        if identified is not None and identified.kind == "expansion":
-            nominal[number] = machine.struts[identified.strut].expansion or 0.0
-    return nominal
 
 
 def _observation_values(calibration: Calibration) -> dict[str, Floats]:
@@ -359,26 +343,19 @@ def _row_coords(machine: Machine, data: Measurements) -> dict[str, xr.Variable]:
             "row", poses[:, at], f"pose {freedom} of the nominal machine at the row", unit
         )
     observation = "observation"
+    read = zip(data.observable.tolist(), data.strut.tolist(), strict=True)
+    columns = (column_name(machine, code, strut) for code, strut in read)
     return {
         **coords,
         observation: label(
             observation, np.arange(data.n_observation), "number of the reading, from 0"
         ),
         "observation_row": label(observation, data.row, "number of the row that it stands in"),
-        "observation_what": label(observation, _texts(_what(machine, data)), "what was read"),
+        "observation_what": label(observation, _texts(columns), "what was read"),
         "observation_units": label(
             observation, _texts(UNITS[code] for code in data.observable.tolist()), "unit of it"
         ),
     }
-
-
-def _what(machine: Machine, data: Measurements) -> list[str]:
-    """The measured column of each reading: "x", "strut.a1.length"."""
-    columns = []
-    for code, strut in zip(data.observable.tolist(), data.strut.tolist(), strict=True):
-        name = OBSERVABLES[code]
-        columns.append(f"strut.{machine.struts[strut].name}.{name}" if name in OF_STRUTS else name)
-    return columns
 
 
 def _tool_coords(calibration: Calibration) -> dict[str, xr.Variable]:

@@ -122,7 +122,7 @@ def test_covariance_with_a_correlated_prior() -> None:
     information[:3, :3] += np.linalg.inv(root @ root.T)
     found = seen.row_covariance(both)
     assert found.root @ found.root.T == pytest.approx(np.linalg.inv(information), rel=1e-9)
-    again = seen.prior_root(covariance)
+    again = seen.covariance_root(covariance)
     assert (again @ again.T)[:3, :3] == pytest.approx(root @ root.T)
     assert not (again @ again.T)[3].any()
 

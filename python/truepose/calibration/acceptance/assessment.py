@@ -18,15 +18,14 @@ from truepose.calibration.acceptance.observability import (
     normalised_rms,
     observability,
     prior,
-    prior_root,
     prior_rows,
     project_out_instruments,
     row_covariance,
-    singular_decomposition,
     stacked,
     weighted,
 )
 from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
+from truepose.calibration.least_squares import singular_decomposition
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
@@ -200,9 +199,7 @@ class Case:
         of_data = self.tool.sort(data, with_gauge=free)
         tool = self.tool.relative(of_data.gauge)
         moving = self.tool.sort(used, with_gauge=free).moving
-        before = None
-        if np.isfinite(self.sigma[tool.moved]).all():
-            before = tool.uncertainty(prior_root(self.prior), np.zeros((0, self.n)))
+        before = tool.beforehand(self.prior)
         after = tool.uncertainty(used.root, moving)
         weak, still = self._weak(seen, rows, tool, before)
         unit = seen.unit
@@ -301,9 +298,7 @@ class Case:
 
     def reference(self, before: ToolUncertainty | None) -> tuple[float | None, float | None]:
         """What the tool is known to before, position and rotation, at the worst pose."""
-        if before is None:
-            return self.measured
-        return before.position_max, before.rotation_max
+        return self.measured if before is None else before.worst
 
     def _no_gain(self, before: ToolUncertainty | None, after: ToolUncertainty) -> list[Reason]:
         """(b): the tool is not known better than before."""
@@ -333,12 +328,7 @@ class Case:
 
     def keeps_target(self, before: ToolUncertainty | None) -> bool:
         """Whether the machine as filed keeps what is asked."""
-        pairs = [
-            (asked, was)
-            for asked, was in zip(self.target, self.reference(before), strict=True)
-            if asked is not None
-        ]
-        return bool(pairs) and all(was is not None and was <= asked for asked, was in pairs)
+        return is_kept(self.target, self.reference(before))
 
     def lacks_only_gain(self, outcome: Outcome) -> bool:
         """Whether the only thing missing is a gain that nobody asked for."""
@@ -350,11 +340,19 @@ def _sparse(directions: Floats) -> Floats:
     return sentences.sparse(directions) if len(directions) else directions
 
 
+def is_kept(
+    target: tuple[float | None, float | None], sizes: tuple[float | None, float | None]
+) -> bool:
+    """Whether something is asked of position or rotation, and the sizes are known to keep it."""
+    pairs = [(asked, size) for asked, size in zip(target, sizes, strict=True) if asked is not None]
+    return bool(pairs) and all(size is not None and size <= asked for asked, size in pairs)
+
+
 def at_worst_pose(
     after: ToolUncertainty, before: ToolUncertainty | None
 ) -> list[tuple[str, str, float, float | None]]:
     """(name, unit, after, before) of position and rotation at the worst pose."""
-    was = (None, None) if before is None else (before.position_max, before.rotation_max)
+    was = (None, None) if before is None else before.worst
     return [
         ("the tool's position", "m", after.position_max, was[0]),
         ("the tool's rotation", "rad", after.rotation_max, was[1]),

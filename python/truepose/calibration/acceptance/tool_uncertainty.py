@@ -10,12 +10,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.acceptance.observability import RowCovariance, singular_decomposition
+from truepose.calibration.acceptance.observability import RowCovariance, covariance_root
+from truepose.calibration.least_squares import (
+    column_basis,
+    column_norms,
+    singular_decomposition,
+)
+from truepose.machine import Machine
 
 POSITION = "xyz"
 ROTATION = "abc"
 SLIGHT = 1e-3
 """Of the largest effect at the tool of any unknown, by columns of length one: smaller is none."""
+
+
+def tool_components(machine: Machine) -> list[str]:
+    """The machine's components as they are called here: x y z, and a b c for rotations."""
+    return [_ROTATIONS.get(name, name) for name in machine.components]
+
+
+_ROTATIONS = {"rx": "a", "ry": "b", "rz": "c"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +54,11 @@ class ToolUncertainty:
     def rotation_max(self) -> float:
         """At the worst pose, rad."""
         return float(self.rotation.max(initial=0.0))
+
+    @property
+    def worst(self) -> tuple[float, float]:
+        """`position_max` and `rotation_max`."""
+        return self.position_max, self.rotation_max
 
     @property
     def position_rms(self) -> float:
@@ -117,6 +136,12 @@ class Tool:
             self._size(standard, ROTATION),
         )
 
+    def beforehand(self, prior: Floats) -> ToolUncertainty | None:
+        """Of a prior covariance (n, n); None where an unknown that moves the tool has none."""
+        if not np.isfinite(np.diagonal(prior)[self.moved]).all():
+            return None
+        return self.uncertainty(covariance_root(prior), np.zeros((0, len(prior))))
+
     def size_of(self, direction: Floats) -> float:
         """Largest displacement (m) over the workspace that a direction (n,) makes."""
         return float(self._size(self.effects @ direction, POSITION).max(initial=0.0))
@@ -150,8 +175,7 @@ class Tool:
         if len(gauge) == 0:
             return self
         flat = self._flat
-        basis, singular, _ = np.linalg.svd(flat @ gauge.T, full_matrices=False)
-        basis = basis[:, singular > SLIGHT * singular.max(initial=0.0)]
+        basis = column_basis(flat @ gauge.T, SLIGHT)
         left = flat - basis @ (basis.T @ flat)
         effects = left.reshape(self.effects.shape) / self._weights()[:, np.newaxis]
         return Tool(self.components, effects, self.positions, self.length)
@@ -167,8 +191,7 @@ class Tool:
 
     @cached_property
     def _sizes(self) -> Floats:
-        sizes: Floats = np.sqrt(np.einsum("ij,ij->j", self._flat, self._flat))
-        return sizes
+        return column_norms(self._flat)
 
     def _largest(self, lengths: Floats) -> float:
         return float((self._sizes / lengths).max(initial=0.0))
@@ -187,8 +210,7 @@ class Tool:
                 fields[:, index, 3:] = turns[:, :, axis]
             else:
                 fields[:, index, 3 + ROTATION.index(component)] = self.length
-        basis, singular, _ = np.linalg.svd(fields.reshape(-1, 6), full_matrices=False)
-        return np.asarray(basis[:, singular > SLIGHT * singular.max(initial=0.0)], np.float64)
+        return column_basis(fields.reshape(-1, 6), SLIGHT)
 
     def _size(self, values: Floats, components: str) -> Floats:
         chosen = [index for index, name in enumerate(self.components) if name in components]

@@ -21,14 +21,14 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.assessment import ROUNDING, Reason, at_worst_pose
+from truepose.calibration.acceptance.assessment import ROUNDING, Reason, at_worst_pose, is_kept
 from truepose.calibration.acceptance.decision import Gate
 from truepose.calibration.acceptance.observability import (
-    prior_root,
+    covariance_root,
     project_out_instruments,
     row_covariance,
 )
-from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
+from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty, tool_components
 from truepose.calibration.identification.fit import Fit, whitened
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.tool_effects import tool_effects
@@ -45,8 +45,6 @@ SOURCE = 0.5
 
 _OF_GAIN = ("not-determined", "not-told-apart", "less-than-tolerance", "no-gain", "not-identified")
 """Codes of the reasons that a remedy is for."""
-
-_ANGLES = {"rx": "a", "ry": "b", "rz": "c"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +85,7 @@ def consider_covariance(
     problem = IdentificationProblem(machine, fitted.measurements, every)
     rows = np.sqrt(fitted.weights)[:, np.newaxis] * whitened(problem, values) / fitted.birge
     effects, _ = tool_effects(machine, every, values, joints, placements)
-    components = [_ANGLES.get(name, name) for name in machine.components]
-    tool = Tool.of(effects, components, placements[:, :3])
+    tool = Tool.of(effects, tool_components(machine), placements[:, :3])
     prior = np.asarray(every.prior_covariance, np.float64)[:count, :count]
     sigma: Floats = np.sqrt(np.diagonal(prior))
     relative = False
@@ -98,18 +95,15 @@ def consider_covariance(
         ).gauge
         relative, tool = len(gauge) > 0, tool.relative(gauge)
     none = np.zeros((0, count))
-    before = None
-    if np.isfinite(sigma[tool.moved]).all():
-        before = tool.uncertainty(prior_root(prior), none)
     exact = np.zeros((count, fitted.unknowns.n_machine))
-    exact[identified[: exact.shape[1]]] = _root(
+    exact[identified[: exact.shape[1]]] = covariance_root(
         fitted.covariance[: exact.shape[1], : exact.shape[1]]
     )
     root, part = _roots(fitted, every, rows, identified, unidentified)
     return Considered(
         tuple(every.labels[at] for at in unidentified),
         every.labels[:count],
-        before,
+        tool.beforehand(prior),
         tool.uncertainty(root, none),
         tool.uncertainty(exact, none),
         tool.uncertainty(part, none),
@@ -133,15 +127,6 @@ def _with_unidentified(machine: Machine, fitted: Fit, identify: Sequence[str]) -
     return unknowns_of(machine, fitted.measurements, [*identify, *unidentified])
 
 
-def _root(covariance: Floats) -> Floats:
-    """(n, n) with covariance = root root^T."""
-    sigma = np.sqrt(np.diagonal(covariance))
-    scale = np.where(sigma > 0.0, sigma, 1.0)
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    root: Floats = scale[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, 0.0))
-    return root
-
-
 def _roots(
     fitted: Fit, every: Unknowns, rows: Floats, identified: Indices, unidentified: Indices
 ) -> tuple[Floats, Floats]:
@@ -153,7 +138,7 @@ def _roots(
     n, count = own.n_machine, every.n_machine
     gain = fitted.covariance @ rows[:, identified].T
     response = -gain @ rows[:, unidentified]
-    beforehand = prior_root(every.prior_covariance[:count, :count])
+    beforehand = covariance_root(every.prior_covariance[:count, :count])
     known = np.zeros((own.count, beforehand.shape[1]))
     known[:n] = beforehand[identified[:n]]
     held = Prior.of(own).rows if fitted.use_prior else np.zeros((0, own.count))
@@ -167,7 +152,7 @@ def _roots(
     of_prior[identified[:n]], of_prior[unidentified] = of_identified[:n], beforehand[unidentified]
     of_data = np.zeros((count, noise.shape[1] + 1))
     of_data[identified[:n]] = np.column_stack([noise, middle])
-    alone = prior_root(every.prior_covariance[np.ix_(unidentified, unidentified)])
+    alone = covariance_root(every.prior_covariance[np.ix_(unidentified, unidentified)])
     part = np.zeros((count, alone.shape[1] + 1))
     part[identified[:n]] = np.column_stack([response[:n] @ alone, middle])
     part[unidentified, :-1] = alone
@@ -296,9 +281,7 @@ def _named(considered: Considered) -> str:
 def _keeps_target(considered: Considered, target: tuple[float | None, float | None]) -> bool:
     """Whether the machine as filed keeps what is asked."""
     before = considered.before
-    was = (None, None) if before is None else (before.position_max, before.rotation_max)
-    pairs = [(asked, size) for asked, size in zip(target, was, strict=True) if asked is not None]
-    return bool(pairs) and all(size is not None and size <= asked for asked, size in pairs)
+    return is_kept(target, (None, None) if before is None else before.worst)
 
 
 __all__ = ["Considered", "consider_covariance", "with_considered"]

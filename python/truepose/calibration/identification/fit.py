@@ -25,6 +25,7 @@ from truepose.calibration.identification.frames import (
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.robust import LOSS_ROUNDS, noise_of, weights_of
 from truepose.calibration.identification.unknowns import Unknowns
+from truepose.calibration.least_squares import singular_decomposition
 from truepose.calibration.measurements import Measurements
 from truepose.errors import Problem as Refused
 from truepose.errors import RequestError
@@ -136,16 +137,11 @@ class Equations:
         has_prior = np.isfinite(variances)
         scale = np.where(norms > 0.0, 1.0 / np.where(norms > 0.0, norms, 1.0), 1.0)
         scale[has_prior] = np.sqrt(variances[has_prior])
-        count = unknowns.count
         scaled = equations * scale
         if left_out is not None and len(left_out):
             basis = np.linalg.qr((left_out / scale).T)[0].T
             scaled = scaled - scaled @ basis.T @ basis
-        factor = np.linalg.qr(scaled, mode="r")
-        _, values, directions = np.linalg.svd(factor, full_matrices=True)
-        singular = np.zeros(count)
-        singular[: values.size] = values
-        return cls(scale, singular, directions)
+        return cls(scale, *singular_decomposition(np.asarray(np.linalg.qr(scaled, mode="r"))))
 
     @property
     def seen(self) -> np.ndarray:

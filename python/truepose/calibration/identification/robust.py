@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS
+from truepose.calibration.observables import column_name
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.fit import Fit
@@ -98,9 +98,7 @@ def outliers(
     odd = []
     for at in np.flatnonzero(np.abs(size) >= OUTLIER).tolist():
         row = int(data.row[at])
-        what = OBSERVABLES[int(data.observable[at])]
-        if what in OF_STRUTS:
-            what = f"strut.{machine.struts[int(data.strut[at])].name}.{what}"
+        what = column_name(machine, int(data.observable[at]), int(data.strut[at]))
         name = data.instruments[int(data.instrument[row])].name
         line, sigmas = int(data.lines[row]), float(size[at])
         odd.append(Outlier(row, line, name, what, sigmas, bool(kept[at])))

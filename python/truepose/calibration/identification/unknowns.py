@@ -20,7 +20,7 @@ from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property, properties_of
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.calibration.observables import UNITS, column_name
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.files.units import QuantityError, UnitSystem
@@ -78,6 +78,22 @@ class Unknowns:
         change: Floats = self.effects @ values
         return change
 
+    def nominal_sizes(self, machine: Machine) -> Floats:
+        """(n_machine,) the size that an unknown changes: of one parameter, or of equal ones, SI.
+
+        NaN for what moves several that differ, such as the coordinates of a radius, and for
+        properties.
+        """
+        sizes = np.full(self.n_machine, np.nan)
+        for number in range(self.n_machine):
+            rows = np.flatnonzero(self.effects[:, number])
+            nominal = machine.nominal[self.columns[rows]]
+            # Rods that are equal are one number for people, coordinates that move apart are not.
+            alike = rows.size and (self.effects[rows, number] == 1.0).all()
+            if alike and np.ptp(nominal) <= 1e-9 * np.abs(nominal).max():
+                sizes[number] = nominal[0]
+        return sizes
+
     @property
     def of_instruments(self) -> Unknowns:
         """The instruments' alone; the machine stays as its file has it."""
@@ -131,7 +147,7 @@ def unknowns_of(
 
     Raises `RequestError` (unknown-parameter, no-unknowns, bad-band, no-stiffness, bad-prior).
     """
-    bands = _bands(machine)
+    bands = bands_of(machine)
     tolerated = _tolerance_unknowns(machine, bands)
     wanted = _chosen_unknowns(machine, tolerated, identify)
     if not wanted:
@@ -175,11 +191,12 @@ def unknowns_of(
     )
 
 
-def _bands(machine: Machine) -> Deviation | None:
-    for source in machine.sources:
-        if isinstance(source, DimensionalTolerance):
-            return source.bands
-    return None
+def bands_of(machine: Machine) -> Deviation | None:
+    """The bands of the machine's tolerances; None where its file has none."""
+    of_tolerances = (
+        source.bands for source in machine.sources if isinstance(source, DimensionalTolerance)
+    )
+    return next(of_tolerances, None)
 
 
 def _tolerance_unknowns(machine: Machine, bands: Deviation | None) -> list[_MachineUnknown]:
@@ -363,12 +380,11 @@ def _instrument_unknowns(
         for observable, strut in sorted(
             {(int(code), int(strut_number)) for code, strut_number in read}
         ):
-            what = OBSERVABLES[observable]
-            part = f"strut.{machine.struts[strut].name}." if what in OF_STRUTS else ""
+            column = column_name(machine, observable, strut)
             unknowns.biases[number, observable, strut] = add(
-                f"{instrument.name}.bias.{part}{what}",
+                f"{instrument.name}.bias.{column}",
                 UNITS[observable],
-                f"constant that {instrument.name} adds to {part}{what}",
+                f"constant that {instrument.name} adds to {column}",
             )
     return unknowns
 

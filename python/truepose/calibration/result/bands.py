@@ -7,17 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats, Indices
+from truepose.calibration.identification.unknowns import bands_of
 from truepose.machine import Machine
-from truepose.sources.deviation import Deviation
-from truepose.sources.tolerance import DimensionalTolerance
-
-
-def bands_of(machine: Machine) -> Deviation | None:
-    """The bands of the machine's tolerances; None where its file has none."""
-    return next(
-        (source.bands for source in machine.sources if isinstance(source, DimensionalTolerance)),
-        None,
-    )
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,11 @@ import tomlkit
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property
+from truepose.calibration.identification.unknowns import bands_of
 from truepose.calibration.result.bands import (
     Banded,
     ToleranceCovariance,
     banded,
-    bands_of,
     tolerance_covariance,
 )
 from truepose.calibration.result.directions import (

@@ -8,7 +8,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.observability import prior_root, prior_rows
+from truepose.calibration.acceptance.observability import covariance_root, prior_rows
 from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.calibrate import Calibration
 from truepose.calibration.dataset import covariance_of, determined_covariance, verdict_of
@@ -114,7 +114,7 @@ def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
     effects, _ = tool_effects(machine, unknowns, calibration.fit.values, joints, placements)
     stated = effects.copy()
     stated[:, :, list(unknowns.properties)] = 0.0
-    root, none = prior_root(covariance), np.zeros((0, unknowns.n_machine))
+    root, none = covariance_root(covariance), np.zeros((0, unknowns.n_machine))
     components = calibration.gate.after.components
     whole, known = (
         Tool.of(slopes, components, None).uncertainty(root, none) for slopes in (effects, stated)

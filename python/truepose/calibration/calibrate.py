@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 class Calibration:
     """What measurements say of a machine, and whether it may be used.
 
-    `gate.accepted` is the answer, `gate.words` says why. `suspicions` are blunders that the data
-    look like; `outliers` readings that do not fit; `validation` None where there was too little to
+    `gate.accepted` is the answer, `gate.words` says why. `suspicions`: mistakes that the data look
+    like; `outliers` readings that do not fit; `validation` None where there was too little to
     hold anything back. `poses` (n, n_commanded): where the tool was looked at, those that are
     `usable` (n,): the calibrated machine reaches them too. `seed`: of the folds.
     """
@@ -105,7 +105,7 @@ def calibrate(
     seed: int = 0,
     margin: float = MARGIN,
 ) -> Calibration:
-    """Find the machine's parameters from measurements, and judge what was found.
+    """Find the machine's parameters from measurements, and decide whether they may be used.
 
     `data`: measurements, or the file of them. `identify`: what is to be found, patterns over
     parameters, groups of tolerances, `strut.*.expansion`, `strut.*.compliance`, each with a half
@@ -153,8 +153,8 @@ def calibrate(
 def _suspected(machine: Machine, whole: Measurements, unknowns: Unknowns) -> tuple[Suspicion, ...]:
     """What is suspected, with unknown frames first set where they fit best.
 
-    A blunder may lead them astray: what then stays unexplained is looked at with the frames as
-    declared too.
+    A mistake in the data may put the frames in a wrong place: what then stays unexplained is
+    checked with the frames as declared too.
     """
     try:
         standing = place_instruments(machine, whole, unknowns)[0].measurements
@@ -184,7 +184,7 @@ def _nothing_to_fit(whole: Measurements) -> RequestError:
 
 
 def _with_suspicions(failure: RequestError, suspected: Sequence[Suspicion]) -> RequestError:
-    """What stopped the fit, with what the measurements look like in the place of the hint."""
+    """What stopped the fit, its hint being the suspicions that refuse the measurements."""
     sentences = "; ".join(suspicion.sentence for suspicion in suspected if suspicion.refuses)
     if not sentences or any(problem.code != "no-fit" for problem in failure.problems):
         return failure

@@ -147,7 +147,7 @@ def dataset_of(calibration: Calibration) -> xr.Dataset:
 
 
 def verdict_of(calibration: Calibration) -> str:
-    """Yes or no with its reasons: suspicions that refuse go first, then what the gate says."""
+    """Yes or no with its reasons: first the suspicions that refuse, then the gate's reasons."""
     gate = calibration.gate
     refusing = [suspicion.sentence for suspicion in calibration.suspicions if suspicion.refuses]
     if not refusing:
@@ -161,7 +161,7 @@ def verdict_of(calibration: Calibration) -> str:
 
 
 def answer_of(calibration: Calibration) -> str:
-    """The verdict without what to heed and what to measure next, which are said elsewhere."""
+    """The verdict without its warnings and the remedy, which are shown elsewhere."""
     gate, answer = calibration.gate, verdict_of(calibration)
     if answer != gate.words:
         return answer

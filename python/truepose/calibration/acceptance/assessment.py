@@ -1,4 +1,4 @@
-"""What measurements are worth: the part of the gate's verdict that changes when some are added."""
+"""What measurements determine: the part of the verdict that changes when some are added."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 
 
 POOR = 1e-3
-"""Of the largest singular value: what is weak where nothing is there to compare with."""
+"""Of the largest singular value: below it a direction is weak, where there is no tolerance."""
 NOTHING = 100.0
-"""Half bands of a tolerance: an uncertainty beyond is not worth its number."""
+"""Half bands of a tolerance: a larger uncertainty is said in words, not as a number."""
 ROUNDING = 1e-6
-"""Relatively so much worse is not worse."""
+"""Relative: an uncertainty that is larger by no more than this is not larger."""
 
 Kind = Literal["unseen", "weak", "gauge", "harmless"]
 
 
 @dataclass(frozen=True)
 class Reason:
-    """Why not, or what to heed: a code word and a sentence without its full stop."""
+    """A reason against the calibration, or a warning: code, and sentence without its full stop."""
 
     code: str
     sentence: str
@@ -65,7 +65,7 @@ class Direction:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What some rows lead to: (a), (b) and (e) of the verdict."""
+    """What the measured rows lead to: (a), (b) and (e) of the verdict."""
 
     data: RowCovariance
     used: RowCovariance
@@ -327,11 +327,11 @@ class Case:
         return [Reason("no-gain", text)]
 
     def keeps_target(self, before: ToolUncertainty | None) -> bool:
-        """Whether the machine as filed keeps what is asked."""
+        """Whether the machine as filed keeps the accuracy that is asked of it."""
         return is_kept(self.target, self.reference(before))
 
     def lacks_only_gain(self, outcome: Outcome) -> bool:
-        """Whether the only thing missing is a gain that nobody asked for."""
+        """Whether the only reason is a missing gain that nobody asked for."""
         only = {reason.code for reason in outcome.reasons} == {"no-gain"}
         return only and self.keeps_target(outcome.before)
 

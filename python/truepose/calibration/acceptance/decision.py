@@ -1,8 +1,9 @@
 """The gate: whether a calibration may be used, why not, and what to measure so that it may.
 
-Least squares finds a best machine for any measurements, also for those that cannot tell it from a
-hundred others. The gate looks at what the measurements determine, at what that is worth at the
-tool over the whole workspace, and at what the found values claim, and says yes or no with reasons.
+Least squares finds a best machine for any measurements, also for those that hundreds of machines
+explain equally well. The gate looks at what the measurements determine, at how well the tool is
+then known over the whole workspace, and at whether the values found are plausible; its answer is
+yes or no, with reasons.
 Arrays only; `docs/calibration_gate.md` has formulas, thresholds and references.
 """
 
@@ -243,7 +244,7 @@ def assess(
 
 
 def _not_confirmed(held: Iterable[HeldOut], margin: float, units: ShownUnits) -> list[Reason]:
-    """(c): poses that were not fitted do not confirm what the fit claims."""
+    """(c): poses that were not fitted do not confirm the fit."""
     reasons = []
     for check in held:
         above = check.before > ABOVE_NOISE * check.noise and check.after > margin * check.before
@@ -267,7 +268,7 @@ def _not_confirmed(held: Iterable[HeldOut], margin: float, units: ShownUnits) ->
 
 
 def _absurd_values(case: Case, outcome: Outcome) -> list[Reason]:
-    """(d): values far outside of what was made."""
+    """(d): values far outside of the tolerances."""
     n = case.n
     off = case.values[:n] - np.asarray(case.unknowns.prior_mean, np.float64)[:n]
     own = outcome.used.standard()

@@ -21,7 +21,7 @@ from truepose.machine import Machine
 POSITION = "xyz"
 ROTATION = "abc"
 SLIGHT = 1e-3
-"""Of the largest effect at the tool of any unknown, by columns of length one: smaller is none."""
+"""Of the largest effect of any unknown at the tool, by columns of length one: less is none."""
 
 
 def tool_components(machine: Machine) -> list[str]:

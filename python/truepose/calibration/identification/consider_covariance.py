@@ -38,10 +38,10 @@ from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.machine import Machine
 
 SLIGHT = 1.05
-"""An uncertainty that the considered tolerances make less than so much larger needs no warning."""
+"""If the considered tolerances raise an uncertainty by less than this, there is no warning."""
 
 SOURCE = 0.5
-"""Of the uncertainty: tolerances that make up so much of it are named as its cause."""
+"""Share of the uncertainty from which tolerances are named as its cause."""
 
 _OF_GAIN = ("not-determined", "not-told-apart", "less-than-tolerance", "no-gain", "not-identified")
 """Codes of the reasons that a remedy is for."""
@@ -52,7 +52,8 @@ class Considered:
     """The tool with all tolerances, those that were identified and those that were not.
 
     `labels` of the latter, and `every` tolerance. `before` is None where something that moves the
-    tool has no tolerance; `alone` is `after` were the others exact, `part` what these make of it.
+    tool has no tolerance; `alone` is `after` if those not identified were exact, `part` is what
+    they contribute to it.
     `relative`: without what moves the whole machine in an instrument's unknown frame.
     """
 
@@ -162,7 +163,7 @@ def _roots(
 def with_considered(
     gate: Gate, considered: Considered | None, target: tuple[float | None, float | None]
 ) -> Gate:
-    """The gate with what all tolerances leave uncertain, and its answer by that.
+    """The gate with the uncertainty that all tolerances leave, and its answer by that.
 
     `target`: what is asked of the tool, m and rad.
     """
@@ -205,7 +206,7 @@ def _pairs(considered: Considered) -> list[tuple[str, str, float, float]]:
 
 
 def _no_gain(considered: Considered, margin: float, *, within: bool) -> list[Reason]:
-    """The tool is not known better than before: the gate's rule, with all tolerances."""
+    """The tool is not known better than before: the gate's rule, applied to all tolerances."""
     pairs = _pairs(considered)
     worse = [pair for pair in pairs if pair[2] > (1.0 + ROUNDING) * pair[3]]
     gained = any(size <= margin * was for _, _, size, was in pairs)

@@ -38,8 +38,8 @@ ROUNDING = 1e-13
 """Columns of the equations shorter than this share of the longest are rounding."""
 
 HELD = 1e-3
-"""How firmly an undetermined direction is held, in shares of the largest singular value: it is
-nowhere else, for nothing pulls at it."""
+"""Weight of the rows that hold an undetermined direction, in shares of the largest singular value;
+no other equation acts on it."""
 
 SETTLED = ("cost", "step", "gradient")
 
@@ -270,7 +270,7 @@ def place_instruments(
     """The problem, its instruments where the machine as filed has them, and values (n,) of that.
 
     Of several starts of the frames the one that fits best is taken, one that settles before one
-    that does not; frames that then still are far from fitting are turned further.
+    that does not; frames that are still far from fitting are then tried in other rotations.
 
     Raises `RequestError` (no-fit) where from no start the readings can be followed.
     """
@@ -331,7 +331,7 @@ def _fit_instruments(
 
 
 def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bool) -> None:
-    """Refuse fewer equations than unknowns: how many more, and of what kind."""
+    """Refuse fewer equations than unknowns, saying how many readings are lacking."""
     free = unknowns.count
     if use_prior:
         free -= int(unknowns.has_prior.sum())

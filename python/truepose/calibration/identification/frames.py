@@ -1,4 +1,4 @@
-"""Where an instrument stands, to begin with: closed forms on the nominal machine.
+"""Where the search for an instrument's frame starts: closed forms on the nominal machine.
 
 The search for an unknown frame is not linear in its rotation, so it starts from the rigid motion
 that fits the nominal points best (B. K. P. Horn, Closed-form solution of absolute orientation using
@@ -31,12 +31,12 @@ _NUMBER = {name: number for number, name in enumerate(OBSERVABLES)}
 _ORIGIN, _ROTATION = slice(0, 3), slice(3, 6)
 
 FAR = 10.0
-"""Root mean square of an instrument's residuals, in uncertainties, from which its frame is sought
-further; a machine within wide tolerances may be so far off too, and then nothing is lost."""
+"""Root mean square of an instrument's residuals, in uncertainties, from which further rotations of
+its frame are tried; a machine with wide tolerances may be as far off, which only costs time."""
 
 TURNED = 0.5
-"""rad of a rotation unknown from which the frame is set down where it was found: half a turn of one
-is infinite."""
+"""rad of a rotation unknown from which the frame is rebased to where it was found: the unknown of
+half a turn is infinite."""
 
 _ALONG = 1.0 - 1e-6
 """Cosine from which two axes are one."""
@@ -168,7 +168,7 @@ def _rotation_by(frame: Frame, product: Floats) -> Floats | None:
 
 
 def _with_origin(frame: Frame, rotation: Floats, points: Floats, read: dict[str, Floats]) -> Frame:
-    """The frame so turned, its origin where the coordinates read of points (n, 3) put it."""
+    """The frame with this rotation, its origin where the readings of points (n, 3) put it."""
     origin = np.array(frame.origin)
     free = np.array(frame.unknown[_ORIGIN])
     axes = [at for at, axis in enumerate("xyz") if axis in read]
@@ -198,7 +198,8 @@ def _table(measurements: Measurements, number: int) -> dict[str, Floats]:
 def _point_product(frame: Frame, points: Floats, read: dict[str, Floats]) -> Floats | None:
     """(3, 3) sum over points of (in the base frame) (as read)^T, both from their means.
 
-    None where they do not fix the rotation. About one axis alone what is read across it does.
+    None where they do not fix the rotation. For a rotation about one axis, the two coordinates
+    across it are enough.
     """
     axes = [at for at, axis in enumerate("xyz") if axis in read]
     unread = [at for at in range(3) if at not in axes]

@@ -2,8 +2,8 @@
 
 Huber's loss: squared up to `HUBER` standard uncertainties, linear beyond, by weights that are found
 anew from the residuals until they stay (P. J. Huber, Robust Estimation of a Location Parameter,
-Ann. Math. Statist. 35 (1964) 73-101). Good readings lose next to nothing: of a normal distribution
-one in 370 lies beyond three.
+Ann. Math. Statist. 35 (1964) 73-101). Good readings keep almost all their weight: of a normal
+distribution one in 370 lies beyond three.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What unknowns do at the tool over the workspace, and what could be measured besides."""
+"""What unknowns do at the tool over the workspace, and further measurements that could help."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from truepose.machine import Condition, Machine
 from truepose.runs.poses import OK, requested_poses
 
 MOST_POSES = 300
-"""Poses of the workspace at which the tool is looked at; more are thinned evenly."""
+"""Poses of the workspace at which the tool's uncertainty is computed; more are thinned evenly."""
 
 FURTHER = (5, 20)
 """Numbers of further poses that are tried as a remedy."""

@@ -1,11 +1,11 @@
 """Validation on rows that were not used: k-fold, or a set that the measurements state.
 
-Every fold fits the others' rows, instruments' frames and all, and then says what the left-out rows
-should have read; so does the machine as its file has it, with the same frames' freedom. A fit that
-only follows its own noise shows here.
+For every fold the other folds are fitted, the instruments' frames included, and the fit predicts
+the readings of the fold's rows; so does the machine as its file has it, its instruments fitted to
+the same rows. A fit that only follows the noise of its own rows is found out here.
 
-A reading that the other rows cannot foretell is not predicted: where they leave the frame, target
-or constant of its instrument open. Of the others the fit says how uncertain its prediction is.
+A reading is not predicted where the other rows leave the frame, target or constant of its
+instrument open. For every prediction the fit states how uncertain it is.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FEW = 0.1
 """Share of the readings up to which those that do not fit are left out of what is counted."""
 
 LEAST_ROWS = 4
-"""Fewer rows are not divided."""
+"""Fewer rows are not divided into folds."""
 
 CONSISTENT = 1.5
 """Up to this times what the fit promises for them, rows that were not used agree with it."""

@@ -45,13 +45,13 @@ _ROUNDING = 1e-12
 """Of the number of parameters: an eigenvalue so small, of a correlation matrix, is zero."""
 
 _CERTAIN = 1e-3
-"""Standard deviations: from here on it counts along what neither file has an uncertainty of."""
+"""Standard deviations from which a difference counts as a change where no file is uncertain."""
 
 _EXACT = 1e-12
 """Relative to a parameter: a smaller difference is rounding."""
 
 _ROUNDED = 1e-15
-"""m, rad: the same of what is near zero, and has no size to be exact to."""
+"""m, rad: the same for parameters near zero, of which a relative size says nothing."""
 
 _TURNED = 0.5
 """Cosine of the angle by which a direction may have turned."""
@@ -83,7 +83,7 @@ class _Change:
 
     @property
     def changed(self) -> bool:
-        """Whether the machine did."""
+        """Whether the machine changed."""
         return bool(self.each.any()) or self.probability < 0.5 * ALPHA
 
 
@@ -402,7 +402,7 @@ def _amount(name: str, value: float, deviation: float, unit: Shown) -> str:
 
 
 def _allowed(dataset: xr.Dataset, units: ShownUnits) -> str:
-    """What the difference would do to the tool, where it is no sign of a change."""
+    """How far the files differ at the tool, and how likely that is without a change."""
     likely = float(dataset.attrs["chi_square_probability"])
     return (
         f"taken as they are the two files differ at the tool by up to {_largest(dataset, units)}, "

@@ -2,9 +2,8 @@
 
 A direction has two parameters `u`, `v`: it points along `axis + u t1 + v t2`, where the tangents t1
 and t2 follow from the nominal axis alone (`tangents` in `crates/kernel/src/spatial/vector.rs`). A
-machine file has the axis only. So a direction that was found to be off is written as a new axis,
-from which its deviations then count about new tangents: what is known of `u`, `v` has to be turned
-with them.
+machine file has the axis only. So a direction that deviates is written as a new axis, from which
+its deviations count about new tangents: the covariance of `u`, `v` has to be transformed with them.
 """
 
 from __future__ import annotations

@@ -4,9 +4,9 @@ Every parameter that the unknowns move has its identified value, or, with `as_sh
 that the controller has and gets the deviation as the middle of its band. Bands are normal, of the
 identified covariance, with all correlations. What the file says besides, comments included, stays.
 
-An accuracy that is asked of every machine inside the bands, because the file does not say of how
-many, is asked at a coverage: ends of normal bands are no ends, and what a calibration knows, it
-knows by the correlations, which the worst case does not count.
+An accuracy that the original asks in the worst case (it states no coverage) is asked at a coverage
+in the calibrated file: normal bands have no ends, and a calibration knows most by the correlations,
+which the worst case does not use.
 """
 
 from __future__ import annotations

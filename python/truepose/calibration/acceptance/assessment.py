@@ -283,13 +283,14 @@ class Case:
         if np.isfinite(half) and own[at] > half:
             known = f"its tolerance is {sentences.stated(half, unit, units)}"
         else:
-            known = f"its tolerance alone by {sentences.quantity(sigma, unit, units=units)}"
+            known = f"its tolerance already to {sentences.quantity(sigma, unit, units=units)}"
         uncertainty = sentences.quantity(own[at], unit, units=units)
-        text = f"the data leave {self.labels[at]} uncertain by {uncertainty}, {known}"
+        text = f"the measurements determine {self.labels[at]} only to {uncertainty}, {known}"
         if np.isfinite(half) and own[at] > NOTHING * half:
             tolerance = sentences.stated(half, unit, units)
             text = (
-                f"the data say next to nothing of {self.labels[at]}, its tolerance is {tolerance}"
+                f"the measurements say almost nothing about {self.labels[at]}, "
+                f"its tolerance is {tolerance}"
             )
         if len(loose) > 1:
             others = "one more unknown is" if len(loose) == 2 else f"{len(loose) - 1} more are"
@@ -323,7 +324,7 @@ class Case:
         texts[0] = texts[0].replace(" by ", " would be uncertain by ", 1)
         text = f"at the worst pose of the workspace {', and '.join(texts)}"
         if self.keeps_target(before):
-            text += "; but what is asked of the tool is kept without calibration"
+            text += "; but the machine as filed already keeps the accuracy that is asked"
         return [Reason("no-gain", text)]
 
     def keeps_target(self, before: ToolUncertainty | None) -> bool:

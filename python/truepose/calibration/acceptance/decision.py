@@ -283,7 +283,7 @@ def _absurd_values(case: Case, outcome: Outcome) -> list[Reason]:
     text = _absurd_sentence(case, at[0], float(off[at[0]]))
     more = sentences.collapsed([case.labels[i] for i in sorted(at[1:])], case.labels)
     if more:
-        text += f"; {sentences.listed(more)} would be off likewise"
+        text += f"; {sentences.listed(more)} would be off too"
     return [Reason("absurd-value", text)]
 
 
@@ -317,28 +317,34 @@ def _contradicts_noise(case: Case) -> list[Reason]:
 def _warnings(case: Case, outcome: Outcome) -> list[Reason]:
     warnings = []
     if case.degrees < 0.5:
-        text = "there are no more measurements than unknowns, so the stated noise is not checked"
+        text = (
+            "there are no more readings than unknowns, so the stated uncertainties cannot be "
+            "checked"
+        )
         warnings.append(Reason("noise-unchecked", text))
     elif case.rms <= CONTRADICTED and _unlikely(case) > UNLIKELY:
         text = (
             f"the residuals are {sentences.times(case.rms)} times as large as the stated "
-            "uncertainties, which are multiplied by that here"
+            "uncertainties, which have been multiplied by this factor"
         )
         warnings.append(Reason("noise-too-small", text))
     elif _unlikely(case) < -UNLIKELY:
         text = (
-            f"the residuals are only {sentences.times(case.rms)} of the stated uncertainties, "
+            f"the residuals are only {sentences.times(case.rms)} times the stated uncertainties, "
             "which seem too large"
         )
         warnings.append(Reason("noise-too-large", text))
     if case.use_prior and outcome.sentences and not outcome.reasons:
-        text = f"{'; '.join(outcome.sentences)}: what is found of these rests on their tolerances"
+        text = (
+            f"{'; '.join(outcome.sentences)}: what is stated for these rests on their tolerances, "
+            "not on the measurements"
+        )
         warnings.append(Reason("rests-on-tolerances", text))
     gauge = [direction for direction in outcome.directions if direction.kind == "gauge"]
     if gauge:
         text = (
-            "where the machine as a whole stands in the instrument's frame is unknown, without "
-            "effect on what it does: uncertainties at the tool are without it"
+            "where the machine as a whole stands in the instrument's frame is not determined, "
+            "which does not affect its accuracy: the uncertainties at the tool leave it out"
         )
         warnings.append(Reason("gauge", text))
     if outcome.before is None and case.measured[0] is None and case.measured[1] is None:
@@ -348,7 +354,10 @@ def _warnings(case: Case, outcome: Outcome) -> list[Reason]:
         )
         warnings.append(Reason("nothing-to-compare", text))
     if case.keeps_target(outcome.before) and not case.lacks_only_gain(outcome):
-        text = "what is asked of the tool is kept without calibration: it is not needed"
+        text = (
+            "the machine as filed already keeps the accuracy that is asked: "
+            "calibration is not needed"
+        )
         warnings.append(Reason("not-needed", text))
     if not outcome.reasons:
         pairs = zip(at_worst_pose(outcome.after, None), case.reference(outcome.before), strict=True)

@@ -177,7 +177,10 @@ def with_considered(
         warning for warning in gate.warnings if warning.code not in ("one-sided", "not-needed")
     ]
     if within and codes not in ({"no-gain"}, {"not-identified"}):
-        text = "what is asked of the tool is kept without calibration: it is not needed"
+        text = (
+            "the machine as filed already keeps the accuracy that is asked: "
+            "calibration is not needed"
+        )
         warnings.append(Reason("not-needed", text))
     if not codes & set(_OF_GAIN):
         warnings += _one_sided(considered, gate.margin)
@@ -217,7 +220,7 @@ def _no_gain(considered: Considered, margin: float, *, within: bool) -> list[Rea
         f"{sentences.quantity(was, unit, units=considered.shown)} of the machine as filed"
         for name, unit, size, was in worse or pairs
     ]
-    ending = "; but what is asked of the tool is kept without calibration" if within else ""
+    ending = "; but the machine as filed already keeps the accuracy that is asked" if within else ""
     if not _is_source(considered):
         texts[0] = texts[0].replace(" uncertain", " would be uncertain", 1)
         text = f"at the worst pose of the workspace {', and '.join(texts)}{ending}"
@@ -261,8 +264,8 @@ def _unidentified_warning(considered: Considered) -> list[Reason]:
         )
     )
     more = [
-        f"{name} would be known to {sentences.quantity(less, unit, units=considered.shown)} in "
-        f"place of {sentences.quantity(size, unit, units=considered.shown)}"
+        f"{name} would be known to {sentences.quantity(less, unit, units=considered.shown)} "
+        f"instead of {sentences.quantity(size, unit, units=considered.shown)}"
         for (name, unit, size, _), (*_, less, _) in pairs
         if size > SLIGHT * less
     ]
@@ -270,7 +273,7 @@ def _unidentified_warning(considered: Considered) -> list[Reason]:
         return []
     text = (
         f"{_named(considered)} were not identified and count with their tolerances: "
-        f"were they exact, {' and '.join(more)}; identify them too if that is too much"
+        f"if they were exact, {' and '.join(more)}; identify them too if this is too uncertain"
     )
     return [Reason("not-identified", text)]
 

@@ -405,9 +405,9 @@ def _allowed(dataset: xr.Dataset, units: ShownUnits) -> str:
     """How far the files differ at the tool, and how likely that is without a change."""
     likely = float(dataset.attrs["chi_square_probability"])
     return (
-        f"taken as they are the two files differ at the tool by up to {_largest(dataset, units)}, "
-        "and what both files say of their uncertainty allows it: without a change all parameters "
-        f"together differ so much in {100.0 * likely:.3g} % of cases"
+        f"the two files differ at the tool by up to {_largest(dataset, units)}, which is within "
+        "their uncertainties: without a change all parameters together differ as much in "
+        f"{100.0 * likely:.3g} % of cases"
     )
 
 

@@ -131,8 +131,8 @@ def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
         unit, with_them, without = "rad", whole.rotation_max, known.rotation_max
         what = "rotation"
     return [
-        f"the uncertainty of what was found of {names} is not in this file, which has no place for "
-        f"it: by the rest of what was found the tool's {what} at the worst pose is known to "
+        f"the uncertainty of {names} is not in this file, which has no key for it: without it the "
+        f"tool's {what} at the worst pose is known to "
         f"{sentences.quantity(without, unit, units=machine.shown)}, with it, at this file's "
         "temperatures and loads, to "
         f"{sentences.quantity(with_them, unit, units=machine.shown)}"

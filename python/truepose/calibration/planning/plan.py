@@ -19,7 +19,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.calibration.acceptance.observability import of_machine, row_covariance
+from truepose.calibration.acceptance.observability import project_out_instruments, row_covariance
 from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
@@ -368,7 +368,7 @@ def _tool(
         return effects, False
     sigma = np.sqrt(np.diagonal(unknowns.prior_covariance))[:n_machine]
     triangle = np.linalg.qr(blocks.reshape(-1, unknowns.count), mode="r")
-    seen = row_covariance(of_machine(triangle, n_machine, sigma))
+    seen = row_covariance(project_out_instruments(triangle, n_machine, sigma))
     # The tool's rotations are named as angles there.
     names = ["abc"["xyz".index(name[1])] if name[0] == "r" else name for name in machine.components]
     tool = Tool.of(found, names, over.placements[solved, :3])

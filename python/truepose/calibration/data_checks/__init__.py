@@ -81,7 +81,7 @@ def suspicions(machine: Machine, measurements: Measurements) -> tuple[Suspicion,
     Empty for data that a machine within its tolerances gives. Raises nothing of its own, and
     `TrueposeError` where a row's condition asks an error source for what the machine does not say.
     """
-    geometry = Geometry.of(machine, measurements.joints, measurements.placements)
+    geometry = Geometry.of(machine.kernel, measurements.joints, measurements.placements)
     allowed = expected_residual(machine, measurements, geometry)
     instrument_of = measurements.instrument[measurements.row]
     suspected: list[Suspicion] = []

@@ -243,15 +243,14 @@ class View:
         poses, _ = kernel.forward(joints, status=True)
         if not np.isfinite(poses).all():
             return None
-        placements = kernel.placement_of(poses)
-        return Geometry.of(self.machine, joints, placements)
+        return Geometry.of(kernel, joints, kernel.placement_of(poses))
 
     def geometry_at_poses(self, poses: Floats) -> Geometry | None:
         """Where it would be at other commanded poses (n_row, n_commanded); None: not reached."""
         joints, placements, status = self.machine.kernel.place(poses)
         if (status > 1).any():  # out of travel is a place, though not a good one
             return None
-        return Geometry.of(self.machine, joints, placements)
+        return Geometry.of(self.machine.kernel, joints, placements)
 
     @cached_property
     def poses(self) -> Floats:

@@ -17,7 +17,6 @@ from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import UNITS
 from truepose.machine import Machine
 from truepose.sources import Deviation, PoseBlock, acting
-from truepose.sources.pose_block import rotations_of
 from truepose.sources.tolerance import DimensionalTolerance
 
 MACHINES = 24
@@ -81,8 +80,7 @@ def _by_tolerance(machine: Machine, measurements: Measurements, geometry: Geomet
         )
         poses, _ = kernel.forward(measurements.joints, start, status=True)
         placements = kernel.placement_of(poses)
-        centres = kernel.joint_centres(measurements.joints, placements)
-        drawn = Geometry(placements[:, :3], rotations_of(placements), centres)
+        drawn = Geometry.of(kernel, measurements.joints, placements)
         readings = nominal_readings(machine, measurements, geometry=drawn)
         squares.append(difference(measurements.observable, readings, nominal) ** 2)
     table = np.stack(squares)

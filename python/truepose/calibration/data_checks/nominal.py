@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose._kernel import Machine as KernelMachine
 from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments._base import Frame, Instrument
 from truepose.calibration.measurements import Measurements
@@ -41,9 +42,9 @@ class Geometry:
     centres: Floats
 
     @classmethod
-    def of(cls, machine: Machine, joints: Floats, placements: Floats) -> Geometry:
+    def of(cls, kernel: KernelMachine, joints: Floats, placements: Floats) -> Geometry:
         """Of joints (n, n_joint) and the placements (n, 7) that they lead to."""
-        centres = machine.kernel.joint_centres(joints, placements)
+        centres = kernel.joint_centres(joints, placements)
         return cls(placements[:, :3], quaternion_to_matrix(placements[:, 3:]), centres)
 
     def rows(self, rows: Indices) -> Geometry:
@@ -136,7 +137,7 @@ def nominal_readings(
     counts as its start. Biases count as zero. Raises nothing: a row that is not placed gives NaN.
     """
     if geometry is None:
-        geometry = Geometry.of(machine, measurements.joints, measurements.placements)
+        geometry = Geometry.of(machine.kernel, measurements.joints, measurements.placements)
     value = np.empty(measurements.n_observation)
     instrument_of = measurements.instrument[measurements.row]
     for index, instrument in enumerate(measurements.instruments):

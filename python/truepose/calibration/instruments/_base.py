@@ -120,8 +120,8 @@ class Kind:
         struts are of every strut.
         """
         possible = self.fixed or tuple(dict.fromkeys(self.reads.values()))
-        found = tuple(each for each in possible if moved(each, components))
-        return found if self.most is None else found[-1:]
+        readable = tuple(observable for observable in possible if moved(observable, components))
+        return readable if self.most is None else readable[-1:]
 
 
 def moved(observable: str, components: Sequence[str]) -> bool:

@@ -84,10 +84,12 @@ def measurements_of(
         joints=commanded if poses is None else None,
         whole=frozenset({instrument.name} if frame_unknown else ()),
     )
-    found = measurements_in(machine, (instrument,), rows, _Report(problems, rows))
+    measurements = measurements_in(machine, (instrument,), rows, _Report(problems, rows))
     if problems:
         raise RequestError(*cut_short(problems))
-    return found if conditions is None else dataclasses.replace(found, conditions=conditions)
+    if conditions is None:
+        return measurements
+    return dataclasses.replace(measurements, conditions=conditions)
 
 
 def joined(*several: Measurements) -> Measurements:
@@ -99,8 +101,8 @@ def joined(*several: Measurements) -> Measurements:
     if not several:
         raise RequestError(_bad("measurements", "nothing", "one or more"))
     instruments: dict[str, Instrument] = {}
-    for each in several:
-        for instrument in each.instruments:
+    for part in several:
+        for instrument in part.instruments:
             if instruments.setdefault(instrument.name, instrument) != instrument:
                 raise RequestError(
                     _bad(
@@ -109,31 +111,31 @@ def joined(*several: Measurements) -> Measurements:
                         "a name of its own for each instrument",
                     )
                 )
-    if len({each.joints.shape[1] for each in several}) > 1:
+    if len({part.joints.shape[1] for part in several}) > 1:
         raise RequestError(
             _bad("joints", "measurements of machines with other joints", "those of one machine")
         )
     names = list(instruments)
     numbers = [np.array([names.index(i.name) for i in e.instruments], np.intp) for e in several]
-    first = np.cumsum([0, *(each.n_row for each in several)])[:-1].tolist()
-    files = dict.fromkeys(each.file for each in several)
+    first = np.cumsum([0, *(part.n_row for part in several)])[:-1].tolist()
+    files = dict.fromkeys(part.file for part in several)
     return Measurements(
         instruments=tuple(instruments.values()),
-        joints=np.concatenate([each.joints for each in several]),
-        placements=np.concatenate([each.placements for each in several]),
+        joints=np.concatenate([part.joints for part in several]),
+        placements=np.concatenate([part.placements for part in several]),
         instrument=np.concatenate(
-            [of[each.instrument] for of, each in zip(numbers, several, strict=True)]
+            [of[part.instrument] for of, part in zip(numbers, several, strict=True)]
         ),
-        conditions=_same_objects([c for each in several for c in each.conditions]),
-        held_out=np.concatenate([each.held_out for each in several]),
-        row=np.concatenate([each.row + at for each, at in zip(several, first, strict=True)]),
-        observable=np.concatenate([each.observable for each in several]),
-        strut=np.concatenate([each.strut for each in several]),
-        value=np.concatenate([each.value for each in several]),
-        uncertainty=np.concatenate([each.uncertainty for each in several]),
-        lines=np.concatenate([each.lines for each in several]),
-        file=", ".join(each for each in files if each),
-        file_hash=", ".join(dict.fromkeys(each.file_hash for each in several if each.file_hash)),
+        conditions=_same_objects([c for part in several for c in part.conditions]),
+        held_out=np.concatenate([part.held_out for part in several]),
+        row=np.concatenate([part.row + at for part, at in zip(several, first, strict=True)]),
+        observable=np.concatenate([part.observable for part in several]),
+        strut=np.concatenate([part.strut for part in several]),
+        value=np.concatenate([part.value for part in several]),
+        uncertainty=np.concatenate([part.uncertainty for part in several]),
+        lines=np.concatenate([part.lines for part in several]),
+        file=", ".join(file for file in files if file),
+        file_hash=", ".join(dict.fromkeys(part.file_hash for part in several if part.file_hash)),
     )
 
 
@@ -143,11 +145,11 @@ def _same_objects(conditions: Sequence[Condition]) -> tuple[Condition, ...]:
     by_identity: dict[int, Condition] = {}
     for condition in conditions:
         if id(condition) not in by_identity:
-            same = next((each for each in kept if each == condition), None)
+            same = next((other for other in kept if other == condition), None)
             if same is None:
                 kept.append(condition)
             by_identity[id(condition)] = condition if same is None else same
-    return tuple(by_identity[id(each)] for each in conditions)
+    return tuple(by_identity[id(condition)] for condition in conditions)
 
 
 def _bad(path: str, found: str, expected: str, hint: str | None = None) -> Problem:
@@ -249,8 +251,12 @@ class _Maker:
         if given is None or self.instrument.kind not in REGISTRY:
             return {}
         kind = REGISTRY[self.instrument.kind]
-        own = [name for name, each in self.known.items() if each.word in kind.reads] or kind.fixed
-        read = [name for name in own if name in readings or kind.fixed or kind.optional]
+        columns = [name for name, column in self.known.items() if column.word in kind.reads]
+        read = [
+            name
+            for name in columns or kind.fixed
+            if name in readings or kind.fixed or kind.optional
+        ]
         by_column: Mapping[str, ArrayLike]
         by_column = given if isinstance(given, Mapping) else dict.fromkeys(read, given)
         result = {}
@@ -278,7 +284,7 @@ class _Maker:
             )
             return None
         same = _same_objects(every)
-        for condition in {id(each): each for each in same}.values():
+        for condition in {id(condition): condition for condition in same}.values():
             try:
                 self.machine.check_condition(condition)
             except RequestError as error:

@@ -122,7 +122,7 @@ def _not_toml(error: Exception, head: str, file: str) -> Problem:
     line, found = None, None
     if match is not None:
         reason = reason[: match.start()]
-        written = [at for at, each in enumerate(head.split("\n"), 1) if each]
+        written = [number for number, text in enumerate(head.split("\n"), 1) if text]
         line = int(match[1]) if match[1] else (written[-1] if written else None)
         all_lines = head.split("\n")
         found = all_lines[line - 1].strip()[:80] if line and line <= len(all_lines) else None
@@ -245,7 +245,7 @@ class _Reader:
                 "missing",
                 (*key, "kind"),
                 found="nothing",
-                expected=one_of(f'"{each}"' for each in REGISTRY),
+                expected=one_of(f'"{name}"' for name in REGISTRY),
             )
             return None
         word = table["kind"]
@@ -256,7 +256,7 @@ class _Reader:
             f"there is no instrument of kind {shown_value(word)}",
             (*key, "kind"),
             found=shown_value(word),
-            expected=one_of(f'"{each}"' for each in REGISTRY),
+            expected=one_of(f'"{name}"' for name in REGISTRY),
             hint=did_you_mean(word, REGISTRY) if isinstance(word, str) else None,
         )
         return None
@@ -340,9 +340,9 @@ class _Reader:
                     "no freedom of a frame",
                     (*key, "unknown"),
                     bad[0],
-                    "a list of some of " + ", ".join(f'"{each}"' for each in FRAME_FREEDOMS),
+                    "a list of some of " + ", ".join(f'"{name}"' for name in FRAME_FREEDOMS),
                 )
-            flags = tuple(each in words for each in FRAME_FREEDOMS)
+            flags = tuple(name in words for name in FRAME_FREEDOMS)
             frame = dataclasses.replace(frame, unknown=flags)
         return frame
 
@@ -426,7 +426,7 @@ class _Reader:
 
     def _uncertainty(self, key: Key, value: Any, kind: Kind) -> dict[str, float]:
         """Standard uncertainties by observable: one text for each dimension, or by column."""
-        observed = dict(kind.reads) or {each: each for each in kind.fixed}
+        observed = dict(kind.reads) or {observable: observable for observable in kind.fixed}
         if isinstance(value, dict):
             result = {}
             for word, entry in value.items():
@@ -437,19 +437,19 @@ class _Reader:
                 result[observed[word]] = self._positive((*key, word), entry, (dimension,))[0]
             return result
         entries = value if isinstance(value, list) else [value]
-        dimensions = tuple(dict.fromkeys(_dimension(each) for each in observed.values()))
+        dimensions = tuple(dict.fromkeys(map(_dimension, observed.values())))
         result = {}
         for at, entry in enumerate(entries):
             where = (*key, at) if isinstance(value, list) else key
             amount, dimension = self._positive(where, entry, dimensions)
-            mine = [each for each in observed.values() if _dimension(each) == dimension]
-            if not result.keys().isdisjoint(mine):
+            same = [name for name in observed.values() if _dimension(name) == dimension]
+            if not result.keys().isdisjoint(same):
                 plural = DIMENSIONS[dimension].plural
                 expected = f"one for all {plural}, or a table by column"
                 self._refuse(
                     "excluding-keys", f"two uncertainties of {plural}", where, entry, expected
                 )
-            result.update(dict.fromkeys(mine, amount))
+            result.update(dict.fromkeys(same, amount))
         return result
 
     def _positive(self, key: Key, value: Any, dimensions: tuple[str, ...]) -> tuple[float, str]:
@@ -464,7 +464,7 @@ class _Reader:
             except QuantityError as error:
                 if error.code == "wrong-dimension" and dimension != tried[-1]:
                     continue
-                self._quantity(key, error, [DIMENSIONS[each].phrase for each in tried])
+                self._quantity(key, error, [DIMENSIONS[name].phrase for name in tried])
             if amount > 0.0:
                 return amount, dimension if dimension in dimensions else dimensions[0]
             self._refuse(

@@ -76,7 +76,7 @@ class Measurements:
     def observables(self, instrument: int) -> tuple[str, ...]:
         """Names of what an instrument, by its index, read in any row, in the order of the table."""
         mine = self.observable[self.instrument[self.row] == instrument]
-        return tuple(OBSERVABLES[each] for each in np.unique(mine).tolist())
+        return tuple(OBSERVABLES[number] for number in np.unique(mine).tolist())
 
     @property
     def digest(self) -> str:
@@ -84,7 +84,7 @@ class Measurements:
         if self.file_hash:
             return self.file_hash
         arrays = (self.joints, self.row, self.observable, self.strut, self.value, self.uncertainty)
-        parts = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
+        parts = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
         return hashlib.sha256(parts).hexdigest()
 
     def select(self, rows: ArrayLike) -> Measurements:

@@ -132,12 +132,12 @@ def measurements_in(
     for number in range(len(instruments)):
         observed.of_instrument(number)
     table = observed.table()
-    found = [
+    framed = [
         _with_frame(machine, instrument, number, rows, table)
         for number, instrument in enumerate(instruments)
     ]
     return Measurements(
-        instruments=tuple(found),
+        instruments=tuple(framed),
         joints=placed[0],
         placements=placed[1],
         instrument=rows.instrument,
@@ -171,7 +171,7 @@ def _with_frame(
     if instrument.name not in rows.whole or rule is None:
         return instrument
     mine = rows.instrument[table.row] == number
-    read = [OBSERVABLES[each] for each in np.unique(table.observable[mine]).tolist()]
+    read = [OBSERVABLES[number] for number in np.unique(table.observable[mine]).tolist()]
     frame = dataclasses.replace(instrument.frame, unknown=rule(read, machine.components))
     return dataclasses.replace(instrument, frame=frame)
 
@@ -182,7 +182,7 @@ def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Fl
     placements = np.full((rows.n_row, 7), math.nan)
     if rows.commands is not None:
         good = np.isfinite(rows.commands).all(axis=1)
-        for column in (f"command.{each}" for each in machine.commanded):
+        for column in (f"command.{freedom}" for freedom in machine.commanded):
             good &= ~rows.spoilt(column)
         at = np.flatnonzero(good)
         joints[at], placements[at], status = machine.kernel.place(rows.commands[at])
@@ -202,7 +202,7 @@ def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Fl
             )
     if rows.joints is not None:
         good = np.asarray(np.isfinite(rows.joints).all(axis=1), np.bool_)
-        for column in (f"joint.{each}" for each in machine.joints):
+        for column in (f"joint.{joint}" for joint in machine.joints):
             good &= ~rows.spoilt(column)
         at = np.flatnonzero(good & _within_travel(machine, rows, good, report))
         joints[at] = rows.joints[at]
@@ -334,7 +334,7 @@ class _Observations:
                 )
             return
         self._refuse_unwanted(instrument, kind, mine)
-        own = {name: each for name, each in self.columns.items() if each.word in kind.reads}
+        own = {name: column for name, column in self.columns.items() if column.word in kind.reads}
         self._require(instrument, kind, mine, own)
         self._check_signs(kind, mine, own)
         if any(word.startswith("direction") for word in kind.reads):

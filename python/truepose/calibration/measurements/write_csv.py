@@ -46,7 +46,7 @@ def measurements_text(machine: Machine, measurements: Measurements) -> str:
         columns.numbers(f"joint.{drive.name}", drive.coordinate, measurements.joints[:, at])
     _readings(machine, measurements, columns)
     _conditions(machine, measurements, columns)
-    columns.words(SET, [CHECK if each else FIT for each in measurements.held_out.tolist()])
+    columns.words(SET, [CHECK if held_out else FIT for held_out in measurements.held_out.tolist()])
     return "\n".join([*head, *columns.lines(), ""])
 
 
@@ -67,7 +67,7 @@ def _declared(machine: Machine, instrument: Instrument) -> list[str]:
     if instrument.bias_unknown:
         lines.append('bias = "unknown"')
     words = {observable: word for word, observable in kind.reads.items()} or {
-        each: each for each in kind.fixed
+        observable: observable for observable in kind.fixed
     }
     stated = []
     for observable, word in words.items():
@@ -161,7 +161,7 @@ class _Columns:
         blank = np.isnan(values)
         numbers = _in_file(np.where(blank, 1.0, values), unit).tolist()
         self._cells.append(
-            ["" if no else repr(each) for each, no in zip(numbers, blank.tolist(), strict=True)]
+            ["" if no else repr(number) for number, no in zip(numbers, blank.tolist(), strict=True)]
         )
 
     def lines(self) -> list[str]:
@@ -171,7 +171,7 @@ class _Columns:
 
 def _readings(machine: Machine, measurements: Measurements, columns: _Columns) -> None:
     """The columns of readings, each with its uncertainties."""
-    kinds = [REGISTRY[each.kind] for each in measurements.instruments]
+    kinds = [REGISTRY[instrument.kind] for instrument in measurements.instruments]
     mine = measurements.instrument[measurements.row]
     for name, reading in reading_columns(machine).items():
         value = np.full(measurements.n_row, math.nan)
@@ -211,18 +211,18 @@ def _conditions(machine: Machine, measurements: Measurements, columns: _Columns)
     """The columns of temperatures and loads, those that say something."""
     conditions = measurements.conditions
     reference = machine.condition.reference_temperature
-    for condition in {id(each): each for each in conditions}.values():
+    for condition in {id(condition): condition for condition in conditions}.values():
         lost = _lost(machine, condition)
         if lost is not None:
             raise RequestError(_bad("conditions", lost, "temperatures, force and moment only"))
-    defaults = np.array([each.default_temperature for each in conditions])
+    defaults = np.array([condition.default_temperature for condition in conditions])
     if (defaults != reference).any():
         columns.numbers(f"temperature.{DEFAULT_PART}", "temperature", defaults)
-    named = dict.fromkeys(part for each in conditions for part in each.part_temperatures)
+    named = dict.fromkeys(part for condition in conditions for part in condition.part_temperatures)
     for part in named:
-        values = [each.part_temperatures.get(part, math.nan) for each in conditions]
+        values = [condition.part_temperatures.get(part, math.nan) for condition in conditions]
         columns.numbers(f"temperature.{part}", "temperature", np.array(values))
-    wrenches = np.array([each.wrench for each in conditions]).reshape(-1, 6)
+    wrenches = np.array([condition.wrench for condition in conditions]).reshape(-1, 6)
     for at, (name, dimension) in enumerate(WRENCH.items()):
         if wrenches[:, at].any():
             columns.numbers(name, dimension, wrenches[:, at])

@@ -48,14 +48,14 @@ class Comparison:
     def sentences(self) -> tuple[str, ...]:
         """One for each instrument but the first, for people."""
         first = f"{_readings(self.counts[0], self.names[0])}"
-        found = []
+        sentences = []
         for name, count in zip(self.names[1:], self.counts[1:], strict=True):
             if count is None:
-                found.append(f"not even {_readings(self.most, name)} do what {first} do")
+                sentences.append(f"not even {_readings(self.most, name)} do what {first} do")
             else:
                 verb = "does" if count == 1 else "do"
-                found.append(f"{_readings(count, name)} {verb} what {first} do")
-        return tuple(found)
+                sentences.append(f"{_readings(count, name)} {verb} what {first} do")
+        return tuple(sentences)
 
 
 def compare_instruments(
@@ -89,8 +89,8 @@ def compare_instruments(
         )
     wanted = tuple(identify)
     fields = [
-        Field(machine, each, candidates=candidates, condition=condition, identify=wanted)
-        for each in instruments
+        Field(machine, instrument, candidates=candidates, condition=condition, identify=wanted)
+        for instrument in instruments
     ]
     # One ruler for all: what the least telling of them leaves to be judged.
     ruler = min(fields, key=lambda field: field.mean_before)
@@ -102,18 +102,18 @@ def compare_instruments(
     goal = np.inf
     for at, field in enumerate(fields):
         if at == 0:
-            found = _planned(field.candidates, count, seed)
-            goal = found.value
+            design = _planned(field.candidates, count, seed)
+            goal = design.value
             counts.append(count)
         else:
             number = _fewest(field.candidates, goal, most, seed)
             counts.append(number)
-            found = _planned(field.candidates, number or most, seed)
-        rms.append(field.after(found.chosen)[0])
+            design = _planned(field.candidates, number or most, seed)
+        rms.append(field.after(design.chosen)[0])
         if progress is not None:
             progress(at + 1, len(fields))
     before = ruler.after(np.empty(0, np.intp))[0]
-    names = tuple(each.name for each in instruments)
+    names = tuple(instrument.name for instrument in instruments)
     return Comparison(names, tuple(counts), np.array(rms), before, most)
 
 

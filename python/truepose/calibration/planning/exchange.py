@@ -133,15 +133,15 @@ class Candidates:
     def values(self, sets: ArrayLike, criterion: Criterion = "tool") -> Floats:
         """(n_set,) the criterion of each set of candidates `sets` (n_set, m)."""
         numbers = np.asarray(sets, np.intp)
-        found = np.empty(len(numbers))
-        for each, chosen in enumerate(numbers):
+        values = np.empty(len(numbers))
+        for index, chosen in enumerate(numbers):
             lower = np.linalg.cholesky(self.information(chosen))
             if criterion == "determinant":
-                found[each] = 2.0 * np.log(np.diagonal(lower) / self.scale).sum()
+                values[index] = 2.0 * np.log(np.diagonal(lower) / self.scale).sum()
             else:
                 half = np.linalg.inv(lower)
-                found[each] = np.einsum("ij,jk,ik->", half, self.weight, half, optimize=True)
-        return found
+                values[index] = np.einsum("ij,jk,ik->", half, self.weight, half, optimize=True)
+        return values
 
 
 def best(
@@ -173,7 +173,7 @@ def best(
     if count > candidates.count and not again:
         raise ValueError(f"{count} of {candidates.count} candidates were asked for")
     generator = np.random.default_rng(seed)
-    found: list[tuple[float, list[int]]] = []
+    attempts: list[tuple[float, list[int]]] = []
     for start in range(1 + starts):
         if start == 0:
             state = _greedy(candidates, criterion, count, again)
@@ -183,11 +183,11 @@ def best(
         _exchange(state, criterion, again)
         if excursions:
             state = _excursions(state, criterion, again)
-        found.append((state.loss(), state.chosen))
+        attempts.append((state.loss(), state.chosen))
         if progress is not None:
             progress(start + 1, 1 + starts)
-    chosen = ordered(candidates, min(found, key=lambda each: each[0])[1], criterion)
-    reached = np.array([candidates.value(each, criterion) for _, each in found])
+    chosen = ordered(candidates, min(attempts, key=lambda attempt: attempt[0])[1], criterion)
+    reached = np.array([candidates.value(selection, criterion) for _, selection in attempts])
     return Design(chosen, candidates.value(chosen, criterion), reached)
 
 

@@ -68,7 +68,7 @@ def _of_word(machine: Machine, text: str, match: re.Match[str]) -> Instrument:
     uncertainty: dict[str, float] = {}
     for amount in match["amounts"].split(","):
         value, unit = _amount(text, amount, chosen)
-        uncertainty |= {each: value for each in chosen if UNITS[OBSERVABLES.index(each)] == unit}
+        uncertainty |= {name: value for name in chosen if UNITS[OBSERVABLES.index(name)] == unit}
     name = "-".join([kind.name, *(word.replace(".", "-") for word in reads)])
     instrument = Instrument(name, kind.name, Frame(), uncertainty=uncertainty)
     return _standing(machine, instrument)
@@ -76,7 +76,7 @@ def _of_word(machine: Machine, text: str, match: re.Match[str]) -> Instrument:
 
 def _amount(text: str, amount: str, reads: list[str]) -> tuple[float, str]:
     """An uncertainty above zero, SI, and the unit of what it is one of."""
-    units = dict.fromkeys(UNITS[OBSERVABLES.index(each)] for each in reads)
+    units = dict.fromkeys(UNITS[OBSERVABLES.index(observable)] for observable in reads)
     error: QuantityError | None = None
     for unit in units:
         try:
@@ -101,12 +101,12 @@ def _of_file(machine: Machine, text: str) -> tuple[Instrument, ...]:
     path, name = text, ""
     if not Path(text).exists() and ":" in text:
         path, _, name = text.rpartition(":")
-    found = read_instruments(path, machine)
+    declared = read_instruments(path, machine)
     if not name:
-        return found
-    named = tuple(each for each in found if each.name == name)
+        return declared
+    named = tuple(instrument for instrument in declared if instrument.name == name)
     if not named:
-        names = [each.name for each in found]
+        names = [instrument.name for instrument in declared]
         raise _refusal(
             f"the file declares no instrument called {name}",
             found=name,
@@ -139,8 +139,8 @@ def read_instruments(path: str | Path, machine: Machine) -> tuple[Instrument, ..
             expected="kind, frame and uncertainty of an instrument in lines that begin with #:",
         )
     return tuple(
-        _standing(machine, each) if each.name in header.whole else each
-        for each in header.instruments
+        _standing(machine, instrument) if instrument.name in header.whole else instrument
+        for instrument in header.instruments
     )
 
 
@@ -180,16 +180,16 @@ def distinct(machine: Machine, instruments: tuple[Instrument, ...]) -> tuple[Ins
 
 def _renamed(reserved: frozenset[str], instruments: tuple[Instrument, ...]) -> Iterator[Instrument]:
     taken: set[str] = set()
-    for each in instruments:
-        name, number = each.name, 2
+    for instrument in instruments:
+        name, number = instrument.name, 2
         if not name_is_good(name, reserved):
             raise _refusal(
                 "an instrument cannot have this name", found=name, expected=expected_name(reserved)
             )
         while name in taken:
-            name, number = f"{each.name}-{number}", number + 1
+            name, number = f"{instrument.name}-{number}", number + 1
         taken.add(name)
-        yield dataclasses.replace(each, name=name)
+        yield dataclasses.replace(instrument, name=name)
 
 
 def _refusal(

@@ -149,10 +149,10 @@ def plan(
     field = Field(
         machine, instrument, candidates=candidates, condition=condition, identify=identify
     )
-    found = exchange.best(
+    design = exchange.best(
         field.candidates, count, criterion=criterion, starts=starts, seed=seed, progress=progress
     )
-    ordered = found.chosen
+    ordered = design.chosen
     rms, highest = field.curve(ordered)
     way = short_way(machine, field.placed.poses[ordered])
     rank = np.empty(count, np.intp)
@@ -171,7 +171,7 @@ def plan(
         highest,
         before,
         np.minimum(field.deviations(ordered), before),
-        found.value,
+        design.value,
         len(field.placed),
         field.placed.left_out,
         count > len(field.placed),
@@ -198,8 +198,9 @@ class Field:
         identify: Iterable[str] = (),
     ) -> None:
         self.machine = machine
-        given = (instrument,) if isinstance(instrument, Instrument) else tuple(instrument)
-        self.instruments = given
+        self.instruments = (
+            (instrument,) if isinstance(instrument, Instrument) else tuple(instrument)
+        )
         if candidates is None:
             offered = Placed(machine, workspace_poses(machine), of_file=True)
             over = offered
@@ -209,13 +210,13 @@ class Field:
             if machine.workspace is not None:
                 over = Placed(machine, workspace_poses(machine), of_file=True)
         regular = offered.away_from_singularities()
-        measurements = planned(machine, given, offered, condition)
+        measurements = planned(machine, self.instruments, offered, condition)
         self.condition = measurements.conditions[0]
         self.unknowns = unknowns_of(machine, measurements, identify=tuple(identify))
         blocks = whitened(machine, measurements, self.unknowns, len(offered))
         usable = regular & self._readable(blocks)
         if not usable.any():
-            names = ", ".join(each.name for each in given)
+            names = ", ".join(measuring.name for measuring in self.instruments)
             raise RequestError(
                 Problem(
                     "plan-instrument",
@@ -265,8 +266,8 @@ class Field:
 
     def curve(self, ordered: Indices) -> tuple[Floats, Floats]:
         """(m + 1, n_quantity) rms and highest uncertainty after 0, 1, ... m of the candidates."""
-        each = [self.after(ordered[:count]) for count in range(len(ordered) + 1)]
-        return np.array([rms for rms, _ in each]), np.array([highest for _, highest in each])
+        after = [self.after(ordered[:count]) for count in range(len(ordered) + 1)]
+        return np.array([rms for rms, _ in after]), np.array([highest for _, highest in after])
 
     def after(self, chosen: Indices) -> tuple[Floats, Floats]:
         """(n_quantity,) rms and highest standard uncertainty at the tool after some candidates."""
@@ -359,11 +360,11 @@ def _tool(
     part of every effect is taken away, as the gate does, and the flag is set.
     """
     n_machine = unknowns.n_machine
-    found, solved = tool_effects(
+    own_effects, solved = tool_effects(
         machine, unknowns, unknowns.prior_mean, over.joints, over.placements
     )
-    effects = np.zeros((*found.shape[:2], unknowns.count))
-    effects[:, :, :n_machine] = found
+    effects = np.zeros((*own_effects.shape[:2], unknowns.count))
+    effects[:, :, :n_machine] = own_effects
     if n_machine == unknowns.count:
         return effects, False
     sigma = np.sqrt(np.diagonal(unknowns.prior_covariance))[:n_machine]
@@ -371,15 +372,15 @@ def _tool(
     seen = row_covariance(of_machine(triangle, n_machine, sigma))
     # The tool's rotations are named as angles there.
     names = ["abc"["xyz".index(name[1])] if name[0] == "r" else name for name in machine.components]
-    tool = Tool.of(found, names, over.placements[solved, :3])
+    tool = Tool.of(own_effects, names, over.placements[solved, :3])
     gauge = tool.sort(seen, with_gauge=True).gauge
     effects[:, :, :n_machine] = tool.relative(gauge).effects
     return effects, len(gauge) > 0
 
 
-def _dataset(found: Plan) -> xr.Dataset:
-    machine, unknowns = found.machine, found.unknowns
-    n_pose = len(found.poses)
+def _dataset(plan: Plan) -> xr.Dataset:
+    machine, unknowns = plan.machine, plan.unknowns
+    n_pose = len(plan.poses)
     units = {
         "joint": joint_units(machine),
         "quantity": [str(unit) for unit in quantity_coords(machine)["quantity_units"].values],
@@ -396,22 +397,22 @@ def _dataset(found: Plan) -> xr.Dataset:
         return xr.Variable(dims, values, attrs)
 
     data = {
-        "joint": variable(("pose", "joint"), found.joints, "joint", "commanded joints"),
+        "joint": variable(("pose", "joint"), plan.joints, "joint", "commanded joints"),
         "rank": variable(
-            ("pose",), found.rank, "1", "place, from 1, in the order in which poses buy most"
+            ("pose",), plan.rank, "1", "place, from 1, in the order in which poses buy most"
         ),
         "rms": variable(
-            ("count", "quantity"), found.rms, "quantity", "rms uncertainty at the tool over poses"
+            ("count", "quantity"), plan.rms, "quantity", "rms uncertainty at the tool over poses"
         ),
         "highest": variable(
-            ("count", "quantity"), found.highest, "quantity", "highest uncertainty at the tool"
+            ("count", "quantity"), plan.highest, "quantity", "highest uncertainty at the tool"
         ),
         "before": variable(
-            ("sought",), found.before, "sought", "standard uncertainty of the unknown before"
+            ("sought",), plan.before, "sought", "standard uncertainty of the unknown before"
         ),
-        "after": variable(("sought",), found.after, "sought", "the same after all poses"),
+        "after": variable(("sought",), plan.after, "sought", "the same after all poses"),
         "from_data": variable(
-            ("sought",), found.from_data, "1", "share of what is known that is measured"
+            ("sought",), plan.from_data, "1", "share of what is known that is measured"
         ),
     }
     labels = {
@@ -426,15 +427,15 @@ def _dataset(found: Plan) -> xr.Dataset:
     for at, freedom in enumerate(machine.commanded):
         unit = commanded_units(machine)[at]
         meaning = f"pose {freedom}, commanded"
-        labels[f"pose_{freedom}"] = label("pose", found.poses[:, at], meaning, unit)
-    attrs = provenance(machine, found.condition)
+        labels[f"pose_{freedom}"] = label("pose", plan.poses[:, at], meaning, unit)
+    attrs = provenance(machine, plan.condition)
     attrs |= {
-        "instruments": ", ".join(each.name for each in found.instruments),
-        "criterion": found.criterion,
-        "criterion_value": found.value,
-        "candidates": found.n_candidate,
-        "candidates_left_out": found.left_out,
-        "without_place_of_machine": int(found.relative),
-        "seed": str(found.seed),
+        "instruments": ", ".join(instrument.name for instrument in plan.instruments),
+        "criterion": plan.criterion,
+        "criterion_value": plan.value,
+        "candidates": plan.n_candidate,
+        "candidates_left_out": plan.left_out,
+        "without_place_of_machine": int(plan.relative),
+        "seed": str(plan.seed),
     }
     return xr.Dataset(data, labels, attrs)

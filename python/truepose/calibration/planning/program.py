@@ -72,12 +72,12 @@ def way_through(machine: Machine, poses: Floats) -> Way:
     places, numbers = [home], [-1]
     problems = []
     for leg in range(len(poses) + 1):
-        ends = [each for each in (leg - 1, leg) if 0 <= each < len(poses)]
+        ends = [number for number in (leg - 1, leg) if 0 <= number < len(poses)]
         if not straight[leg]:
-            blocked = [each for each in ends if not from_home[each]]
+            blocked = [number for number in ends if not from_home[number]]
             # From home and to home there is no other way.
             if blocked or len(ends) < 2:
-                problems += [_no_way(machine, poses, leg, each) for each in blocked or ends]
+                problems += [_no_way(machine, poses, leg, number) for number in blocked or ends]
             places.append(home)
             numbers.append(-1)
         if leg < len(poses):
@@ -147,7 +147,7 @@ def _lines(
     unit = _program_unit(machine)
     scale = {"mm": MILLIMETRE, "inch": INCH}[unit]
     total = int(way.pose.max()) + 1
-    names = ", ".join(each.name for each in instruments)
+    names = ", ".join(instrument.name for instrument in instruments)
     yield f"; {_plain(machine.name)}: {total} poses to measure" + (
         f" with {_plain(names)}" if names else ""
     )
@@ -190,7 +190,7 @@ def _number(value: float, digits: int) -> str:
 
 def _plain(text: str) -> str:
     """Text that can stand in a comment of any controller."""
-    kept = "".join(each if " " <= each <= "~" else "?" for each in text)
+    kept = "".join(character if " " <= character <= "~" else "?" for character in text)
     return kept.replace("(", "[").replace(")", "]")
 
 
@@ -216,8 +216,8 @@ def template(machine: Machine, poses: Floats, instruments: Sequence[Instrument])
     lines = [*head, ", ".join([INSTRUMENT, *commanded, *readings])]
     for pose in poses:
         cells = [repr(float(unit.to_file(value))) for unit, value in zip(units, pose, strict=True)]
-        blank = [""] * len(readings)
-        lines += [", ".join([each.name, *cells, *blank]).rstrip() for each in instruments]
+        rest = [*cells, *[""] * len(readings)]
+        lines += [", ".join([instrument.name, *rest]).rstrip() for instrument in instruments]
     return "\n".join(lines) + "\n"
 
 

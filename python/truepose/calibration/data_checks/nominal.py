@@ -141,14 +141,14 @@ def nominal_readings(
     value = np.empty(measurements.n_observation)
     instrument_of = measurements.instrument[measurements.row]
     for index, instrument in enumerate(measurements.instruments):
-        mine = np.flatnonzero(instrument_of == index)
+        own = np.flatnonzero(instrument_of == index)
         placement = Placement.stated(instrument) if placements is None else placements[index]
-        value[mine] = read(
+        value[own] = read(
             geometry,
             instrument,
             placement,
-            measurements.row[mine],
-            measurements.observable[mine],
-            measurements.strut[mine],
+            measurements.row[own],
+            measurements.observable[own],
+            measurements.strut[own],
         )
     return value

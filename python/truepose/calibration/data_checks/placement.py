@@ -195,11 +195,11 @@ def _trilaterated(geometry: Geometry, placement: Placement, readings: Readings) 
 
     And the mirror image behind the plane in which the points most nearly lie.
     """
-    mine = readings.observable == DISTANCE
-    points = (geometry.points + geometry.rotations @ placement.target)[readings.row[mine]]
+    of_distance = readings.observable == DISTANCE
+    points = (geometry.points + geometry.rotations @ placement.target)[readings.row[of_distance]]
     middle = points.mean(axis=0)
     points = points - middle
-    right = readings.value[mine] ** 2 - (points**2).sum(axis=1)
+    right = readings.value[of_distance] ** 2 - (points**2).sum(axis=1)
     mean = right.mean()
     _, size, axes = np.linalg.svd(points)
     thin = size[-1] < FLAT * size[0] or size.size < 3

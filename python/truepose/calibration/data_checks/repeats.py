@@ -22,14 +22,14 @@ def inspect_doubled(view: View) -> Iterator[Suspicion]:
     seen: dict[tuple[bytes, ...], int] = {}
     doubled: list[int] = []
     for row in view.rows.tolist():
-        mine = view.readings.row == row
-        value = view.readings.value[mine]
+        of_row = view.readings.row == row
+        value = view.readings.value[of_row]
         if not value.any():
             return  # a contact reads zero everywhere
         key = (
             view.measurements.joints[row].tobytes(),
             value.tobytes(),
-            view.readings.observable[mine].tobytes(),
+            view.readings.observable[of_row].tobytes(),
         )
         if key in seen:
             doubled += [seen[key], row]

@@ -45,15 +45,15 @@ def _reordered(view: View, columns: Sequence[MeasuredColumn]) -> Iterator[Hypoth
 def _exchanged(
     view: View, columns: Sequence[MeasuredColumn], order: Sequence[int]
 ) -> Iterator[Hypothesis]:
-    moved = [(a, columns[order[k]]) for k, a in enumerate(columns) if order[k] != k]
-    if len({column.observations.size for pair in moved for column in pair}) != 1:
+    pairs = [(a, columns[order[k]]) for k, a in enumerate(columns) if order[k] != k]
+    if len({column.observations.size for pair in pairs for column in pair}) != 1:
         return
     value = view.readings.value.copy()
-    for into, out in moved:
+    for into, out in pairs:
         target = into.observations[np.argsort(view.readings.row[into.observations])]
         source = out.observations[np.argsort(view.readings.row[out.observations])]
         value[target] = view.readings.value[source]
-    names = tuple(column.name for column, _ in moved)
+    names = tuple(column.name for column, _ in pairs)
     words = f"the readings {listed(names)} stand in each other's place"
     yield Hypothesis(words, names, view.assess(value))
 

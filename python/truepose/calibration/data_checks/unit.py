@@ -72,19 +72,19 @@ def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> I
     machine, joints = view.machine, view.measurements.joints
     parameters = machine.parameters
     # A drive's coordinate has the unit of its offset.
-    mine = [
+    of_unit = [
         k
         for k, name in enumerate(machine.joints)
         if machine.units[parameters.index(f"drive.{name}.offset")] == unit
     ]
     freedoms = [k for k, name in enumerate(machine.commanded) if (name in "xyz") == (unit == "m")]
     for factor, word in _factors(factors):
-        if mine:
-            moved = joints.copy()
-            moved[:, mine] /= factor
-            geometry = view.geometry_at_joints(moved)
+        if of_unit:
+            scaled = joints.copy()
+            scaled[:, of_unit] /= factor
+            geometry = view.geometry_at_joints(scaled)
             if geometry is not None:
-                where = tuple(f"joint.{machine.joints[k]}" for k in mine)
+                where = tuple(f"joint.{machine.joints[k]}" for k in of_unit)
                 yield Hypothesis(
                     f"the joints are {word}", where, view.assess(geometry=geometry), of_command=True
                 )

@@ -216,7 +216,11 @@ class _Reader:
         if "axis" in kind.keys:
             zero = self._zero(key, table, axis, zero)
         uncertainty = self._if_there(
-            key, table, "uncertainty", lambda at, value: self._uncertainty(at, value, kind), {}
+            key,
+            table,
+            "uncertainty",
+            lambda place, value: self._uncertainty(place, value, kind),
+            {},
         )
         bias = self._if_there(key, table, "bias", self._bias, False)
         if len(self.header.problems) > before:
@@ -350,7 +354,9 @@ class _Reader:
         """Three angles a b c, or the four numbers of a unit quaternion w x y z."""
         if not isinstance(value, list) or len(value) != 4:
             return euler_to_quaternion(self._three(key, value, "angle"))
-        w, x, y, z = (self._number((*key, at), entry, "ratio") for at, entry in enumerate(value))
+        w, x, y, z = (
+            self._number((*key, index), entry, "ratio") for index, entry in enumerate(value)
+        )
         size = math.hypot(w, x, y, z)
         if abs(size - 1.0) > NEARLY:
             expected = "a unit quaternion [w, x, y, z], or three angles"
@@ -407,10 +413,10 @@ class _Reader:
     def _zero(self, key: Key, table: dict[str, Any], axis: Vector, zero: Vector | None) -> Vector:
         """The zero direction, made across the axis; where none is given, some direction is."""
         around = np.array(axis)
-        given = np.eye(3)[int(np.argmin(np.abs(around)))] if zero is None else np.array(zero)
-        if zero is not None and abs(given @ around) <= ROUNDING:
+        direction = np.eye(3)[int(np.argmin(np.abs(around)))] if zero is None else np.array(zero)
+        if zero is not None and abs(direction @ around) <= ROUNDING:
             return zero
-        across = given - (given @ around) * around
+        across = direction - (direction @ around) * around
         size = float(np.linalg.norm(across))
         if size < 1e-6:
             self._tell(
@@ -439,8 +445,8 @@ class _Reader:
         entries = value if isinstance(value, list) else [value]
         dimensions = tuple(dict.fromkeys(map(_dimension, observed.values())))
         result = {}
-        for at, entry in enumerate(entries):
-            where = (*key, at) if isinstance(value, list) else key
+        for index, entry in enumerate(entries):
+            where = (*key, index) if isinstance(value, list) else key
             amount, dimension = self._positive(where, entry, dimensions)
             same = [name for name in observed.values() if _dimension(name) == dimension]
             if not result.keys().isdisjoint(same):
@@ -488,7 +494,9 @@ class _Reader:
                 value,
                 f'["0{unit}", "0{unit}", "1{unit}"]' if unit else "[0, 0, 1]",
             )
-        x, y, z = (self._number((*key, at), entry, dimension) for at, entry in enumerate(value))
+        x, y, z = (
+            self._number((*key, index), entry, dimension) for index, entry in enumerate(value)
+        )
         return (x, y, z)
 
     def _number(self, key: Key, value: Any, dimension: str) -> float:

@@ -75,8 +75,8 @@ class Measurements:
 
     def observables(self, instrument: int) -> tuple[str, ...]:
         """Names of what an instrument, by its index, read in any row, in the order of the table."""
-        mine = self.observable[self.instrument[self.row] == instrument]
-        return tuple(OBSERVABLES[number] for number in np.unique(mine).tolist())
+        read = self.observable[self.instrument[self.row] == instrument]
+        return tuple(OBSERVABLES[number] for number in np.unique(read).tolist())
 
     @property
     def digest(self) -> str:
@@ -99,7 +99,7 @@ class Measurements:
             joints=self.joints[wanted],
             placements=self.placements[wanted],
             instrument=self.instrument[wanted],
-            conditions=tuple(self.conditions[at] for at in np.flatnonzero(wanted).tolist()),
+            conditions=tuple(self.conditions[row] for row in np.flatnonzero(wanted).tolist()),
             held_out=self.held_out[wanted],
             lines=self.lines[wanted],
             row=number[self.row[kept]].astype(np.intp),

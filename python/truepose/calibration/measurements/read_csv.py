@@ -263,37 +263,39 @@ class _Reading:
         strange = {p.path for p in self.problems if p.code == "other-machine"}
         unknown = any(p.code in ("unknown-column", "unknown-part") for p in self.problems)
         columns = table.columns
-        given = [
+        beginnings = [
             beginning
             for beginning in ("command.", "joint.")
             if any(column.startswith(beginning) for column in columns)
             or any(column and column.startswith(beginning) for column in strange)
         ]
-        if len(given) > 1:
+        if len(beginnings) > 1:
             self._tell(
                 "excluding-columns",
                 "the file has both joints and commanded poses",
-                found=", ".join(e for e in columns if e.startswith(("command.", "joint."))),
+                found=", ".join(
+                    column for column in columns if column.startswith(("command.", "joint."))
+                ),
                 expected="either columns command.* or columns joint.*",
                 hint="what the controller was sent counts",
             )
         commands = ", ".join(f"command.{freedom}" for freedom in self.machine.commanded)
         joints = ", ".join(f"joint.{joint}" for joint in self.machine.joints)
-        if not given and not unknown:
+        if not beginnings and not unknown:
             self._tell(
                 "missing-column",
                 "nothing says where the machine was commanded to",
                 found=", ".join(columns) or "no column",
                 expected=f"{commands}; or {joints}",
             )
-        for beginning in given if len(given) == 1 else ():
+        for beginning in beginnings if len(beginnings) == 1 else ():
             of_machine = [beginning + name for name in self._own(beginning)]
             lacking = [column for column in of_machine if column not in columns]
             if lacking and not any(column and column.startswith(beginning) for column in strange):
                 self._tell(
                     "missing-column",
                     f"there is no column {', '.join(lacking)}",
-                    found=", ".join(e for e in columns if e.startswith(beginning)),
+                    found=", ".join(column for column in columns if column.startswith(beginning)),
                     expected=", ".join(of_machine),
                 )
         kinds = [REGISTRY[instrument.kind] for instrument in self.header.instruments]

@@ -42,8 +42,8 @@ def measurements_text(machine: Machine, measurements: Measurements) -> str:
         head += _declared(machine, instrument)
     columns = _Columns(machine)
     columns.words(INSTRUMENT, _names(measurements))
-    for at, drive in enumerate(machine.drives):
-        columns.numbers(f"joint.{drive.name}", drive.coordinate, measurements.joints[:, at])
+    for joint, drive in enumerate(machine.drives):
+        columns.numbers(f"joint.{drive.name}", drive.coordinate, measurements.joints[:, joint])
     _readings(machine, measurements, columns)
     _conditions(machine, measurements, columns)
     columns.words(SET, [CHECK if held_out else FIT for held_out in measurements.held_out.tolist()])
@@ -51,7 +51,7 @@ def measurements_text(machine: Machine, measurements: Measurements) -> str:
 
 
 def _names(measurements: Measurements) -> list[str]:
-    return [measurements.instruments[at].name for at in measurements.instrument.tolist()]
+    return [measurements.instruments[number].name for number in measurements.instrument.tolist()]
 
 
 def _declared(machine: Machine, instrument: Instrument) -> list[str]:
@@ -74,7 +74,7 @@ def _declared(machine: Machine, instrument: Instrument) -> list[str]:
         amount = instrument.uncertainty_of(observable)
         if amount is not None:
             dimension = BY_UNIT[UNITS[OBSERVABLES.index(observable)]]
-            (text,) = _each(machine, [amount], dimension)
+            (text,) = _quantity_texts(machine, [amount], dimension)
             stated.append(f'"{word}" = {text}')
     if stated:
         lines.append(f"uncertainty = {{ {', '.join(stated)} }}")
@@ -100,10 +100,10 @@ def _frame(machine: Machine, frame: Frame) -> str:
 
 
 def _texts(machine: Machine, values: Iterable[float], dimension: str) -> str:
-    return f"[{', '.join(_each(machine, values, dimension))}]"
+    return f"[{', '.join(_quantity_texts(machine, values, dimension))}]"
 
 
-def _each(machine: Machine, values: Iterable[float], dimension: str) -> list[str]:
+def _quantity_texts(machine: Machine, values: Iterable[float], dimension: str) -> list[str]:
     """Values as text with their unit."""
     unit = _unit(machine, dimension)
     numbers = _in_file(np.array(list(values), np.float64), unit)
@@ -172,7 +172,7 @@ class _Columns:
 def _readings(machine: Machine, measurements: Measurements, columns: _Columns) -> None:
     """The columns of readings, each with its uncertainties."""
     kinds = [REGISTRY[instrument.kind] for instrument in measurements.instruments]
-    mine = measurements.instrument[measurements.row]
+    instrument_of = measurements.instrument[measurements.row]
     for name, reading in reading_columns(machine).items():
         value = np.full(measurements.n_row, math.nan)
         stated = np.full(measurements.n_row, math.nan)
@@ -184,14 +184,14 @@ def _readings(machine: Machine, measurements: Measurements, columns: _Columns) -
             if observable is None:
                 continue
             which = (
-                (mine == number)
+                (instrument_of == number)
                 & (measurements.observable == OBSERVABLES.index(observable))
                 & (measurements.strut == reading.strut)
             )
-            at = measurements.row[which]
-            stated[at] = measurements.uncertainty[which]
+            rows = measurements.row[which]
+            stated[rows] = measurements.uncertainty[which]
             if reading.word in kind.reads:
-                value[at] = measurements.value[which]
+                value[rows] = measurements.value[which]
                 silent = silent and not which.any()
             elif np.any(measurements.value[which] != 0.0):
                 raise RequestError(
@@ -223,9 +223,9 @@ def _conditions(machine: Machine, measurements: Measurements, columns: _Columns)
         values = [condition.part_temperatures.get(part, math.nan) for condition in conditions]
         columns.numbers(f"temperature.{part}", "temperature", np.array(values))
     wrenches = np.array([condition.wrench for condition in conditions]).reshape(-1, 6)
-    for at, (name, dimension) in enumerate(WRENCH.items()):
-        if wrenches[:, at].any():
-            columns.numbers(name, dimension, wrenches[:, at])
+    for component, (name, dimension) in enumerate(WRENCH.items()):
+        if wrenches[:, component].any():
+            columns.numbers(name, dimension, wrenches[:, component])
 
 
 def _lost(machine: Machine, condition: Condition) -> str | None:

@@ -72,7 +72,7 @@ def compare_instruments(
     """How many planned readings of each instrument leave what `budget` of the first leave.
 
     Of the criterion "tool" of `plan`, in which position and rotation count; the options are those
-    of `plan`. All are judged in the machine's base frame but for where the whole machine stands,
+    of `plan`. All are assessed in the machine's base frame but for where the whole machine stands,
     where any of them cannot tell that. `progress(instruments done, instruments)`.
 
     Raises `RequestError` as `plan` does, and plan-instrument for fewer than two.
@@ -92,16 +92,16 @@ def compare_instruments(
         Field(machine, instrument, candidates=candidates, condition=condition, identify=wanted)
         for instrument in instruments
     ]
-    # One ruler for all: what the least telling of them leaves to be judged.
+    # One ruler for all: what the least telling of them leaves to be assessed.
     ruler = min(fields, key=lambda field: field.mean_before)
     for field in fields:
-        field.judge_as(ruler)
+        field.assess_as(ruler)
     most = MOST_TIMES * count
     counts: list[int | None] = []
     rms = []
     goal = np.inf
-    for at, field in enumerate(fields):
-        if at == 0:
+    for index, field in enumerate(fields):
+        if index == 0:
             design = _planned(field.candidates, count, seed)
             goal = design.value
             counts.append(count)
@@ -111,7 +111,7 @@ def compare_instruments(
             design = _planned(field.candidates, number or most, seed)
         rms.append(field.after(design.chosen)[0])
         if progress is not None:
-            progress(at + 1, len(fields))
+            progress(index + 1, len(fields))
     before = ruler.after(np.empty(0, np.intp))[0]
     names = tuple(instrument.name for instrument in instruments)
     return Comparison(names, tuple(counts), np.array(rms), before, most)

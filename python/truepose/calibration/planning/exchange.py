@@ -9,7 +9,7 @@ M = prior + sum of B^T B, and the covariance of the unknowns is C = M^-1. Two cr
 
 A start, greedy or at random, is bettered by exchanging one of its candidates for another until no
 exchange helps, then by excursions, which add several before they drop as many. Removing and adding
-a block changes C by k columns, so that all candidates are judged for one removal by matrices of k
+a block changes C by k columns, so that all candidates are assessed for one removal by matrices of k
 rows: with C' = C + s U U^T,
 
     B C' B^T = B C B^T + s P P^T,                  P = B U
@@ -93,15 +93,19 @@ class Candidates:
         if self.blocks.ndim != 3 or 0 in self.blocks.shape:
             raise ValueError(f"blocks have shape {self.blocks.shape}, expected (n_candidate, k, n)")
         self.count, self.readings, size = self.blocks.shape
-        given = np.asarray(tool, np.float64)
-        if given.ndim not in (2, 3) or given.shape[-1] != size or 0 in given.shape:
+        tool_effects = np.asarray(tool, np.float64)
+        if (
+            tool_effects.ndim not in (2, 3)
+            or tool_effects.shape[-1] != size
+            or 0 in tool_effects.shape
+        ):
             raise ValueError(
-                f"tool has shape {given.shape}, expected (n_pose, n_component, {size})"
+                f"tool has shape {tool_effects.shape}, expected (n_pose, n_component, {size})"
             )
         known = np.zeros((size, size)) if prior is None else np.array(prior, np.float64)
         if known.shape != (size, size):
             raise ValueError(f"prior has shape {known.shape}, expected ({size}, {size})")
-        for name, values in (("blocks", self.blocks), ("tool", given), ("prior", known)):
+        for name, values in (("blocks", self.blocks), ("tool", tool_effects), ("prior", known)):
             if not np.isfinite(values).all():
                 raise ValueError(f"{name} has a value that is not finite")
         rows = self.blocks.reshape(-1, size)
@@ -114,8 +118,8 @@ class Candidates:
         self.rows = self.blocks.reshape(-1, size)
         self.prior = known * np.outer(self.scale, self.scale)
         self.prior[np.diag_indices(size)] += np.where(self.open, WIDE, 0.0)
-        tool_rows = given.reshape(-1, size) * self.scale
-        self.weight: Floats = tool_rows.T @ tool_rows / len(given)
+        tool_rows = tool_effects.reshape(-1, size) * self.scale
+        self.weight: Floats = tool_rows.T @ tool_rows / len(tool_effects)
 
     def information(self, chosen: ArrayLike) -> Floats:
         """(n, n) information of the prior and the candidates `chosen` (m,), scaled."""

@@ -71,7 +71,7 @@ def _of_word(machine: Machine, text: str, match: re.Match[str]) -> Instrument:
         uncertainty |= {name: value for name in chosen if UNITS[OBSERVABLES.index(name)] == unit}
     name = "-".join([kind.name, *(word.replace(".", "-") for word in reads)])
     instrument = Instrument(name, kind.name, Frame(), uncertainty=uncertainty)
-    return _standing(machine, instrument)
+    return _with_frame_unknown(machine, instrument)
 
 
 def _amount(text: str, amount: str, reads: list[str]) -> tuple[float, str]:
@@ -139,12 +139,12 @@ def read_instruments(path: str | Path, machine: Machine) -> tuple[Instrument, ..
             expected="kind, frame and uncertainty of an instrument in lines that begin with #:",
         )
     return tuple(
-        _standing(machine, instrument) if instrument.name in header.whole else instrument
+        _with_frame_unknown(machine, instrument) if instrument.name in header.whole else instrument
         for instrument in header.instruments
     )
 
 
-def _standing(machine: Machine, instrument: Instrument) -> Instrument:
+def _with_frame_unknown(machine: Machine, instrument: Instrument) -> Instrument:
     """The instrument with everything to be found of its frame that it can tell.
 
     One of distances stands beside the workspace, half its diagonal away along the last axis in
@@ -167,7 +167,9 @@ def _beside(machine: Machine) -> tuple[float, float, float]:
         return (0.0, 0.0, 0.0)
     low, high = points.min(axis=0), points.max(axis=0)
     place = 0.5 * (low + high)
-    axis = max((at for at, name in enumerate("xyz") if name in machine.components), default=2)
+    axis = max(
+        (number for number, name in enumerate("xyz") if name in machine.components), default=2
+    )
     place[axis] = low[axis] - 0.5 * math.dist(low, high)
     x, y, z = place.tolist()
     return (x, y, z)
@@ -179,16 +181,16 @@ def distinct(machine: Machine, instruments: tuple[Instrument, ...]) -> tuple[Ins
 
 
 def _renamed(reserved: frozenset[str], instruments: tuple[Instrument, ...]) -> Iterator[Instrument]:
-    taken: set[str] = set()
+    used: set[str] = set()
     for instrument in instruments:
         name, number = instrument.name, 2
         if not name_is_good(name, reserved):
             raise _refusal(
                 "an instrument cannot have this name", found=name, expected=expected_name(reserved)
             )
-        while name in taken:
+        while name in used:
             name, number = f"{instrument.name}-{number}", number + 1
-        taken.add(name)
+        used.add(name)
         yield dataclasses.replace(instrument, name=name)
 
 

@@ -103,7 +103,7 @@ class Plan:
     def prior_dominated(self) -> tuple[str, ...]:
         """Labels of the unknowns that the readings tell less of than the prior does."""
         weak = self.from_data < DOMINATED
-        return tuple(self.unknowns.labels[at] for at in np.flatnonzero(weak).tolist())
+        return tuple(self.unknowns.labels[number] for number in np.flatnonzero(weak).tolist())
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -233,7 +233,7 @@ class Field:
         self._parts = [part for part in (components, ~components) if part.any()]
         self._weights = np.where(components, 1.0, machine.characteristic_length)[:, np.newaxis]
         self._blocks = blocks[usable]
-        self.candidates = self._judged()
+        self.candidates = self._weighted_candidates()
 
     def _readable(self, blocks: Floats) -> Flags:
         """(n,) of candidates (n, k, n_unknown) where no reading is near a singularity of its own.
@@ -247,17 +247,17 @@ class Field:
             return finite
         return np.asarray((sizes <= STEEP * np.median(sizes[finite], axis=0)).all(axis=1), np.bool_)
 
-    def _judged(self) -> Candidates:
+    def _weighted_candidates(self) -> Candidates:
         return Candidates(self._blocks, self.tool * self._weights, _information(self.unknowns))
 
-    def judge_as(self, other: Field) -> None:
-        """Judge the tool as another field of the same machine does: by the same effects."""
+    def assess_as(self, other: Field) -> None:
+        """Assess the tool as another field of the same machine does: by the same effects."""
         n_machine = self.unknowns.n_machine
         tool = np.zeros((*other.tool.shape[:2], self.unknowns.count))
         tool[:, :, :n_machine] = other.tool[:, :, :n_machine]
         self.tool = tool
         self.relative = other.relative
-        self.candidates = self._judged()
+        self.candidates = self._weighted_candidates()
 
     @property
     def mean_before(self) -> float:
@@ -424,10 +424,10 @@ def _dataset(plan: Plan) -> xr.Dataset:
         "sought_units": label("sought", units["sought"], "unit of the unknown"),
         **quantity_coords(machine),
     }
-    for at, freedom in enumerate(machine.commanded):
-        unit = commanded_units(machine)[at]
+    for column, freedom in enumerate(machine.commanded):
+        unit = commanded_units(machine)[column]
         meaning = f"pose {freedom}, commanded"
-        labels[f"pose_{freedom}"] = label("pose", plan.poses[:, at], meaning, unit)
+        labels[f"pose_{freedom}"] = label("pose", plan.poses[:, column], meaning, unit)
     attrs = provenance(machine, plan.condition)
     attrs |= {
         "instruments": ", ".join(instrument.name for instrument in plan.instruments),

@@ -148,10 +148,10 @@ def _lines(
     scale = {"mm": MILLIMETRE, "inch": INCH}[unit]
     total = int(way.pose.max()) + 1
     names = ", ".join(instrument.name for instrument in instruments)
-    yield f"; {_plain(machine.name)}: {total} poses to measure" + (
-        f" with {_plain(names)}" if names else ""
+    yield f"; {_ascii(machine.name)}: {total} poses to measure" + (
+        f" with {_ascii(names)}" if names else ""
     )
-    yield f"; planned by truepose {version()} for {_plain(machine.file)}"
+    yield f"; planned by truepose {version()} for {_ascii(machine.file)}"
     yield "; in machine coordinates: without work offsets and tool length"
     yield f"; G4 P is in seconds; the machine rests {dwell:g} s at every pose"
     yield "; begins and ends at home" + (
@@ -188,7 +188,7 @@ def _number(value: float, digits: int) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def _plain(text: str) -> str:
+def _ascii(text: str) -> str:
     """Text that can stand in a comment of any controller."""
     kept = "".join(character if " " <= character <= "~" else "?" for character in text)
     return kept.replace("(", "[").replace(")", "]")

@@ -29,5 +29,11 @@ OBSERVABLES = (
 UNITS = ("m",) * 3 + ("rad",) * 3 + ("m",) * 2 + ("1",) * 3 + ("rad",)
 """SI unit of each."""
 
+
 OF_STRUTS = frozenset(OBSERVABLES[7:])
 """Those that are of one strut."""
+
+
+def si_unit(observable: str) -> str:
+    """SI unit of an observable, by its name."""
+    return UNITS[OBSERVABLES.index(observable)]

@@ -7,7 +7,7 @@ and never kept. An *inspection* reads a suspicion off the data themselves: "row 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -193,11 +193,13 @@ class View:
         counts = [column.observations.size for column in self.columns]
         if set(counts) != {self.rows.size}:
             return None
-        by_row = [
-            column.observations[np.argsort(self.readings.row[column.observations])]
-            for column in self.columns
-        ]
-        return np.stack(by_row, axis=1)
+        return self.by_row(self.columns)
+
+    def by_row(self, columns: Sequence[MeasuredColumn]) -> Indices:
+        """(m, n) places of columns of as many rows among the observations, in the rows' order."""
+        row = self.readings.row
+        ordered = [c.observations[np.argsort(row[c.observations])] for c in columns]
+        return np.stack(ordered, axis=1)
 
     def assess(
         self,
@@ -225,6 +227,20 @@ class View:
         reach = math.sqrt(sum(variances))
         redundancy = residual.size - fitted
         return Misfit(residual, residual / readings.scale, column, reach, placement, redundancy)
+
+    def negated(self, columns: Sequence[MeasuredColumn], words: str) -> Hypothesis:
+        """That some columns are of the other sign."""
+        value = self.readings.value.copy()
+        for column in columns:
+            value[column.observations] *= -1.0
+        return Hypothesis(words, tuple(column.name for column in columns), self.assess(value))
+
+    def other_command(
+        self, geometry: Geometry | None, words: str, where: tuple[str, ...]
+    ) -> Iterator[Hypothesis]:
+        """That the machine was commanded to another geometry; nothing where it cannot be there."""
+        if geometry is not None:
+            yield Hypothesis(words, where, self.assess(geometry=geometry), of_command=True)
 
     def rms(self, misfit: Misfit, hypothesis: Hypothesis, unit: str) -> float:
         """Of the residuals of one SI unit, of those observations that a hypothesis keeps."""

@@ -7,7 +7,6 @@ from itertools import permutations
 
 import numpy as np
 
-from truepose.arrays import Indices
 from truepose.calibration.data_checks._base import Hypothesis, HypothesisKind, MeasuredColumn, View
 from truepose.spatial import euler_to_matrix_in_order, matrix_to_euler
 
@@ -20,16 +19,16 @@ def propose_sign(view: View) -> Iterator[Hypothesis]:
     columns = _angles(view)
     names = tuple(column.name for column in columns)
     if len(columns) == 3:
-        table = _table(view, columns)
+        table = view.by_row(columns)
         turned = view.readings.value.copy()
         turned[table] = matrix_to_euler(
             np.swapaxes(euler_to_matrix_in_order(view.readings.value[table], OURS), 1, 2)
         )
         words = "a, b and c are of the inverse rotation (base in the platform's axes)"
         yield Hypothesis(words, names, view.assess(turned))
-        yield from _negative(view, columns, "a, b and c are turned the other way")
+        yield view.negated(columns, "a, b and c are turned the other way")
     for column in columns:
-        yield from _negative(view, [column], f"{column.name} is turned the other way")
+        yield view.negated([column], f"{column.name} is turned the other way")
 
 
 def propose_order(view: View) -> Iterator[Hypothesis]:
@@ -37,7 +36,7 @@ def propose_order(view: View) -> Iterator[Hypothesis]:
     columns = _angles(view)
     if len(columns) != 3:
         return
-    table = _table(view, columns)
+    table = view.by_row(columns)
     for order in permutations("xyz"):
         word = "".join(order)
         if word == OURS:
@@ -53,20 +52,6 @@ def _angles(view: View) -> list[MeasuredColumn]:
     columns = [column for column in view.columns if column.name in ("a", "b", "c")]
     sizes = {column.observations.size for column in columns}
     return columns if len(sizes) == 1 else []
-
-
-def _table(view: View, columns: list[MeasuredColumn]) -> Indices:
-    """(m, 3) places of a b c among the observations, by row."""
-    return np.stack(
-        [c.observations[np.argsort(view.readings.row[c.observations])] for c in columns], axis=1
-    )
-
-
-def _negative(view: View, columns: list[MeasuredColumn], words: str) -> Iterator[Hypothesis]:
-    value = view.readings.value.copy()
-    for column in columns:
-        value[column.observations] *= -1.0
-    yield Hypothesis(words, tuple(column.name for column in columns), view.assess(value))
 
 
 SIGN = HypothesisKind("rotation-sign", "angles turned the other way", propose_sign)

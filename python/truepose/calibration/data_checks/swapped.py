@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
 
-import numpy as np
-
 from truepose.calibration.data_checks._base import (
     Hypothesis,
     HypothesisKind,
@@ -50,8 +48,7 @@ def _exchanged(
         return
     value = view.readings.value.copy()
     for into, out in pairs:
-        target = into.observations[np.argsort(view.readings.row[into.observations])]
-        source = out.observations[np.argsort(view.readings.row[out.observations])]
+        target, source = view.by_row([into, out]).T
         value[target] = view.readings.value[source]
     names = tuple(column.name for column, _ in pairs)
     words = f"the readings {listed(names)} stand in each other's place"
@@ -63,11 +60,9 @@ def _joints(view: View) -> Iterator[Hypothesis]:
     for i, j in combinations(range(len(names)), 2):
         joints = view.measurements.joints.copy()
         joints[:, [i, j]] = joints[:, [j, i]]
-        geometry = view.geometry_at_joints(joints)
-        if geometry is not None:
-            where = (f"joint.{names[i]}", f"joint.{names[j]}")
-            words = f"the joints {names[i]} and {names[j]} stand in each other's place"
-            yield Hypothesis(words, where, view.assess(geometry=geometry), of_command=True)
+        where = (f"joint.{names[i]}", f"joint.{names[j]}")
+        words = f"the joints {names[i]} and {names[j]} stand in each other's place"
+        yield from view.other_command(view.geometry_at_joints(joints), words, where)
 
 
 def _commands(view: View) -> Iterator[Hypothesis]:
@@ -77,11 +72,9 @@ def _commands(view: View) -> Iterator[Hypothesis]:
             continue
         poses = view.poses.copy()
         poses[:, [i, j]] = poses[:, [j, i]]
-        geometry = view.geometry_at_poses(poses)
-        if geometry is not None:
-            where = (f"command.{freedoms[i]}", f"command.{freedoms[j]}")
-            words = f"the commands {freedoms[i]} and {freedoms[j]} stand in each other's place"
-            yield Hypothesis(words, where, view.assess(geometry=geometry), of_command=True)
+        where = (f"command.{freedoms[i]}", f"command.{freedoms[j]}")
+        words = f"the commands {freedoms[i]} and {freedoms[j]} stand in each other's place"
+        yield from view.other_command(view.geometry_at_poses(poses), words, where)
 
 
 KIND = HypothesisKind(

@@ -82,20 +82,16 @@ def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> I
         if of_unit:
             scaled = joints.copy()
             scaled[:, of_unit] /= factor
+            where = tuple(f"joint.{machine.joints[k]}" for k in of_unit)
             geometry = view.geometry_at_joints(scaled)
-            if geometry is not None:
-                where = tuple(f"joint.{machine.joints[k]}" for k in of_unit)
-                yield Hypothesis(
-                    f"the joints are {word}", where, view.assess(geometry=geometry), of_command=True
-                )
+            yield from view.other_command(geometry, f"the joints are {word}", where)
         if freedoms:
             poses = view.poses.copy()
             poses[:, freedoms] /= factor
-            geometry = view.geometry_at_poses(poses)
-            if geometry is not None:
-                where = tuple(f"command.{machine.commanded[k]}" for k in freedoms)
-                words = f"the commands {listed(machine.commanded[k] for k in freedoms)} are {word}"
-                yield Hypothesis(words, where, view.assess(geometry=geometry), of_command=True)
+            names = [machine.commanded[k] for k in freedoms]
+            where = tuple(f"command.{name}" for name in names)
+            words = f"the commands {listed(names)} are {word}"
+            yield from view.other_command(view.geometry_at_poses(poses), words, where)
 
 
 LENGTH = HypothesisKind("wrong-unit", "lengths in another unit than declared", propose_length)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.calibration.observables import OF_STRUTS, si_unit
 from truepose.spatial import Quaternion
 
 Vector = tuple[float, float, float]
@@ -68,7 +68,7 @@ class Instrument:
         given = self.uncertainty.get(observable)
         if given is not None:
             return given
-        return self.uncertainty.get(UNITS[OBSERVABLES.index(observable)])
+        return self.uncertainty.get(si_unit(observable))
 
 
 FrameRule = Callable[[Sequence[str], Sequence[str]], Freedoms]

@@ -25,7 +25,7 @@ import numpy as np
 from truepose._kernel import toml_lines
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument, Kind
 from truepose.calibration.instruments._base import Vector
-from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.calibration.observables import si_unit
 from truepose.errors import Fault, Problem
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.document import Document, Key
@@ -166,9 +166,7 @@ class _Reader:
 
     def read(self) -> None:
         data = self.document.data
-        for key in data:
-            if key not in TOP_KEYS:
-                self._unknown_key((key,), TOP_KEYS)
+        self._check_keys((), data, TOP_KEYS)
         if "machine" in data:
             self.header.machine = self._text(("machine",))
             self.header.machine_line = self.document.line(("machine",))
@@ -204,10 +202,7 @@ class _Reader:
         kind = self._kind(key, table)
         if kind is None:
             return None
-        known = self._keys(kind)
-        for word in table:
-            if word not in known:
-                self._unknown_key((*key, word), known)
+        self._check_keys(key, table, self._keys(kind))
         end = str(self._if_there(key, table, "end", self._end, "base"))
         frame = self._frame_of(key, table, kind, end)
         target = self._if_there(key, table, "target", self._target, ((0.0, 0.0, 0.0), False))
@@ -323,10 +318,7 @@ class _Reader:
                 value,
                 '"base", "unknown" or a table with origin, rotation, unknown',
             )
-        known = ("origin", "rotation", "unknown")
-        for word in value:
-            if word not in known:
-                self._unknown_key((*key, word), known)
+        self._check_keys(key, value, ("origin", "rotation", "unknown"))
         frame = Frame()
         if "origin" in value:
             origin = self._three((*key, "origin"), value["origin"], "length")
@@ -334,21 +326,14 @@ class _Reader:
         if "rotation" in value:
             rotation = self._rotation((*key, "rotation"), value["rotation"])
             frame = dataclasses.replace(frame, rotation=rotation)
-        if "unknown" in value:
-            unknown = value["unknown"]
-            words = unknown if isinstance(unknown, list) else [unknown]
-            bad = [word for word in words if word not in FRAME_FREEDOMS]
-            if bad:
-                self._refuse(
-                    "unknown-choice",
-                    "no freedom of a frame",
-                    (*key, "unknown"),
-                    bad[0],
-                    "a list of some of " + ", ".join(f'"{name}"' for name in FRAME_FREEDOMS),
-                )
-            flags = tuple(name in words for name in FRAME_FREEDOMS)
-            frame = dataclasses.replace(frame, unknown=flags)
-        return frame
+        unknown = value.get("unknown", [])
+        words = unknown if isinstance(unknown, list) else [unknown]
+        for word in words:
+            if word not in FRAME_FREEDOMS:
+                expected = "a list of some of " + ", ".join(f'"{name}"' for name in FRAME_FREEDOMS)
+                place = (*key, "unknown")
+                self._refuse("unknown-choice", "no freedom of a frame", place, word, expected)
+        return dataclasses.replace(frame, unknown=tuple(name in words for name in FRAME_FREEDOMS))
 
     def _rotation(self, key: Key, value: Any) -> Quaternion:
         """Three angles a b c, or the four numbers of a unit quaternion w x y z."""
@@ -362,7 +347,7 @@ class _Reader:
             expected = "a unit quaternion [w, x, y, z], or three angles"
             self._refuse("wrong-type", "the quaternion is not of length 1", key, value, expected)
         if abs(size - 1.0) <= ROUNDING:
-            return (w, x, y, z)
+            size = 1.0
         return (w / size, x / size, y / size, z / size)
 
     def _target(self, key: Key, value: Any) -> tuple[Vector, bool]:
@@ -370,9 +355,7 @@ class _Reader:
             return (0.0, 0.0, 0.0), True
         if not isinstance(value, dict):
             return self._three(key, value, "length"), False
-        for word in value:
-            if word not in ("start", "unknown"):
-                self._unknown_key((*key, word), ("start", "unknown"))
+        self._check_keys(key, value, ("start", "unknown"))
         start = (0.0, 0.0, 0.0)
         if "start" in value:
             start = self._three((*key, "start"), value["start"], "length")
@@ -407,7 +390,7 @@ class _Reader:
                 "at least one component that is not zero",
             )
         if abs(size - 1.0) <= ROUNDING:
-            return (x, y, z)  # to the last digit as it is written
+            size = 1.0  # to the last digit as it is written
         return (x / size, y / size, z / size)
 
     def _zero(self, key: Key, table: dict[str, Any], axis: Vector, zero: Vector | None) -> Vector:
@@ -530,6 +513,12 @@ class _Reader:
         self._tell(code, message, key, found=shown_value(value), expected=expected)
         raise _RefusedError
 
+    def _check_keys(self, key: Key, table: dict[str, Any], known: Iterable[str]) -> None:
+        """Refuse the keys of a table that are not among the `known` ones."""
+        for word in table:
+            if word not in known:
+                self._unknown_key((*key, word), known)
+
     def _unknown_key(self, key: Key, known: Iterable[str]) -> None:
         word, words = str(key[-1]), list(known)
         self._tell(
@@ -557,4 +546,4 @@ class _Reader:
 
 
 def _dimension(observable: str) -> str:
-    return BY_UNIT[UNITS[OBSERVABLES.index(observable)]]
+    return BY_UNIT[si_unit(observable)]

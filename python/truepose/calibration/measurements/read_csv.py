@@ -260,14 +260,13 @@ class _Reading:
 
     def _check_columns(self, table: DataTable) -> None:
         """Whether there are columns of commands or joints, and of readings."""
-        strange = {p.path for p in self.problems if p.code == "other-machine"}
+        strange = [p.path for p in self.problems if p.code == "other-machine" and p.path]
         unknown = any(p.code in ("unknown-column", "unknown-part") for p in self.problems)
         columns = table.columns
         beginnings = [
             beginning
             for beginning in ("command.", "joint.")
-            if any(column.startswith(beginning) for column in columns)
-            or any(column and column.startswith(beginning) for column in strange)
+            if any(column.startswith(beginning) for column in (*columns, *strange))
         ]
         if len(beginnings) > 1:
             self._tell(
@@ -279,9 +278,9 @@ class _Reading:
                 expected="either columns command.* or columns joint.*",
                 hint="what the controller was sent counts",
             )
-        commands = ", ".join(f"command.{freedom}" for freedom in self.machine.commanded)
-        joints = ", ".join(f"joint.{joint}" for joint in self.machine.joints)
         if not beginnings and not unknown:
+            commands = ", ".join(f"command.{freedom}" for freedom in self.machine.commanded)
+            joints = ", ".join(f"joint.{joint}" for joint in self.machine.joints)
             self._tell(
                 "missing-column",
                 "nothing says where the machine was commanded to",
@@ -291,7 +290,7 @@ class _Reading:
         for beginning in beginnings if len(beginnings) == 1 else ():
             of_machine = [beginning + name for name in self._own(beginning)]
             lacking = [column for column in of_machine if column not in columns]
-            if lacking and not any(column and column.startswith(beginning) for column in strange):
+            if lacking and not any(column.startswith(beginning) for column in strange):
                 self._tell(
                     "missing-column",
                     f"there is no column {', '.join(lacking)}",
@@ -301,7 +300,7 @@ class _Reading:
         kinds = [REGISTRY[instrument.kind] for instrument in self.header.instruments]
         readings = [column for column in columns if column in reading_columns(self.machine)]
         silent = any(kind.optional or kind.fixed for kind in kinds)
-        wrong = unknown or any(column and column.startswith("strut.") for column in strange)
+        wrong = unknown or any(column.startswith("strut.") for column in strange)
         if not readings and not silent and not wrong:
             self._tell(
                 "nothing-measured",

@@ -13,7 +13,7 @@ from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, In
 from truepose.calibration.measurements.measurements import Measurements
 from truepose.calibration.measurements.read_csv import CHECK, FIT, INSTRUMENT, SET
 from truepose.calibration.measurements.rows import UNCERTAINTY, WRENCH, reading_columns
-from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.calibration.observables import OBSERVABLES, si_unit
 from truepose.errors import Problem, RequestError
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.units import FileUnit, meant, unit_of
@@ -73,8 +73,7 @@ def _declared(machine: Machine, instrument: Instrument) -> list[str]:
     for observable, word in words.items():
         amount = instrument.uncertainty_of(observable)
         if amount is not None:
-            dimension = BY_UNIT[UNITS[OBSERVABLES.index(observable)]]
-            (text,) = _quantity_texts(machine, [amount], dimension)
+            (text,) = _quantity_texts(machine, [amount], BY_UNIT[si_unit(observable)])
             stated.append(f'"{word}" = {text}')
     if stated:
         lines.append(f"uncertainty = {{ {', '.join(stated)} }}")

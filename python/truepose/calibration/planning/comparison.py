@@ -99,16 +99,10 @@ def compare_instruments(
     most = MOST_TIMES * count
     counts: list[int | None] = []
     rms = []
-    goal = np.inf
+    goal = _planned(fields[0].candidates, count, seed)
     for index, field in enumerate(fields):
-        if index == 0:
-            design = _planned(field.candidates, count, seed)
-            goal = design.value
-            counts.append(count)
-        else:
-            number = _fewest(field.candidates, goal, most, seed)
-            counts.append(number)
-            design = _planned(field.candidates, number or most, seed)
+        counts.append(_fewest(field.candidates, goal.value, most, seed) if index else count)
+        design = _planned(field.candidates, counts[-1] or most, seed) if index else goal
         rms.append(field.after(design.chosen)[0])
         if progress is not None:
             progress(index + 1, len(fields))

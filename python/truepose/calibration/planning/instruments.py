@@ -23,7 +23,7 @@ from truepose.calibration.measurements.declarations import (
     reserved_names,
     separated,
 )
-from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.calibration.observables import si_unit
 from truepose.calibration.planning.poses import workspace_poses
 from truepose.calibration.planning.readings import observed
 from truepose.errors import MachineFileError, Problem, RequestError
@@ -68,7 +68,7 @@ def _of_word(machine: Machine, text: str, match: re.Match[str]) -> Instrument:
     uncertainty: dict[str, float] = {}
     for amount in match["amounts"].split(","):
         value, unit = _amount(text, amount, chosen)
-        uncertainty |= {name: value for name in chosen if UNITS[OBSERVABLES.index(name)] == unit}
+        uncertainty |= {name: value for name in chosen if si_unit(name) == unit}
     name = "-".join([kind.name, *(word.replace(".", "-") for word in reads)])
     instrument = Instrument(name, kind.name, Frame(), uncertainty=uncertainty)
     return _with_frame_unknown(machine, instrument)
@@ -76,7 +76,7 @@ def _of_word(machine: Machine, text: str, match: re.Match[str]) -> Instrument:
 
 def _amount(text: str, amount: str, reads: list[str]) -> tuple[float, str]:
     """An uncertainty above zero, SI, and the unit of what it is one of."""
-    units = dict.fromkeys(UNITS[OBSERVABLES.index(observable)] for observable in reads)
+    units = dict.fromkeys(map(si_unit, reads))
     error: QuantityError | None = None
     for unit in units:
         try:

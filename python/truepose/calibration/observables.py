@@ -29,7 +29,6 @@ OBSERVABLES = (
 UNITS = ("m",) * 3 + ("rad",) * 3 + ("m",) * 2 + ("1",) * 3 + ("rad",)
 """SI unit of each."""
 
-
 OF_STRUTS = frozenset(OBSERVABLES[7:])
 """Those that are of one strut."""
 

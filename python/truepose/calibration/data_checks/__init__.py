@@ -76,9 +76,9 @@ _SAME = 1.02
 
 
 def suspicions(machine: Machine, measurements: Measurements) -> tuple[Suspicion, ...]:
-    """What is suspected of measurements of a machine, the likeliest of each instrument first.
+    """Suspicions about the measurements of a machine, the likeliest of each instrument first.
 
-    Empty for data that a machine within its tolerances gives. Raises nothing of its own, and
+    Empty for data of a machine that is within its tolerances. Raises nothing of its own, and
     `TrueposeError` where a row's condition asks an error source for what the machine does not say.
     """
     geometry = Geometry.of(machine.kernel, measurements.joints, measurements.placements)

@@ -73,7 +73,7 @@ class Misfit:
     """How far readings are from a machine.
 
     `residual` (k,) SI; `quotients` (k,) residual over what is allowed; `column` (k,) number of the
-    column of each; `reach`: how far the machine moves what is read, in what is allowed.
+    column of each; `reach`: by how much the readings vary as the machine moves, in what is allowed.
     """
 
     residual: Floats
@@ -86,8 +86,8 @@ class Misfit:
     def size(self, trimmed: bool = True) -> float:
         """Root mean square of the quotients of the worst column, corrected for what was fitted.
 
-        NaN where nothing is redundant. One column alone tells: a wrong sign of one angle must not
-        drown in five good columns.
+        NaN where nothing is redundant. The worst column counts, so that five good columns do not
+        hide a wrong sign of one angle.
         """
         if self.redundancy < 1:
             return float("nan")
@@ -153,7 +153,7 @@ class View:
 
     @cached_property
     def as_given(self) -> Misfit:
-        """How far the data are off as they are."""
+        """The misfit of the data as they are."""
         return self.assess()
 
     @cached_property
@@ -208,7 +208,7 @@ class View:
         kept: Indices | None = None,
         free: Free | None = None,
     ) -> Misfit:
-        """How far other values, other poses, a part of the data or a freer instrument are off."""
+        """The misfit of other values, other poses, a part of the data or a freer instrument."""
         readings = self.readings
         if value is not None:
             readings = replace(readings, value=value)
@@ -254,7 +254,7 @@ class View:
         return _rms(of_unit, hypothesis.trimmed) if of_unit.size else 0.0
 
     def geometry_at_joints(self, joints: Floats) -> Geometry | None:
-        """Where the nominal machine would be at other joints (n_row, n_joint); None: nowhere."""
+        """The nominal machine at other joints (n_row, n_joint); None: it has no pose there."""
         kernel = self.machine.kernel
         poses, _ = kernel.forward(joints, status=True)
         if not np.isfinite(poses).all():
@@ -262,9 +262,9 @@ class View:
         return Geometry.of(kernel, joints, kernel.placement_of(poses))
 
     def geometry_at_poses(self, poses: Floats) -> Geometry | None:
-        """Where it would be at other commanded poses (n_row, n_commanded); None: not reached."""
+        """The nominal machine at other poses (n_row, n_commanded); None: it does not reach them."""
         joints, placements, status = self.machine.kernel.place(poses)
-        if (status > 1).any():  # out of travel is a place, though not a good one
+        if (status > 1).any():  # out of travel there is still a pose
             return None
         return Geometry.of(self.machine.kernel, joints, placements)
 

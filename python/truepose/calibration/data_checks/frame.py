@@ -13,7 +13,7 @@ from truepose.spatial import rotation_angle
 
 
 def propose_target(view: View) -> Iterator[Hypothesis]:
-    """The point that is looked at stands off the stated one, along the platform's axes."""
+    """The target is not at the stated point; the offset is along the platform's axes."""
     instrument = view.instrument
     if instrument.target_unknown or not _sees_point(view):
         return
@@ -26,7 +26,7 @@ def propose_target(view: View) -> Iterator[Hypothesis]:
 
 
 def propose_frame(view: View) -> Iterator[Hypothesis]:
-    """The frame stands elsewhere, or is turned, by one rigid motion for all rows."""
+    """The frame is displaced and turned from the stated one, by one rigid motion for all rows."""
     instrument = view.instrument
     if all(instrument.frame.unknown) or not _sees_frame(view):
         return

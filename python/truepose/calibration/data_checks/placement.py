@@ -34,7 +34,7 @@ TILT = 0.2
 """rad by which a frame is tilted where a search did not lead anywhere."""
 
 FAINT = 1e-5
-"""Derivatives below this share of the largest are none: differences do not tell them from zero."""
+"""Derivatives below this share of the largest count as zero: differences cannot resolve them."""
 
 FLAT = 0.02
 """Points that reach this share of their width out of a plane count as in it."""

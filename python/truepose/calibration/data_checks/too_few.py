@@ -9,7 +9,7 @@ import numpy as np
 from truepose.calibration.data_checks._base import InspectionKind, MeasuredColumn, Suspicion, View
 
 BELOW_DIGIT = 20.0
-"""A standard uncertainty this many times below the last digit is none: rounding alone has 0.29."""
+"""A standard uncertainty this many times below the last digit is absurd: rounding has 0.29."""
 
 OVERSTATED = 0.1
 """Residuals, nothing fitted, below this share of the stated uncertainty: chance gives about 1."""

@@ -84,7 +84,7 @@ class Kind:
     read, by the column that holds them: {"x": "x"}; a strut's columns are `strut.<name>.length`,
     here `length`. `least`, `most`: how many of them an instrument has, None: all that the platform
     moves in. `fixed`: observables that are 0 in every row, without a column. `optional`: a column
-    that may be missing or blank and then is 0. `frame`: which of a frame's freedoms are to be found
+    that may be missing or blank and then is 0. `frame`: which of a frame's freedoms are identified
     where the file says `frame = "unknown"`; None: what it reads has no frame. `has_target`:
     whether what it reads depends on a target point. `keys`: of `axis`, `zero`, `end` those that it
     takes.
@@ -113,7 +113,7 @@ class Kind:
         return self.by if self.phrases is None else self.phrases(observables)
 
     def observed(self, components: Sequence[str]) -> tuple[str, ...]:
-        """The observables that an instrument of this kind has of a machine if nobody says which.
+        """The observables that an instrument of this kind reads by default.
 
         All that the platform can change, of a kind that reads some coordinates the last of them:
         the height. `components`: those of x y z rx ry rz that the platform moves in. Those of

@@ -152,7 +152,7 @@ def expected_name(reserved: frozenset[str]) -> str:
 
 
 class _RefusedError(Exception):
-    """A value is no good; what is wrong is told already."""
+    """A value is refused; its problem is noted already."""
 
 
 class _Reader:
@@ -276,7 +276,7 @@ class _Reader:
         except _RefusedError:
             return default
 
-    # Values. Each raises `_RefusedError` once it has told what is wrong.
+    # Values. Each raises `_RefusedError` once it has noted what is wrong.
 
     def _frame_of(self, key: Key, table: dict[str, Any], kind: Kind, end: str) -> Frame:
         without = kind.frame is None or end == "platform"

@@ -1,8 +1,8 @@
 """Measurements: what instruments read of a machine, row by row, ready to be fitted.
 
 A row is one pose at which one instrument measured; an observation is one number of a row.
-`measurement_file.py` reads them from a file, `measurement_arrays.py` makes them from arrays, and
-`measurement_writer.py` writes them.
+`read_csv.py` reads them from a file, `arrays.py` makes them from arrays, and `write_csv.py` writes
+them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from truepose.machine.condition import Condition
 
 
 def unloaded_at_reference(condition: Condition) -> Condition:
-    """The condition of a row that says nothing: at reference throughout, nothing on the tool."""
+    """The condition of a row that states none: at reference temperature, with an unloaded tool."""
     return dataclasses.replace(
         condition,
         default_temperature=condition.reference_temperature,

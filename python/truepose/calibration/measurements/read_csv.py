@@ -109,7 +109,7 @@ def _parts(machine: Machine) -> tuple[str, ...]:
 
 @dataclass
 class _Reading:
-    """One file on its way to measurements; every problem of it is collected."""
+    """Makes measurements of one file and collects every problem in it."""
 
     machine: Machine
     header: Header
@@ -118,7 +118,7 @@ class _Reading:
     problems: list[Problem] = field(default_factory=list)
 
     def measurements(self) -> Measurements | None:
-        """The measurements, as far as problems let them be made."""
+        """The measurements; None where problems leave nothing to make them of."""
         self.problems += self.header.problems
         self.problems += self._of_this_machine(self.read.problems)
         self._check_machine()
@@ -157,7 +157,7 @@ class _Reading:
         return measurements_in(self.machine, self.header.instruments, rows, report)
 
     def _of_this_machine(self, problems: Iterable[Problem]) -> Iterator[Problem]:
-        """Columns that name what the machine does not have are not misspelt: they are another's."""
+        """Columns of unknown joints, freedoms, struts mean another machine; others are misspelt."""
         strange: dict[str, list[Problem]] = {}
         for problem in problems:
             word = problem.path or ""
@@ -208,7 +208,7 @@ class _Reading:
         )
 
     def _words_beside(self, column: str) -> list[str]:
-        """The columns that one that is not known may have been meant to be, in short."""
+        """The columns that an unknown one may be a misspelling of, shortened."""
         if column.startswith("strut."):
             name = next(
                 (s.name for s in self.machine.struts if column.startswith(f"strut.{s.name}.")), "1"
@@ -335,7 +335,7 @@ class _Reading:
         return np.stack(present, axis=1) if len(present) == len(names) else None
 
     def _instruments(self, table: DataTable) -> Indices:
-        """(n_row,) the instrument of each row, -1 where there is none that is good."""
+        """(n_row,) each row's instrument, -1 where none that is declared and valid is named."""
         numbers = {
             instrument.name: number for number, instrument in enumerate(self.header.instruments)
         }

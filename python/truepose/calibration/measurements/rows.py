@@ -304,28 +304,29 @@ class _Observations:
         self.rows = rows
         self.report = report
         self.columns = columns
-        self._found: list[tuple[Indices, int, int, Floats, Floats]] = []
+        self._blocks: list[tuple[Indices, int, int, Floats, Floats]] = []
 
     def table(self) -> _Table:
-        """Everything that was found."""
-        if not self._found:
+        """All observations."""
+        if not self._blocks:
             none = np.empty(0, np.intp)
             return _Table(none, none, none, np.empty(0), np.empty(0))
-        row = np.concatenate([rows for rows, *_ in self._found])
-        observable = np.concatenate([np.full(len(r), o, np.intp) for r, o, *_ in self._found])
-        strut = np.concatenate([np.full(len(r), s, np.intp) for r, _, s, *_ in self._found])
-        value = np.concatenate([values for *_, values, _ in self._found])
-        stated = np.concatenate([stated for *_, stated in self._found])
+        row = np.concatenate([rows for rows, *_ in self._blocks])
+        observable = np.concatenate([np.full(len(r), o, np.intp) for r, o, *_ in self._blocks])
+        strut = np.concatenate([np.full(len(r), s, np.intp) for r, _, s, *_ in self._blocks])
+        value = np.concatenate([values for *_, values, _ in self._blocks])
+        stated = np.concatenate([stated for *_, stated in self._blocks])
         order = np.lexsort((observable, strut, row))
         return _Table(row[order], observable[order], strut[order], value[order], stated[order])
 
     def of_instrument(self, number: int) -> None:
-        """Look at the rows of one instrument."""
+        """Check the rows of one instrument, and add what they observe."""
         instrument = self.instruments[number]
         kind = REGISTRY[instrument.kind]
         own_rows = self.rows.instrument == number
         if not own_rows.any():
-            if (self.rows.instrument >= 0).all():  # else a row that is nobody's may be its
+            # A row of an unknown instrument may be meant to be its.
+            if (self.rows.instrument >= 0).all():
                 self.report(
                     "no-rows",
                     f"no row is of the instrument {instrument.name}",
@@ -367,7 +368,7 @@ class _Observations:
             values = within_a_turn(values)
         stated = self._stated(instrument, column, observable, filled)
         number = OBSERVABLES.index(observable)
-        self._found.append((rows, number, strut, values[rows], stated[rows]))
+        self._blocks.append((rows, number, strut, values[rows], stated[rows]))
 
     def _stated(
         self, instrument: Instrument, column: str, observable: str, filled: Flags

@@ -85,7 +85,7 @@ def _declared(machine: Machine, instrument: Instrument) -> list[str]:
 
 
 def _frame(machine: Machine, frame: Frame) -> str:
-    """The line of a frame, its rotation as a quaternion, which angles give back with less care."""
+    """The line of a frame; its rotation as a quaternion, because angles would round it."""
     parts = []
     if any(frame.origin):
         parts.append(f"origin = {_texts(machine, frame.origin, 'length')}")

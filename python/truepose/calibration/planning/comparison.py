@@ -1,4 +1,4 @@
-"""How many readings of one instrument do what so many of another do, at the tool.
+"""How many readings of one instrument reach, at the tool, what so many of another reach.
 
 Every number of readings is planned: what is compared is the best that each instrument can do.
 """
@@ -72,8 +72,9 @@ def compare_instruments(
     """How many planned readings of each instrument leave what `budget` of the first leave.
 
     Of the criterion "tool" of `plan`, in which position and rotation count; the options are those
-    of `plan`. All are assessed in the machine's base frame but for where the whole machine stands,
-    where any of them cannot tell that. `progress(instruments done, instruments)`.
+    of `plan`. The tool is assessed in the machine's base frame, without the place of the whole
+    machine where one of the instruments cannot determine that. `progress(instruments done,
+    instruments)`.
 
     Raises `RequestError` as `plan` does, and plan-instrument for fewer than two.
     """
@@ -92,7 +93,7 @@ def compare_instruments(
         Field(machine, instrument, candidates=candidates, condition=condition, identify=wanted)
         for instrument in instruments
     ]
-    # One ruler for all: what the least telling of them leaves to be assessed.
+    # One measure for all: the effects that the least informative of them can determine.
     ruler = min(fields, key=lambda field: field.mean_before)
     for field in fields:
         field.assess_as(ruler)

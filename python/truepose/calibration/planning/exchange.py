@@ -371,7 +371,7 @@ def _exchange(state: ExchangeState, criterion: Criterion, repeats: bool) -> None
             if not repeats:
                 gains[state.chosen] = -np.inf
             number = int(np.argmax(gains))
-            # To take it again gives back exactly what removing it cost.
+            # Taking it again would restore exactly what removing it lost.
             if number == own or gains[number] - change.lost <= least:
                 continue
             # Differences of large losses are rounding: the set itself has the last word.

@@ -145,10 +145,10 @@ def read_instruments(path: str | Path, machine: Machine) -> tuple[Instrument, ..
 
 
 def _with_frame_unknown(machine: Machine, instrument: Instrument) -> Instrument:
-    """The instrument with everything to be found of its frame that it can tell.
+    """The instrument with every freedom of its frame unknown that its readings determine.
 
     One of distances stands beside the workspace, half its diagonal away along the last axis in
-    which the platform moves, where nothing else is said: from within, distances tell little.
+    which the platform moves, where no origin is stated: from within, distances determine little.
     """
     kind = REGISTRY[instrument.kind]
     if kind.frame is None:

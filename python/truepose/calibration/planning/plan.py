@@ -3,9 +3,9 @@
 Every pose of the workspace that can be measured is a candidate: what the instrument would read
 there changes by so much a unit of every unknown (the machine's and the instrument's own). A set of
 poses leaves the unknowns with the covariance C = (prior + sum of the readings' information)^-1, in
-which what is unknown of the instrument is allowed for by itself, and the tool with S C S^T at a
+which the instrument's own unknowns are included, and the tool with S C S^T at a
 pose, S being the machine's sensitivity there. The set whose mean of the trace of that over the
-workspace is least, rotations weighed with the characteristic length, is looked for by exchange
+workspace is least, rotations weighted by the characteristic length, is searched by exchange
 (`exchange.py`).
 """
 
@@ -46,7 +46,7 @@ DOMINATED = 0.5
 dominated by its prior."""
 
 UNDETERMINED = 1e3
-"""What is known of a combination of unknowns is taken for nothing below so many times `WIDE`."""
+"""A combination of unknowns counts as undetermined below so many times `WIDE` of information."""
 
 SEEN = 1e-12
 """Share of a squared effect along what is undetermined that is no rounding."""
@@ -101,7 +101,7 @@ class Plan:
 
     @property
     def prior_dominated(self) -> tuple[str, ...]:
-        """Labels of the unknowns that the readings tell less of than the prior does."""
+        """Labels of the unknowns of which the readings give less information than the prior."""
         weak = self.from_data < DOMINATED
         return tuple(self.unknowns.labels[number] for number in np.flatnonzero(weak).tolist())
 
@@ -181,7 +181,7 @@ def plan(
 
 
 class Field:
-    """What a plan chooses from: the poses placed, what would be read at them, and the workspace.
+    """What a plan chooses from: the candidate poses, what would be read there, and the workspace.
 
     `placed`: the poses that may be measured. `candidates`: their readings as plain arrays. `tool`
     (n_pose, n_component, n): displacement and rotation of the tool per unit of each unknown, over
@@ -288,10 +288,10 @@ class Field:
 
 
 class CombinationVariance:
-    """What is known of combinations of unknowns after some candidates, scaled as these are.
+    """Variances of linear combinations of unknowns after some candidates, scaled as these are.
 
-    Unknowns with a prior are always known somehow; of those without, the readings alone decide: the
-    Schur complement of the information on them has an eigenvalue near zero where they do not.
+    Unknowns with a prior always have a finite variance; the others are determined by the readings
+    only: where those do not, the Schur complement of the information has an eigenvalue near zero.
     """
 
     def __init__(self, candidates: Candidates, chosen: Indices) -> None:
@@ -357,7 +357,7 @@ def _tool(
     """(n_pose, n_component, n) what each unknown does to the tool, over poses that can be used.
 
     Where an instrument's own frame is unknown no reading tells where the whole machine stands: that
-    part of every effect is taken away, as the gate does, and the flag is set.
+    part of every effect is removed, as in the acceptance, and the flag is set.
     """
     n_machine = unknowns.n_machine
     own_effects, solved = tool_effects(

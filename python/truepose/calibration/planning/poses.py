@@ -23,7 +23,7 @@ from truepose.machine.workspace import GridAxis, Workspace, grid
 from truepose.runs.poses import OK, SkippedPoses, no_pose_left, requested_poses
 
 MOST_POSES = 1024
-"""Poses of a workspace that are looked at, about: a finer grid betters a plan by little."""
+"""About how many poses of a workspace are considered: a finer grid hardly improves a plan."""
 
 CONDITIONED = 0.1
 """A candidate's conditioning is at least this share of the best in the workspace: nearer to a

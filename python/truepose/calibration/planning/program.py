@@ -1,8 +1,8 @@
 """A plan on its way to the machine: a program that stops at every pose, and a table to fill in.
 
 The program moves in straight lines of the commanded freedoms, as controllers do. Every line is
-looked at beforehand; where it leaves what the machine can reach, the way goes by home. Axis words
-are machine coordinates in mm or inches and degrees (ISO 6983-1).
+checked beforehand; where it leaves what the machine can reach, the way leads through home. Axis
+words are machine coordinates in mm or inches and degrees (ISO 6983-1).
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ def _number(value: float, digits: int) -> str:
 
 
 def _ascii(text: str) -> str:
-    """Text that can stand in a comment of any controller."""
+    """Text as printable ASCII without round brackets, for a comment of any controller."""
     kept = "".join(character if " " <= character <= "~" else "?" for character in text)
     return kept.replace("(", "[").replace(")", "]")
 

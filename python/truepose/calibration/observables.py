@@ -42,3 +42,8 @@ def column_name(machine: Machine, observable: int, strut: int) -> str:
     """What a reading's column is called: "x", "strut.a1.length"."""
     name = OBSERVABLES[observable]
     return f"strut.{machine.struts[strut].name}.{name}" if name in OF_STRUTS else name
+
+
+def si_unit(observable: str) -> str:
+    """SI unit of an observable, by its name."""
+    return UNITS[OBSERVABLES.index(observable)]

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 use std::process::Command;
-use truepose_kernel::element::guide::{GuideFrames, GuideKind, GuideLimb};
-use truepose_kernel::element::{Direction, DriveKind, strut};
+use truepose_kernel::element::guide::{GuideFrames, GuideLimb};
+use truepose_kernel::element::{Direction, DriveKind, GuideKind, strut};
 use truepose_kernel::scalar::{Dual, Interval, LANES, Lanes, Scalar, Tape, Trace};
 use truepose_kernel::spatial::{quaternion_from_euler, rotation_matrix};
 

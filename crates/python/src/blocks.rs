@@ -2,8 +2,9 @@
 //! a pose.
 
 use crate::arrays::{Array, Input, output};
-use crate::evaluate::{BLOCK, Quantity, codes, in_blocks, part};
 use crate::machine::Machine;
+use crate::quantity::Quantity;
+use crate::samples::{BLOCK, codes, in_blocks, part};
 use numpy::PyArrayMethods;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;

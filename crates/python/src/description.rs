@@ -4,8 +4,7 @@ use crate::failure::KernelError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
-use truepose_kernel::element::guide::GuideKind;
-use truepose_kernel::element::{DriveKind, Field};
+use truepose_kernel::element::{DriveKind, Field, GuideKind};
 use truepose_kernel::machine::{FREEDOMS, JointLimit};
 use truepose_kernel::{Description, DriveDescription, GuideDescription, StrutDescription};
 

@@ -4,54 +4,23 @@
 use crate::arrays::{Array, Input, output};
 use crate::failure::pose_error;
 use crate::machine::Machine;
-use numpy::{PyArray1, PyArrayMethods};
+use crate::quantity::Quantity;
+use crate::samples::{BLOCK, codes, in_blocks, part};
+use numpy::PyArrayMethods;
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 use truepose_kernel::Status;
-use truepose_kernel::batch::{self, Deviations, FirstOrder, Rows, Samples};
+use truepose_kernel::batch::{self, Deviations, Rows, Samples};
 use truepose_kernel::kinematics::{self, Obstacle};
 use truepose_kernel::machine::chosen;
 use truepose_kernel::spatial::Pose;
-
-/// Samples between two looks at Ctrl-C.
-pub const BLOCK: usize = 65_536;
 
 /// Joints and poses of commands, with their status.
 pub struct Placed {
     pub joints: Vec<f64>,
     pub poses: Vec<f64>,
     pub status: Vec<Status>,
-}
-
-/// Calls `work(first, size)` for blocks of samples without the GIL, looking at Ctrl-C in between.
-pub fn in_blocks(
-    py: Python<'_>,
-    count: usize,
-    mut work: impl FnMut(usize, usize) + Send,
-) -> PyResult<()> {
-    let mut first = 0;
-    while first < count {
-        let size = BLOCK.min(count - first);
-        py.detach(|| work(first, size));
-        first += size;
-        if first < count {
-            py.check_signals()?;
-        }
-    }
-    Ok(())
-}
-
-pub fn codes<'py>(
-    py: Python<'py>,
-    leading: &[usize],
-    status: &[Status],
-) -> PyResult<Bound<'py, PyAny>> {
-    let numbers: Vec<u8> = status.iter().map(|&status| status as u8).collect();
-    PyArray1::from_vec(py, numbers)
-        .into_any()
-        .call_method1("reshape", (PyTuple::new(py, leading)?,))
 }
 
 impl Machine {
@@ -336,11 +305,6 @@ fn plain_reason(status: Status) -> &'static str {
     }
 }
 
-/// Rows of `data` from sample `first` on, or its one row for all.
-pub fn part(data: &[f64], width: usize, first: usize, shared: bool) -> Rows<'_> {
-    if shared { Rows::shared(&data[..width]) } else { Rows::each(&data[first * width..], width) }
-}
-
 /// Samples that close the struts.
 #[derive(Clone, Copy)]
 pub struct At<'a> {
@@ -349,54 +313,4 @@ pub struct At<'a> {
     pub poses: &'a [f64],
     pub shared_joints: bool,
     pub shared_poses: bool,
-}
-
-/// Any of the kernel's first-order quantities.
-pub enum Quantity<'a> {
-    Sensitivity(batch::Sensitivity<'a>),
-    JointJacobian(batch::JointJacobian),
-    Forces(batch::Forces<'a>),
-    Loads(batch::Loads<'a>),
-    Compliance(batch::Compliance<'a>),
-    Stiffness(batch::Stiffness<'a>),
-    InternalForces(batch::InternalForces<'a>),
-}
-
-impl Quantity<'_> {
-    fn compute(
-        &self,
-        machine: &truepose_kernel::Machine,
-        samples: &Samples<'_>,
-        out: &mut [f64],
-        status: &mut [Status],
-    ) {
-        fn run(
-            quantity: &impl FirstOrder,
-            machine: &truepose_kernel::Machine,
-            samples: &Samples<'_>,
-            out: &mut [f64],
-            status: &mut [Status],
-        ) {
-            batch::first_order(machine, samples, quantity, out, status);
-        }
-        match self {
-            Quantity::Sensitivity(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::JointJacobian(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Forces(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Loads(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Compliance(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Stiffness(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::InternalForces(quantity) => run(quantity, machine, samples, out, status),
-        }
-    }
-}
-pub fn write_coordinates(row: &mut [f64], freedoms: &[usize], pose: &Pose<f64>, found: bool) {
-    if !found {
-        row.fill(f64::NAN);
-        return;
-    }
-    let coordinates = pose.to_coordinates();
-    for (value, &freedom) in row.iter_mut().zip(freedoms) {
-        *value = coordinates[freedom];
-    }
 }

@@ -1,8 +1,8 @@
 //! Calibration as a Python class: a design of measurements, what it predicts, and the fit to readings.
 
 use crate::arrays::{Array, Input, output};
-use crate::evaluate::codes;
 use crate::machine::Machine;
+use crate::samples::codes;
 use numpy::PyArrayMethods;
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;

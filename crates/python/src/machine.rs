@@ -2,8 +2,9 @@
 
 use crate::arrays::{Array, Input, output};
 use crate::description::description;
-use crate::evaluate::{BLOCK, Quantity, codes, in_blocks, part, write_coordinates};
 use crate::failure::{KernelError, kernel_error};
+use crate::quantity::Quantity;
+use crate::samples::{BLOCK, codes, in_blocks, part, write_coordinates};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;

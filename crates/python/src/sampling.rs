@@ -1,8 +1,8 @@
 //! Monte Carlo as Python classes: variables, a study of a machine at poses, and the tallies of its samples.
 
 use crate::arrays::{Array, Input, output};
-use crate::evaluate::codes;
 use crate::machine::Machine;
+use crate::samples::codes;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

@@ -296,7 +296,7 @@ fn multipliers<S: Real>(
 ) -> [S; CLOSURES] {
     let mut wrench = [S::default(); SIX];
     wrenches.load(place.first, place.size, &mut wrench);
-    closure_forces(linear, &wrench)
+    closure_forces(&linear.inverse, &wrench)
 }
 
 impl FirstOrder for Forces<'_> {
@@ -379,8 +379,8 @@ impl FirstOrder for Compliance<'_> {
     ) {
         let mut compliances = vec![S::default(); self.readers.len()];
         self.compliances.load(place.first, place.size, &mut compliances);
-        let closures = closure_compliance(linear, &self.readers, &compliances);
-        let matrix = pose_compliance(linear, &closures);
+        let closures = closure_compliance(&linear.to_parameters, &self.readers, &compliances);
+        let matrix = pose_compliance(&linear.inverse, &closures);
         let mut cells = columns.iter_mut();
         for &i in &self.components {
             for (&k, cell) in self.components.iter().zip(&mut cells) {
@@ -421,7 +421,7 @@ impl FirstOrder for Stiffness<'_> {
     ) {
         let mut compliances = vec![S::default(); self.from.readers.len()];
         self.from.compliances.load(place.first, place.size, &mut compliances);
-        let closures = closure_compliance(linear, &self.from.readers, &compliances);
+        let closures = closure_compliance(&linear.to_parameters, &self.from.readers, &compliances);
         // Pivoting is per sample: the closures' compliance may be as ill-scaled as the file.
         for lane in 0..S::WIDTH {
             let single = closures.map(|row| row.map(|value| value.lane(lane)));

@@ -1,7 +1,8 @@
 //! An arm that turns about a fixed axis.
 
-use super::{Dimension, Direction, Drawing, Drive, ElementTable, Field, ParameterField, Reach};
-use super::{axis_parameter_fields, axis_parameters};
+use super::direction::Direction;
+use super::drive::{Drive, Reach, axis_parameter_fields, axis_parameters};
+use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, add, cross, dot, scale as scaled, subtract};
 

@@ -4,7 +4,9 @@
 //! they move with the pose and with their own deviations is added here, once for all guides, as dual
 //! numbers through the guide's closures.
 
-use super::{DRIVE_END, Dimension, Direction, ElementTable, PLACES};
+use super::direction::Direction;
+use super::table::{Dimension, ElementTable};
+use super::{DRIVE_END, PLACES};
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{RotationMatrix, Vector, add, cross, rotate};
 
@@ -125,7 +127,7 @@ impl<S: Scalar> GuideLimb<S> {
 
 /// Residual of a closure and its row: derivatives to the platform's twist about the tool point.
 #[inline(always)]
-fn row_of<S: Scalar, G: Guide>(
+pub fn row_of<S: Scalar, G: Guide>(
     which: usize,
     frames: &GuideFrames,
     limb: &GuideLimb<S>,
@@ -167,7 +169,7 @@ fn row_of<S: Scalar, G: Guide>(
 
 /// Residual of a closure on any scalar.
 #[inline(always)]
-fn residual_of<S: Scalar, G: Guide>(
+pub fn residual_of<S: Scalar, G: Guide>(
     which: usize,
     frames: &GuideFrames,
     limb: &GuideLimb<S>,
@@ -179,7 +181,7 @@ fn residual_of<S: Scalar, G: Guide>(
 
 /// The derivatives of a closure to its own parameters and to the tool point's, at their places.
 #[inline(always)]
-fn gradient_of<S: Scalar, G: Guide>(
+pub fn gradient_of<S: Scalar, G: Guide>(
     which: usize,
     frames: &GuideFrames,
     limb: &GuideLimb<S>,
@@ -207,82 +209,6 @@ fn gradient_of<S: Scalar, G: Guide>(
 
 /// Where a platform is: its rotation and its tool point.
 pub type Placement<'a, S> = (&'a RotationMatrix<S>, Vector<S>);
-
-/// Makes the closed set of guides from its list, with static dispatch.
-macro_rules! guides {
-    ($($name:ident => $type:path),+ $(,)?) => {
-        /// The kinds of guide.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[allow(missing_docs)] // each is described by its table
-        pub enum GuideKind { $($name),+ }
-
-        impl GuideKind {
-            /// Every kind, in the order of the list.
-            pub const ALL: &[GuideKind] = &[$(GuideKind::$name),+];
-
-            /// Kind, fields and parameters.
-            pub fn table(self) -> &'static ElementTable {
-                match self { $(GuideKind::$name => const { &<$type as Guide>::TABLE }),+ }
-            }
-
-            /// The field that each anchor is given by.
-            pub fn fields(self) -> &'static [(Anchor, &'static str)] {
-                match self { $(GuideKind::$name => <$type as Guide>::FIELDS),+ }
-            }
-
-            /// How many closures it has.
-            pub fn closures(self) -> usize {
-                match self { $(GuideKind::$name => <$type as Guide>::CLOSURES),+ }
-            }
-
-            /// Residual (m) of one closure and its row: derivatives to the platform's twist.
-            pub fn row<S: Scalar>(
-                self,
-                which: usize,
-                frames: &GuideFrames,
-                limb: &GuideLimb<S>,
-                at: Placement<'_, S>,
-                length: f64,
-            ) -> (S, [S; 6]) {
-                match self { $(GuideKind::$name => row_of::<S, $type>(which, frames, limb, at, length)),+ }
-            }
-
-            /// Residual (m) of one closure, on any scalar.
-            pub fn residual<S: Scalar>(
-                self,
-                which: usize,
-                frames: &GuideFrames,
-                limb: &GuideLimb<S>,
-                at: Placement<'_, S>,
-                length: f64,
-            ) -> S {
-                match self { $(GuideKind::$name => residual_of::<S, $type>(which, frames, limb, at, length)),+ }
-            }
-
-            /// The derivatives of one closure to its parameters and to the tool's, at their places.
-            pub fn gradient<S: Scalar>(
-                self,
-                which: usize,
-                frames: &GuideFrames,
-                limb: &GuideLimb<S>,
-                at: Placement<'_, S>,
-                length: f64,
-                places: &mut [S; PLACES],
-            ) {
-                match self {
-                    $(GuideKind::$name => gradient_of::<S, $type>(which, frames, limb, at, length, places)),+
-                }
-            }
-        }
-    };
-}
-
-// The list: a new guide is its file, its `mod` line in `element/mod.rs` and one line here.
-guides! {
-    Plane => super::plane::Plane,
-    Line => super::line::Line,
-    Universal => super::universal::Universal,
-}
 
 /// The names and dimensions of the parameters of one anchor.
 pub fn anchor_parameters(anchor: Anchor) -> &'static [(&'static str, Dimension)] {

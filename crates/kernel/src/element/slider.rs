@@ -1,7 +1,8 @@
 //! A carriage on a straight guideway.
 
-use super::{Dimension, Direction, Drawing, Drive, ElementTable, Field, ParameterField, Reach};
-use super::{axis_parameter_fields, axis_parameters};
+use super::direction::Direction;
+use super::drive::{Drive, Reach, axis_parameter_fields, axis_parameters};
+use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, add, dot, norm, scale as scaled, subtract};
 

@@ -1,7 +1,7 @@
 //! A strut: two joint centres at a fixed distance.
 
-use super::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
-use crate::scalar::Scalar;
+use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
+use crate::scalar::{Dual, Scalar};
 use crate::spatial::{Vector, add, dot, norm, scale, subtract};
 
 /// Keys and parameters of a strut. Its length is a parameter only where no telescopic drive is it.
@@ -87,4 +87,20 @@ pub fn nearest_on_ring<S: Scalar>(
     let across = subtract(away, scale(axis, dot(away, axis)));
     let radial = scale(across, radius.lift(1.0) / norm(across));
     (add(centre, scale(radial, radius)), radial)
+}
+
+/// The derivatives of the strut closure to the platform-side centre and to the length. That to the
+/// base-side centre is the former's opposite: moving both points alike changes no distance.
+#[inline(always)]
+pub fn strut_gradient<S: Scalar>([base, platform]: [Vector<S>; 2], length: S) -> (Vector<S>, S) {
+    let gradient = closure(
+        [Dual::constant(base[0]), Dual::constant(base[1]), Dual::constant(base[2])],
+        [
+            Dual::<S, 4>::variable(platform[0], 0),
+            Dual::variable(platform[1], 1),
+            Dual::variable(platform[2], 2),
+        ],
+        Dual::variable(length, 3),
+    );
+    ([gradient.parts[0], gradient.parts[1], gradient.parts[2]], gradient.parts[3])
 }

@@ -1,7 +1,8 @@
 //! A strut whose own length is driven.
 
-use super::parameter;
-use super::{Dimension, Direction, Drawing, Drive, ElementTable, Field, ParameterField, Reach};
+use super::direction::Direction;
+use super::drive::{Drive, Reach};
+use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, norm, subtract};
 

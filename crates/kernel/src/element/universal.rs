@@ -1,7 +1,7 @@
 //! A universal joint: the platform does not twist.
 
 use super::guide::{Anchor, Guide, GuidePoints};
-use super::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
+use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
 use crate::scalar::Scalar;
 use crate::spatial::dot;
 

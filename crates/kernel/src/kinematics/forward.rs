@@ -7,11 +7,11 @@
 
 use super::SINGULAR;
 use super::closures::{Limbs, Sample, squared_residuals, squared_rows, start_rows};
+use super::condition::condition_at;
 use super::linearisation::proven_regular;
 use super::overconstrained::{Surroundings, least_energy};
 use crate::linear::{
-    IN_ORDER, Matrix6, Order, Pivoted, SIX, condition_index, factor, factor_pivoting, inverse_of,
-    solve,
+    IN_ORDER, Matrix6, Order, Pivoted, SIX, factor, factor_pivoting, inverse_of, solve,
 };
 use crate::machine::Machine;
 use crate::scalar::Real;
@@ -277,15 +277,4 @@ fn judged(sample: &Sample<'_>, pose: Pose<f64>, determinant: f64) -> (Pose<f64>,
         sample.machine.plain && proven_regular(sample.machine, sample.limbs, determinant) > 0.0;
     let regular = proven || condition_at(sample, &pose) >= SINGULAR;
     (pose, if regular { Status::Ok } else { Status::Singular })
-}
-
-/// Smallest over largest singular value of the scaled rows.
-pub fn condition_at(sample: &Sample<'_>, pose: &Pose<f64>) -> f64 {
-    let (mut rows, _) = sample.closures(pose);
-    for row in &mut rows {
-        for value in &mut row[3..] {
-            *value /= sample.machine.characteristic_length;
-        }
-    }
-    condition_index(&rows, sample.machine.closure_count(), &sample.machine.dof)
 }

@@ -5,13 +5,12 @@
 //! solved for together by Newton's iteration, started from the closed forms at the home attitude.
 
 use super::SINGULAR;
-use super::closures::{Limb, Rows, Sample, limbs, place_limbs, ring_arm};
+use super::closures::{Limb, Sample, limbs, place_limbs, ring_arm};
+use super::condition::condition;
 use super::forward::forward;
 use super::linearisation::Linearisation;
 use crate::element::{Dimension, Reach};
-use crate::linear::{
-    CLOSURES, Matrix6, Pivoted, SIX, condition_index, factor_pivoting, null_space, solve,
-};
+use crate::linear::{CLOSURES, Matrix6, Pivoted, SIX, condition_index, factor_pivoting, solve};
 use crate::machine::{Machine, MachineDrive, chosen};
 use crate::scalar::{Real, Scalar};
 use crate::spatial::{
@@ -435,38 +434,6 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
         }
     }
     found
-}
-
-/// The closures' rows with rotations in units of the characteristic length.
-fn scaled_rows(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Rows<f64> {
-    let mut linear = Linearisation::default();
-    linear.differentiate(machine, p, q, pose);
-    let mut rows = linear.rows;
-    for row in &mut rows {
-        for value in &mut row[3..] {
-            *value /= machine.characteristic_length;
-        }
-    }
-    rows
-}
-
-/// Smallest over largest singular value of the scaled closure Jacobian: 1 isotropic, 0 singular.
-pub fn condition(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> f64 {
-    let rows = scaled_rows(machine, p, q, pose);
-    condition_index(&rows, machine.closure_count(), &machine.dof)
-}
-
-/// The twists of the platform about its tool point that no closure holds: none at a good pose. Of unit
-/// length where rotations are measured by the characteristic length.
-pub fn free_motions(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Vec<[f64; SIX]> {
-    let rows = scaled_rows(machine, p, q, pose);
-    let mut free = null_space(&rows, machine.closure_count(), &machine.dof, SINGULAR);
-    for twist in &mut free {
-        for value in &mut twist[3..] {
-            *value /= machine.characteristic_length;
-        }
-    }
-    free
 }
 
 /// The commanded pose that a row of values in the order of the commanded freedoms names; what is not

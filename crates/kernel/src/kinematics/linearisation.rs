@@ -3,7 +3,7 @@
 
 use super::SINGULAR;
 use super::closures::{Limb, Limbs, Sample, guide_limb, held_row, ring_arm, row};
-use super::overconstrained::spread;
+use super::elastic::spread;
 use crate::element::{DRIVE_END, PLACES, RING, fixed_gradient};
 use crate::linear::{CLOSURES, Order, SIX, factor, factor_pivoting, growth, invert};
 use crate::machine::Machine;
@@ -167,7 +167,7 @@ impl Linearisation<f64> {
         let machine = sample.machine;
         self.differentiate(machine, sample.p, q, pose);
         if machine.is_overconstrained() {
-            self.inverse = spread(machine, self);
+            self.inverse = spread(machine, &self.rows, &self.to_parameters);
         } else {
             let mut square = [[0.0; SIX]; SIX];
             square.copy_from_slice(&self.rows[..SIX]);

@@ -1,6 +1,8 @@
 //! How joints, pose and parameters hang together.
 
 mod closures;
+mod condition;
+mod elastic;
 mod forward;
 mod gradients;
 mod inverse;
@@ -9,12 +11,10 @@ mod overconstrained;
 
 pub(crate) use closures::system;
 pub use closures::{Limb, Limbs, Sample, guide_limb, limbs, place_limbs, ring_arm};
+pub use condition::{condition, free_motions};
 pub use forward::{Descent, chord, chord_inverse, descend, forward, start_order};
 pub(crate) use gradients::{Gradients, gradients};
-pub use inverse::{
-    Inverse, Obstacle, commanded_pose, condition, free_motions, inverse, lane_inverse, obstacles,
-    permitted,
-};
+pub use inverse::{Inverse, Obstacle, commanded_pose, inverse, lane_inverse, obstacles, permitted};
 pub(crate) use inverse::{closed_form, leanings};
 pub use linearisation::{Linearisation, proven_regular};
 pub use overconstrained::{Settled, Surroundings, internal_forces, least_energy};

@@ -10,13 +10,15 @@
 //! The change of the rows with the pose is left out of the stiffness, so that where clearances are wide and
 //! loads large against the stiffness the iteration may not settle, which the status then says.
 
+use super::SINGULAR;
 use super::closures::Sample;
+use super::condition::condition_at;
+use super::elastic::{Structure, scaled_rows, spread, unit};
 use super::linearisation::Linearisation;
-use super::{SINGULAR, forward::condition_at};
 use crate::linear::{CLOSURES, SIX};
 use crate::machine::{Machine, chosen};
 use crate::spatial::Pose;
-use crate::statics::{ClosureMatrix, closure_compliance};
+use crate::statics::ClosureMatrix;
 use crate::status::Status;
 use nalgebra::{DMatrix, DVector};
 
@@ -64,76 +66,13 @@ enum Contact {
     Floating,
 }
 
-/// Closures that carry at all, and the compliance between all closures.
-struct Structure {
-    carrying: Vec<usize>,
-    compliance: ClosureMatrix<f64>,
-}
-
-impl Structure {
-    fn new(machine: &Machine, linear: &Linearisation<f64>) -> Self {
-        let readers: Vec<&[(usize, usize)]> = machine
-            .parameter_compliance
-            .iter()
-            .map(|&(parameter, _)| machine.readers[parameter].as_slice())
-            .collect();
-        let values: Vec<f64> = machine.parameter_compliance.iter().map(|&(_, c)| c).collect();
-        let mut compliance = closure_compliance(linear, &readers, &values);
-        let own = &machine.closure_compliance;
-        let carrying: Vec<usize> = machine.carrying().collect();
-        for &i in &carrying {
-            compliance[i][i] += own[i];
-        }
-        Structure { carrying, compliance }
-    }
-
-    /// The stiffness between some of the closures; `None` where one of them is rigid.
-    fn stiffness(&self, closures: &[usize]) -> Option<DMatrix<f64>> {
-        let size = closures.len();
-        let matrix = DMatrix::from_fn(size, size, |i, k| self.compliance[closures[i]][closures[k]]);
-        matrix.cholesky().map(|factors| factors.inverse())
-    }
-}
-
-/// Rows of some closures in the platform's freedoms, rotations in units of the characteristic length.
-fn scaled_rows(machine: &Machine, rows: &[[f64; SIX]], closures: &[usize]) -> DMatrix<f64> {
-    let freedoms = chosen(&machine.dof);
-    DMatrix::from_fn(closures.len(), freedoms.len(), |i, k| {
-        rows[closures[i]][freedoms[k]] / unit(machine, freedoms[k])
-    })
-}
-
-/// What one unit of a scaled freedom is: 1 m, or the angle that moves the characteristic length by 1 m.
-fn unit(machine: &Machine, freedom: usize) -> f64 {
-    if freedom < 3 { 1.0 } else { machine.characteristic_length }
-}
-
-/// `(W^T K W)^-1 W^T K`: the twist per unit residual that leaves the least elastic energy. Not finite
-/// where the closures are rigid or do not hold the platform.
-pub fn spread(machine: &Machine, linear: &Linearisation<f64>) -> [[f64; CLOSURES]; SIX] {
-    let mut result = [[0.0; CLOSURES]; SIX];
-    let structure = Structure::new(machine, linear);
-    let rows = scaled_rows(machine, &linear.rows, &structure.carrying);
-    let solved = structure.stiffness(&structure.carrying).and_then(|stiffness| {
-        let weighted = rows.transpose() * stiffness;
-        (&weighted * &rows).cholesky().map(|normal| normal.solve(&weighted))
-    });
-    for (k, &freedom) in chosen(&machine.dof).iter().enumerate() {
-        for (i, &closure) in structure.carrying.iter().enumerate() {
-            result[freedom][closure] =
-                solved.as_ref().map_or(f64::NAN, |solved| solved[(k, i)] / unit(machine, freedom));
-        }
-    }
-    result
-}
-
 /// `K (I - W W^+)` with the spread W^+: the force in each closure per unit residual of each, after the
 /// platform gave way. Tension of a strut positive; not finite where a closure is rigid.
 pub fn internal_forces(machine: &Machine, linear: &Linearisation<f64>) -> ClosureMatrix<f64> {
     let mut result = [[0.0; CLOSURES]; CLOSURES];
-    let structure = Structure::new(machine, linear);
+    let structure = Structure::new(machine, &linear.to_parameters);
     let carrying = &structure.carrying;
-    let spread = spread(machine, linear);
+    let spread = spread(machine, &linear.rows, &linear.to_parameters);
     let Some(stiffness) = structure.stiffness(carrying) else {
         return [[f64::NAN; CLOSURES]; CLOSURES];
     };
@@ -174,7 +113,7 @@ pub fn least_energy(
     let mut linear = Linearisation::default();
     for _ in 0..STEPS {
         linear.differentiate(machine, sample.p, q, &settled.pose);
-        let structure = Structure::new(machine, &linear);
+        let structure = Structure::new(machine, &linear.to_parameters);
         let (_, residuals) = sample.closures(&settled.pose);
         let found =
             Rest { machine, surroundings, structure: &structure, linear: &linear, residuals }

@@ -1,7 +1,7 @@
 //! A machine as its file gives it, in SI units, and why it may be none.
 
 use crate::element::DriveKind;
-use crate::element::guide::GuideKind;
+use crate::element::GuideKind;
 use crate::linear::SIX;
 use crate::spatial::Vector;
 use std::collections::BTreeMap;

@@ -7,8 +7,8 @@ pub use description::{
     Description, DriveDescription, GuideDescription, JointLimit, MachineError, StrutDescription,
 };
 
-use crate::element::guide::{GuideFrames, GuideKind};
-use crate::element::{Dimension, Direction, DriveKind};
+use crate::element::guide::GuideFrames;
+use crate::element::{Dimension, Direction, DriveKind, GuideKind};
 use crate::linear::{CLOSURES, SIX};
 use crate::spatial::{Pose, Vector, norm, rotate, rotation_matrix, subtract};
 

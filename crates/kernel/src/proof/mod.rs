@@ -9,16 +9,20 @@ mod affine;
 mod at_pose;
 mod boxes;
 mod closures;
+mod command;
 mod directions;
 mod over_region;
 mod pose_box;
+mod rates;
+mod region;
 mod root;
 mod targets;
 
 pub use affine::Affine;
 pub use at_pose::{Extent, PoseBound};
 pub use boxes::{Effort, bound_in_boxes};
-pub use over_region::{Region, RegionBound, bound_over_region, can_be_enclosed};
+pub use over_region::{RegionBound, bound_over_region, can_be_enclosed};
+pub use region::Region;
 
 use crate::scalar::Interval;
 

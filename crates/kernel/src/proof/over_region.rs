@@ -4,9 +4,10 @@
 //! the unknowns), then the actual platform relative to it. The box with the largest bound is halved until
 //! no bound lies above what is reached somewhere by more than the gap.
 
-use super::affine::Affine;
 use super::at_pose::{Extent, along, displacement_numbers};
-use super::pose_box::{Over, reach, reach_more};
+use super::pose_box::Over;
+use super::rates::{reach, reach_more};
+use super::region::Region;
 use super::targets::{AS_LOW_AS_CAN_BE, Closeness, TARGETS, targets};
 use super::{Deviating, Unproven, point};
 use crate::batch::{displacement, share_out};
@@ -25,27 +26,6 @@ const SMALLEST: f64 = 1e-4;
 const FINE: f64 = 1.01;
 /// A component below this share of its magnitude is closed to the gap of this share.
 const MINOR: f64 = 0.1;
-
-/// A region and what deviates in it.
-#[derive(Clone, Debug)]
-pub struct Region<'a> {
-    /// The machine.
-    pub machine: &'a Machine,
-    /// Lowest and highest value of each commanded freedom, m and rad.
-    pub sides: Vec<[f64; 2]>,
-    /// Known deviations of the parameters.
-    pub shift: Vec<Affine>,
-    /// Compliances, m/N or rad/(N m), of parameters that yield under the wrench.
-    pub yielding: Vec<Affine>,
-    /// Force (N) and moment (N m) on the tool, base axes.
-    pub wrench: [f64; SIX],
-    /// What the variables move.
-    pub deviating: &'a Deviating,
-    /// How far the bounds may lie above what is reached, relative.
-    pub gap: f64,
-    /// Boxes that may be looked at.
-    pub most_boxes: usize,
-}
 
 /// What is proven over a region; bounds are infinite where nothing is.
 #[derive(Clone, Debug)]

@@ -11,8 +11,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use truepose_kernel::Status;
 use truepose_kernel::batch::{self, Deviations, Samples};
-use truepose_kernel::kinematics::{self, Obstacle, Sample, Surroundings};
-use truepose_kernel::machine::chosen;
+use truepose_kernel::kinematics::{self, Loads, Obstacle, Sample};
+use truepose_kernel::machine::indices_of;
 use truepose_kernel::spatial::{Pose, rotate, rotation_matrix};
 
 #[pymethods]
@@ -134,7 +134,7 @@ impl Machine {
         let gaps = clearances.rows(0, shared(&clearances, "clearances")?);
         let wrenches = wrenches.rows(0, shared(&wrenches, "wrenches")?);
         let commands = joints.rows(0, false);
-        let components = chosen(&machine.dof);
+        let components = indices_of(&machine.dof);
         let errors = output(py, &[count], &[components.len()])?;
         let tables = [
             output(py, &[count], &[closures])?,
@@ -149,14 +149,14 @@ impl Machine {
             }
             let limbs = kinematics::limbs(machine, &p, commands.row(i));
             let start = Pose::from_row(starts.row(i));
-            let mut surroundings = Surroundings::default();
-            surroundings.clearance[..closures].copy_from_slice(gaps.row(i));
-            surroundings.wrench.copy_from_slice(wrenches.row(i));
+            let mut loads = Loads::default();
+            loads.clearance[..closures].copy_from_slice(gaps.row(i));
+            loads.wrench.copy_from_slice(wrenches.row(i));
             let sample = Sample { machine, p: &p, limbs: &limbs };
-            let settled = kinematics::least_energy(&sample, commands.row(i), &start, &surroundings);
-            *status = settled.status;
-            let solved = settled.status == Status::Ok;
-            let error = batch::displacement(&start, &settled.pose);
+            let equilibrium = kinematics::least_energy(&sample, commands.row(i), &start, &loads);
+            *status = equilibrium.status;
+            let solved = equilibrium.status == Status::Ok;
+            let error = batch::displacement(&start, &equilibrium.pose);
             let row = components.iter().map(|&k| error[k]);
             let keep = |value: f64| if solved { value } else { f64::NAN };
             for (cell, value) in
@@ -164,11 +164,11 @@ impl Machine {
             {
                 *cell = keep(value);
             }
-            let found = [settled.forces, settled.absorbed, settled.strain];
-            for (table, found) in tables.iter().zip(found) {
+            let rows = [equilibrium.forces, equilibrium.absorbed, equilibrium.strain];
+            for (table, rows) in tables.iter().zip(rows) {
                 let mut writable = table.readwrite();
                 let cells = &mut writable.as_slice_mut()?[i * closures..(i + 1) * closures];
-                for (cell, value) in cells.iter_mut().zip(found) {
+                for (cell, value) in cells.iter_mut().zip(rows) {
                     *cell = keep(value);
                 }
             }

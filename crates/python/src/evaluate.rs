@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use truepose_kernel::Status;
 use truepose_kernel::batch::{self, Deviations, Rows, Samples};
 use truepose_kernel::kinematics::{self, Obstacle};
-use truepose_kernel::machine::chosen;
+use truepose_kernel::machine::indices_of;
 use truepose_kernel::spatial::Pose;
 
 /// Joints and poses of commands, with their status.
@@ -219,7 +219,7 @@ impl Machine {
     pub fn rows_of_poses(&self, poses: &Input<'_>) -> Vec<f64> {
         let machine = &self.inner;
         let home = machine.home.to_coordinates();
-        let freedoms = chosen(if poses.width == self.components() {
+        let freedoms = indices_of(if poses.width == self.components() {
             &machine.dof
         } else {
             &machine.commanded

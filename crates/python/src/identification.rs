@@ -115,7 +115,7 @@ fn design(machine: &Machine, entry: &Bound<'_, PyDict>) -> PyResult<Design> {
     })
 }
 
-/// What is measured where, and what is to be found.
+/// The measurements of a calibration and its unknowns.
 #[pyclass(frozen, module = "truepose._kernel")]
 pub struct Identification {
     inner: Prepared,
@@ -143,7 +143,7 @@ impl Identification {
         (out, status).into_bound_py_any(py)
     }
 
-    /// (derivatives (n_observation, n), status (n_pose,)) of what is read to the unknowns.
+    /// (derivatives (n_observation, n), status (n_pose,)) of the readings to the unknowns.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -193,22 +193,22 @@ impl Identification {
             ..Options::default()
         };
         let (read, weighted, from) = (measured.data(), weights.data(), start.data());
-        let found = py.detach(|| {
+        let fits = py.detach(|| {
             identification::fit_many(&self.inner, read, weighted, &prior, from, &options)
         });
-        let values: Array<'py> = output(py, &[found.len()], &[unknowns])?;
-        let costs: Array<'py> = output(py, &[found.len()], &[])?;
+        let values: Array<'py> = output(py, &[fits.len()], &[unknowns])?;
+        let costs: Array<'py> = output(py, &[fits.len()], &[])?;
         {
             let (mut values, mut costs) = (values.readwrite(), costs.readwrite());
             let (values, costs) = (values.as_slice_mut()?, costs.as_slice_mut()?);
-            for (set, one) in found.iter().enumerate() {
+            for (set, one) in fits.iter().enumerate() {
                 values[set * unknowns..(set + 1) * unknowns].copy_from_slice(&one.values);
                 costs[set] = one.cost;
             }
         }
         let endings: Vec<&str> =
-            found.iter().map(|one| one.ended.map_or("unreachable", |ended| ended.name())).collect();
-        let evaluations: Vec<usize> = found.iter().map(|one| one.evaluations).collect();
+            fits.iter().map(|one| one.ended.map_or("unreachable", |ended| ended.name())).collect();
+        let evaluations: Vec<usize> = fits.iter().map(|one| one.evaluations).collect();
         (values, costs, endings, evaluations).into_bound_py_any(py)
     }
 }

@@ -46,9 +46,9 @@ pub fn largest<'py>(
         domain: &domain,
         quantities: &quantities,
     };
-    let found = output(py, &[count], &[quantities.len(), NUMBERS])?;
+    let lengths = output(py, &[count], &[quantities.len(), NUMBERS])?;
     let mut numbers = vec![0.0; count * quantities.len() * NUMBERS];
     py.detach(|| largest_of(count, &of, &mut numbers));
-    found.readwrite().as_slice_mut()?.copy_from_slice(&numbers);
-    Ok(found)
+    lengths.readwrite().as_slice_mut()?.copy_from_slice(&numbers);
+    Ok(lengths)
 }

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use truepose_kernel::Status;
 use truepose_kernel::batch::{self, Deviations, Rows, Samples};
 use truepose_kernel::kinematics::{self, Sample};
-use truepose_kernel::machine::{COMPONENTS, FREEDOMS, chosen};
+use truepose_kernel::machine::{COMPONENTS, FREEDOMS, indices_of};
 use truepose_kernel::spatial::Pose;
 
 /// A parallel kinematic machine: immutable, picklable. SI units and radians throughout.
@@ -25,7 +25,7 @@ pub struct Machine {
 }
 
 fn names(flags: &[bool; 6], all: [&'static str; 6]) -> Vec<&'static str> {
-    chosen(flags).into_iter().map(|k| all[k]).collect()
+    indices_of(flags).into_iter().map(|k| all[k]).collect()
 }
 impl Machine {
     fn build(table: &Bound<'_, PyDict>, replaced: BTreeMap<usize, f64>) -> PyResult<Self> {
@@ -113,7 +113,7 @@ impl Machine {
     #[getter]
     fn home<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let coordinates = self.inner.home.to_coordinates();
-        PyArray1::from_iter(py, chosen(&self.inner.dof).into_iter().map(|k| coordinates[k]))
+        PyArray1::from_iter(py, indices_of(&self.inner.dof).into_iter().map(|k| coordinates[k]))
     }
     #[getter]
     fn length_parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
@@ -128,9 +128,9 @@ impl Machine {
     fn replace(&self, py: Python<'_>, values: BTreeMap<String, f64>) -> PyResult<Self> {
         let mut replaced = self.replaced.clone();
         for (name, value) in values {
-            let found = self.inner.parameters.iter().position(|parameter| parameter.name == name);
+            let index = self.inner.parameters.iter().position(|parameter| parameter.name == name);
             let refused = |code, message| Err(KernelError::new_err((code, message, name.clone())));
-            match found {
+            match index {
                 None => {
                     return refused("unknown-parameter", format!("there is no parameter {name:?}"));
                 }
@@ -181,7 +181,7 @@ impl Machine {
                 (self.rows_of_poses(&start), shared)
             }
         };
-        let freedoms = chosen(&machine.dof);
+        let freedoms = indices_of(&machine.dof);
         let out = output(py, &joints.leading, &[freedoms.len()])?;
         let mut codes = vec![Status::Ok; count];
         {
@@ -468,7 +468,7 @@ impl Machine {
         placements: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
         let placements = Input::new(placements, &[7], "placements")?;
-        let freedoms = chosen(&self.inner.dof);
+        let freedoms = indices_of(&self.inner.dof);
         let out = output(py, &placements.leading, &[freedoms.len()])?;
         {
             let mut writable = out.readwrite();

@@ -47,8 +47,8 @@ pub fn part(data: &[f64], width: usize, first: usize, shared: bool) -> Rows<'_> 
 }
 
 /// Writes the freedoms of a pose, NaN where it is none.
-pub fn write_coordinates(row: &mut [f64], freedoms: &[usize], pose: &Pose<f64>, found: bool) {
-    if !found {
+pub fn write_coordinates(row: &mut [f64], freedoms: &[usize], pose: &Pose<f64>, solved: bool) {
+    if !solved {
         row.fill(f64::NAN);
         return;
     }

@@ -8,7 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truepose_kernel::Status;
-use truepose_kernel::machine::{chosen, parts};
+use truepose_kernel::machine::{indices_of, parts};
 use truepose_kernel::sampling::{
     self, Columns, Copula, Shape, StudyPose, Tally, Variable, Whitening,
 };
@@ -274,7 +274,7 @@ impl Study {
             .then(|| Ok::<_, PyErr>(swing.rows(0, swing.serves(count, "swing")?)))
             .transpose()?;
         let given = whitening.as_ref().map(Input::data);
-        let places = placements.data();
+        let placed = placements.data();
         let poses = py.detach(|| {
             let pose = |i: usize| {
                 let mut centre = machine.nominal.clone();
@@ -284,7 +284,7 @@ impl Study {
                     }
                 }
                 let swing = swings.as_ref().map_or(Vec::new(), |swings| swings.row(i).to_vec());
-                let nominal = Pose::from_row(&places[7 * i..7 * i + 7]);
+                let nominal = Pose::from_row(&placed[7 * i..7 * i + 7]);
                 let whitening = given.map(|rows| {
                     let row = &rows[12 * i..12 * i + 12];
                     Whitening {
@@ -310,7 +310,7 @@ impl Study {
     /// (n, n_component) error at the shifts.
     #[getter]
     fn shift_error<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
-        let components = chosen(&self.machine.dof);
+        let components = indices_of(&self.machine.dof);
         let out = output(py, &[self.poses.len()], &[components.len()])?;
         let rows: Vec<f64> = self
             .poses
@@ -366,7 +366,7 @@ impl Study {
     }
 
     fn check(&self, tallies: &Tallies, variables: usize) -> PyResult<()> {
-        let components = chosen(&self.machine.dof);
+        let components = indices_of(&self.machine.dof);
         let whitened = self.poses.iter().all(|pose| pose.is_whitened());
         let columns = components.len() + parts(&self.machine.dof).len() + usize::from(whitened);
         if tallies.inner.len() != self.poses.len()

@@ -74,11 +74,11 @@ impl Work for Chunk<'_> {
             }
             for (cell, &column) in cells.iter_mut().zip(columns) {
                 let mut sum = S::default();
-                for &(closure, place) in &machine.readers[column] {
-                    // The places of the base side: the strut's base, and the drive's parameters.
-                    let of_base = place < 3 || (6..DRIVE_END).contains(&place);
+                for &(closure, slot) in &machine.dependents[column] {
+                    // The slots of the base side: the strut's base, and the drive's parameters.
+                    let of_base = slot < 3 || (6..DRIVE_END).contains(&slot);
                     if closure < count && of_base {
-                        sum = sum + works[closure][place];
+                        sum = sum + works[closure][slot];
                     }
                 }
                 *cell = sum;

@@ -1,7 +1,7 @@
 //! An arm that turns about a fixed axis.
 
 use super::direction::Direction;
-use super::drive::{Drive, Reach, axis_parameter_fields, axis_parameters};
+use super::drive::{Drive, InverseRoot, axis_parameter_fields, axis_parameters};
 use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, add, cross, dot, scale as scaled, subtract};
@@ -80,7 +80,7 @@ impl Drive for Crank {
         base: Vector<S>,
         length: S,
         platform: Vector<S>,
-    ) -> Reach<S> {
+    ) -> InverseRoot<S> {
         let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
         let arm = Arm::new(nominal.tilted(u, v), base);
         let w = subtract(platform, [x, y, z]);
@@ -90,7 +90,7 @@ impl Drive for Crank {
         let margin = p.square() + q.square() - c.square();
         let side = margin.select(margin, margin.lift(0.0)).sqrt() * margin.lift(mode);
         let angle = (q * c + p * side).atan2(p * c - q * side);
-        Reach { joint: (angle - offset) / scale, margin }
+        InverseRoot { joint: (angle - offset) / scale, margin }
     }
 
     fn span(

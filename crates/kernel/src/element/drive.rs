@@ -9,7 +9,7 @@ use crate::spatial::{Vector, dot};
 
 /// The closed-form inverse of a drive at one platform-side joint centre.
 #[derive(Clone, Copy, Debug)]
-pub struct Reach<S> {
+pub struct InverseRoot<S> {
     /// The joint coordinate; where `margin < 0` that of the nearest reachable point.
     pub joint: S,
     /// Not negative exactly where the strut reaches.
@@ -44,7 +44,7 @@ pub trait Drive {
         base: Vector<S>,
         length: S,
         platform: Vector<S>,
-    ) -> Reach<S>;
+    ) -> InverseRoot<S>;
 
     /// The shortest and the longest strut that reaches `platform` from some joint coordinate.
     fn span(
@@ -92,7 +92,7 @@ pub fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
     joint: S,
     [base, platform]: [Vector<S>; 2],
     length: S,
-    places: &mut [S; PLACES],
+    slots: &mut [S; PLACES],
 ) -> ClosureGradient<S> {
     let count = D::TABLE.parameters.len();
     let (centre, own) = driven_place::<S, D, N>(nominal, parameters, joint, base, length);
@@ -103,14 +103,14 @@ pub fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
         let along = [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]];
         chained[j] = to_length.mul_add(own.parts[j], -dot(to_centre, along));
     }
-    places[..3].copy_from_slice(&chained[count + 1..count + 4]);
-    places[6] = chained[count + 4];
-    places[OWN..OWN + count].copy_from_slice(&chained[..count]);
+    slots[..3].copy_from_slice(&chained[count + 1..count + 4]);
+    slots[6] = chained[count + 4];
+    slots[OWN..OWN + count].copy_from_slice(&chained[..count]);
     ClosureGradient { centre: to_centre, joint: chained[count] }
 }
 
 /// The work of a force on the base-side joint centre per unit of each parameter, through the drive `D`,
-/// at the places of a gradient.
+/// at the slots of a gradient.
 #[inline(always)]
 pub fn driven_base_load<S: Scalar, D: Drive, const N: usize>(
     nominal: &Direction,
@@ -118,7 +118,7 @@ pub fn driven_base_load<S: Scalar, D: Drive, const N: usize>(
     joint: S,
     base: Vector<S>,
     force: Vector<S>,
-    places: &mut [S; PLACES],
+    slots: &mut [S; PLACES],
 ) {
     let count = D::TABLE.parameters.len();
     let (centre, _) = driven_place::<S, D, N>(nominal, parameters, joint, base, joint.lift(1.0));
@@ -126,8 +126,8 @@ pub fn driven_base_load<S: Scalar, D: Drive, const N: usize>(
     for j in 0..N {
         work[j] = dot(force, [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]]);
     }
-    places[..3].copy_from_slice(&work[count + 1..count + 4]);
-    places[OWN..OWN + count].copy_from_slice(&work[..count]);
+    slots[..3].copy_from_slice(&work[count + 1..count + 4]);
+    slots[OWN..OWN + count].copy_from_slice(&work[..count]);
 }
 
 /// The parameters of every drive with an axis; the offset is of the joint coordinate's dimension.

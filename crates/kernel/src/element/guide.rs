@@ -10,16 +10,16 @@ use super::{DRIVE_END, PLACES};
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{RotationMatrix, Vector, add, cross, rotate};
 
-/// The four things that a guide may read, in the order of their parameters' places in a gradient.
+/// The four things that a guide may read, in the order of their parameters' slots in a gradient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
-    /// A point of the frame: places 0 to 2.
+    /// A point of the frame: slots 0 to 2.
     FramePoint,
-    /// A point of the platform: places 3 to 5.
+    /// A point of the platform: slots 3 to 5.
     PlatformPoint,
-    /// A direction of the frame, with two tilts: places 6 and 7.
+    /// A direction of the frame, with two tilts: slots 6 and 7.
     FrameDirection,
-    /// A direction of the platform, with two tilts: places 8 and 9.
+    /// A direction of the platform, with two tilts: slots 8 and 9.
     PlatformDirection,
 }
 
@@ -33,7 +33,7 @@ impl Anchor {
     ];
 
     /// Where its first parameter stands in a gradient.
-    pub fn place(self) -> usize {
+    pub fn slot(self) -> usize {
         match self {
             Anchor::FramePoint => 0,
             Anchor::PlatformPoint => 3,
@@ -179,7 +179,7 @@ pub fn residual_of<S: Scalar, G: Guide>(
     G::closure(which, &limb.points(frames, rotation, position), length)
 }
 
-/// The derivatives of a closure to its own parameters and to the tool point's, at their places.
+/// The derivatives of a closure to its own parameters and to the tool point's, at their slots.
 #[inline(always)]
 pub fn gradient_of<S: Scalar, G: Guide>(
     which: usize,
@@ -187,23 +187,23 @@ pub fn gradient_of<S: Scalar, G: Guide>(
     limb: &GuideLimb<S>,
     (rotation, position): Placement<'_, S>,
     length: f64,
-    places: &mut [S; PLACES],
+    slots: &mut [S; PLACES],
 ) {
     let one = position[0].lift(1.0);
     let mut own = limb.map(Dual::<S, OWN_PARAMETERS>::constant);
     for k in 0..3 {
-        own.frame_point[k].parts[Anchor::FramePoint.place() + k] = one;
-        own.arm[k].parts[Anchor::PlatformPoint.place() + k] = one;
+        own.frame_point[k].parts[Anchor::FramePoint.slot() + k] = one;
+        own.arm[k].parts[Anchor::PlatformPoint.slot() + k] = one;
     }
     for k in 0..2 {
-        own.tilts[0][k].parts[Anchor::FrameDirection.place() + k] = one;
-        own.tilts[1][k].parts[Anchor::PlatformDirection.place() + k] = one;
+        own.tilts[0][k].parts[Anchor::FrameDirection.slot() + k] = one;
+        own.tilts[1][k].parts[Anchor::PlatformDirection.slot() + k] = one;
     }
     let pose = (&rotation.map(|row| row.map(Dual::constant)), position.map(Dual::constant));
     let closure = residual_of::<_, G>(which, frames, &own, pose, length);
-    places[..OWN_PARAMETERS].copy_from_slice(&closure.parts);
+    slots[..OWN_PARAMETERS].copy_from_slice(&closure.parts);
     for k in 0..3 {
-        places[DRIVE_END + k] = -closure.parts[Anchor::PlatformPoint.place() + k];
+        slots[DRIVE_END + k] = -closure.parts[Anchor::PlatformPoint.slot() + k];
     }
 }
 

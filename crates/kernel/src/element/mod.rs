@@ -17,7 +17,7 @@ mod telescopic;
 mod universal;
 
 pub use direction::Direction;
-pub use drive::{Drive, Reach};
+pub use drive::{Drive, InverseRoot};
 pub use table::{Dimension, Drawing, ElementTable, Field, ParameterField};
 
 use crate::scalar::Scalar;
@@ -32,12 +32,12 @@ pub const OWN: usize = 7;
 pub const DRIVE_END: usize = OWN + MAX_DRIVE_PARAMETERS;
 /// Where the derivative to the radius of a strut's ring stands.
 pub const RING: usize = DRIVE_END + 3;
-/// Places of one closure's gradient: a strut's `base`, `platform`, `length`, the drive's parameters,
+/// Slots of one closure's gradient: a strut's `base`, `platform`, `length`, the drive's parameters,
 /// `tool`, `ring_radius`; a guide's anchors, then `tool`. The platform's, the tool's and the ring's are
 /// the library's to fill, since they depend on the attitude.
 pub const PLACES: usize = RING + 1;
 
-/// The derivatives of one closure that need no knowledge of poses, beside those in its places.
+/// The derivatives of one closure that need no knowledge of poses, beside those in its slots.
 #[derive(Clone, Copy, Debug)]
 pub struct ClosureGradient<S> {
     /// To the platform-side joint centre, base frame.
@@ -46,19 +46,19 @@ pub struct ClosureGradient<S> {
     pub joint: S,
 }
 
-/// The gradient of the closure of a strut that hangs on the frame; `points` are its base-side and its
+/// The gradient of the closure of a strut on the frame; `points` are its base-side and its
 /// platform-side joint centre.
 #[inline(always)]
 pub fn fixed_gradient<S: Scalar>(
     points: [Vector<S>; 2],
     length: S,
-    places: &mut [S; PLACES],
+    slots: &mut [S; PLACES],
 ) -> ClosureGradient<S> {
     let (to_centre, to_length) = strut_gradient(points, length);
     for k in 0..3 {
-        places[k] = -to_centre[k];
+        slots[k] = -to_centre[k];
     }
-    places[6] = to_length;
+    slots[6] = to_length;
     ClosureGradient { centre: to_centre, joint: length.lift(0.0) }
 }
 
@@ -120,7 +120,7 @@ macro_rules! drives {
                 base: Vector<S>,
                 length: S,
                 platform: Vector<S>,
-            ) -> Reach<S> {
+            ) -> InverseRoot<S> {
                 match self {
                     $(DriveKind::$name => <$type as Drive>::inverse(nominal, parameters, mode, base, length, platform)),+
                 }
@@ -148,11 +148,11 @@ macro_rules! drives {
                 joint: S,
                 base: Vector<S>,
                 force: Vector<S>,
-                places: &mut [S; PLACES],
+                slots: &mut [S; PLACES],
             ) {
                 match self {
                     $(DriveKind::$name => driven_base_load::<S, $type, { <$type as Drive>::WIDTH }>(
-                        nominal, parameters, joint, base, force, places,
+                        nominal, parameters, joint, base, force, slots,
                     )),+
                 }
             }
@@ -166,11 +166,11 @@ macro_rules! drives {
                 joint: S,
                 points: [Vector<S>; 2],
                 length: S,
-                places: &mut [S; PLACES],
+                slots: &mut [S; PLACES],
             ) -> ClosureGradient<S> {
                 match self {
                     $(DriveKind::$name => driven_gradient::<S, $type, { <$type as Drive>::WIDTH }>(
-                        nominal, parameters, joint, points, length, places,
+                        nominal, parameters, joint, points, length, slots,
                     )),+
                 }
             }
@@ -229,7 +229,7 @@ macro_rules! guides {
                 match self { $(GuideKind::$name => residual_of::<S, $type>(which, frames, limb, at, length)),+ }
             }
 
-            /// The derivatives of one closure to its parameters and to the tool's, at their places.
+            /// The derivatives of one closure to its parameters and to the tool's, at their slots.
             pub fn gradient<S: Scalar>(
                 self,
                 which: usize,
@@ -237,10 +237,10 @@ macro_rules! guides {
                 limb: &GuideLimb<S>,
                 at: Placement<'_, S>,
                 length: f64,
-                places: &mut [S; PLACES],
+                slots: &mut [S; PLACES],
             ) {
                 match self {
-                    $(GuideKind::$name => gradient_of::<S, $type>(which, frames, limb, at, length, places)),+
+                    $(GuideKind::$name => gradient_of::<S, $type>(which, frames, limb, at, length, slots)),+
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! A carriage on a straight guideway.
 
 use super::direction::Direction;
-use super::drive::{Drive, Reach, axis_parameter_fields, axis_parameters};
+use super::drive::{Drive, InverseRoot, axis_parameter_fields, axis_parameters};
 use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, add, dot, norm, scale as scaled, subtract};
@@ -75,7 +75,7 @@ impl Drive for Slider {
         base: Vector<S>,
         length: S,
         platform: Vector<S>,
-    ) -> Reach<S> {
+    ) -> InverseRoot<S> {
         let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
         let axis = nominal.tilted(u, v);
         let from_origin = subtract(platform, add([x, y, z], base));
@@ -85,7 +85,7 @@ impl Drive for Slider {
         let margin = length.square() - dot(perpendicular, perpendicular);
         let half_chord = margin.select(margin, margin.lift(0.0)).sqrt();
         let travelled = half_chord.mul_add(half_chord.lift(mode), foot);
-        Reach { joint: (travelled - offset) / scale, margin }
+        InverseRoot { joint: (travelled - offset) / scale, margin }
     }
 
     fn span(

@@ -1,12 +1,12 @@
 //! A strut whose own length is driven.
 
 use super::direction::Direction;
-use super::drive::{Drive, Reach};
+use super::drive::{Drive, InverseRoot};
 use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, norm, subtract};
 
-/// The strut hangs on the frame and is `scale q + offset` long.
+/// The strut stands on the frame and is `scale q + offset` long.
 pub struct Telescopic;
 
 const FIELDS: &[Field] = &[
@@ -59,9 +59,9 @@ impl Drive for Telescopic {
         base: Vector<S>,
         length: S,
         platform: Vector<S>,
-    ) -> Reach<S> {
+    ) -> InverseRoot<S> {
         let distance = norm(subtract(platform, base));
-        Reach { joint: (distance - parameters[0]) / parameters[1], margin: length.lift(1.0) }
+        InverseRoot { joint: (distance - parameters[0]) / parameters[1], margin: length.lift(1.0) }
     }
 
     fn span(

@@ -212,7 +212,7 @@ pub fn system<S: Scalar, const SQUARED: bool>(
     (rows, residuals)
 }
 
-/// One sample of any machine on the single road: parameters, and the struts placed.
+/// One sample of any machine on the scalar path: parameters, and the struts placed.
 #[derive(Clone, Copy)]
 pub struct Sample<'a> {
     /// The machine.

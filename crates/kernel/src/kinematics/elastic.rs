@@ -2,7 +2,7 @@
 
 use crate::element::PLACES;
 use crate::linear::{CLOSURES, SIX};
-use crate::machine::{Machine, chosen};
+use crate::machine::{Machine, indices_of};
 use crate::statics::{ClosureMatrix, closure_compliance};
 use nalgebra::DMatrix;
 
@@ -14,13 +14,13 @@ pub struct Structure {
 
 impl Structure {
     pub fn new(machine: &Machine, to_parameters: &[[f64; PLACES]; CLOSURES]) -> Self {
-        let readers: Vec<&[(usize, usize)]> = machine
+        let dependents: Vec<&[(usize, usize)]> = machine
             .parameter_compliance
             .iter()
-            .map(|&(parameter, _)| machine.readers[parameter].as_slice())
+            .map(|&(parameter, _)| machine.dependents[parameter].as_slice())
             .collect();
         let values: Vec<f64> = machine.parameter_compliance.iter().map(|&(_, c)| c).collect();
-        let mut compliance = closure_compliance(to_parameters, &readers, &values);
+        let mut compliance = closure_compliance(to_parameters, &dependents, &values);
         let own = &machine.closure_compliance;
         let carrying: Vec<usize> = machine.carrying().collect();
         for &i in &carrying {
@@ -39,7 +39,7 @@ impl Structure {
 
 /// Rows of some closures in the platform's freedoms, rotations in units of the characteristic length.
 pub fn scaled_rows(machine: &Machine, rows: &[[f64; SIX]], closures: &[usize]) -> DMatrix<f64> {
-    let freedoms = chosen(&machine.dof);
+    let freedoms = indices_of(&machine.dof);
     DMatrix::from_fn(closures.len(), freedoms.len(), |i, k| {
         rows[closures[i]][freedoms[k]] / unit(machine, freedoms[k])
     })
@@ -64,7 +64,7 @@ pub fn spread(
         let weighted = rows.transpose() * stiffness;
         (&weighted * &rows).cholesky().map(|normal| normal.solve(&weighted))
     });
-    for (k, &freedom) in chosen(&machine.dof).iter().enumerate() {
+    for (k, &freedom) in indices_of(&machine.dof).iter().enumerate() {
         for (i, &closure) in structure.carrying.iter().enumerate() {
             result[freedom][closure] =
                 solved.as_ref().map_or(f64::NAN, |solved| solved[(k, i)] / unit(machine, freedom));

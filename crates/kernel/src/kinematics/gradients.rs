@@ -19,7 +19,7 @@ pub struct Gradients<S, const N: usize> {
     pub to_twist: [[S; SIX]; N],
     /// To the joint coordinate of each closure's drive.
     pub to_joint: [S; N],
-    /// To the parameters, at the places that [`Machine::readers`] names.
+    /// To the parameters, at the slots that [`Machine::dependents`] names.
     to_parameters: [[S; PLACES]; N],
 }
 
@@ -27,8 +27,8 @@ impl<S: Scalar, const N: usize> Gradients<S, N> {
     /// Derivatives of all closures to one parameter.
     pub fn to_parameter(&self, machine: &Machine, parameter: usize) -> [S; N] {
         let mut column = [self.residuals[0].lift(0.0); N];
-        for &(closure, place) in &machine.readers[parameter] {
-            column[closure] = self.to_parameters[closure][place];
+        for &(closure, slot) in &machine.dependents[parameter] {
+            column[closure] = self.to_parameters[closure][slot];
         }
         column
     }
@@ -62,27 +62,27 @@ pub fn gradients<S: Scalar, const N: usize>(
         }
         let centre = add(arm, position);
         let length = strut.own_length.map_or(zero, |index| p[index]);
-        let places = &mut result.to_parameters[i];
+        let slots = &mut result.to_parameters[i];
         let (gradient, joint_centre, length) = match strut.drive {
-            None => (fixed_gradient([base, centre], length, places), base, length),
+            None => (fixed_gradient([base, centre], length, slots), base, length),
             Some(index) => {
                 let drive = &machine.drives[index];
                 let parameters = &p[drive.first..];
                 let (nominal, joint) = (&drive.nominal, q[index]);
                 let points = [base, centre];
                 let gradient =
-                    drive.kind.gradient(nominal, parameters, joint, points, length, places);
+                    drive.kind.gradient(nominal, parameters, joint, points, length, slots);
                 let (at, length) = drive.kind.place(nominal, parameters, joint, base, length);
                 (gradient, at, length)
             }
         };
         let to_platform = rotate_back(rotation, gradient.centre);
         for k in 0..3 {
-            places[3 + k] = to_platform[k];
-            places[DRIVE_END + k] = -to_platform[k];
+            slots[3 + k] = to_platform[k];
+            slots[DRIVE_END + k] = -to_platform[k];
         }
         if strut.ring.is_some() {
-            places[RING] = dot(gradient.centre, radial);
+            slots[RING] = dot(gradient.centre, radial);
         }
         result.to_joint[i] = gradient.joint;
         result.residuals[i] = norm(subtract(centre, joint_centre)) - length;
@@ -96,8 +96,8 @@ pub fn gradients<S: Scalar, const N: usize>(
         let limb = guide_limb(guide, p, tool);
         let placed = (rotation, position);
         let length = machine.characteristic_length;
-        let places = &mut result.to_parameters[i];
-        guide.kind.gradient(which, &guide.frames, &limb, placed, length, places);
+        let slots = &mut result.to_parameters[i];
+        guide.kind.gradient(which, &guide.frames, &limb, placed, length, slots);
         (result.residuals[i], result.to_twist[i]) =
             guide.kind.row(which, &guide.frames, &limb, placed, length);
     }

@@ -9,9 +9,9 @@ use super::closures::{Limb, Sample, limbs, place_limbs, ring_arm};
 use super::condition::condition;
 use super::forward::forward;
 use super::linearisation::Linearisation;
-use crate::element::{Dimension, Reach};
+use crate::element::{Dimension, InverseRoot};
 use crate::linear::{CLOSURES, Matrix6, Pivoted, SIX, condition_index, factor_pivoting, solve};
-use crate::machine::{Machine, MachineDrive, chosen};
+use crate::machine::{Machine, MachineDrive, indices_of};
 use crate::scalar::{Real, Scalar};
 use crate::spatial::{
     Pose, RotationMatrix, Vector, add, angle_rates, cross, dot, euler_axes, norm, rotate,
@@ -64,7 +64,7 @@ pub fn closed_form<S: Scalar>(
     p: &[S],
     position: Vector<S>,
     rotation: &RotationMatrix<S>,
-) -> Reach<S> {
+) -> InverseRoot<S> {
     let strut = &machine.struts[drive.struts[0]];
     let own = &p[strut.first..];
     let tool = &p[machine.tool..];
@@ -151,7 +151,7 @@ pub fn leanings<S: Scalar>(
     let zero = position[0].lift(0.0);
     let mut at = [Limb { base: [zero; 3], arm: [zero; 3], length: zero }; CLOSURES];
     place_limbs(machine, p, joints, &mut at);
-    let mut found = Vec::new();
+    let mut leanings = Vec::new();
     for (i, strut) in machine.struts.iter().enumerate() {
         let limb = &at[i];
         let arm = match &strut.ring {
@@ -168,10 +168,10 @@ pub fn leanings<S: Scalar>(
                 (_, Some(drive)) => carried(machine, p, joints, drive, given),
             };
             let angle = norm(cross(axis, along)).atan2(dot(axis, along));
-            found.push((i, end, angle - zero.lift(limit.angle)));
+            leanings.push((i, end, angle - zero.lift(limit.angle)));
         }
     }
-    found
+    leanings
 }
 
 /// The same of a pose, by how much beyond.
@@ -210,22 +210,22 @@ fn solve_strained(
 ) {
     let unreachable = if seed_margin < 0.0 { Status::Unreachable } else { Status::NotConverged };
     let wanted = pose.to_coordinates();
-    let commanded = chosen(&machine.commanded);
+    let commanded = indices_of(&machine.commanded);
     let l = machine.characteristic_length;
     let unit = |freedom: usize| if freedom < 3 { 1.0 } else { l };
     for _ in 0..STEPS {
         let at = limbs(machine, p, &solved.joints);
         let sample = Sample { machine, p, limbs: &at };
-        let (found, status) = forward(&sample, &solved.joints, &solved.pose);
+        let (reached_pose, status) = forward(&sample, &solved.joints, &solved.pose);
         if status != Status::Ok {
             solved.status = if status == Status::NotConverged { unreachable } else { status };
             return;
         }
-        solved.pose = found;
-        let reached = found.to_coordinates();
+        solved.pose = reached_pose;
+        let reached = reached_pose.to_coordinates();
         let angles = [reached[3], reached[4], reached[5]];
         let mut linear = Linearisation::default();
-        linear.fill_alone(&sample, &solved.joints, &found);
+        linear.fill_scalar(&sample, &solved.joints, &reached_pose);
         // Twist per joint, and twist per coordinate, in the commanded freedoms.
         let count = commanded.len();
         let mut system = [[0.0; SIX]; SIX];
@@ -392,7 +392,7 @@ pub enum Obstacle {
 
 /// What keeps a commanded pose from being used, with amounts.
 pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle> {
-    let mut found = Vec::new();
+    let mut obstacles = Vec::new();
     let rotation = rotation_matrix(pose.rotation);
     for (index, strut) in machine.struts.iter().enumerate() {
         let Some(length) = strut.own_length.map(|own| p[own]) else { continue };
@@ -408,9 +408,9 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
         };
         let fixed_in_closed_pose = strut.drive.is_none() && !machine.has_direct_inverse();
         if length < least && !fixed_in_closed_pose {
-            found.push(Obstacle::Strut(index, least - length));
+            obstacles.push(Obstacle::Strut(index, least - length));
         } else if length > most && !fixed_in_closed_pose {
-            found.push(Obstacle::Strut(index, most - length));
+            obstacles.push(Obstacle::Strut(index, most - length));
         }
     }
     let solved = inverse(machine, p, pose);
@@ -418,22 +418,23 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
         for (index, (&joint, drive)) in solved.joints.iter().zip(&machine.drives).enumerate() {
             let [low, high] = drive.travel;
             if joint > high {
-                found.push(Obstacle::Travel(index, joint - high));
+                obstacles.push(Obstacle::Travel(index, joint - high));
             } else if joint < low {
-                found.push(Obstacle::Travel(index, joint - low));
+                obstacles.push(Obstacle::Travel(index, joint - low));
             }
         }
         if machine.limited {
             let beyond = leaning_at(machine, p, &solved.joints, &solved.pose)
                 .filter(|&(_, _, beyond)| beyond > 0.0);
-            found.extend(beyond.map(|(strut, end, angle)| Obstacle::Leaning(strut, end, angle)));
+            obstacles
+                .extend(beyond.map(|(strut, end, angle)| Obstacle::Leaning(strut, end, angle)));
         }
         let index = condition(machine, p, &solved.joints, &solved.pose);
         if index < SINGULAR {
-            found.push(Obstacle::Singular(index));
+            obstacles.push(Obstacle::Singular(index));
         }
     }
-    found
+    obstacles
 }
 
 /// The commanded pose that a row of values in the order of the commanded freedoms names; what is not
@@ -443,7 +444,7 @@ pub fn commanded_pose(machine: &Machine, values: &[f64]) -> Pose<f64> {
         return Pose::from_coordinates(std::array::from_fn(|k| values[k]));
     }
     let mut coordinates = machine.home.to_coordinates();
-    for (&freedom, &value) in chosen(&machine.commanded).iter().zip(values) {
+    for (&freedom, &value) in indices_of(&machine.commanded).iter().zip(values) {
         coordinates[freedom] = value;
     }
     Pose::from_coordinates(coordinates)

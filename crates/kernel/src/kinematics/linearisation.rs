@@ -25,7 +25,7 @@ pub struct Linearisation<S> {
     pub inverse: [[S; CLOSURES]; SIX],
     /// Closure i to its joint.
     pub to_joint: [S; CLOSURES],
-    /// Closure i to its parameters, at the places that [`Machine::readers`] names.
+    /// Closure i to its parameters, at the slots that [`Machine::dependents`] names.
     pub to_parameters: [[S; PLACES]; CLOSURES],
     /// Positive where the rows are proven regular and their order of elimination served.
     pub regular: S,
@@ -62,23 +62,23 @@ impl<S: Real> Linearisation<S> {
                 Some(index) => p[index],
                 None => S::default(),
             };
-            let places = &mut self.to_parameters[i];
+            let slots = &mut self.to_parameters[i];
             let gradient = match strut.drive {
-                None => fixed_gradient([base, centre], length, places),
+                None => fixed_gradient([base, centre], length, slots),
                 Some(index) => {
                     let drive = &machine.drives[index];
                     let parameters = &p[drive.first..];
                     let (nominal, joint) = (&drive.nominal, q[index]);
-                    drive.kind.gradient(nominal, parameters, joint, [base, centre], length, places)
+                    drive.kind.gradient(nominal, parameters, joint, [base, centre], length, slots)
                 }
             };
             let platform = rotate_back(&rotation, gradient.centre);
             for k in 0..3 {
-                places[3 + k] = platform[k];
-                places[DRIVE_END + k] = -platform[k];
+                slots[3 + k] = platform[k];
+                slots[DRIVE_END + k] = -platform[k];
             }
             if ring.is_some() {
-                places[RING] = dot(gradient.centre, radial);
+                slots[RING] = dot(gradient.centre, radial);
             }
             self.to_joint[i] = gradient.joint;
             self.rows[i] = row(machine, gradient.centre, arm);
@@ -151,8 +151,8 @@ impl Linearisation<f64> {
             let guide = &machine.guides[guide];
             let limb = guide_limb(guide, p, tool);
             let (at, length) = ((&rotation, pose.position), machine.characteristic_length);
-            let places = &mut self.to_parameters[i];
-            guide.kind.gradient(which, &guide.frames, &limb, at, length, places);
+            let slots = &mut self.to_parameters[i];
+            guide.kind.gradient(which, &guide.frames, &limb, at, length, slots);
             self.rows[i] = guide.kind.row(which, &guide.frames, &limb, at, length).1;
             for &freedom in &machine.held {
                 self.rows[i][freedom] = 0.0;
@@ -163,7 +163,7 @@ impl Linearisation<f64> {
     }
 
     /// Fills everything of one sample of any machine; whether the rows are regular is not looked at.
-    pub fn fill_alone(&mut self, sample: &Sample<'_>, q: &[f64], pose: &Pose<f64>) {
+    pub fn fill_scalar(&mut self, sample: &Sample<'_>, q: &[f64], pose: &Pose<f64>) {
         let machine = sample.machine;
         self.differentiate(machine, sample.p, q, pose);
         if machine.is_overconstrained() {

@@ -1,4 +1,4 @@
-//! How joints, pose and parameters hang together.
+//! How joints, pose and parameters depend on each other.
 
 mod closures;
 mod condition;
@@ -17,7 +17,7 @@ pub(crate) use gradients::{Gradients, gradients};
 pub use inverse::{Inverse, Obstacle, commanded_pose, inverse, lane_inverse, obstacles, permitted};
 pub(crate) use inverse::{closed_form, leanings};
 pub use linearisation::{Linearisation, proven_regular};
-pub use overconstrained::{Settled, Surroundings, internal_forces, least_energy};
+pub use overconstrained::{Equilibrium, Loads, internal_forces, least_energy};
 
 /// Singular: smallest scaled singular value below this share of the largest.
 pub const SINGULAR: f64 = 1e-6;

@@ -1,9 +1,9 @@
-//! From a description to a machine: elements, parameters and who reads which.
+//! From a description to a machine: elements, parameters and which closures depend on them.
 
 use super::description::error;
 use super::{
     Description, DriveDescription, FREEDOMS, GuideDescription, Machine, MachineDrive, MachineError,
-    MachineGuide, Parameter, Ring, Strut, StrutDescription, chosen,
+    MachineGuide, Parameter, Ring, Strut, StrutDescription, indices_of,
 };
 use crate::element::guide::{Anchor, GuideFrames, anchor_parameters};
 use crate::element::{DRIVE_END, Dimension, Direction, OWN, RING, strut};
@@ -36,7 +36,7 @@ impl Machine {
             limited: false,
             characteristic_length: 0.0,
             home: Pose::from_coordinates(description.home),
-            readers: Vec::new(),
+            dependents: Vec::new(),
             regularity_scale: 0.0,
         };
         for strut in &description.struts {
@@ -62,7 +62,7 @@ impl Machine {
             }
         }
         machine.check_counts()?;
-        machine.find_readers();
+        machine.find_dependents();
         machine.plain = machine.guides.is_empty()
             && !machine.is_overconstrained()
             && machine.struts.iter().all(|strut| strut.ring.is_none());
@@ -291,27 +291,27 @@ impl Machine {
         Ok(())
     }
 
-    /// Fills in who reads which parameter, at the places of [`crate::element::PLACES`].
-    fn find_readers(&mut self) {
-        let mut readers = vec![Vec::new(); self.nominal.len()];
+    /// Fills in which closures depend on which parameter, at the slots of [`crate::element::PLACES`].
+    fn find_dependents(&mut self) {
+        let mut dependents = vec![Vec::new(); self.nominal.len()];
         for (i, strut) in self.struts.iter().enumerate() {
-            for place in 0..6 {
-                readers[strut.first + place].push((i, place));
+            for slot in 0..6 {
+                dependents[strut.first + slot].push((i, slot));
             }
             if let Some(index) = strut.own_length {
-                readers[index].push((i, 6));
+                dependents[index].push((i, 6));
             }
             if let Some(drive) = strut.drive {
                 let drive = &self.drives[drive];
-                for place in 0..drive.kind.table().parameters.len() {
-                    readers[drive.first + place].push((i, OWN + place));
+                for slot in 0..drive.kind.table().parameters.len() {
+                    dependents[drive.first + slot].push((i, OWN + slot));
                 }
             }
             if let Some(ring) = strut.ring {
-                readers[ring.radius].push((i, RING));
+                dependents[ring.radius].push((i, RING));
             }
             for k in 0..3 {
-                readers[self.tool + k].push((i, DRIVE_END + k));
+                dependents[self.tool + k].push((i, DRIVE_END + k));
             }
         }
         for (number, &(guide, _)) in self.guide_closures.iter().enumerate() {
@@ -319,15 +319,15 @@ impl Machine {
             for anchor in Anchor::ALL {
                 if let Some(first) = self.guides[guide].first[anchor as usize] {
                     for k in 0..anchor_parameters(anchor).len() {
-                        readers[first + k].push((i, anchor.place() + k));
+                        dependents[first + k].push((i, anchor.slot() + k));
                     }
                 }
             }
             for k in 0..3 {
-                readers[self.tool + k].push((i, DRIVE_END + k));
+                dependents[self.tool + k].push((i, DRIVE_END + k));
             }
         }
-        self.readers = readers;
+        self.dependents = dependents;
     }
 
     fn check_counts(&self) -> Result<(), MachineError> {
@@ -388,7 +388,7 @@ fn unit(direction: Vector<f64>, place: impl Fn() -> String) -> Result<Vector<f64
 
 fn check_freedoms(description: &Description) -> Result<(), MachineError> {
     let names = |flags: &[bool; SIX]| {
-        let names: Vec<&str> = chosen(flags).into_iter().map(|k| FREEDOMS[k]).collect();
+        let names: Vec<&str> = indices_of(flags).into_iter().map(|k| FREEDOMS[k]).collect();
         names.join(" ")
     };
     if !description.dof.contains(&true) {

@@ -27,7 +27,7 @@ pub struct DriveDescription {
 pub struct StrutDescription {
     /// Unique among the struts.
     pub name: String,
-    /// The drive that carries it (or is its length); `None`: it hangs on the frame.
+    /// The drive that carries it (or is its length); `None`: it stands on the frame.
     pub drive: Option<String>,
     /// Base-side joint centre.
     pub base: Vector<f64>,

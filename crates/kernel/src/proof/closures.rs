@@ -16,7 +16,7 @@ pub type Six<S = Interval> = [S; SIX];
 /// Rows of derivatives.
 pub type Square<S = Interval> = [Six<S>; SIX];
 
-/// Where a platform is, on intervals or what is built of them.
+/// The placement of a platform, on intervals or dual numbers of intervals.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<S = Interval> {
     /// The tool point, m.

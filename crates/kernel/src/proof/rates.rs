@@ -200,7 +200,7 @@ impl Region<'_> {
         Ok(rates)
     }
 
-    /// Whether what is known differs from pose to pose.
+    /// Whether the known deviations differ from pose to pose.
     pub fn varies(&self) -> bool {
         !self.yielding.is_empty() || self.shift.iter().any(|shift| shift.per_length != 0.0)
     }

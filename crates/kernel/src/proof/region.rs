@@ -20,7 +20,7 @@ pub struct Region<'a> {
     pub wrench: [f64; SIX],
     /// What the variables move.
     pub deviating: &'a Deviating,
-    /// How far the bounds may lie above what is reached, relative.
+    /// How far the bounds may lie above the errors reached, relative.
     pub gap: f64,
     /// Boxes that may be looked at.
     pub most_boxes: usize,

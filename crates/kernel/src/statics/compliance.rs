@@ -11,25 +11,25 @@ use nalgebra::DMatrix;
 /// Closures by closures.
 pub type ClosureMatrix<S> = [[S; CLOSURES]; CLOSURES];
 
-/// How many closures a machine may have on a road: lanes run machines of at most six.
+/// How many closures a machine may have on a path: lanes run machines of at most six.
 #[inline(always)]
 pub const fn most_closures<S: Real>() -> usize {
     if S::WIDTH > 1 { SIX } else { CLOSURES }
 }
 
-/// `G diag(c) G^T`: how far closures open per unit force in closures. `readers[j]` lists the
-/// (closure, place) pairs that read the parameter of compliance `compliances[j]`.
+/// `G diag(c) G^T`: how far closures open per unit force in closures. `dependents[j]` lists the
+/// (closure, slot) pairs that read the parameter of compliance `compliances[j]`.
 #[inline(always)]
 pub fn closure_compliance<S: Real>(
     to_parameters: &[[S; PLACES]; CLOSURES],
-    readers: &[&[(usize, usize)]],
+    dependents: &[&[(usize, usize)]],
     compliances: &[S],
 ) -> ClosureMatrix<S> {
     let mut matrix = [[S::default(); CLOSURES]; CLOSURES];
-    for (readers, &compliance) in readers.iter().zip(compliances) {
-        for &(i, place) in *readers {
-            let scaled = to_parameters[i][place] * compliance;
-            for &(k, other) in *readers {
+    for (dependents, &compliance) in dependents.iter().zip(compliances) {
+        for &(i, slot) in *dependents {
+            let scaled = to_parameters[i][slot] * compliance;
+            for &(k, other) in *dependents {
                 matrix[i][k] = scaled.mul_add(to_parameters[k][other], matrix[i][k]);
             }
         }

@@ -21,16 +21,16 @@ pub fn closure_forces<S: Real>(inverse: &[[S; CLOSURES]; SIX], wrench: &[S; SIX]
 }
 
 /// The load on a parameter by virtual work, `lambda . dg/dp`, over the closures that read it at the
-/// given (closure, place): positive drives the parameter up. For a strut's length it is the tension.
+/// given (closure, slot): positive drives the parameter up. For a strut's length it is the tension.
 #[inline(always)]
 pub fn parameter_load<S: Real>(
     multipliers: &[S; CLOSURES],
     to_parameters: &[[S; PLACES]; CLOSURES],
-    readers: &[(usize, usize)],
+    dependents: &[(usize, usize)],
 ) -> S {
     let mut load = S::default();
-    for &(closure, place) in readers {
-        load = multipliers[closure].mul_add(to_parameters[closure][place], load);
+    for &(closure, slot) in dependents {
+        load = multipliers[closure].mul_add(to_parameters[closure][slot], load);
     }
     load
 }

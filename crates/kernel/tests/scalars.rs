@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 use truepose_kernel::element::guide::{GuideFrames, GuideLimb};
-use truepose_kernel::element::{Direction, DriveKind, GuideKind, strut};
+use truepose_kernel::element::{Direction, DriveKind, GuideKind, ParameterGradient, strut};
 use truepose_kernel::scalar::{Dual, Interval, LANES, Lanes, Scalar, Tape, Trace};
 use truepose_kernel::spatial::{quaternion_from_euler, rotation_matrix};
 
@@ -116,7 +116,7 @@ fn the_gradient_that_kinematics_uses_is_the_dual_one() {
             let dual: [Dual<f64, INPUTS>; INPUTS] =
                 std::array::from_fn(|i| Dual::variable(x[i], i));
             let expected = residual(Closure::Driven(kind), &frame(), &dual).parts;
-            let mut slots = [0.0; truepose_kernel::element::PLACES];
+            let mut slots = ParameterGradient::default();
             let points = [[x[0], x[1], x[2]], [x[3], x[4], x[5]]];
             let gradient = kind.gradient(&frame(), &x[7..14], x[14], points, x[6], &mut slots);
             let derivatives: Vec<f64> = slots[..3]

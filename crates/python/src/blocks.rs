@@ -13,7 +13,7 @@ use truepose_kernel::Status;
 use truepose_kernel::batch::{self, Deviations, Samples};
 use truepose_kernel::kinematics::{self, Loads, Obstacle, Sample};
 use truepose_kernel::machine::indices_of;
-use truepose_kernel::spatial::{Pose, rotate, rotation_matrix};
+use truepose_kernel::spatial::{Pose, rotation_matrix};
 
 #[pymethods]
 impl Machine {
@@ -202,13 +202,7 @@ impl Machine {
                 let rotation = rotation_matrix(pose.rotation);
                 let struts = machine.struts.iter().zip(&limbs);
                 for (cell, (strut, limb)) in cell.chunks_exact_mut(6).zip(struts) {
-                    let arm = match &strut.ring {
-                        None => rotate(&rotation, limb.arm),
-                        Some(ring) => {
-                            let radius = machine.nominal[ring.radius];
-                            kinematics::ring_arm(ring, radius, limb, &rotation, pose.position).0
-                        }
-                    };
+                    let arm = limb.turned_arm(strut, &machine.nominal, &rotation, pose.position);
                     for k in 0..3 {
                         cell[k] = limb.base[k];
                         cell[3 + k] = arm[k] + pose.position[k];

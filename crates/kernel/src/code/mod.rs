@@ -244,7 +244,7 @@ pub fn functions(machine: &Machine, shifts: &Shifts) -> Vec<Function> {
          double row[6][6], double residual[6]",
         |f| {
             let p = f.many("p", parameters);
-            let mut limbs = [no_limb(p[0]); CLOSURES];
+            let mut limbs = [Limb::zero(p[0]); CLOSURES];
             for (i, limb) in limbs[..machine.struts.len()].iter_mut().enumerate() {
                 let at = |k: usize| f.tape.input(format!("limb[{}]", 7 * i + k));
                 let vector = |from: usize| [0, 1, 2].map(|k| at(from + k));
@@ -419,13 +419,8 @@ fn loads<'t>(
     parameters.iter().map(load).collect()
 }
 
-fn no_limb<S: Scalar>(of: S) -> Limb<S> {
-    let zero = of.lift(0.0);
-    Limb { base: [zero; 3], arm: [zero; 3], length: zero }
-}
-
 fn placed<S: Scalar>(machine: &Machine, p: &[S], q: &[S]) -> Limbs<S> {
-    let mut limbs = [no_limb(p[0]); CLOSURES];
+    let mut limbs = [Limb::zero(p[0]); CLOSURES];
     place_limbs(machine, p, q, &mut limbs);
     limbs
 }

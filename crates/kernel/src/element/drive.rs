@@ -3,7 +3,6 @@
 use super::direction::Direction;
 use super::strut::strut_gradient;
 use super::table::{Dimension, ElementTable, ParameterField, parameter};
-use super::{ClosureGradient, MAX_DRIVE_PARAMETERS, OWN, PLACES};
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{Vector, dot};
 
@@ -16,13 +15,25 @@ pub struct InverseRoot<S> {
     pub margin: S,
 }
 
+/// Inputs of [`Drive::place`] beside the drive's parameters: joint coordinate, base point, length.
+pub const DRIVE_INPUTS: usize = 5;
+
+/// The derivatives of one closure that need no knowledge of poses, beside those to the parameters.
+#[derive(Clone, Copy, Debug)]
+pub struct ClosureGradient<S> {
+    /// To the platform-side joint centre, base frame.
+    pub centre: Vector<S>,
+    /// To the joint coordinate.
+    pub joint: S,
+}
+
 /// An actuated joint.
 pub trait Drive {
     /// Kind, fields and parameters.
     const TABLE: ElementTable;
     /// Directions of a dual number that differentiates [`Drive::place`]: its parameters, the joint
     /// coordinate, the strut's base point and length.
-    const WIDTH: usize = Self::TABLE.parameters.len() + 5;
+    const WIDTH: usize = Self::TABLE.parameters.len() + DRIVE_INPUTS;
 
     /// The base-side joint centre (base frame) and the length of a strut that this drive carries.
     ///
@@ -66,7 +77,7 @@ fn driven_place<S: Scalar, D: Drive, const N: usize>(
     length: S,
 ) -> (Vector<Dual<S, N>>, Dual<S, N>) {
     let count = D::TABLE.parameters.len();
-    let mut inputs = [Dual::<S, N>::constant(joint); MAX_DRIVE_PARAMETERS];
+    let mut inputs = [Dual::<S, N>::constant(joint); N];
     for k in 0..count {
         inputs[k] = Dual::variable(parameters[k], k);
     }
@@ -84,7 +95,8 @@ fn driven_place<S: Scalar, D: Drive, const N: usize>(
 }
 
 /// The gradient of the strut closure through the drive `D`; `N` is its [`Drive::WIDTH`]. `points` are
-/// the strut's base as the machine file gives it and its platform-side joint centre.
+/// the strut's base as the machine file gives it and its platform-side joint centre. Returns the derivatives
+/// to the latter, and to the inputs of [`Drive::place`].
 #[inline(always)]
 pub fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
     nominal: &Direction,
@@ -92,9 +104,7 @@ pub fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
     joint: S,
     [base, platform]: [Vector<S>; 2],
     length: S,
-    slots: &mut [S; PLACES],
-) -> ClosureGradient<S> {
-    let count = D::TABLE.parameters.len();
+) -> (Vector<S>, [S; N]) {
     let (centre, own) = driven_place::<S, D, N>(nominal, parameters, joint, base, length);
     let at = [centre[0].value, centre[1].value, centre[2].value];
     let (to_centre, to_length) = strut_gradient([at, platform], own.value);
@@ -103,14 +113,11 @@ pub fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
         let along = [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]];
         chained[j] = to_length.mul_add(own.parts[j], -dot(to_centre, along));
     }
-    slots[..3].copy_from_slice(&chained[count + 1..count + 4]);
-    slots[6] = chained[count + 4];
-    slots[OWN..OWN + count].copy_from_slice(&chained[..count]);
-    ClosureGradient { centre: to_centre, joint: chained[count] }
+    (to_centre, chained)
 }
 
-/// The work of a force on the base-side joint centre per unit of each parameter, through the drive `D`,
-/// at the slots of a gradient.
+/// The work of a force on the base-side joint centre per unit of each input of [`Drive::place`], through the
+/// drive `D`.
 #[inline(always)]
 pub fn driven_base_load<S: Scalar, D: Drive, const N: usize>(
     nominal: &Direction,
@@ -118,16 +125,13 @@ pub fn driven_base_load<S: Scalar, D: Drive, const N: usize>(
     joint: S,
     base: Vector<S>,
     force: Vector<S>,
-    slots: &mut [S; PLACES],
-) {
-    let count = D::TABLE.parameters.len();
+) -> [S; N] {
     let (centre, _) = driven_place::<S, D, N>(nominal, parameters, joint, base, joint.lift(1.0));
     let mut work = [joint; N];
     for j in 0..N {
         work[j] = dot(force, [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]]);
     }
-    slots[..3].copy_from_slice(&work[count + 1..count + 4]);
-    slots[OWN..OWN + count].copy_from_slice(&work[..count]);
+    work
 }
 
 /// The parameters of every drive with an axis; the offset is of the joint coordinate's dimension.

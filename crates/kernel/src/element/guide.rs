@@ -6,7 +6,6 @@
 
 use super::direction::Direction;
 use super::table::{Dimension, ElementTable};
-use super::{DRIVE_END, PLACES};
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{RotationMatrix, Vector, add, cross, rotate};
 
@@ -44,7 +43,7 @@ impl Anchor {
 }
 
 /// Parameters of the four anchors together.
-const OWN_PARAMETERS: usize = 10;
+pub const ANCHOR_PARAMETERS: usize = 10;
 
 /// What a guide's closures read at one pose, all in base axes. Directions come as a unit vector and two
 /// tangents; what the guide does not declare is zero.
@@ -179,7 +178,7 @@ pub fn residual_of<S: Scalar, G: Guide>(
     G::closure(which, &limb.points(frames, rotation, position), length)
 }
 
-/// The derivatives of a closure to its own parameters and to the tool point's, at their slots.
+/// The derivatives of a closure to the parameters of its anchors, at their slots.
 #[inline(always)]
 pub fn gradient_of<S: Scalar, G: Guide>(
     which: usize,
@@ -187,10 +186,9 @@ pub fn gradient_of<S: Scalar, G: Guide>(
     limb: &GuideLimb<S>,
     (rotation, position): Placement<'_, S>,
     length: f64,
-    slots: &mut [S; PLACES],
-) {
+) -> [S; ANCHOR_PARAMETERS] {
     let one = position[0].lift(1.0);
-    let mut own = limb.map(Dual::<S, OWN_PARAMETERS>::constant);
+    let mut own = limb.map(Dual::<S, ANCHOR_PARAMETERS>::constant);
     for k in 0..3 {
         own.frame_point[k].parts[Anchor::FramePoint.slot() + k] = one;
         own.arm[k].parts[Anchor::PlatformPoint.slot() + k] = one;
@@ -200,11 +198,7 @@ pub fn gradient_of<S: Scalar, G: Guide>(
         own.tilts[1][k].parts[Anchor::PlatformDirection.slot() + k] = one;
     }
     let pose = (&rotation.map(|row| row.map(Dual::constant)), position.map(Dual::constant));
-    let closure = residual_of::<_, G>(which, frames, &own, pose, length);
-    slots[..OWN_PARAMETERS].copy_from_slice(&closure.parts);
-    for k in 0..3 {
-        slots[DRIVE_END + k] = -closure.parts[Anchor::PlatformPoint.slot() + k];
-    }
+    residual_of::<_, G>(which, frames, &own, pose, length).parts
 }
 
 /// Where a platform is: its rotation and its tool point.

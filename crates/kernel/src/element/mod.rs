@@ -17,33 +17,113 @@ mod telescopic;
 mod universal;
 
 pub use direction::Direction;
-pub use drive::{Drive, InverseRoot};
+pub use drive::{ClosureGradient, Drive, InverseRoot};
 pub use table::{Dimension, Drawing, ElementTable, Field, ParameterField};
 
-use crate::scalar::Scalar;
+use crate::scalar::{Real, Scalar};
 use crate::spatial::Vector;
-use drive::{driven_base_load, driven_gradient};
-use guide::{Anchor, Guide, GuideFrames, GuideLimb, Placement, gradient_of, residual_of, row_of};
+use drive::{DRIVE_INPUTS, driven_base_load, driven_gradient};
+use guide::{
+    ANCHOR_PARAMETERS, Anchor, Guide, GuideFrames, GuideLimb, Placement, gradient_of, residual_of,
+    row_of,
+};
+use std::ops::Deref;
 use strut::strut_gradient;
 
-/// Where a closure's gradient keeps the derivatives to the strut's own parameters, in their order.
-pub const OWN: usize = 7;
-/// Where the drive's parameters end.
-pub const DRIVE_END: usize = OWN + MAX_DRIVE_PARAMETERS;
-/// Where the derivative to the radius of a strut's ring stands.
-pub const RING: usize = DRIVE_END + 3;
-/// Slots of one closure's gradient: a strut's `base`, `platform`, `length`, the drive's parameters,
-/// `tool`, `ring_radius`; a guide's anchors, then `tool`. The platform's, the tool's and the ring's are
-/// the library's to fill, since they depend on the attitude.
-pub const PLACES: usize = RING + 1;
+/// Where the gradient of one closure has its derivatives to the parameters that the closure reads: a
+/// strut's `base`, `platform`, `length`, the drive's parameters, `tool`, `ring_radius`; a guide's anchors
+/// ([`Anchor::slot`]), then `tool`.
+pub struct Slots;
 
-/// The derivatives of one closure that need no knowledge of poses, beside those in its slots.
-#[derive(Clone, Copy, Debug)]
-pub struct ClosureGradient<S> {
-    /// To the platform-side joint centre, base frame.
-    pub centre: Vector<S>,
-    /// To the joint coordinate.
-    pub joint: S,
+impl Slots {
+    /// `base.x`; y and z follow.
+    pub const BASE: usize = 0;
+    /// `platform.x`; y and z follow.
+    pub const PLATFORM: usize = Self::BASE + 3;
+    /// `length`.
+    pub const LENGTH: usize = Self::PLATFORM + 3;
+    /// The drive's first parameter; the others follow.
+    pub const DRIVE: usize = Self::LENGTH + 1;
+    /// `tool.x`; y and z follow.
+    pub const TOOL: usize = Self::DRIVE + MAX_DRIVE_PARAMETERS;
+    /// `ring_radius`.
+    pub const RING_RADIUS: usize = Self::TOOL + 3;
+    /// How many.
+    pub const COUNT: usize = Self::RING_RADIUS + 1;
+
+    /// Whether a strut's slot is of its base side: the base, the length and the drive.
+    #[inline(always)]
+    pub fn is_base_side(slot: usize) -> bool {
+        slot < Self::PLATFORM || (Self::LENGTH..Self::TOOL).contains(&slot)
+    }
+}
+
+/// The derivatives of one closure to the parameters that it reads, by their [`Slots`]. The platform's, the
+/// tool's and the ring's are the library's to fill, since they depend on the attitude.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ParameterGradient<S>([S; Slots::COUNT]);
+
+impl<S: Scalar> ParameterGradient<S> {
+    /// Zero everywhere, of the same kind as `like`.
+    pub fn zero(like: S) -> Self {
+        ParameterGradient([like.lift(0.0); Slots::COUNT])
+    }
+
+    /// To the strut's base.
+    #[inline(always)]
+    pub fn set_base(&mut self, to_base: &[S]) {
+        self.0[Slots::BASE..Slots::PLATFORM].copy_from_slice(to_base);
+    }
+
+    /// To the drive's parameters and the strut's base, of the inputs of [`Drive::place`]; returns those to
+    /// the joint coordinate and to the length.
+    #[inline(always)]
+    fn set_driven<const N: usize>(&mut self, inputs: &[S; N]) -> (S, S) {
+        let count = N - DRIVE_INPUTS;
+        self.set_base(&inputs[count + 1..count + 4]);
+        self.0[Slots::DRIVE..Slots::DRIVE + count].copy_from_slice(&inputs[..count]);
+        (inputs[count], inputs[count + 4])
+    }
+
+    /// To the platform-side joint, platform axes. That to the tool point is its opposite.
+    #[inline(always)]
+    pub fn set_platform(&mut self, to_platform: Vector<S>) {
+        for k in 0..3 {
+            self.0[Slots::PLATFORM + k] = to_platform[k];
+            self.0[Slots::TOOL + k] = -to_platform[k];
+        }
+    }
+
+    /// To the radius of the strut's ring.
+    #[inline(always)]
+    pub fn set_ring_radius(&mut self, to_radius: S) {
+        self.0[Slots::RING_RADIUS] = to_radius;
+    }
+
+    /// To a guide's anchors and the tool point.
+    fn set_anchors(&mut self, to_anchors: [S; ANCHOR_PARAMETERS]) {
+        self.0[..ANCHOR_PARAMETERS].copy_from_slice(&to_anchors);
+        let platform = Anchor::PlatformPoint.slot();
+        for k in 0..3 {
+            self.0[Slots::TOOL + k] = -to_anchors[platform + k];
+        }
+    }
+}
+
+impl<S: Real> ParameterGradient<S> {
+    /// That of one sample of a group.
+    pub fn lane(&self, lane: usize) -> ParameterGradient<f64> {
+        ParameterGradient(self.0.map(|value| value.lane(lane)))
+    }
+}
+
+impl<S> Deref for ParameterGradient<S> {
+    type Target = [S; Slots::COUNT];
+
+    #[inline(always)]
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
 }
 
 /// The gradient of the closure of a strut on the frame; `points` are its base-side and its
@@ -52,13 +132,11 @@ pub struct ClosureGradient<S> {
 pub fn fixed_gradient<S: Scalar>(
     points: [Vector<S>; 2],
     length: S,
-    slots: &mut [S; PLACES],
+    to_parameters: &mut ParameterGradient<S>,
 ) -> ClosureGradient<S> {
     let (to_centre, to_length) = strut_gradient(points, length);
-    for k in 0..3 {
-        slots[k] = -to_centre[k];
-    }
-    slots[6] = to_length;
+    to_parameters.set_base(&[-to_centre[0], -to_centre[1], -to_centre[2]]);
+    to_parameters.0[Slots::LENGTH] = to_length;
     ClosureGradient { centre: to_centre, joint: length.lift(0.0) }
 }
 
@@ -148,12 +226,15 @@ macro_rules! drives {
                 joint: S,
                 base: Vector<S>,
                 force: Vector<S>,
-                slots: &mut [S; PLACES],
+                loads: &mut ParameterGradient<S>,
             ) {
                 match self {
-                    $(DriveKind::$name => driven_base_load::<S, $type, { <$type as Drive>::WIDTH }>(
-                        nominal, parameters, joint, base, force, slots,
-                    )),+
+                    $(DriveKind::$name => {
+                        let inputs = driven_base_load::<S, $type, { <$type as Drive>::WIDTH }>(
+                            nominal, parameters, joint, base, force,
+                        );
+                        loads.set_driven(&inputs);
+                    }),+
                 }
             }
 
@@ -166,12 +247,18 @@ macro_rules! drives {
                 joint: S,
                 points: [Vector<S>; 2],
                 length: S,
-                slots: &mut [S; PLACES],
+                to_parameters: &mut ParameterGradient<S>,
             ) -> ClosureGradient<S> {
                 match self {
-                    $(DriveKind::$name => driven_gradient::<S, $type, { <$type as Drive>::WIDTH }>(
-                        nominal, parameters, joint, points, length, slots,
-                    )),+
+                    $(DriveKind::$name => {
+                        let (centre, inputs) =
+                            driven_gradient::<S, $type, { <$type as Drive>::WIDTH }>(
+                                nominal, parameters, joint, points, length,
+                            );
+                        let (joint, to_length) = to_parameters.set_driven(&inputs);
+                        to_parameters.0[Slots::LENGTH] = to_length;
+                        ClosureGradient { centre, joint }
+                    }),+
                 }
             }
         }
@@ -229,7 +316,7 @@ macro_rules! guides {
                 match self { $(GuideKind::$name => residual_of::<S, $type>(which, frames, limb, at, length)),+ }
             }
 
-            /// The derivatives of one closure to its parameters and to the tool's, at their slots.
+            /// The derivatives of one closure to its parameters and to the tool's.
             pub fn gradient<S: Scalar>(
                 self,
                 which: usize,
@@ -237,11 +324,11 @@ macro_rules! guides {
                 limb: &GuideLimb<S>,
                 at: Placement<'_, S>,
                 length: f64,
-                slots: &mut [S; PLACES],
+                to_parameters: &mut ParameterGradient<S>,
             ) {
-                match self {
-                    $(GuideKind::$name => gradient_of::<S, $type>(which, frames, limb, at, length, slots)),+
-                }
+                to_parameters.set_anchors(match self {
+                    $(GuideKind::$name => gradient_of::<S, $type>(which, frames, limb, at, length)),+
+                });
             }
         }
     };

@@ -1,6 +1,6 @@
 //! Elastic closures: their compliance, and the twist that leaves the least elastic energy.
 
-use crate::element::PLACES;
+use crate::element::ParameterGradient;
 use crate::linear::{CLOSURES, SIX};
 use crate::machine::{Machine, indices_of};
 use crate::statics::{ClosureMatrix, closure_compliance};
@@ -13,7 +13,7 @@ pub struct Structure {
 }
 
 impl Structure {
-    pub fn new(machine: &Machine, to_parameters: &[[f64; PLACES]; CLOSURES]) -> Self {
+    pub fn new(machine: &Machine, to_parameters: &[ParameterGradient<f64>; CLOSURES]) -> Self {
         let dependents: Vec<&[(usize, usize)]> = machine
             .parameter_compliance
             .iter()
@@ -55,7 +55,7 @@ pub fn unit(machine: &Machine, freedom: usize) -> f64 {
 pub fn spread(
     machine: &Machine,
     rows: &[[f64; SIX]; CLOSURES],
-    to_parameters: &[[f64; PLACES]; CLOSURES],
+    to_parameters: &[ParameterGradient<f64>; CLOSURES],
 ) -> [[f64; CLOSURES]; SIX] {
     let mut result = [[0.0; CLOSURES]; SIX];
     let structure = Structure::new(machine, to_parameters);

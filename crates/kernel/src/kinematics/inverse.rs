@@ -77,6 +77,7 @@ pub fn closed_form<S: Scalar>(
             ring_arm(ring, p[ring.radius], &limb, rotation, position).0
         }
     };
+    // Last, since it may be a constant of its own: printed code names its steps in this order.
     let length = match strut.own_length {
         Some(index) => p[index],
         None => base[0].lift(0.0),
@@ -149,15 +150,12 @@ pub fn leanings<S: Scalar>(
     position: Vector<S>,
 ) -> Vec<(usize, usize, S)> {
     let zero = position[0].lift(0.0);
-    let mut at = [Limb { base: [zero; 3], arm: [zero; 3], length: zero }; CLOSURES];
+    let mut at = [Limb::zero(zero); CLOSURES];
     place_limbs(machine, p, joints, &mut at);
     let mut leanings = Vec::new();
     for (i, strut) in machine.struts.iter().enumerate() {
         let limb = &at[i];
-        let arm = match &strut.ring {
-            None => rotate(rotation, limb.arm),
-            Some(ring) => ring_arm(ring, p[ring.radius], limb, rotation, position).0,
-        };
+        let arm = limb.turned_arm(strut, p, rotation, position);
         let along = subtract(add(arm, position), limb.base);
         for (end, limit) in strut.limits.iter().enumerate() {
             let Some(limit) = limit else { continue };

@@ -10,7 +10,7 @@ mod linearisation;
 mod overconstrained;
 
 pub(crate) use closures::system;
-pub use closures::{Limb, Limbs, Sample, guide_limb, limbs, place_limbs, ring_arm};
+pub use closures::{Limb, Limbs, Sample, limbs, place_limbs, ring_arm, tool_point};
 pub use condition::{condition, free_motions};
 pub use forward::{Descent, chord, chord_inverse, descend, forward, start_order};
 pub(crate) use gradients::{Gradients, gradients};

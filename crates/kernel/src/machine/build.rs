@@ -6,7 +6,7 @@ use super::{
     MachineGuide, Parameter, Ring, Strut, StrutDescription, indices_of,
 };
 use crate::element::guide::{Anchor, GuideFrames, anchor_parameters};
-use crate::element::{DRIVE_END, Dimension, Direction, OWN, RING, strut};
+use crate::element::{Dimension, Direction, Slots, strut};
 use crate::linear::{CLOSURES, SIX};
 use crate::spatial::{Pose, Vector, norm, scale};
 use std::collections::BTreeMap;
@@ -291,41 +291,37 @@ impl Machine {
         Ok(())
     }
 
-    /// Fills in which closures depend on which parameter, at the slots of [`crate::element::PLACES`].
+    /// Fills in which closures depend on which parameter, at [`Slots`].
     fn find_dependents(&mut self) {
         let mut dependents = vec![Vec::new(); self.nominal.len()];
-        for (i, strut) in self.struts.iter().enumerate() {
-            for slot in 0..6 {
-                dependents[strut.first + slot].push((i, slot));
+        // Neighbouring parameters have neighbouring slots.
+        let mut depend = |closure: usize, first: usize, slot: usize, count: usize| {
+            for k in 0..count {
+                dependents[first + k].push((closure, slot + k));
             }
+        };
+        for (i, strut) in self.struts.iter().enumerate() {
+            depend(i, strut.first, Slots::BASE, Slots::LENGTH);
             if let Some(index) = strut.own_length {
-                dependents[index].push((i, 6));
+                depend(i, index, Slots::LENGTH, 1);
             }
             if let Some(drive) = strut.drive {
                 let drive = &self.drives[drive];
-                for slot in 0..drive.kind.table().parameters.len() {
-                    dependents[drive.first + slot].push((i, OWN + slot));
-                }
+                depend(i, drive.first, Slots::DRIVE, drive.kind.table().parameters.len());
             }
             if let Some(ring) = strut.ring {
-                dependents[ring.radius].push((i, RING));
+                depend(i, ring.radius, Slots::RING_RADIUS, 1);
             }
-            for k in 0..3 {
-                dependents[self.tool + k].push((i, DRIVE_END + k));
-            }
+            depend(i, self.tool, Slots::TOOL, 3);
         }
         for (number, &(guide, _)) in self.guide_closures.iter().enumerate() {
             let i = self.struts.len() + number;
             for anchor in Anchor::ALL {
                 if let Some(first) = self.guides[guide].first[anchor as usize] {
-                    for k in 0..anchor_parameters(anchor).len() {
-                        dependents[first + k].push((i, anchor.slot() + k));
-                    }
+                    depend(i, first, anchor.slot(), anchor_parameters(anchor).len());
                 }
             }
-            for k in 0..3 {
-                dependents[self.tool + k].push((i, DRIVE_END + k));
-            }
+            depend(i, self.tool, Slots::TOOL, 3);
         }
         self.dependents = dependents;
     }

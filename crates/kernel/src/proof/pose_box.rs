@@ -8,6 +8,7 @@ use super::command::Command;
 use super::region::Region;
 use super::root::{Inverse, Varying, prove};
 use super::{Deviating, Unproven, point};
+use crate::kinematics::{Limb, tool_point};
 use crate::linear::SIX;
 use crate::machine::Strut;
 use crate::scalar::{Interval, Scalar};
@@ -93,13 +94,8 @@ impl Region<'_> {
 
     /// Present lengths of the struts.
     pub fn lengths<S: Scalar>(&self, p: &[S], q: &[S]) -> Vec<S> {
-        let length = |strut: &Strut| {
-            let own = strut.own_length.map_or(p[0].lift(0.0), |index| p[index]);
-            let Some(index) = strut.drive else { return own };
-            let drive = &self.machine.drives[index];
-            let base = [0, 1, 2].map(|k| p[strut.first + k]);
-            drive.kind.place(&drive.nominal, &p[drive.first..], q[index], base, own).1
-        };
+        let tool = tool_point(self.machine, p);
+        let length = |strut: &Strut| Limb::placed(self.machine, strut, p, q, tool).length;
         self.machine.struts.iter().map(length).collect()
     }
 

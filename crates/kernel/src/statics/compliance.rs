@@ -3,7 +3,7 @@
 //! A parameter of compliance c under load Q moves by c Q; the closures move by
 //! `C_g = G diag(c) G^T` per unit force, and the platform by `W^-1 C_g W^-T`.
 
-use crate::element::PLACES;
+use crate::element::ParameterGradient;
 use crate::linear::{CLOSURES, Matrix6, SIX};
 use crate::scalar::Real;
 use nalgebra::DMatrix;
@@ -21,7 +21,7 @@ pub const fn most_closures<S: Real>() -> usize {
 /// (closure, slot) pairs that read the parameter of compliance `compliances[j]`.
 #[inline(always)]
 pub fn closure_compliance<S: Real>(
-    to_parameters: &[[S; PLACES]; CLOSURES],
+    to_parameters: &[ParameterGradient<S>; CLOSURES],
     dependents: &[&[(usize, usize)]],
     compliances: &[S],
 ) -> ClosureMatrix<S> {

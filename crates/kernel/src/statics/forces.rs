@@ -1,6 +1,6 @@
 //! Closure forces under a wrench on the tool.
 
-use crate::element::PLACES;
+use crate::element::ParameterGradient;
 use crate::linear::{CLOSURES, SIX};
 use crate::scalar::Real;
 use crate::statics::most_closures;
@@ -25,7 +25,7 @@ pub fn closure_forces<S: Real>(inverse: &[[S; CLOSURES]; SIX], wrench: &[S; SIX]
 #[inline(always)]
 pub fn parameter_load<S: Real>(
     multipliers: &[S; CLOSURES],
-    to_parameters: &[[S; PLACES]; CLOSURES],
+    to_parameters: &[ParameterGradient<S>; CLOSURES],
     dependents: &[(usize, usize)],
 ) -> S {
     let mut load = S::default();

@@ -2,7 +2,7 @@
 
 use super::direction::Direction;
 use super::strut::strut_gradient;
-use super::table::{Dimension, ElementTable, ParameterField, parameter};
+use super::table::{Dimension, ElementTable, Field, ParameterField, parameters};
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{Vector, dot};
 
@@ -134,17 +134,17 @@ pub fn driven_base_load<S: Scalar, D: Drive, const N: usize>(
     work
 }
 
+/// The key of a drive whose coordinate is a travel.
+pub const TRAVEL_SCALE: Field = Field::number(
+    "scale",
+    Dimension::Scale,
+    "true travel per commanded travel (lead, scale factor)",
+)
+.or(1.0);
+
 /// The parameters of every drive with an axis; the offset is of the joint coordinate's dimension.
 pub const fn axis_parameter_fields(offset: Dimension) -> [ParameterField; 7] {
-    [
-        parameter("origin.x", Dimension::Length),
-        parameter("origin.y", Dimension::Length),
-        parameter("origin.z", Dimension::Length),
-        parameter("axis.u", Dimension::Angle),
-        parameter("axis.v", Dimension::Angle),
-        parameter("offset", offset),
-        parameter("scale", Dimension::Scale),
-    ]
+    parameters![point "origin" tilt "axis" (offset) "offset" (Dimension::Scale) "scale"]
 }
 
 /// The values of [`axis_parameter_fields`].

@@ -1,6 +1,8 @@
 //! A strut: two joint centres at a fixed distance.
 
-use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
+use super::table::{
+    Dimension, Drawing, ElementTable, Field, ParameterField, parameter, parameters,
+};
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{Vector, add, dot, norm, scale, subtract};
 
@@ -8,52 +10,25 @@ use crate::spatial::{Vector, add, dot, norm, scale, subtract};
 pub const TABLE: ElementTable = ElementTable {
     kind: "strut",
     doc: "Two joint centres, one on the base side and one on the platform, at a distance.",
-    sets_length: false,
     drawing: Drawing::Line,
     fields: &[
-        Field {
-            name: "base",
-            shape: 3,
-            dimension: Dimension::Length,
-            default: None,
-            doc: "base-side joint centre: on the frame, or on the drive's carriage or crank",
-        },
-        Field {
-            name: "platform",
-            shape: 3,
-            dimension: Dimension::Length,
-            default: None,
-            doc: "platform-side joint centre in the platform's axes",
-        },
-        Field {
-            name: "ring_radius",
-            shape: 0,
-            dimension: Dimension::Length,
-            default: Some(0.0),
-            doc: "radius of a ring about `platform` on which the platform-side joint slides \
-                  (pentapods); 0: the joint stands at `platform`",
-        },
-        Field {
-            name: "ring_axis",
-            shape: 3,
-            dimension: Dimension::Direction,
-            default: Some(0.0),
-            doc: "axis of the ring, platform axes",
-        },
+        Field::point(
+            "base",
+            "base-side joint centre: on the frame, or on the drive's carriage or crank",
+        ),
+        Field::point("platform", "platform-side joint centre in the platform's axes"),
+        Field::number(
+            "ring_radius",
+            Dimension::Length,
+            "radius of a ring about `platform` on which the platform-side joint slides \
+             (pentapods); 0: the joint stands at `platform`",
+        )
+        .or(0.0),
+        Field::direction("ring_axis", "axis of the ring, platform axes").or(0.0),
     ],
-    parameters: PARAMETERS,
-    coordinate: Dimension::Length,
+    parameters: &parameters![point "base" point "platform" (Dimension::Length) "length"],
+    ..ElementTable::COMMON
 };
-
-const PARAMETERS: &[ParameterField] = &[
-    parameter("base.x", Dimension::Length),
-    parameter("base.y", Dimension::Length),
-    parameter("base.z", Dimension::Length),
-    parameter("platform.x", Dimension::Length),
-    parameter("platform.y", Dimension::Length),
-    parameter("platform.z", Dimension::Length),
-    parameter("length", Dimension::Length),
-];
 
 /// The parameter of a strut whose platform-side joint slides on a ring, beside [`TABLE`]'s.
 pub const RING_RADIUS: ParameterField = parameter("ring_radius", Dimension::Length);

@@ -52,6 +52,28 @@ pub struct Field {
     pub doc: &'static str,
 }
 
+impl Field {
+    /// A required number.
+    pub const fn number(name: &'static str, dimension: Dimension, doc: &'static str) -> Self {
+        Field { name, shape: 0, dimension, default: None, doc }
+    }
+
+    /// A required point.
+    pub const fn point(name: &'static str, doc: &'static str) -> Self {
+        Field { name, shape: 3, dimension: Dimension::Length, default: None, doc }
+    }
+
+    /// A required direction.
+    pub const fn direction(name: &'static str, doc: &'static str) -> Self {
+        Field { name, shape: 3, dimension: Dimension::Direction, default: None, doc }
+    }
+
+    /// The same, of this value where the key is missing.
+    pub const fn or(self, default: f64) -> Self {
+        Field { default: Some(default), ..self }
+    }
+}
+
 /// A number that the closure reads and that a deviation may move.
 #[derive(Clone, Copy, Debug)]
 pub struct ParameterField {
@@ -64,6 +86,32 @@ pub struct ParameterField {
 pub const fn parameter(name: &'static str, dimension: Dimension) -> ParameterField {
     ParameterField { name, dimension }
 }
+
+/// The parameters of an element, in their order: `point "origin"` are its x, y and z, `tilt "axis"` the
+/// angles u and v by which a direction is tilted, `(dimension) "name"` is one number.
+macro_rules! parameters {
+    (@ [$($done:expr,)*]) => { [$($done),*] };
+    (@ [$($done:expr,)*] point $name:literal $($rest:tt)*) => {
+        parameters!(@ [
+            $($done,)*
+            $crate::element::table::parameter(concat!($name, ".x"), $crate::element::Dimension::Length),
+            $crate::element::table::parameter(concat!($name, ".y"), $crate::element::Dimension::Length),
+            $crate::element::table::parameter(concat!($name, ".z"), $crate::element::Dimension::Length),
+        ] $($rest)*)
+    };
+    (@ [$($done:expr,)*] tilt $name:literal $($rest:tt)*) => {
+        parameters!(@ [
+            $($done,)*
+            $crate::element::table::parameter(concat!($name, ".u"), $crate::element::Dimension::Angle),
+            $crate::element::table::parameter(concat!($name, ".v"), $crate::element::Dimension::Angle),
+        ] $($rest)*)
+    };
+    (@ [$($done:expr,)*] ($dimension:expr) $name:literal $($rest:tt)*) => {
+        parameters!(@ [$($done,)* $crate::element::table::parameter($name, $dimension),] $($rest)*)
+    };
+    ($kind:tt $($rest:tt)*) => { parameters!(@ [] $kind $($rest)*) };
+}
+pub(super) use parameters;
 
 /// How an element is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,4 +152,17 @@ pub struct ElementTable {
     pub parameters: &'static [ParameterField],
     /// What its joint coordinate measures ([`Dimension::Length`] or [`Dimension::Angle`]).
     pub coordinate: Dimension,
+}
+
+impl ElementTable {
+    /// What most elements have in common; each gives its own kind, doc, fields and parameters.
+    pub const COMMON: ElementTable = ElementTable {
+        kind: "",
+        doc: "",
+        sets_length: false,
+        drawing: Drawing::None,
+        fields: &[],
+        parameters: &[],
+        coordinate: Dimension::Length,
+    };
 }

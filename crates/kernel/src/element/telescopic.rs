@@ -1,43 +1,30 @@
 //! A strut whose own length is driven.
 
 use super::direction::Direction;
-use super::drive::{Drive, InverseRoot};
-use super::table::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
+use super::drive::{Drive, InverseRoot, TRAVEL_SCALE};
+use super::table::{Dimension, ElementTable, Field, parameters};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, norm, subtract};
 
 /// The strut stands on the frame and is `scale q + offset` long.
 pub struct Telescopic;
 
-const FIELDS: &[Field] = &[
-    Field {
-        name: "offset",
-        shape: 0,
-        dimension: Dimension::Coordinate,
-        default: Some(0.0),
-        doc: "strut length where the joint coordinate is 0",
-    },
-    Field {
-        name: "scale",
-        shape: 0,
-        dimension: Dimension::Scale,
-        default: Some(1.0),
-        doc: "true travel per commanded travel (lead, scale factor)",
-    },
-];
-
-const PARAMETERS: &[ParameterField] =
-    &[parameter("offset", Dimension::Length), parameter("scale", Dimension::Scale)];
-
 impl Drive for Telescopic {
     const TABLE: ElementTable = ElementTable {
         kind: "telescopic",
         doc: "The strut itself grows and shrinks; its length is the joint coordinate plus an offset.",
         sets_length: true,
-        drawing: Drawing::None,
-        fields: FIELDS,
-        parameters: PARAMETERS,
-        coordinate: Dimension::Length,
+        fields: &[
+            Field::number(
+                "offset",
+                Dimension::Coordinate,
+                "strut length where the joint coordinate is 0",
+            )
+            .or(0.0),
+            TRAVEL_SCALE,
+        ],
+        parameters: &parameters![(Dimension::Length) "offset" (Dimension::Scale) "scale"],
+        ..ElementTable::COMMON
     };
 
     #[inline(always)]

@@ -1,6 +1,6 @@
 //! The kernel's least squares on Python's own residual and Jacobian.
 
-use crate::arrays::{Array, output};
+use crate::arrays::{Array, filled};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -152,15 +152,10 @@ pub fn least_squares<'py>(
     let Solution { values, cost, status, evaluations, iterations } =
         solution.map_err(|refusal| PyValueError::new_err(refusal.to_string()))?;
     let (residual, rows) = problem.here;
-    let array = |numbers: &[f64], shape: &[usize]| -> PyResult<Array<'py>> {
-        let out = output(py, shape, &[])?;
-        out.readwrite().as_slice_mut()?.copy_from_slice(numbers);
-        Ok(out)
-    };
     Ok((
-        array(&values, &[values.len()])?,
-        array(&residual, &[residual.len()])?,
-        array(&rows, &[residual.len(), values.len()])?,
+        filled(py, &[values.len()], &[], &values)?,
+        filled(py, &[residual.len()], &[], &residual)?,
+        filled(py, &[residual.len(), values.len()], &[], &rows)?,
         cost,
         status.name(),
         evaluations,

@@ -60,18 +60,15 @@ impl Machine {
         let shifted = self.columns(shifted)?;
         let parameters = self.columns(parameters)?;
         let machine = &self.inner;
-        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
+        let posed = self.posed(joints, placements)?;
         let shift = Input::new(shift, &[shifted.len()], "shift")?;
         let swing = Input::new(swing, &[parameters.len()], "swing")?;
-        let count = placements.count;
         if variables.len() != parameters.len() {
             return Err(PyValueError::new_err("as many variables as parameters are needed"));
         }
-        let commands = joints.rows(0, joints.serves(count, "joints")?);
-        let shifts = shift.rows(0, shift.count != count || count == 1);
-        let swings = swing.rows(0, swing.count != count || count == 1);
-        let placed = placements.data();
+        let samples = posed.of_placements()?;
+        let count = samples.count;
+        let (shifts, swings) = (shift.rows_if_any(count)?, swing.rows_if_any(count)?);
         let number = variables.iter().map(|&variable| variable + 1).max().unwrap_or(0);
         if directions.iter().flatten().any(|&member| member >= number) {
             return Err(PyValueError::new_err("a direction of variables that are not there"));
@@ -79,10 +76,7 @@ impl Machine {
         let quantities = parts(&machine.dof);
         let targets =
             targets.map(|given| Input::new(given, &[quantities.len()], "targets")).transpose()?;
-        let asked = targets
-            .as_ref()
-            .map(|given| Ok::<_, PyErr>(given.rows(0, given.serves(count, "targets")?)))
-            .transpose()?;
+        let asked = targets.as_ref().map(|given| given.rows(count)).transpose()?;
         let mut bounds: Vec<(Result<PoseBound, Unproven>, usize)> =
             vec![(Err(Unproven::TooWide), 0); count];
         py.detach(|| {
@@ -97,8 +91,8 @@ impl Machine {
                     };
                     let extent = Extent::new(
                         machine,
-                        commands.row(i),
-                        Pose::from_row(&placed[7 * i..7 * i + 7]),
+                        samples.joints.row(i),
+                        Pose::from_row(samples.poses.row(i)),
                         shifted.iter().copied().zip(shifts.row(i).iter().copied()),
                         &deviating,
                     );

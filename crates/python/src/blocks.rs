@@ -110,13 +110,9 @@ impl Machine {
         let clearances = clearances.rows(count)?;
         let wrenches = wrenches.rows(count)?;
         let components = indices_of(&machine.dof);
-        let errors = output(py, &[count], &[components.len()])?;
-        let tables = [
-            output(py, &[count], &[closures])?,
-            output(py, &[count], &[closures])?,
-            output(py, &[count], &[closures])?,
-        ];
         let mut status = vec![Status::Ok; count];
+        let mut errors = vec![f64::NAN; count * components.len()];
+        let mut tables = [(); 3].map(|()| vec![f64::NAN; count * closures]);
         for (i, status) in status.iter_mut().enumerate() {
             let mut p = machine.nominal.clone();
             for (&column, value) in columns.iter().zip(values.row(i)) {
@@ -130,28 +126,24 @@ impl Machine {
             let sample = Sample { machine, p: &p, limbs: &limbs };
             let equilibrium = kinematics::least_energy(&sample, commands.row(i), &start, &loads);
             *status = equilibrium.status;
-            let solved = equilibrium.status == Status::Ok;
-            let error = batch::displacement(&start, &equilibrium.pose);
-            let row = components.iter().map(|&k| error[k]);
-            let keep = |value: f64| if solved { value } else { f64::NAN };
-            for (cell, value) in
-                errors.readwrite().as_slice_mut()?[i * components.len()..].iter_mut().zip(row)
-            {
-                *cell = keep(value);
-            }
-            let rows = [equilibrium.forces, equilibrium.absorbed, equilibrium.strain];
-            for (table, rows) in tables.iter().zip(rows) {
-                let mut writable = table.readwrite();
-                let cells = &mut writable.as_slice_mut()?[i * closures..(i + 1) * closures];
-                for (cell, value) in cells.iter_mut().zip(rows) {
-                    *cell = keep(value);
+            if equilibrium.status == Status::Ok {
+                let error = batch::displacement(&start, &equilibrium.pose);
+                for (cell, &k) in errors[i * components.len()..].iter_mut().zip(&components) {
+                    *cell = error[k];
+                }
+                let rows = [equilibrium.forces, equilibrium.absorbed, equilibrium.strain];
+                for (table, row) in tables.iter_mut().zip(rows) {
+                    table[i * closures..(i + 1) * closures].copy_from_slice(&row[..closures]);
                 }
             }
             if i % BLOCK == 0 {
                 py.check_signals()?;
             }
         }
-        let [forces, absorbed, strain] = tables;
+        let errors = filled(py, &[count], &[components.len()], &errors)?;
+        let table = |numbers: &[f64]| filled(py, &[count], &[closures], numbers);
+        let [forces, absorbed, strain] = &tables;
+        let (forces, absorbed, strain) = (table(forces)?, table(absorbed)?, table(strain)?);
         (errors, forces, absorbed, strain, codes(py, &[count], &status)?).into_bound_py_any(py)
     }
 

@@ -13,7 +13,8 @@ use crate::linear::{CLOSURES, Order, SIX, factor_pivoting};
 use crate::machine::{Machine, indices_of};
 use crate::scalar::Real;
 use crate::statics::{
-    closure_compliance, closure_forces, parameter_load, pose_compliance, pose_stiffness,
+    ClosureMatrix, closure_compliance, closure_forces, parameter_load, pose_compliance,
+    pose_stiffness,
 };
 use crate::status::Status;
 
@@ -40,7 +41,7 @@ pub trait FirstOrder: Sync {
     fn write<S: Real>(
         &self,
         linear: &Linearisation<S>,
-        slot: Place,
+        place: Place,
         part: usize,
         columns: &mut [S],
     );
@@ -83,29 +84,29 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
         let mut linear = Linearisation::default();
         let groups = out.chunks_mut((width * S::WIDTH).max(1)).zip(status.chunks_mut(S::WIDTH));
         for (number, (out, status)) in groups.enumerate() {
-            let slot = Place { first: first + number * S::WIDTH, size: status.len() };
-            if group.load(machine, samples, slot.first, slot.size) {
+            let place = Place { first: first + number * S::WIDTH, size: status.len() };
+            if group.load(machine, samples, place.first, place.size) {
                 place_limbs(machine, &group.p, &group.q, &mut at);
             }
             let mut proven = S::splat(-1.0);
             if S::WIDTH > 1 {
                 if number == 0 {
-                    order = single_order(machine, &group, slot.size);
+                    order = single_order(machine, &group, place.size);
                 }
                 linear.fill(machine, &group.p, &group.q, &at, &group.pose, &order);
                 for part in 0..quantity.parts() {
-                    quantity.write(&linear, slot, part, &mut columns);
-                    S::store_rows(&columns, &mut out[part * columns.len()..], width, slot.size);
+                    quantity.write(&linear, place, part, &mut columns);
+                    S::store_rows(&columns, &mut out[part * columns.len()..], width, place.size);
                 }
                 proven = linear.regular;
             }
-            for lane in 0..slot.size {
+            for lane in 0..place.size {
                 status[lane] = Status::Ok;
                 // Also true where it is NaN.
                 if !(proven.lane(lane) > 0.0) {
                     let out = &mut out[width * lane..width * (lane + 1)];
-                    let slot = Place { first: slot.first + lane, size: 1 };
-                    status[lane] = alone(machine, &group, lane, quantity, slot, out);
+                    let place = Place { first: place.first + lane, size: 1 };
+                    status[lane] = alone(machine, &group, lane, quantity, place, out);
                 }
             }
         }
@@ -129,7 +130,7 @@ fn alone<S: Real, Q: FirstOrder>(
     group: &Group<S>,
     lane: usize,
     quantity: &Q,
-    slot: Place,
+    place: Place,
     out: &mut [f64],
 ) -> Status {
     let (p, q, pose) = group.single(lane);
@@ -140,7 +141,7 @@ fn alone<S: Real, Q: FirstOrder>(
     if regular || quantity.survives_singular() {
         let width = out.len() / quantity.parts();
         for (part, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
-            quantity.write(&linear, slot, part, out);
+            quantity.write(&linear, place, part, out);
         }
     } else {
         out.fill(f64::NAN);
@@ -292,10 +293,10 @@ impl<'a> Forces<'a> {
 fn multipliers<S: Real>(
     linear: &Linearisation<S>,
     wrenches: &Rows<'_>,
-    slot: Place,
+    place: Place,
 ) -> [S; CLOSURES] {
     let mut wrench = [S::default(); SIX];
-    wrenches.load(slot.first, slot.size, &mut wrench);
+    wrenches.load(place.first, place.size, &mut wrench);
     closure_forces(&linear.inverse, &wrench)
 }
 
@@ -307,11 +308,11 @@ impl FirstOrder for Forces<'_> {
     fn write<S: Real>(
         &self,
         linear: &Linearisation<S>,
-        slot: Place,
+        place: Place,
         _part: usize,
         columns: &mut [S],
     ) {
-        let forces = multipliers(linear, &self.wrenches, slot);
+        let forces = multipliers(linear, &self.wrenches, place);
         for (column, &force) in columns.iter_mut().zip(&forces) {
             *column = -force;
         }
@@ -339,11 +340,11 @@ impl FirstOrder for Loads<'_> {
     fn write<S: Real>(
         &self,
         linear: &Linearisation<S>,
-        slot: Place,
+        place: Place,
         _part: usize,
         columns: &mut [S],
     ) {
-        let forces = multipliers(linear, &self.wrenches, slot);
+        let forces = multipliers(linear, &self.wrenches, place);
         for (column, dependents) in columns.iter_mut().zip(&self.dependents) {
             *column = parameter_load(&forces, &linear.to_parameters, dependents);
         }
@@ -363,6 +364,14 @@ impl<'a> Compliance<'a> {
         let dependents = dependents(machine, columns);
         Compliance { components: indices_of(&machine.dof), dependents, compliances }
     }
+
+    /// How far closures open per unit force in closures.
+    #[inline(always)]
+    fn of_closures<S: Real>(&self, linear: &Linearisation<S>, place: Place) -> ClosureMatrix<S> {
+        let mut compliances = vec![S::default(); self.dependents.len()];
+        self.compliances.load(place.first, place.size, &mut compliances);
+        closure_compliance(&linear.to_parameters, &self.dependents, &compliances)
+    }
 }
 
 impl FirstOrder for Compliance<'_> {
@@ -373,13 +382,11 @@ impl FirstOrder for Compliance<'_> {
     fn write<S: Real>(
         &self,
         linear: &Linearisation<S>,
-        slot: Place,
+        place: Place,
         _part: usize,
         columns: &mut [S],
     ) {
-        let mut compliances = vec![S::default(); self.dependents.len()];
-        self.compliances.load(slot.first, slot.size, &mut compliances);
-        let closures = closure_compliance(&linear.to_parameters, &self.dependents, &compliances);
+        let closures = self.of_closures(linear, place);
         let matrix = pose_compliance(&linear.inverse, &closures);
         let mut cells = columns.iter_mut();
         for &i in &self.components {
@@ -415,14 +422,11 @@ impl FirstOrder for Stiffness<'_> {
     fn write<S: Real>(
         &self,
         linear: &Linearisation<S>,
-        slot: Place,
+        place: Place,
         _part: usize,
         columns: &mut [S],
     ) {
-        let mut compliances = vec![S::default(); self.from.dependents.len()];
-        self.from.compliances.load(slot.first, slot.size, &mut compliances);
-        let closures =
-            closure_compliance(&linear.to_parameters, &self.from.dependents, &compliances);
+        let closures = self.from.of_closures(linear, place);
         // Pivoting is per sample: the closures' compliance may be as ill-scaled as the file.
         for lane in 0..S::WIDTH {
             let single = closures.map(|row| row.map(|value| value.lane(lane)));

@@ -102,13 +102,7 @@ impl Machine {
         drives: &[DriveDescription],
     ) -> Result<(), MachineError> {
         let place = format!("strut.{}", strut.name);
-        if self.struts.iter().any(|other| other.name == strut.name) {
-            return error(
-                "duplicate-name",
-                place,
-                format!("two struts are named {:?}", strut.name),
-            );
-        }
+        check_unique("strut", &strut.name, self.struts.iter().map(|other| &other.name))?;
         let drive = match &strut.drive {
             None => None,
             Some(name) => match drives.iter().position(|drive| &drive.name == name) {
@@ -172,13 +166,7 @@ impl Machine {
 
     fn add_guide(&mut self, guide: &GuideDescription) -> Result<(), MachineError> {
         let place = format!("guide.{}", guide.name);
-        if self.guides.iter().any(|other| other.name == guide.name) {
-            return error(
-                "duplicate-name",
-                place,
-                format!("two guides are named {:?}", guide.name),
-            );
-        }
+        check_unique("guide", &guide.name, self.guides.iter().map(|other| &other.name))?;
         let mut frames = GuideFrames::default();
         let mut first = [None; 4];
         for &(anchor, name) in guide.kind.fields() {
@@ -237,13 +225,7 @@ impl Machine {
 
     fn add_drive(&mut self, index: usize, drive: &DriveDescription) -> Result<(), MachineError> {
         let place = format!("drive.{}", drive.name);
-        if self.drives.iter().any(|other| other.name == drive.name) {
-            return error(
-                "duplicate-name",
-                place,
-                format!("two drives are named {:?}", drive.name),
-            );
-        }
+        check_unique("drive", &drive.name, self.drives.iter().map(|other| &other.name))?;
         let table = drive.kind.table();
         let mut nominal = Direction::default();
         let mut values = BTreeMap::new();
@@ -380,6 +362,19 @@ fn unit(direction: Vector<f64>, place: impl Fn() -> String) -> Result<Vector<f64
         return Ok(scale(direction, 1.0 / length));
     }
     error("zero-direction", place(), "it points nowhere".into())
+}
+
+/// Refuses a second element of one name.
+fn check_unique<'a>(
+    family: &str,
+    name: &String,
+    mut others: impl Iterator<Item = &'a String>,
+) -> Result<(), MachineError> {
+    if others.any(|other| other == name) {
+        let message = format!("two {family}s are named {name:?}");
+        return error("duplicate-name", format!("{family}.{name}"), message);
+    }
+    Ok(())
 }
 
 fn check_freedoms(description: &Description) -> Result<(), MachineError> {

@@ -9,26 +9,23 @@ use crate::spatial::Pose;
 
 /// Smallest over largest singular value of the scaled rows.
 pub fn condition_at(sample: &Sample<'_>, pose: &Pose<f64>) -> f64 {
-    let (mut rows, _) = sample.closures(pose);
-    for row in &mut rows {
-        for value in &mut row[3..] {
-            *value /= sample.machine.characteristic_length;
-        }
-    }
+    let rows = by_length(sample.machine, sample.closures(pose).0);
     condition_index(&rows, sample.machine.closure_count(), &sample.machine.dof)
+}
+
+/// Rows with rotations in units of the characteristic length.
+fn by_length(machine: &Machine, mut rows: Rows<f64>) -> Rows<f64> {
+    for value in rows.iter_mut().flat_map(|row| &mut row[3..]) {
+        *value /= machine.characteristic_length;
+    }
+    rows
 }
 
 /// The closures' rows with rotations in units of the characteristic length.
 fn scaled_rows(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Rows<f64> {
     let mut linear = Linearisation::default();
     linear.differentiate(machine, p, q, pose);
-    let mut rows = linear.rows;
-    for row in &mut rows {
-        for value in &mut row[3..] {
-            *value /= machine.characteristic_length;
-        }
-    }
-    rows
+    by_length(machine, linear.rows)
 }
 
 /// Smallest over largest singular value of the scaled closure Jacobian: 1 isotropic, 0 singular.

@@ -214,15 +214,7 @@ impl<'a> Extent<'a> {
 
     /// Derivatives of the closures to the variables.
     fn columns(&self, at: &super::closures::Derivatives) -> Vec<Six> {
-        let mut columns = vec![[point(0.0); SIX]; self.deviating.count];
-        let Deviating { parameters, variables, swing, .. } = self.deviating;
-        for ((&parameter, &variable), &swing) in parameters.iter().zip(variables).zip(swing) {
-            let gradient = at.closures.to_parameter(self.machine, parameter);
-            for k in 0..SIX {
-                columns[variable][k] = columns[variable][k] + gradient[k] * point(swing);
-            }
-        }
-        columns
+        self.deviating.columns(|parameter| at.closures.to_parameter(self.machine, parameter))
     }
 
     /// The machine over every variable in [-1, 1].

@@ -16,6 +16,13 @@ pub type Six<S = Interval> = [S; SIX];
 /// Rows of derivatives.
 pub type Square<S = Interval> = [Six<S>; SIX];
 
+/// Adds a multiple of a column.
+pub fn add_multiple(sum: &mut Six, column: &Six, factor: Interval) {
+    for k in 0..SIX {
+        sum[k] = sum[k] + column[k] * factor;
+    }
+}
+
 /// The placement of a platform, on intervals or dual numbers of intervals.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<S = Interval> {

@@ -8,7 +8,7 @@ use super::region::Region;
 use super::root::{Inverse, Varying, prove};
 use super::{Unproven, point};
 use crate::linear::SIX;
-use crate::machine::Machine;
+use crate::machine::{Machine, indices_of};
 use crate::scalar::{Interval, Scalar};
 use crate::spatial::{Pose, RotationMatrix, Vector, add, cross, dot, rotate};
 
@@ -23,24 +23,22 @@ pub struct Command {
 impl Region<'_> {
     /// The commanded pose on intervals, the freedoms that are not commanded as in `solved`.
     fn place(&self, sides: &[[f64; 2]], solved: &Pose<f64>) -> Placed {
-        let coordinates = solved.to_coordinates();
-        let mut given = coordinates.map(point);
-        let mut commanded = sides.iter();
-        let mut turned = false;
-        for k in 0..SIX {
-            if self.machine.commanded[k]
-                && let Some(&[low, high]) = commanded.next()
-            {
-                given[k] = Interval::new(low, high);
-                turned |= k >= 3;
-            }
-        }
+        let [x, y, z, angles @ ..] = self.coordinates(sides, solved);
         let mut result = placed(solved);
-        result.position = [given[0], given[1], given[2]];
-        if turned {
-            result.rotation = euler_matrix([given[3], given[4], given[5]]);
+        result.position = [x, y, z];
+        if self.machine.commanded[3..].contains(&true) {
+            result.rotation = euler_matrix(angles);
         }
         result
+    }
+
+    /// Coordinates of the commanded pose, those that are not commanded as in `solved`.
+    fn coordinates(&self, sides: &[[f64; 2]], solved: &Pose<f64>) -> Six {
+        let mut coordinates = solved.to_coordinates().map(point);
+        for (&freedom, &[low, high]) in indices_of(&self.machine.commanded).iter().zip(sides) {
+            coordinates[freedom] = Interval::new(low, high);
+        }
+        coordinates
     }
 
     /// Which freedoms follow from the others, as places of a displacement.
@@ -147,15 +145,7 @@ impl Region<'_> {
 
     /// The axes about which the Euler angles turn, over a box of poses.
     fn axes(&self, sides: &[[f64; 2]], solved: &Pose<f64>) -> [Vector<Interval>; 3] {
-        let mut angles = solved.to_coordinates().map(point);
-        let mut commanded = sides.iter();
-        for k in 0..SIX {
-            if self.machine.commanded[k]
-                && let Some(&[low, high]) = commanded.next()
-            {
-                angles[k] = Interval::new(low, high);
-            }
-        }
+        let angles = self.coordinates(sides, solved);
         let (sb, cb) = angles[4].sin_cos();
         let (sc, cc) = angles[5].sin_cos();
         let zero = point(0.0);

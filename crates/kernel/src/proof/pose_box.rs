@@ -3,7 +3,7 @@
 //! Everything is an enclosure over all poses of the box and all machines, proved to exist first.
 
 use super::affine::Affine;
-use super::closures::{Derivatives, Six, derivatives};
+use super::closures::{Derivatives, Six, add_multiple, derivatives};
 use super::command::Command;
 use super::region::Region;
 use super::root::{Inverse, Varying, prove};
@@ -45,7 +45,7 @@ impl Region<'_> {
         for &(index, shift) in &shifts {
             p[index] = p[index] + shift;
         }
-        let Deviating { parameters, variables, swing, count, .. } = self.deviating;
+        let Deviating { parameters, swing, .. } = self.deviating;
         for (&parameter, &swing) in parameters.iter().zip(swing) {
             p[parameter] = p[parameter] + Interval::symmetric(swing);
         }
@@ -55,19 +55,10 @@ impl Region<'_> {
         let moves = |over: &Derivatives| {
             let mut known = [point(0.0); SIX];
             for &(index, shift) in &shifts {
-                let gradient = over.closures.to_parameter(machine, index);
-                for k in 0..SIX {
-                    known[k] = known[k] + gradient[k] * shift;
-                }
+                add_multiple(&mut known, &over.closures.to_parameter(machine, index), shift);
             }
-            let mut columns = vec![[point(0.0); SIX]; *count];
-            for ((&parameter, &variable), &swing) in parameters.iter().zip(variables).zip(swing) {
-                let gradient = over.closures.to_parameter(machine, parameter);
-                for k in 0..SIX {
-                    columns[variable][k] = columns[variable][k] + gradient[k] * point(swing);
-                }
-            }
-            (known, columns)
+            let gradient = |parameter| over.closures.to_parameter(machine, parameter);
+            (known, self.deviating.columns(gradient))
         };
         let spread = derivatives(machine, &p, q, at, &still);
         let (known, columns) = moves(&spread);

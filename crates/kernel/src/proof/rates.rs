@@ -2,12 +2,12 @@
 //! numbers on intervals.
 
 use super::at_pose::along;
-use super::closures::{Placed, Six, derivatives, turned};
+use super::closures::{Placed, Six, add_multiple, derivatives, turned};
 use super::command::Command;
 use super::pose_box::Over;
 use super::region::Region;
 use super::root::Inverse;
-use super::{Deviating, Unproven, point};
+use super::{Unproven, point};
 use crate::linear::SIX;
 use crate::scalar::{Dual, Interval};
 use crate::spatial::{cross, rotate};
@@ -76,10 +76,8 @@ impl Region<'_> {
                 }
             }
             for (index, rate) in self.shift_rates(command, freedom)? {
-                let gradient = along.closures.to_parameter(machine, index);
-                for k in 0..SIX {
-                    open[k] = open[k] + gradient[k].value * partly(rate);
-                }
+                let gradient = along.closures.to_parameter(machine, index).map(|one| one.value);
+                add_multiple(&mut open, &gradient, partly(rate));
             }
             result.push(over.inverse.times(&open).map(|value| -value));
         }
@@ -93,7 +91,6 @@ impl Region<'_> {
     /// joints move, and because the displacement and the known deviations change a little.
     pub fn rates(&self, command: &Command, over: &Over) -> Result<Vec<Rates>, Unproven> {
         let machine = self.machine;
-        let Deviating { parameters, variables, swing, count, .. } = self.deviating;
         let changes = self.changes(command, over)?;
         let mut result = Vec::with_capacity(changes.len());
         for (freedom, change) in changes.iter().enumerate() {
@@ -121,27 +118,17 @@ impl Region<'_> {
                 }
                 over.inverse.times(&open).map(|value| -value)
             };
+            let change_of =
+                |parameter| at.closures.to_parameter(machine, parameter).map(|one| one.parts[0]);
             let mut known = [point(0.0); SIX];
             for &(index, shift) in &over.shifts {
-                let gradient = at.closures.to_parameter(machine, index);
-                for k in 0..SIX {
-                    known[k] = known[k] + gradient[k].parts[0] * shift;
-                }
+                add_multiple(&mut known, &change_of(index), shift);
             }
             for &(index, rate) in &shift_rates {
-                let gradient = at.closures.to_parameter(machine, index);
-                for k in 0..SIX {
-                    known[k] = known[k] + gradient[k].value * rate;
-                }
+                let gradient = at.closures.to_parameter(machine, index).map(|one| one.value);
+                add_multiple(&mut known, &gradient, rate);
             }
-            let mut columns = vec![[point(0.0); SIX]; *count];
-            for ((&parameter, &variable), &swing) in parameters.iter().zip(variables).zip(swing) {
-                let gradient = at.closures.to_parameter(machine, parameter);
-                for k in 0..SIX {
-                    let rate = gradient[k].parts[0] * point(swing);
-                    columns[variable][k] = columns[variable][k] + rate;
-                }
-            }
+            let columns = self.deviating.columns(change_of);
             result.push(Rates {
                 known: follow(&over.known, &known),
                 slopes: over.slopes.iter().zip(&columns).map(|(s, c)| follow(s, c)).collect(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,12 +11,14 @@ from truepose.arrays import Floats
 from truepose.calibration.acceptance import sentences
 from truepose.calibration.acceptance.observability import covariance_root, prior_rows
 from truepose.calibration.acceptance.tool_uncertainty import Tool
-from truepose.calibration.calibrate import Calibration
 from truepose.calibration.dataset import covariance_of, determined_covariance, verdict_of
 from truepose.calibration.identification.tool_effects import tool_effects, workspace_poses
 from truepose.calibration.result.file import DEFAULT_COVERAGE, Provenance, write_calibrated
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
+
+if TYPE_CHECKING:
+    from truepose.calibration.calibrate import Calibration
 
 
 def save(

@@ -130,7 +130,7 @@ class _Writer:
 
     def _filled(self, piece: str, ending: str = ".c.in") -> str:
         """A template with its places filled: `@name@`."""
-        text = template("truepose.controllers.c", piece + ending)
+        text = template(__package__, piece + ending)
         if piece == "linear" and (self.strained or not self.parasitic):
             text = _without_function(text, "regular")
         if piece == "linear" and (self.strained or not self.compliant):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +24,7 @@ from truepose.calibration.measurements.rows import (
     measurements_in,
     reading_columns,
 )
-from truepose.errors import Problem, RequestError
+from truepose.errors import Fault, Problem, RequestError
 from truepose.files.data_file import cut_short
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
@@ -322,22 +322,10 @@ class _Report:
     problems: list[Problem]
     rows: MeasurementRows
 
-    def __call__(
-        self,
-        code: str,
-        message: str,
-        *,
-        row: int | None = None,
-        column: str | None = None,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
+    def __call__(self, fault: Fault, *, row: int | None = None, column: str | None = None) -> None:
+        problem = fault.about(column).at(path=column)
         where = "" if row is None else f" (row {row})"
-        message = message if column is None else f"{column}: {message}"
-        self.problems.append(
-            Problem(code, message + where, path=column, found=found, expected=expected, hint=hint)
-        )
+        self.problems.append(replace(problem, message=problem.message + where))
 
     def shown(self, column: str, row: int) -> str:
         """A number as it was given, SI."""

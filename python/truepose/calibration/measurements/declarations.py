@@ -17,7 +17,7 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
 
 import numpy as np
@@ -173,11 +173,13 @@ class _Reader:
         tables = data.get("instrument", {})
         if not isinstance(tables, dict) or not all(isinstance(t, dict) for t in tables.values()):
             self._tell(
-                "wrong-type",
-                "instruments are tables with a name",
+                Fault(
+                    "wrong-type",
+                    "instruments are tables with a name",
+                    found=shown_value(tables),
+                    expected=f"{_MARK} [instrument.tracker]",
+                ),
                 ("instrument",),
-                found=shown_value(tables),
-                expected=f"{_MARK} [instrument.tracker]",
             )
             return
         self.header.declared = tuple(tables)
@@ -192,11 +194,13 @@ class _Reader:
         before = len(self.header.problems)
         if not name_is_good(name, self.reserved):
             self._tell(
-                "bad-name",
-                "an instrument cannot have this name",
+                Fault(
+                    "bad-name",
+                    "an instrument cannot have this name",
+                    found=shown_value(name),
+                    expected=expected_name(self.reserved),
+                ),
                 key,
-                found=shown_value(name),
-                expected=expected_name(self.reserved),
             )
         table = self.document.data["instrument"][name]
         kind = self._kind(key, table)
@@ -240,23 +244,27 @@ class _Reader:
     def _kind(self, key: Key, table: dict[str, Any]) -> Kind | None:
         if "kind" not in table:
             self._tell(
-                "missing-key",
-                "missing",
+                Fault(
+                    "missing-key",
+                    "missing",
+                    found="nothing",
+                    expected=one_of(f'"{name}"' for name in REGISTRY),
+                ),
                 (*key, "kind"),
-                found="nothing",
-                expected=one_of(f'"{name}"' for name in REGISTRY),
             )
             return None
         word = table["kind"]
         if isinstance(word, str) and word in REGISTRY:
             return REGISTRY[word]
         self._tell(
-            "unknown-choice",
-            f"there is no instrument of kind {shown_value(word)}",
+            Fault(
+                "unknown-choice",
+                f"there is no instrument of kind {shown_value(word)}",
+                found=shown_value(word),
+                expected=one_of(f'"{name}"' for name in REGISTRY),
+                hint=did_you_mean(word, REGISTRY) if isinstance(word, str) else None,
+            ),
             (*key, "kind"),
-            found=shown_value(word),
-            expected=one_of(f'"{name}"' for name in REGISTRY),
-            hint=did_you_mean(word, REGISTRY) if isinstance(word, str) else None,
         )
         return None
 
@@ -283,22 +291,26 @@ class _Reader:
         if "frame" not in table:
             if not without:
                 self._tell(
-                    "missing-key",
-                    "missing",
+                    Fault(
+                        "missing-key",
+                        "missing",
+                        found="nothing",
+                        expected='"base", "unknown" or a table: '
+                        '{ origin = ["0 mm", "0 mm", "0 mm"], rotation = ["0 deg", "0 deg", "0 deg"] }',
+                        hint="readings mean nothing without the frame that they are in",
+                    ),
                     (*key, "frame"),
-                    found="nothing",
-                    expected='"base", "unknown" or a table: '
-                    '{ origin = ["0 mm", "0 mm", "0 mm"], rotation = ["0 deg", "0 deg", "0 deg"] }',
-                    hint="readings mean nothing without the frame that they are in",
                 )
             return Frame()
         if without and table["frame"] != "base":
             self._tell(
-                "unknown-choice",
-                "what this instrument reads does not depend on a frame",
+                Fault(
+                    "unknown-choice",
+                    "what this instrument reads does not depend on a frame",
+                    found=shown_value(table["frame"]),
+                    expected='no frame, or "base"',
+                ),
                 (*key, "frame"),
-                found=shown_value(table["frame"]),
-                expected='no frame, or "base"',
             )
             return Frame()
         frame = self._if_there(key, table, "frame", self._frame, Frame())
@@ -312,8 +324,10 @@ class _Reader:
             return Frame()
         if not isinstance(value, dict):
             self._refuse(
-                "unknown-choice" if isinstance(value, str) else "wrong-type",
-                f"expected a frame, found {type_phrase(value)}",
+                Fault(
+                    "unknown-choice" if isinstance(value, str) else "wrong-type",
+                    f"expected a frame, found {type_phrase(value)}",
+                ),
                 key,
                 value,
                 '"base", "unknown" or a table with origin, rotation, unknown',
@@ -332,7 +346,9 @@ class _Reader:
             if word not in FRAME_FREEDOMS:
                 expected = "a list of some of " + ", ".join(f'"{name}"' for name in FRAME_FREEDOMS)
                 place = (*key, "unknown")
-                self._refuse("unknown-choice", "no freedom of a frame", place, word, expected)
+                self._refuse(
+                    Fault("unknown-choice", "no freedom of a frame"), place, word, expected
+                )
         return dataclasses.replace(frame, unknown=tuple(name in words for name in FRAME_FREEDOMS))
 
     def _rotation(self, key: Key, value: Any) -> Quaternion:
@@ -345,7 +361,9 @@ class _Reader:
         size = math.hypot(w, x, y, z)
         if abs(size - 1.0) > NEARLY:
             expected = "a unit quaternion [w, x, y, z], or three angles"
-            self._refuse("wrong-type", "the quaternion is not of length 1", key, value, expected)
+            self._refuse(
+                Fault("wrong-type", "the quaternion is not of length 1"), key, value, expected
+            )
         if abs(size - 1.0) <= ROUNDING:
             size = 1.0
         return (w / size, x / size, y / size, z / size)
@@ -362,20 +380,23 @@ class _Reader:
         unknown = value.get("unknown", True)
         if not isinstance(unknown, bool):
             self._refuse(
-                "wrong-type", "expected true or false", (*key, "unknown"), unknown, "true or false"
+                Fault("wrong-type", "expected true or false"),
+                (*key, "unknown"),
+                unknown,
+                "true or false",
             )
         return start, unknown
 
     def _bias(self, key: Key, value: Any) -> bool:
         if value != UNKNOWN:
             message = "a bias is either unknown, or taken off the readings"
-            self._refuse("unknown-choice", message, key, value, '"unknown", or no such key')
+            self._refuse(Fault("unknown-choice", message), key, value, '"unknown", or no such key')
         return True
 
     def _end(self, key: Key, value: Any) -> str:
         if value not in ("base", "platform"):
             expected = 'one of "base", "platform"'
-            self._refuse("unknown-choice", "no end of a strut", key, value, expected)
+            self._refuse(Fault("unknown-choice", "no end of a strut"), key, value, expected)
         return str(value)
 
     def _direction(self, key: Key, value: Any) -> Vector:
@@ -383,8 +404,7 @@ class _Reader:
         size = math.hypot(x, y, z)
         if not (math.isfinite(size) and size > 0.0):
             self._refuse(
-                "zero-direction",
-                "a direction has a length above zero",
+                Fault("zero-direction", "a direction has a length above zero"),
                 key,
                 value,
                 "at least one component that is not zero",
@@ -403,11 +423,13 @@ class _Reader:
         size = float(np.linalg.norm(across))
         if size < 1e-6:
             self._tell(
-                "zero-direction",
-                "the zero direction is along the axis",
+                Fault(
+                    "zero-direction",
+                    "the zero direction is along the axis",
+                    found=shown_value(table.get("zero")),
+                    expected="a direction across the axis",
+                ),
                 (*key, "zero"),
-                found=shown_value(table.get("zero")),
-                expected="a direction across the axis",
             )
             return (1.0, 0.0, 0.0)
         x, y, z = (across / size).tolist()
@@ -436,7 +458,10 @@ class _Reader:
                 plural = DIMENSIONS[dimension].plural
                 expected = f"one for all {plural}, or a table by column"
                 self._refuse(
-                    "excluding-keys", f"two uncertainties of {plural}", where, entry, expected
+                    Fault("excluding-keys", f"two uncertainties of {plural}"),
+                    where,
+                    entry,
+                    expected,
                 )
             result.update(dict.fromkeys(same, amount))
         return result
@@ -457,8 +482,7 @@ class _Reader:
             if amount > 0.0:
                 return amount, dimension if dimension in dimensions else dimensions[0]
             self._refuse(
-                "not-positive",
-                "a standard uncertainty is above zero",
+                Fault("not-positive", "a standard uncertainty is above zero"),
                 key,
                 value,
                 f"{DIMENSIONS[dimension].phrase} above zero",
@@ -471,8 +495,10 @@ class _Reader:
         if not isinstance(value, list) or len(value) != 3:
             found = f"a list of {len(value)}" if isinstance(value, list) else type_phrase(value)
             self._refuse(
-                "wrong-type",
-                f"expected a list of 3 {DIMENSIONS[dimension].plural}, found {found}",
+                Fault(
+                    "wrong-type",
+                    f"expected a list of 3 {DIMENSIONS[dimension].plural}, found {found}",
+                ),
                 key,
                 value,
                 f'["0{unit}", "0{unit}", "1{unit}"]' if unit else "[0, 0, 1]",
@@ -493,11 +519,13 @@ class _Reader:
         if isinstance(value, str):
             return value
         self._tell(
-            "wrong-type",
-            f"expected text, found {type_phrase(value)}",
+            Fault(
+                "wrong-type",
+                f"expected text, found {type_phrase(value)}",
+                found=shown_value(value),
+                expected="the name of a machine",
+            ),
             key,
-            found=shown_value(value),
-            expected="the name of a machine",
         )
         return None
 
@@ -506,11 +534,11 @@ class _Reader:
         if error.code == "no-unit":
             hint = "write the unit with the number, in quotation marks"
         expected = error.expected if len(wanted) == 1 else " or ".join(wanted)
-        self._tell(error.code, error.message, key, found=error.found, expected=expected, hint=hint)
+        self._tell(replace(error.fault, expected=expected, hint=hint), key)
         raise _RefusedError
 
-    def _refuse(self, code: str, message: str, key: Key, value: Any, expected: str) -> NoReturn:
-        self._tell(code, message, key, found=shown_value(value), expected=expected)
+    def _refuse(self, fault: Fault, key: Key, value: Any, expected: str) -> NoReturn:
+        self._tell(replace(fault, found=shown_value(value), expected=expected), key)
         raise _RefusedError
 
     def _check_keys(self, key: Key, table: dict[str, Any], known: Iterable[str]) -> None:
@@ -522,27 +550,18 @@ class _Reader:
     def _unknown_key(self, key: Key, known: Iterable[str]) -> None:
         word, words = str(key[-1]), list(known)
         self._tell(
-            "unknown-key",
-            "unknown key",
+            Fault(
+                "unknown-key",
+                "unknown key",
+                found=word,
+                expected=one_of(words) if words else "no key",
+                hint=did_you_mean(word, words),
+            ),
             key,
-            found=word,
-            expected=one_of(words) if words else "no key",
-            hint=did_you_mean(word, words),
         )
 
-    def _tell(
-        self,
-        code: str,
-        message: str,
-        key: Key,
-        *,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
-        self.header.problems.append(
-            self.document.problem(Fault(code, message, found, expected, hint), key)
-        )
+    def _tell(self, fault: Fault, key: Key) -> None:
+        self.header.problems.append(self.document.problem(fault, key))
 
 
 def _dimension(observable: str) -> str:

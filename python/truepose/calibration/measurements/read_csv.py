@@ -270,32 +270,40 @@ class _Reading:
         ]
         if len(beginnings) > 1:
             self._tell(
-                "excluding-columns",
-                "the file has both joints and commanded poses",
-                found=", ".join(
-                    column for column in columns if column.startswith(("command.", "joint."))
-                ),
-                expected="either columns command.* or columns joint.*",
-                hint="what the controller was sent counts",
+                Fault(
+                    "excluding-columns",
+                    "the file has both joints and commanded poses",
+                    found=", ".join(
+                        column for column in columns if column.startswith(("command.", "joint."))
+                    ),
+                    expected="either columns command.* or columns joint.*",
+                    hint="what the controller was sent counts",
+                )
             )
         if not beginnings and not unknown:
             commands = ", ".join(f"command.{freedom}" for freedom in self.machine.commanded)
             joints = ", ".join(f"joint.{joint}" for joint in self.machine.joints)
             self._tell(
-                "missing-column",
-                "nothing says where the machine was commanded to",
-                found=", ".join(columns) or "no column",
-                expected=f"{commands}; or {joints}",
+                Fault(
+                    "missing-column",
+                    "nothing says where the machine was commanded to",
+                    found=", ".join(columns) or "no column",
+                    expected=f"{commands}; or {joints}",
+                )
             )
         for beginning in beginnings if len(beginnings) == 1 else ():
             of_machine = [beginning + name for name in self._own(beginning)]
             lacking = [column for column in of_machine if column not in columns]
             if lacking and not any(column.startswith(beginning) for column in strange):
                 self._tell(
-                    "missing-column",
-                    f"there is no column {', '.join(lacking)}",
-                    found=", ".join(column for column in columns if column.startswith(beginning)),
-                    expected=", ".join(of_machine),
+                    Fault(
+                        "missing-column",
+                        f"there is no column {', '.join(lacking)}",
+                        found=", ".join(
+                            column for column in columns if column.startswith(beginning)
+                        ),
+                        expected=", ".join(of_machine),
+                    )
                 )
         kinds = [REGISTRY[instrument.kind] for instrument in self.header.instruments]
         readings = [column for column in columns if column in reading_columns(self.machine)]
@@ -303,30 +311,30 @@ class _Reading:
         wrong = unknown or any(column.startswith("strut.") for column in strange)
         if not readings and not silent and not wrong:
             self._tell(
-                "nothing-measured",
-                "no column holds what was measured",
-                found=", ".join(columns) or "no column",
-                expected="x, y, z, a, b, c, distance, strut.*.length, strut.*.direction.x or "
-                "strut.*.angle",
+                Fault(
+                    "nothing-measured",
+                    "no column holds what was measured",
+                    found=", ".join(columns) or "no column",
+                    expected="x, y, z, a, b, c, distance, strut.*.length, strut.*.direction.x or "
+                    "strut.*.angle",
+                )
             )
         elif readings and not self.header.declared:
             return
         if INSTRUMENT not in columns and len(self.header.declared) > 1:
             self._tell(
-                "missing-column",
-                "there is no column instrument, but more than one instrument",
-                found=", ".join(self.header.declared),
-                expected="a column instrument with the name of one in each row",
+                Fault(
+                    "missing-column",
+                    "there is no column instrument, but more than one instrument",
+                    found=", ".join(self.header.declared),
+                    expected="a column instrument with the name of one in each row",
+                )
             )
 
-    def _tell(
-        self, code: str, message: str, *, found: str, expected: str, hint: str | None = None
-    ) -> None:
+    def _tell(self, fault: Fault) -> None:
         """A problem of the header of the table."""
         line = None if self.read.table is None else self.read.table.header_line
-        self.problems.append(
-            Problem(code, message, self.file, line, found=found, expected=expected, hint=hint)
-        )
+        self.problems.append(fault.at(self.file, line))
 
     def _stacked(self, table: DataTable, beginning: str, names: tuple[str, ...]) -> Floats | None:
         """(n_row, n) of columns that are all there, else None."""
@@ -379,22 +387,10 @@ class _Report:
     problems: list[Problem]
     misnamed: bool
 
-    def __call__(
-        self,
-        code: str,
-        message: str,
-        *,
-        row: int | None = None,
-        column: str | None = None,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
-        if code == "missing-column" and self.misnamed:
+    def __call__(self, fault: Fault, *, row: int | None = None, column: str | None = None) -> None:
+        if fault.code == "missing-column" and self.misnamed:
             return
-        problem = self.table.problem(
-            Fault(code, message, found, expected, hint), row=row, column=column
-        )
+        problem = self.table.problem(fault, row=row, column=column)
         if row is None:
             problem = replace(problem, line=self.table.header_line)
         self.problems.append(problem)

@@ -19,6 +19,7 @@ from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
 from truepose.calibration.measurements.measurements import Measurements, unloaded_at_reference
 from truepose.calibration.observables import OBSERVABLES
+from truepose.errors import Fault
 from truepose.files.data_file import MOST_PROBLEMS
 from truepose.files.wording import counted, one_of
 from truepose.machine import Condition, Machine
@@ -104,17 +105,7 @@ class MeasurementRows:
 class Report(Protocol):
     """Where problems go, with their place as the source of the rows knows it."""
 
-    def __call__(
-        self,
-        code: str,
-        message: str,
-        *,
-        row: int | None = None,
-        column: str | None = None,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
+    def __call__(self, fault: Fault, *, row: int | None = None, column: str | None = None) -> None:
         """Note a problem of a row (from 0), a column, or the whole."""
 
     def shown(self, column: str, row: int) -> str:
@@ -193,12 +184,14 @@ def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Fl
                 faults = machine.kernel.explain(rows.commands[row])
                 why = f"{name}: {faults_text(machine, faults)}" if faults else name
             report(
-                "commanded-out-of-reach",
-                "the machine cannot be commanded to this pose",
+                Fault(
+                    "commanded-out-of-reach",
+                    "the machine cannot be commanded to this pose",
+                    found=why,
+                    expected="a pose within the travel of every drive",
+                    hint="is it a pose of this machine, in the unit of the header?",
+                ),
                 row=int(row),
-                found=why,
-                expected="a pose within the travel of every drive",
-                hint="is it a pose of this machine, in the unit of the header?",
             )
     if rows.joints is not None:
         good = np.asarray(np.isfinite(rows.joints).all(axis=1), np.bool_)
@@ -211,12 +204,14 @@ def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Fl
         placements[usable[solved]] = machine.kernel.placement_of(poses[solved])
         for row, code in zip(usable[~solved].tolist(), status[~solved].tolist(), strict=True):
             report(
-                "commanded-out-of-reach",
-                "the machine has no pose at these joints",
+                Fault(
+                    "commanded-out-of-reach",
+                    "the machine has no pose at these joints",
+                    found=STATUS[code],
+                    expected="joints at which the platform can be",
+                    hint="are they joints of this machine, in the unit of the header?",
+                ),
                 row=row,
-                found=STATUS[code],
-                expected="joints at which the platform can be",
-                hint="are they joints of this machine, in the unit of the header?",
             )
     return joints, placements
 
@@ -235,12 +230,14 @@ def _within_travel(machine: Machine, rows: MeasurementRows, good: Flags, report:
         for row in np.flatnonzero(outside).tolist():
             column = f"joint.{drive.name}"
             report(
-                "commanded-out-of-reach",
-                "the joint is out of its travel",
+                Fault(
+                    "commanded-out-of-reach",
+                    "the joint is out of its travel",
+                    found=report.shown(column, row),
+                    expected=f"a joint from {ends[0]} to {ends[1]} {unit.label}",
+                ),
                 row=row,
                 column=column,
-                found=report.shown(column, row),
-                expected=f"a joint from {ends[0]} to {ends[1]} {unit.label}",
             )
     return within
 
@@ -252,12 +249,14 @@ def _conditions(machine: Machine, rows: MeasurementRows, report: Report) -> tupl
         column = f"temperature.{part}"
         for row in np.flatnonzero((values <= 0.0) & ~rows.spoilt(column)).tolist():
             report(
-                "not-positive",
-                "a temperature is above absolute zero",
+                Fault(
+                    "not-positive",
+                    "a temperature is above absolute zero",
+                    found=report.shown(column, row),
+                    expected="a temperature above absolute zero",
+                ),
                 row=row,
                 column=column,
-                found=report.shown(column, row),
-                expected="a temperature above absolute zero",
             )
     names = [*rows.temperatures, *WRENCH]
     blank = np.full(rows.n_row, math.nan)
@@ -328,10 +327,12 @@ class _Observations:
             # A row of an unknown instrument may be meant to be its.
             if (self.rows.instrument >= 0).all():
                 self.report(
-                    "no-rows",
-                    f"no row is of the instrument {instrument.name}",
-                    found="nothing",
-                    expected=f'a row with "{instrument.name}" in the column instrument',
+                    Fault(
+                        "no-rows",
+                        f"no row is of the instrument {instrument.name}",
+                        found="nothing",
+                        expected=f'a row with "{instrument.name}" in the column instrument',
+                    )
                 )
             return
         self._refuse_unwanted(instrument, kind, own_rows)
@@ -379,13 +380,15 @@ class _Observations:
         spoilt = self.rows.spoilt(name)
         for row in np.flatnonzero(filled & (of_row <= 0.0) & ~spoilt).tolist():
             self.report(
-                "not-positive",
-                "a standard uncertainty is above zero",
+                Fault(
+                    "not-positive",
+                    "a standard uncertainty is above zero",
+                    found=self.report.shown(name, row),
+                    expected="a standard uncertainty above zero",
+                    hint="a reading without uncertainty would outweigh all others",
+                ),
                 row=row,
                 column=name,
-                found=self.report.shown(name, row),
-                expected="a standard uncertainty above zero",
-                hint="a reading without uncertainty would outweigh all others",
             )
         stated = instrument.uncertainty_of(observable)
         if stated is not None:
@@ -393,13 +396,15 @@ class _Observations:
         lacking = np.flatnonzero(filled & np.isnan(of_row) & ~spoilt)
         if lacking.size:
             self.report(
-                "no-uncertainty",
-                f"nothing says how uncertain {column} of {instrument.name} is, "
-                f"in {counted(lacking.size, 'row')}",
+                Fault(
+                    "no-uncertainty",
+                    f"nothing says how uncertain {column} of {instrument.name} is, "
+                    f"in {counted(lacking.size, 'row')}",
+                    found="no standard uncertainty",
+                    expected=f"an uncertainty of the instrument, or a column {name}",
+                ),
                 row=int(lacking[0]),
                 column=column,
-                found="no standard uncertainty",
-                expected=f"an uncertainty of the instrument, or a column {name}",
             )
         return of_row
 
@@ -411,12 +416,14 @@ class _Observations:
                 continue
             for row in np.flatnonzero(own_rows & self.rows.filled(name)).tolist():
                 self.report(
-                    "unwanted-value",
-                    f"the instrument of this row, {instrument.name}, does not read this",
+                    Fault(
+                        "unwanted-value",
+                        f"the instrument of this row, {instrument.name}, does not read this",
+                        found=self._shown(name, row),
+                        expected=f"an empty cell; the kind {kind.name} reads {words}",
+                    ),
                     row=row,
                     column=name,
-                    found=self._shown(name, row),
-                    expected=f"an empty cell; the kind {kind.name} reads {words}",
                 )
         for name, values in self.rows.uncertainties.items():
             column = name.removesuffix(UNCERTAINTY)
@@ -427,12 +434,14 @@ class _Observations:
                 read = own_rows
             for row in np.flatnonzero(own_rows & ~read & ~np.isnan(values)).tolist():
                 self.report(
-                    "unwanted-value",
-                    "an uncertainty of what the row does not have",
+                    Fault(
+                        "unwanted-value",
+                        "an uncertainty of what the row does not have",
+                        found=self.report.shown(name, row),
+                        expected=f"an empty cell, or a value in the column {column}",
+                    ),
                     row=row,
                     column=name,
-                    found=self.report.shown(name, row),
-                    expected=f"an empty cell, or a value in the column {column}",
                 )
 
     def _shown(self, column: str, row: int) -> str:
@@ -455,51 +464,61 @@ class _Observations:
         if not used:
             some = one_of(own, limit=8)
             self.report(
-                "missing-column",
-                f"nothing is read by the instrument {instrument.name}, of kind {kind.name}",
+                Fault(
+                    "missing-column",
+                    f"nothing is read by the instrument {instrument.name}, of kind {kind.name}",
+                    found="no value in its rows",
+                    expected=f"a column of readings: {some}",
+                ),
                 row=int(np.flatnonzero(own_rows)[0]),
-                found="no value in its rows",
-                expected=f"a column of readings: {some}",
             )
             return
         if kind.most is not None and len(used) > kind.most:
             self.report(
-                "unwanted-value",
-                f"the instrument {instrument.name} reads {len(used)} columns",
+                Fault(
+                    "unwanted-value",
+                    f"the instrument {instrument.name} reads {len(used)} columns",
+                    found=", ".join(used),
+                    expected=f"at most {kind.most} of {', '.join(kind.reads)} of kind {kind.name}",
+                    hint='an instrument that reads x, y and z is of kind "position"',
+                ),
                 row=int(np.flatnonzero(own_rows & self.rows.filled(used[kind.most]))[0]),
                 column=used[kind.most],
-                found=", ".join(used),
-                expected=f"at most {kind.most} of {', '.join(kind.reads)} of kind {kind.name}",
-                hint='an instrument that reads x, y and z is of kind "position"',
             )
         empty = own_rows & ~np.any([self.rows.filled(name) for name in used], axis=0)
         for row in np.flatnonzero(empty).tolist():
             self.report(
-                "empty-cell",
-                f"the row has no reading of the instrument {instrument.name}",
+                Fault(
+                    "empty-cell",
+                    f"the row has no reading of the instrument {instrument.name}",
+                    found="nothing",
+                    expected=f"a value in a column of {', '.join(used[:8])}",
+                ),
                 row=row,
-                found="nothing",
-                expected=f"a value in a column of {', '.join(used[:8])}",
             )
 
     def _require_column(self, instrument: Instrument, name: str, own_rows: Flags) -> None:
         if name not in self.rows.readings:
             self.report(
-                "missing-column",
-                f"there is no column {name}, which the instrument {instrument.name} "
-                f"of kind {instrument.kind} needs",
-                found="no such column",
-                expected=f"{name}, as the platform moves in it",
+                Fault(
+                    "missing-column",
+                    f"there is no column {name}, which the instrument {instrument.name} "
+                    f"of kind {instrument.kind} needs",
+                    found="no such column",
+                    expected=f"{name}, as the platform moves in it",
+                )
             )
             return
         for row in np.flatnonzero(own_rows & ~self.rows.filled(name)).tolist():
             self.report(
-                "empty-cell",
-                f"the instrument of this row, {instrument.name}, needs a value",
+                Fault(
+                    "empty-cell",
+                    f"the instrument of this row, {instrument.name}, needs a value",
+                    found="nothing",
+                    expected="a number",
+                ),
                 row=row,
                 column=name,
-                found="nothing",
-                expected="a number",
             )
 
     def _check_signs(self, kind: Kind, own_rows: Flags, own: Mapping[str, ReadingColumn]) -> None:
@@ -511,12 +530,14 @@ class _Observations:
                 own_rows & (values <= 0.0) & ~self.rows.spoilt(name)
             ).tolist():
                 self.report(
-                    "not-positive",
-                    "a length is above zero",
+                    Fault(
+                        "not-positive",
+                        "a length is above zero",
+                        found=self.report.shown(name, row),
+                        expected="a length above zero",
+                    ),
                     row=row,
                     column=name,
-                    found=self.report.shown(name, row),
-                    expected="a length above zero",
                 )
 
     def _check_directions(self, own_rows: Flags) -> None:
@@ -527,12 +548,14 @@ class _Observations:
             for component, name in enumerate(names):
                 for row in np.flatnonzero(filled.any(axis=0) & ~filled[component]).tolist():
                     self.report(
-                        "empty-cell" if name in self.rows.readings else "missing-column",
-                        "a direction has three components",
+                        Fault(
+                            "empty-cell" if name in self.rows.readings else "missing-column",
+                            "a direction has three components",
+                            found="nothing",
+                            expected="a number",
+                        ),
                         row=row,
                         column=name,
-                        found="nothing",
-                        expected="a number",
                     )
             good = filled.all(axis=0) & ~np.any([self.rows.spoilt(name) for name in names], axis=0)
             if not good.any():
@@ -541,12 +564,14 @@ class _Observations:
             length = np.linalg.norm(vectors, axis=1)
             for row in np.flatnonzero(good & (np.abs(length - 1.0) > UNIT_LENGTH)).tolist():
                 self.report(
-                    "not-a-direction",
-                    f"the direction of strut {strut.name} is no unit vector",
+                    Fault(
+                        "not-a-direction",
+                        f"the direction of strut {strut.name} is no unit vector",
+                        found=f"a vector of length {length[row]:.6g}",
+                        expected=f"a length of 1, within {UNIT_LENGTH:g}",
+                    ),
                     row=row,
                     column=names[0].removesuffix(".x"),
-                    found=f"a vector of length {length[row]:.6g}",
-                    expected=f"a length of 1, within {UNIT_LENGTH:g}",
                 )
 
 

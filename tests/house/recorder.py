@@ -254,7 +254,8 @@ def main() -> int:
     options = parser.parse_args()
     if options.command == "record":
         record(options.folder, options.only, options.jobs)
-        summary(options.folder)
+        if options.only == "*":
+            summary(options.folder)
         return 0
     return compare_records(options.old, options.new, options.relative, options.mask_sentences)
 

@@ -80,6 +80,8 @@ def difference(old: Path, new: Path, relative: float, mask: bool) -> list[str]:
 
 def parts_of(name: str, text: str, mask: bool) -> Parts:
     """A file in parts, by its form."""
+    if name.endswith(".exit"):
+        return [("exit", text)]
     if text.startswith(("{", "[")):
         try:
             return list(json_parts(json.loads(text), "", mask))

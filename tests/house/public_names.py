@@ -337,8 +337,8 @@ def registered() -> Iterator[str]:
     yield from (f"controller {name}" for name in CONTROLLERS)
     yield from (f"instrument {name}" for name in instruments.REGISTRY)
     schema = (REPOSITORY / "docs" / "machine_file.schema.json").read_text(encoding="utf-8")
-    for match in re.finditer(r'"distribution": \{[^{}]*?"enum": \[([^\]]*)\]', schema):
-        yield from (f"distribution {name}" for name in re.findall(r'"([^"]+)"', match[1]))
+    for match in re.finditer(r'"distribution": \{\s*"description": "([^"]*)"', schema):
+        yield from (f"distribution {name}" for name in match[1].split(", "))
     yield from (f"kind {path.stem}" for path in MACHINES.glob("*.toml"))
 
 

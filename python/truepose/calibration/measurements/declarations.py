@@ -296,7 +296,8 @@ class _Reader:
                         "missing",
                         found="nothing",
                         expected='"base", "unknown" or a table: '
-                        '{ origin = ["0 mm", "0 mm", "0 mm"], rotation = ["0 deg", "0 deg", "0 deg"] }',
+                        '{ origin = ["0 mm", "0 mm", "0 mm"], '
+                        'rotation = ["0 deg", "0 deg", "0 deg"] }',
                         hint="readings mean nothing without the frame that they are in",
                     ),
                     (*key, "frame"),

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from truepose._kernel import elements
+from truepose.compensation.remainder_struts import KINDS as WITH_MAJORANT
+from truepose.machine import Machine
 
 Vector = NDArray[np.float64]
 Row = Mapping[str, Any]
@@ -57,6 +59,12 @@ def is_strut(kind: str) -> bool:
 def has_carriage(kind: str) -> bool:
     """Whether it moves a body along a line: neither the strut itself, nor an arm."""
     return kind in KINDS and not turns(kind) and not is_strut(kind)
+
+
+def has_majorant(machine: Machine) -> bool:
+    """Whether the remainder of compensation knows all parts; of the others nothing is proven."""
+    known = all(drive.kind in WITH_MAJORANT for drive in machine.drives)
+    return known and not machine.kernel.overconstrained
 
 
 def fields(dimension: str, *, shape: int | None = None) -> tuple[str, ...]:

@@ -9,13 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 import truepose as tp
+from drive_kinds import has_majorant
 from machine_under_test import OK, MachineUnderTest
 from made_source import MadeSource, sizes, with_sources
 from random_machines import DrawnMachine
 from sweeps import thinned
 from truepose.compensation.corrected import corrected
 from truepose.compensation.remainder import Bounds, Remainder
-from truepose.compensation.remainder_struts import KINDS
 from truepose.machine import Machine
 from truepose.runs.first_order import ExactError, first_order
 from truepose.runs.poses import PoseRun
@@ -93,12 +93,6 @@ class State:
     def _targets(self, pose: int, t: Floats) -> Floats:
         beyond = self.beyond(pose, t)
         return np.concatenate([np.abs(beyond), self.norms(beyond)], axis=1)
-
-
-def has_majorant(machine: Machine) -> bool:
-    """Whether the remainder knows all parts; of the others nothing is proven."""
-    known = all(drive.kind in KINDS for drive in machine.drives)
-    return known and not machine.kernel.overconstrained
 
 
 def it_holds(machine: Machine, poses: Floats, *, after: bool, seed: int) -> float:

@@ -22,9 +22,10 @@ def served(name: str, machine: str) -> Export | None:
     try:
         return export(tp.load(MACHINES / f"{machine}.toml"), name)
     except RequestError as refusal:
-        assert {problem.code for problem in refusal.problems} <= REFUSALS
-        assert all(problem.expected for problem in refusal.problems)
-        return None
+        problems = refusal.problems
+    assert {problem.code for problem in problems} <= REFUSALS
+    assert all(problem.expected for problem in problems)
+    return None
 
 
 @pytest.mark.parametrize("name", REGISTRY)

@@ -249,7 +249,7 @@ impl Search {
                     a[k] = reach.mul_add(S::load(&NET.dual[i][k][first..]), a[k]);
                 }
             }
-            for lane in 0..S::WIDTH.min(NET.cones - first) {
+            for lane in 0..S::WIDTH.min(NET.cones.saturating_sub(first)) {
                 let a = [a[0].lane(lane), a[1].lane(lane), a[2].lane(lane)];
                 self.keep(NET.corners[first + lane], a, enough);
             }

@@ -535,6 +535,7 @@ def _condition(machine: Machine) -> str:
     parts += vector("acceleration", known.acceleration, "acceleration")
     if known.gravity != STANDARD_GRAVITY:
         parts.append(f"gravity {in_file_units(machine, known.gravity, 'acceleration')}")
+    parts += [f"{key} {value}" for key, value in known.source_keys.items()]
     return "; ".join(parts)
 
 

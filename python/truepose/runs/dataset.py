@@ -293,4 +293,9 @@ def _condition(condition: Condition) -> dict[str, object]:
         "envelope_normal": None if envelope is None else envelope.normal,
         "gravity_m_per_s2": condition.gravity,
         "acceleration_m_per_s2": list(condition.acceleration),
+        **{
+            key: value
+            for table in condition.source_tables
+            for key, value in table.model_dump(mode="json").items()
+        },
     }

@@ -22,9 +22,11 @@ from truepose.files.document import ARRAY_TABLES
 from truepose.machine import Machine
 from truepose.machine.shared_keys import EACH
 from truepose.machine.tables.workspace import WAYS
+from truepose.sources import REGISTRY
 from truepose.sources.actuator import Actuator
 from truepose.sources.guideway import Guideway
 from truepose.sources.sensor import Sensor
+from truepose.sources.tolerance import DimensionalTolerance
 
 Row = dict[str, Any]
 Edit = Callable[[str, Row], Row]
@@ -34,7 +36,6 @@ _JOINTS = ("base_joint", "platform_joint")
 _CLEARANCES = ("clearance", "axial_clearance")
 _LEANS = ("squareness", "parallelism")
 _FORCES = ("force", "cutting", "kienzle")
-_DRIVE_SOURCES = ("backlash", "sensor", "actuator", "guideway")
 _LENGTH_TOLERANCE = "length_tolerance"
 _OTHERS = "# what else its parts deviate by at this pose:"
 
@@ -58,18 +59,20 @@ class OneValues:
     def no_sources(self) -> None:
         """Take out every key of an error source, and all that acts: the condition is neutral."""
         self._no_play()
-        for key in _DRIVE_SOURCES:
-            self._rewrite("drive", key, lambda path, row: {})
-        self._rewrite("strut", "screw", lambda path, row: {})
+        for source in REGISTRY:
+            if source is not DimensionalTolerance:  # `tolerances` has its keys, in their order
+                for table, model in source.tables.items():
+                    for key in model.model_fields:
+                        self._take_out(table, key)
         condition = self._text.toml.get("condition", {})
         reference = condition.get("reference_temperature")
         if condition:
             del self._text.toml["condition"]
-        table = tomlkit.table()
+        neutral = tomlkit.table()
         if reference is not None:
-            table["reference_temperature"] = reference
-        table["gravity"] = "0 m/s^2"
-        self._text.append(tomlkit.dumps({"condition": table}))
+            neutral["reference_temperature"] = reference
+        neutral["gravity"] = "0 m/s^2"
+        self._text.append(tomlkit.dumps({"condition": neutral}))
 
     def force(self, force: Floats) -> None:
         """A force (3,), N, base axes, in place of the envelope and of what gave one before."""
@@ -230,6 +233,13 @@ class OneValues:
         """What `[each.*]` says for the rows of a table; empty where it says nothing."""
         each = self._text.toml.get(EACH, {})
         return each.get(table, {})
+
+    def _take_out(self, table: str, key: str) -> None:
+        """Take a key out of a table, or of every row of it."""
+        if table in ARRAY_TABLES:
+            self._rewrite(table, key, lambda path, row: {})
+        elif table in self._text.toml:
+            self._text.toml[table].pop(key, None)
 
     def _rewrite(self, table: str, key: str, edit: Edit) -> None:
         """Edit the table of a key in every row, which may have it from `[each.*]`."""

@@ -10,6 +10,7 @@ are worked out here once, for everything that combines them.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,8 +22,11 @@ from truepose.arrays import Flags, Floats, Indices
 from truepose.machine import Machine
 from truepose.probability.domain import Domain
 from truepose.runs.displacement import ParameterDeviation, sum_deviations
-from truepose.sources import REGISTRY, Deviation, PoseBlock, Source
+from truepose.sources import Deviation, PoseBlock, Source
 from truepose.sources.deviation import Distribution
+
+STREAM_BYTES = 4
+"""Of a hash: numbers of a variable and of its stream have room together in 64 bits."""
 
 ROUNDING = 1e-14
 """By which a band is made wider where its middle and its half are rounded, so that none is lost."""
@@ -38,8 +42,8 @@ class Variables:
     `variables` (k,): which variable moves the column; `half_width` (n or 1, k): its deviation,
     m, rad or 1, where that variable is +1. `distributions`, `names` (unique) and `sources` of
     the n_variable variables, and the `domain` that they lie in. `streams`, `numbers`
-    (n_variable,): identity for random numbers, whatever else acts: the place of the source in
-    the registry, and the variable's number in that source's deviation. `correlation`
+    (n_variable,): identity for random numbers, whatever else acts: `stream_of` the source's name,
+    and the variable's number in that source's deviation. `correlation`
     (n_variable, n_variable): Pearson's; None where all are independent.
     """
 
@@ -126,8 +130,8 @@ def variables_of(
 ) -> Variables:
     """The same from what each source says there."""
     parts = [
-        _part(machine, source, position, deviation)
-        for position, (source, deviation) in enumerate(zip(sources, deviations, strict=True))
+        _part(machine, source, deviation)
+        for source, deviation in zip(sources, deviations, strict=True)
     ]
     counts = [len(part.names) for part in parts]
     first = np.cumsum([0, *counts])
@@ -168,6 +172,11 @@ def variables_of(
     )
 
 
+def stream_of(source: str) -> int:
+    """The stream of random numbers of a source, by its name: others beside it do not change it."""
+    return int.from_bytes(hashlib.sha256(source.encode()).digest()[:STREAM_BYTES], "big")
+
+
 def _rows(moved: ParameterDeviation, poses: Flags | slice) -> ParameterDeviation:
     """Deviations at some poses of a block."""
     parameters, shift = moved
@@ -189,7 +198,7 @@ class _Part:
     distributions: tuple[Distribution, ...]
 
 
-def _part(machine: Machine, source: Source, position: int, deviation: Deviation) -> _Part:
+def _part(machine: Machine, source: Source, deviation: Deviation) -> _Part:
     banded = deviation.banded
     numbers, variables = deviation.banded_variables
     columns = deviation.parameters[banded]
@@ -203,12 +212,9 @@ def _part(machine: Machine, source: Source, position: int, deviation: Deviation)
             names.append(moved[0])
         else:
             names.append(group or f"{source.name}: {moved[0]} and others")
-    kinds: list[type] = list(REGISTRY)
-    kind = type(source)
     return _Part(
         source=source.name,
-        # One that no registry has comes after all that it has, in the order given.
-        stream=kinds.index(kind) if kind in kinds else len(kinds) + position,
+        stream=stream_of(source.name),
         deviation=deviation,
         columns=columns,
         variables=variables,

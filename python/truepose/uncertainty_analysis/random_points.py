@@ -24,7 +24,7 @@ from truepose.sources.deviation import Distribution
 
 STUDENT = "student-t"
 
-_STREAM = 1 << 40
+_STREAM = 1 << 32
 """Variables that one stream can number."""
 
 SEEDS = 1 << 64

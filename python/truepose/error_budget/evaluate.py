@@ -17,27 +17,11 @@ from truepose.error_budget.guide_loads import GuideLoads
 from truepose.error_budget.largest import largest, lengths
 from truepose.machine import Condition, Machine
 from truepose.runs import displacement, percent
-from truepose.runs.dataset import (
-    QUANTITY_UNITS,
-    DatasetRows,
-    Schema,
-    Variable,
-    assemble,
-    label,
-    sizes,
-)
+from truepose.runs.dataset import Schema, Variable, label, quantity_coords
 from truepose.runs.first_order import effects_at, rows_of
-from truepose.runs.poses import (
-    OK,
-    PoseRun,
-    Progress,
-    is_path,
-    no_pose_left,
-    of_band,
-    requested_poses,
-    required_sources,
-)
+from truepose.runs.poses import OK, Progress, of_band
 from truepose.runs.quantities import quantities
+from truepose.runs.run import Run
 from truepose.runs.variables import variables_of
 from truepose.sources import Deviation, PoseBlock, Source
 
@@ -150,12 +134,11 @@ def budget(
     the condition asks for what the machine does not say (no-stiffness, no-expansion). What it warns
     of (guide-taken-rigid) is in the attribute `warnings`.
     """
-    given = machine.condition if condition is None else condition
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, given)
+    run = Run(machine, poses, condition, progress)
+    sources = run.sources
     kinds = quantities(machine.components)
-    lengths = sizes(machine, len(table), source=len(sources), quantity=len(kinds))
-    rows = DatasetRows(machine, SCHEMA, lengths)
+    lengths = {"source": len(sources), "component": len(machine.components)}
+    rows = run.begin(SCHEMA, source=len(sources))
     highest = {
         name: comparison.Highest(tuple(lengths[dim] for dim in SCHEMA[name].dims))
         for name in _HIGHEST
@@ -164,22 +147,20 @@ def budget(
     guides = GuideLoads(machine)
     distributions: list[dict[str, None]] = [{} for _ in sources]
 
-    walk = PoseRun(machine, table, given, progress, path=poses is None and is_path(machine))
-    for block in walk:
-        deviations = [source.deviation(machine, given, block) for source in sources]
+    for block in run:
+        deviations = [source.deviation(machine, run.condition, block) for source in sources]
         for found, deviation in zip(distributions, deviations, strict=True):
             found.update((str(deviation.distribution[k]), None) for k in deviation.banded)
         room = rows.room(block.indices.size)
         values, shifted, edges = _evaluate(machine, block, sources, deviations, room)
-        usable = walk.keep(block.indices, *shifted, *map(of_band, edges))
-        rows.append(block, values, usable)
+        usable = run.fill(block, values, *shifted, *map(of_band, edges))
         if usable.any():
             for name, running in highest.items():
                 running.add(values[_HIGHEST[name]][usable])
             statistics.add(values["largest"][usable])
             guides.add(block, usable)
     if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
+        raise run.no_pose_left()
 
     shares = comparison.share(statistics.highest[:, 0])
     over_all: dict[str, Any] = {name: running.value for name, running in highest.items()}
@@ -197,14 +178,9 @@ def budget(
             [" / ".join(found) or "none" for found in distributions],
             "distribution inside the band",
         ),
-        "quantity": label("quantity", list(kinds), "what is compared"),
-        "quantity_units": label(
-            "quantity", [QUANTITY_UNITS[kind] for kind in kinds], "unit of the quantity"
-        ),
+        **quantity_coords(machine, "what is compared"),
     }
-    dataset = assemble(
-        machine, given, SCHEMA, rows, table, walk.left_out, over_all=over_all, coords=coords
-    )
+    dataset = run.dataset(over_all=over_all, coords=coords)
     dataset.attrs["warnings"] = json.dumps(guides.warnings())
     return dataset
 

@@ -106,6 +106,8 @@ def sizes(machine: Machine, n_pose: int, **others: int) -> dict[str, int]:
         "component": len(machine.components),
         "joint": len(machine.joints),
         "closure": len(machine.closures),
+        "other_component": len(machine.components),
+        "quantity": len(quantities(machine.components)),
         **others,
     }
 
@@ -161,12 +163,12 @@ def label(dim: str, values: Any, long_name: str, units: str = "1") -> xr.Variabl
     return xr.Variable((dim,), values, {"long_name": long_name, "units": units})
 
 
-def quantity_coords(machine: Machine) -> dict[str, xr.Variable]:
+def quantity_coords(machine: Machine, long_name: str = "what has a size") -> dict[str, xr.Variable]:
     """What has a size, position and orientation, and its unit."""
     kinds = list(quantities(machine.components))
     units = [QUANTITY_UNITS[kind] for kind in kinds]
     return {
-        "quantity": label("quantity", kinds, "what has a size"),
+        "quantity": label("quantity", kinds, long_name),
         "quantity_units": label("quantity", units, "unit of the quantity"),
     }
 

@@ -158,7 +158,7 @@ class PoseRun:
         self.machine = machine
         self.poses = poses
         self.left_out = SkippedPoses()
-        self._condition = condition
+        self.condition = condition
         self._progress = progress
         self._times = times
         self._travel = Travel(machine) if path else None
@@ -178,7 +178,7 @@ class PoseRun:
         indices = np.arange(start, start + len(poses), dtype=np.intp)
         block = PoseBlock(
             self.machine,
-            self._condition,
+            self.condition,
             self.poses,
             indices,
             joints,

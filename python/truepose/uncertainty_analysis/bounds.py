@@ -15,25 +15,20 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from truepose.arrays import Flags, Floats
+from truepose.arrays import Floats
 from truepose.error_budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import DatasetRows, Schema, Variable, assemble, quantity_coords, sizes
-from truepose.runs.displacement import at_shifts
+from truepose.runs.dataset import Schema, Variable, quantity_coords
 from truepose.runs.first_order import ExactError, first_order
 from truepose.runs.poses import (
     OK,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
     of_band,
-    requested_poses,
-    required_sources,
 )
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import Variables, variables_at
+from truepose.runs.run import Run, in_parts
+from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.bounds_over_region import (
     bounds_over_region,
@@ -127,38 +122,22 @@ def _at_poses(
     ends: Ends,
     progress: Progress | None,
 ) -> xr.Dataset:
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, condition)
-    kinds = quantities(machine.components)
-    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
-    walk = PoseRun(machine, table, condition, path=poses is None and is_path(machine))
-    done = 0
-    for block in walk:
-        every = variables_at(machine, block, sources)
-        usable = walk.keep(block.indices, at_shifts(machine, block, every.alone, every.shift))
-        done += int((~usable).sum())
-        block, every = block.select(usable), ends.truncated(every.select(usable))
-        for start in range(0, block.indices.size, POSES):
-            chosen = np.zeros(block.indices.size, np.bool_)
-            chosen[start : start + POSES] = True
-            part = block.select(chosen)
-            moves = every.select(chosen)
-            value, effects, status = first_order(machine, part, moves)
-            usable = walk.keep(part.indices, of_band(status))
+    run = Run(machine, poses, condition)
+    run.begin(SCHEMA)
+    for block, every in run.with_variables():
+        every = ends.truncated(every)
+        for part, variables in in_parts(block, every, POSES):
+            value, effects, status = first_order(machine, part, variables)
+            usable = run.keep(part.indices, of_band(status))
             if usable.any():
-                part, moves = part.select(usable), moves.select(usable)
                 order = (value[usable], effects[usable])
-                rows.append(part, *_bounded(machine, part, moves, order, walk))
-            done += int(chosen.sum())
+                some = part.select(usable)
+                run.fill(some, *_bounded(machine, some, variables.select(usable), order))
             if progress is not None:
-                progress(done, len(table))
-    if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
-    found = assemble(
-        machine, condition, SCHEMA, rows, table, walk.left_out, coords=quantity_coords(machine)
-    )
-    found["status"] = found["status"].astype(str)
-    return found.assign_attrs(ends.attrs)
+                progress(int(part.indices[-1]) + 1, len(run.poses))
+    dataset = run.dataset(coords=quantity_coords(machine))
+    dataset["status"] = dataset["status"].astype(str)
+    return dataset.assign_attrs(ends.attrs)
 
 
 def proven_bounds(
@@ -201,9 +180,8 @@ def _bounded(
     block: PoseBlock,
     moves: Variables,
     order: tuple[Floats, Floats],
-    walk: PoseRun,
-) -> tuple[dict[str, np.ndarray], Flags]:
-    """Every variable over the poses of a block, and which of them are usable."""
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Every variable over the poses of a block, and a reason (n,) of each where it is unusable."""
     value, effects = order
     kinds = list(quantities(machine.components).values())
     found = worst_corners(ExactError(machine, block, moves), value, effects, moves.domain, kinds)
@@ -222,4 +200,4 @@ def _bounded(
         "reached_magnitude": found.most[:, 2 * m :],
         "linear": worst(value, moves.domain.reach(effects)),
     }
-    return values, walk.keep(block.indices, of_band(found.status))
+    return values, of_band(found.status)

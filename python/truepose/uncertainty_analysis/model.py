@@ -19,19 +19,15 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Flags, Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import DatasetRows, Schema, assemble, component_units, sizes
-from truepose.runs.displacement import at_shifts, displacement
+from truepose.runs.dataset import Schema, component_units
+from truepose.runs.displacement import displacement
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
     OK,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
-    requested_poses,
-    required_sources,
 )
-from truepose.runs.variables import Variables, variables_at
+from truepose.runs.run import Run
+from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
 from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.functions import derivatives
@@ -325,24 +321,14 @@ class Models:
         progress: Progress | None = None,
     ) -> None:
         self.machine = machine
-        self.condition = machine.condition if condition is None else condition
-        self.table = requested_poses(machine, poses)
-        self.sources = required_sources(machine, self.condition)
-        self._of_file = poses is None
         self._progress = progress
-        self._walk = PoseRun(
-            machine, self.table, self.condition, path=poses is None and is_path(machine)
-        )
+        self._run = Run(machine, poses, condition)
 
     def __iter__(self) -> Iterator[tuple[int, MachineModel]]:
-        total = len(self.table)
-        for block in self._walk:
-            moves = variables_at(self.machine, block, self.sources)
-            shifted = at_shifts(self.machine, block, moves.alone, moves.shift)
-            usable = self._walk.keep(block.indices, shifted)
-            for pose in np.flatnonzero(usable).tolist():
-                number = int(block.indices[pose])
-                yield number, MachineModel(self.machine, block, moves, pose)
+        total = len(self._run.poses)
+        for block, variables in self._run.with_variables():
+            for pose, number in enumerate(block.indices.tolist()):
+                yield number, MachineModel(self.machine, block, variables, pose)
                 if self._progress is not None:
                     self._progress(number + 1, total)
         if self._progress is not None:
@@ -350,41 +336,21 @@ class Models:
 
     def leave_out(self, model: MachineModel, status: int) -> None:
         """Set a pose aside for a reason that turned out, a kernel code or a number of `REASONS`."""
-        self._walk.left_out.add(model.at.indices, np.array([status], np.uint8))
+        self._run.left_out.add(model.at.indices, np.array([status], np.uint8))
 
-    def rows(self, schema: Schema, **others: int) -> DatasetRows:
-        """Room for a result over all poses; `others`: lengths of dims that no machine has."""
-        return DatasetRows(self.machine, schema, sizes(self.machine, len(self.table), **others))
+    def begin(self, schema: Schema, **others: int) -> None:
+        """Make room for a result over all poses; `others`: lengths of dims that no machine has."""
+        self._run.begin(schema, **others)
 
-    def append(
-        self, rows: DatasetRows, model: MachineModel, values: Mapping[str, ArrayLike]
-    ) -> None:
-        """One pose of a result, `values` without their dim pose."""
-        given = {name: np.asarray(value)[np.newaxis] for name, value in values.items()}
-        rows.append(model.at, given, np.ones(1, np.bool_))
-
-    def dataset(
-        self,
-        schema: Schema,
-        rows: DatasetRows,
-        *,
-        over_all: Mapping[str, Any] | None = None,
-        coords: Mapping[str, xr.Variable] | None = None,
-    ) -> xr.Dataset:
-        """The Dataset of the poses appended. Raises `RequestError` (no-pose-left) if none was."""
-        left_out = self._walk.left_out
-        if rows.count == 0:
-            raise no_pose_left(self.machine, self.table, left_out, of_file=self._of_file)
-        return assemble(
-            self.machine,
-            self.condition,
-            schema,
-            rows,
-            self.table,
-            left_out,
-            over_all=over_all,
-            coords=coords,
+    def fill(self, model: MachineModel, values: Mapping[str, ArrayLike]) -> None:
+        """One pose of the result, `values` without their dim pose."""
+        self._run.fill(
+            model.at, {name: np.asarray(value)[np.newaxis] for name, value in values.items()}
         )
+
+    def dataset(self, coords: Mapping[str, xr.Variable]) -> xr.Dataset:
+        """The Dataset of the poses filled. Raises `RequestError` (no-pose-left) if none was."""
+        return self._run.dataset(coords=coords)
 
 
 def models(

@@ -342,7 +342,7 @@ def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
     names, groups = list(sources), list(dict.fromkeys(sources.values()))
     correlated = any(each.drawing.linked.size for _, each, _ in poses)
     schema = {**SCHEMA, **CORRELATED} if correlated else SCHEMA
-    rows = found.rows(schema, parameter=len(names), source=len(groups))
+    found.begin(schema, parameter=len(names), source=len(groups))
     for model, each, values in poses:
         at = {
             "parameter": [names.index(name) for name in each.names],
@@ -354,9 +354,9 @@ def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
             name: _whole(variable, values.get(name, values["total"] * np.nan), at, lengths)
             for name, variable in schema.items()
         }
-        found.append(rows, model, whole)
+        found.fill(model, whole)
     coords = _coords(names, list(sources.values()), groups)
-    result = found.dataset(schema, rows, coords=coords)
+    result = found.dataset(coords)
     # Poses that were not come to are neither used nor left out.
     return result.assign_attrs(
         plan.attrs,

@@ -24,25 +24,18 @@ from truepose.error_budget.evaluate import FEW
 from truepose.error_budget.propagation import combine, coverage_factor
 from truepose.machine import Condition, Machine
 from truepose.runs.dataset import (
-    DatasetRows,
     Schema,
     Variable,
-    assemble,
     component_units,
     label,
-    sizes,
 )
 from truepose.runs.displacement import at_shifts
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
     OK,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
-    requested_poses,
-    required_sources,
 )
+from truepose.runs.run import Run
 from truepose.runs.variables import variables_at
 from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.arguments import required_digits, required_probability
@@ -230,15 +223,12 @@ def _of_machine(
     progress: Progress | None,
     asked: _Options,
 ) -> xr.Dataset:
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, condition)
-    lengths = sizes(machine, len(table), other_component=len(machine.components))
-    rows = DatasetRows(machine, asked.schema(), lengths)
+    run = Run(machine, poses, condition, progress)
+    rows = run.begin(asked.schema())
     units = component_units(machine)
     scale = np.array([machine.characteristic_length if unit == "m" else 1.0 for unit in units])
-    walk = PoseRun(machine, table, condition, progress, path=poses is None and is_path(machine))
-    for block in walk:
-        moves = variables_at(machine, block, sources)
+    for block in run:
+        moves = variables_at(machine, block, run.sources)
         variables = _Variables(
             moves.names,
             moves.distributions,
@@ -260,16 +250,8 @@ def _of_machine(
                 found |= _compared(found, effects, variables, asked, asked.sampled, numbers)
             for name, values in found.items():
                 room[name][some] = values
-        rows.append(block, room, walk.keep(block.indices, status))
-    if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
-    result = assemble(
-        machine,
-        condition,
-        asked.schema(),
-        rows,
-        table,
-        walk.left_out,
+        run.fill(block, room, status)
+    result = run.dataset(
         over_all={"reason": np.array(rows.arrays["reason"], np.str_)} if asked.sampled else {},
         coords={
             "other_component": label(

@@ -26,27 +26,19 @@ from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.probability.domain import Domain
 from truepose.runs.dataset import (
-    QUANTITY_UNITS,
-    DatasetRows,
     Schema,
     Variable,
-    assemble,
-    label,
-    sizes,
+    quantity_coords,
 )
 from truepose.runs.displacement import at_shifts
 from truepose.runs.first_order import ExactError, first_order
 from truepose.runs.poses import (
     OK,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
     of_band,
-    requested_poses,
-    required_sources,
 )
 from truepose.runs.quantities import quantities
+from truepose.runs.run import Run
 from truepose.runs.variables import variables_at
 from truepose.uncertainty_analysis.corners import WorstCorners, worst_corners
 from truepose.uncertainty_analysis.functions.dataset import function_dataset
@@ -121,45 +113,28 @@ def worst_case(
 def _of_machine(
     machine: Machine, poses: ArrayLike | None, condition: Condition, progress: Progress | None
 ) -> xr.Dataset:
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, condition)
-    kinds = quantities(machine.components)
-    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
+    run = Run(machine, poses, condition, progress)
+    rows = run.begin(SCHEMA)
+    kinds = list(quantities(machine.components).values())
     endless = Endless()
-    walk = PoseRun(machine, table, condition, progress, path=poses is None and is_path(machine))
-    for block in walk:
-        moves = variables_at(machine, block, sources)
+    for block in run:
+        moves = variables_at(machine, block, run.sources)
         value, effects, status = first_order(machine, block, moves)
         shifted = at_shifts(machine, block, moves.alone, moves.shift)
-        usable = walk.keep(block.indices, shifted, status)
+        usable = run.keep(block.indices, shifted, status)
         found = worst_corners(
             _only(usable, ExactError(machine, block, moves)),
             value[usable],
             effects[usable],
             moves.domain,
-            list(kinds.values()),
+            kinds,
         )
-        block = block.select(usable)
-        values = _values(found, value[usable], effects[usable], moves.domain, list(kinds.values()))
-        rows.append(block, values, walk.keep(block.indices, of_band(found.status)))
+        values = _values(found, value[usable], effects[usable], moves.domain, kinds)
+        run.fill(block.select(usable), values, of_band(found.status))
         endless.note(moves.names, moves.distributions)
-    if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
-    coords = {
-        "quantity": label("quantity", list(kinds), "what the norm is taken of"),
-        "quantity_units": label(
-            "quantity", [QUANTITY_UNITS[kind] for kind in kinds], "unit of the quantity"
-        ),
-    }
-    result = assemble(
-        machine,
-        condition,
-        SCHEMA,
-        rows,
-        table,
-        walk.left_out,
+    result = run.dataset(
         over_all={"search": np.array(rows.arrays["search"], np.str_)},
-        coords=coords,
+        coords=quantity_coords(machine, "what the norm is taken of"),
     )
     return result.assign_attrs(unbounded=str(endless))
 

@@ -67,7 +67,7 @@ def accuracy(
     Raises as `truepose.budget`, and `RequestError` (unknown-choice) for another state.
     """
     asked = _required_states(states)
-    population = Population.of(machine, poses, condition, progress)
+    population = Population(machine, poses, condition, progress)
     found: list[Answer] = []
     for state in asked:
         found += answers(population, state)

@@ -279,10 +279,7 @@ def _of_function(model: FunctionModel, asked: _Options) -> xr.Dataset:
     if asked.sampled is not None:
         sampled = asked.sampled.expand_dims("pose")
         found |= _compared(found, effects, variables, asked, sampled, np.zeros(1, np.intp))
-    schema = {
-        name: replace(variable, dims=variable.dims[1:])
-        for name, variable in asked.schema(SECOND_ORDER).items()
-    }
+    schema = asked.schema(SECOND_ORDER)
     result = function_dataset(schema, {name: found[name][0] for name in schema}, model)
     return result.assign_attrs(asked.attrs)
 

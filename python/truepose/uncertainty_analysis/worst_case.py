@@ -191,9 +191,7 @@ def _of_function(function: Callable[..., Any], inputs: Any) -> xr.Dataset:
         )
     values = _values(found, law.value[np.newaxis], law.effects[np.newaxis], domain, [])
     schema = {
-        name: Variable(each.dims[1:], each.units, each.long_name, each.dtype)
-        for name, each in SCHEMA.items()
-        if "quantity" not in each.dims
+        name: variable for name, variable in SCHEMA.items() if "quantity" not in variable.dims
     }
     endless = Endless()
     endless.note(model.names, model.distributions)

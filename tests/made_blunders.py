@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from made_measurements import made_measurements, poses_within
-from truepose.calibration.data_checks.nominal import Geometry, Placement, nominal_readings, turned
+from truepose.calibration.data_checks.nominal import Geometry, Placement, nominal_readings
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Machine
 from truepose.sources.tolerance import DimensionalTolerance
+from truepose.spatial import vector_to_matrix
 
 Floats = NDArray[np.float64]
 
@@ -63,7 +64,9 @@ def good(
         far = unknown * np.r_[random.uniform(-1.0, 1.0, 3), random.uniform(-0.3, 0.3, 3)]
         stated = Placement.stated(made.instruments[0])
         setups = [
-            Placement(stated.origin + far[:3], turned(far[3:]) @ stated.rotation, stated.target)
+            Placement(
+                stated.origin + far[:3], vector_to_matrix(far[3:]) @ stated.rotation, stated.target
+            )
         ]
     return with_noise(made, shown(machine, drawn(machine, seed), made, setups), seed)
 

@@ -18,16 +18,16 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
-    import xarray as xr
-    from numpy.typing import ArrayLike
-
     from truepose import errors
     from truepose._kernel import threads
     from truepose.calibration.calibrate import calibrate
+    from truepose.compensation.compensate import compensate
     from truepose.controllers import export
     from truepose.controllers.gcode import correct_program
+    from truepose.error_budget.evaluate import budget
+    from truepose.error_budget.over_time import over_time
+    from truepose.error_budget.strain import strain
     from truepose.machine import Condition, Machine
-    from truepose.runs.poses import Progress
     from truepose.uncertainty_analysis.bounds import bounds
     from truepose.uncertainty_analysis.functions.inputs import Input
     from truepose.uncertainty_analysis.monte_carlo import monte_carlo
@@ -44,12 +44,16 @@ _WHERE = {
     "Machine": "truepose.machine",
     "accuracy": "truepose.verdict.accuracy",
     "bounds": "truepose.uncertainty_analysis.bounds",
+    "budget": "truepose.error_budget.evaluate",
     "calibrate": "truepose.calibration.calibrate",
+    "compensate": "truepose.compensation.compensate",
     "correct_program": "truepose.controllers.gcode",
     "export": "truepose.controllers",
     "monte_carlo": "truepose.uncertainty_analysis.monte_carlo",
+    "over_time": "truepose.error_budget.over_time",
     "plan": "truepose.calibration.planning.plan",
     "shares": "truepose.uncertainty_analysis.shares",
+    "strain": "truepose.error_budget.strain",
     "threads": "truepose._kernel",
     "uncertainty": "truepose.uncertainty_analysis.uncertainty",
     "worst_case": "truepose.uncertainty_analysis.worst_case",
@@ -90,59 +94,6 @@ def load(path: str | Path, settings: Mapping[str, str] | Sequence[str] = ()) -> 
     from truepose import machine, sources
 
     return machine.load(path, settings=settings, registry=sources.REGISTRY)
-
-
-def budget(
-    machine: Machine,
-    poses: ArrayLike | None = None,
-    condition: Condition | None = None,
-    *,
-    progress: Progress | None = None,
-) -> xr.Dataset:
-    """The error budget over the workspace, or at `poses`; see `error_budget.evaluate`."""
-    from truepose.error_budget.evaluate import budget as evaluate
-
-    return evaluate(machine, poses, condition, progress=progress)
-
-
-def compensate(
-    machine: Machine,
-    poses: ArrayLike | None = None,
-    condition: Condition | None = None,
-    *,
-    progress: Progress | None = None,
-) -> xr.Dataset:
-    """Corrected commands and what then remains; see `truepose.compensation.compensate`."""
-    from truepose.compensation.compensate import compensate as correct
-
-    return correct(machine, poses, condition, progress=progress)
-
-
-def over_time(
-    machine: Machine,
-    poses: ArrayLike | None = None,
-    condition: Condition | None = None,
-    times: ArrayLike | None = None,
-    *,
-    progress: Progress | None = None,
-) -> xr.Dataset:
-    """The error at home, or at `poses`, over a temperature log; see `error_budget.over_time`."""
-    from truepose.error_budget.over_time import over_time as evaluate
-
-    return evaluate(machine, poses, condition, times, progress=progress)
-
-
-def strain(
-    machine: Machine,
-    poses: ArrayLike | None = None,
-    condition: Condition | None = None,
-    *,
-    progress: Progress | None = None,
-) -> xr.Dataset:
-    """Internal forces of an over-constrained machine; see `error_budget.strain`."""
-    from truepose.error_budget.strain import strain as evaluate
-
-    return evaluate(machine, poses, condition, progress=progress)
 
 
 def __getattr__(name: str) -> Any:

@@ -129,7 +129,7 @@ CATALOGUE: dict[str, str] = {
     "unusable-pose": "a pose cannot be used, and --strict makes that an error",
     "output-not-writable": "the output cannot be written",
     "extra-missing": "an optional package that this needs is not installed",
-    "output-ending": "the ending of the output file does not say what to write",
+    "output-ending": "the ending of the output file is not one that can be written",
     "output-is-input": "the output would write over the machine file",
     "output-exists": "a new file is wanted where there is one already",
     "machine-file-changed": "a machine file that is not the one that was read",

@@ -69,7 +69,7 @@ def test_linear(tmp_path: Path) -> None:
     assert np.abs(probed[:, 2]).max() < 1e-5
     # ... what the exported model counts: half a step and what the points are off ...
     model = KlipperLinear(machine, options)
-    values = model.taken(model.printed(np.array([p.start for p in model.parameters])))
+    values = model.parse(model.format(np.array([p.start for p in model.parameters])))
     joints = model.joints(values, wanted())
     counted = (tops - joints / MM) / data["step_mm"]
     assert np.abs(counted - steps).max() < 2.5
@@ -107,7 +107,7 @@ def test_rotary(tmp_path: Path) -> None:
     assert np.abs(probed[:, :2] - data["expected_xy"]).max() < 2e-3
     assert np.abs(probed[:, 2]).max() < 6.5e-4
     model = Rotary(machine, options)
-    values = model.taken(model.printed(np.array([p.start for p in model.parameters])))
+    values = model.parse(model.format(np.array([p.start for p in model.parameters])))
     counted = (ends - model.joints(values, wanted())) / data["step_rad"]
     assert np.abs(counted - steps).max() < 1.5
     reached, status = actual_of_joints(machine, ends - steps * data["step_rad"])

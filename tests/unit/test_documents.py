@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from pathlib import Path
 from typing import Any
@@ -50,4 +51,33 @@ def test_links_and_paths_lead_somewhere(document: Path) -> None:
     paths = re.findall(r"`((?:python|crates|docs|machines|tests|benchmarks)/[\w./-]+)`", text)
     missing = [path for path in (*links, *paths) if not (ROOT / path).exists()]
     assert links or paths
+    assert not missing
+
+
+def test_the_architecture_is_short_enough_to_be_read() -> None:
+    assert len((ROOT / "ARCHITECTURE.md").read_text("utf-8").split()) <= 900
+
+
+def test_the_picture_of_the_layers_is_fresh() -> None:
+    generator = ROOT / "docs" / "generate_architecture_picture.py"
+    spec = importlib.util.spec_from_file_location("generate", generator)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    written = (ROOT / "docs" / "architecture.svg").read_text("utf-8")
+    assert written == module.picture(), "run: python docs/generate_architecture_picture.py"
+
+
+def test_every_word_of_the_glossary_lives_somewhere() -> None:
+    text = (ROOT / "docs" / "glossary.md").read_text("utf-8")
+    rows = re.findall(r"^\| (.+) \| .+ \| (.+) \|$", text, re.MULTILINE)
+    paths = [path for _, where in rows for path in re.findall(r"`(.+?)`", where)]
+    roots = [ROOT / "python" / "truepose", ROOT / "crates"]
+    missing = [
+        path
+        for path in (one.replace("kernel/", "kernel/src/", 1) for one in paths)
+        if not any((root / path).exists() for root in roots)
+    ]
+    assert len(paths) >= len(rows) - text.count("| word |") > 0
     assert not missing

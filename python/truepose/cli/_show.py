@@ -41,8 +41,8 @@ def _print(shown: Iterable[Any]) -> None:
         force_terminal=terminal,
         width=None if terminal else PIPED_WIDTH,
     )
-    for each in shown:
-        console.print(each)
+    for table in shown:
+        console.print(table)
     sys.stdout.writelines(f"{line.rstrip(' ')}\n" for line in text.getvalue().splitlines())
 
 
@@ -56,10 +56,10 @@ def show_answers(answers: Iterable[Told], gains: Iterable[str] = ()) -> None:
     from rich.text import Text
 
     lines = RichTable.grid(padding=(0, 2))
-    for each in answers:
-        lines.add_row(Text(each.word, f"bold {COLOURS[each.colour]}"), Text(each.line))
-        if each.witness:
-            lines.add_row("", Text(f"witness: {each.witness}", style="dim"))
+    for answer in answers:
+        lines.add_row(Text(answer.word, f"bold {COLOURS[answer.colour]}"), Text(answer.line))
+        if answer.witness:
+            lines.add_row("", Text(f"witness: {answer.witness}", style="dim"))
     for sentence in gains:
         lines.add_row("", Text(sentence))
     if lines.row_count:

@@ -74,35 +74,35 @@ def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMAT
 def evaluate(request: Request, machine: Machine) -> xr.Dataset:
     """The error budget over the file's workspace; what it warns of goes to stderr."""
     with progress("error budget") as report:
-        found = truepose.budget(machine, progress=report)
-    refuse_left_out_of(request, machine, found)
-    for warning in warnings_of(found):
+        result = truepose.budget(machine, progress=report)
+    refuse_left_out_of(request, machine, result)
+    for warning in warnings_of(result):
         click.echo(f"warning[{warning['code']}]: {warning['sentence']}", err=True)
-    return found
+    return result
 
 
 def correct(request: Request, machine: Machine) -> xr.Dataset:
     """The compensation over the file's workspace."""
     with progress("compensation") as report:
-        found = truepose.compensate(machine, progress=report)
-    refuse_left_out_of(request, machine, found)
-    return found
+        result = truepose.compensate(machine, progress=report)
+    refuse_left_out_of(request, machine, result)
+    return result
 
 
 def strain(request: Request, machine: Machine) -> xr.Dataset:
     """The internal forces over the file's workspace."""
     with progress("internal forces") as report:
-        found = truepose.strain(machine, progress=report)
-    refuse_left_out_of(request, machine, found)
-    return found
+        result = truepose.strain(machine, progress=report)
+    refuse_left_out_of(request, machine, result)
+    return result
 
 
 def over_time(request: Request, machine: Machine) -> xr.Dataset:
     """The error over the file's temperature log, at home."""
     with progress("error over time") as report:
-        found = truepose.over_time(machine, progress=report)
-    refuse_left_out_of(request, machine, found)
-    return found
+        result = truepose.over_time(machine, progress=report)
+    refuse_left_out_of(request, machine, result)
+    return result
 
 
 def answers_of(machine: Machine, *states: str) -> tuple[Answer, ...]:
@@ -136,8 +136,8 @@ def with_calibration(study: Study, measurements: Path | None) -> Study:
     if measurements is None:
         return study
     with waiting("calibration"):
-        found = truepose.calibrate(study.machine, measurements)
-    return replace(study, calibration=found.dataset)
+        result = truepose.calibrate(study.machine, measurements)
+    return replace(study, calibration=result.dataset)
 
 
 def with_strain(request: Request, study: Study) -> Study:
@@ -188,11 +188,11 @@ def write_witness(request: Request, answers: Sequence[Answer], state: str) -> bo
 def no_witness(answers: Sequence[Answer], state: str) -> RequestError:
     """What is raised where a witness was asked for, and the answers of the state have none."""
     words = [
-        f"{each.quantity}: {each.answer or 'nothing asked'}"
-        for each in answers
-        if each.state == state
+        f"{answer.quantity}: {answer.answer or 'nothing asked'}"
+        for answer in answers
+        if answer.state == state
     ]
-    sampled = any(each.coverage is not None for each in answers)
+    sampled = any(answer.coverage is not None for answer in answers)
     hint = "a coverage has no one machine: try --set accuracy.at=worst" if sampled else None
     return _no_witness(f"{state}, {', '.join(words)}", hint)
 

@@ -51,16 +51,16 @@ SYNTAX = "x=200:400,y=100:300"
 def sample(request: Request, machine: Machine, **asked: Any) -> xr.Dataset:
     """The error sampled over the file's workspace; after Ctrl-C, what there is by then."""
     with progress("Monte Carlo", "samples") as report:
-        found = truepose.monte_carlo(machine, progress=report, **asked)
-    if found.attrs["interrupted"]:
-        count = int(found["samples"].sum())
+        result = truepose.monte_carlo(machine, progress=report, **asked)
+    if result.attrs["interrupted"]:
+        count = int(result["samples"].sum())
         click.echo(
-            f"Interrupted after {count:,} samples over {counted(found.sizes['pose'], 'pose')}: "
+            f"Interrupted after {count:,} samples over {counted(result.sizes['pose'], 'pose')}: "
             "the result is of these.",
             err=True,
         )
-    _steps.refuse_left_out_of(request, machine, found)
-    return found
+    _steps.refuse_left_out_of(request, machine, result)
+    return result
 
 
 def bound(
@@ -77,18 +77,18 @@ def bound(
     if region is not None:
         asked["region"] = read_region(machine, region)
     with progress("bounds", "poses" if region is None else "boxes") as report:
-        found = truepose.bounds(machine, progress=report, **asked)
+        result = truepose.bounds(machine, progress=report, **asked)
     if region is None:
-        _steps.refuse_left_out_of(request, machine, found)
-    return found
+        _steps.refuse_left_out_of(request, machine, result)
+    return result
 
 
 def share(request: Request, machine: Machine, **asked: Any) -> xr.Dataset:
     """The shares of the variance over the file's workspace."""
     with progress("shares") as report:
-        found = truepose.shares(machine, progress=report, **asked)
-    _steps.refuse_left_out_of(request, machine, found)
-    return found
+        result = truepose.shares(machine, progress=report, **asked)
+    _steps.refuse_left_out_of(request, machine, result)
+    return result
 
 
 def read_region(machine: Machine, text: str) -> dict[str, tuple[float, float]]:
@@ -130,18 +130,18 @@ def _bad_region(part: str, message: str, expected: str | None = None) -> Problem
     )
 
 
-def keeps_accuracy(machine: Machine, found: xr.Dataset) -> bool:
+def keeps_accuracy(machine: Machine, result: xr.Dataset) -> bool:
     """Whether the accuracy asked is proven to be kept: everywhere, and of all that is asked.
 
     It is not where a machine inside the bands was met that cannot be assembled.
     """
-    if "left_out_status" in found.coords and broken(found["left_out_status"].values).any():
+    if "left_out_status" in result.coords and broken(result["left_out_status"].values).any():
         return False
     asked = {"position": machine.accuracy.target, "orientation": machine.accuracy.angle_target}
-    if not (found["status"].values == uncertainty_tables.PROVEN).all():
+    if not (result["status"].values == uncertainty_tables.PROVEN).all():
         return False
-    sizes = found["magnitude"].values
-    limits = (asked.get(name) for name in reading.quantities(found))
+    sizes = result["magnitude"].values
+    limits = (asked.get(name) for name in reading.quantities(result))
     return all(
         limit is None or bool((sizes[..., at] <= limit).all()) for at, limit in enumerate(limits)
     )
@@ -171,30 +171,30 @@ def with_how_sure(study: Study) -> Study:
         axes = [at for at, name in enumerate(machine.commanded) if is_position(name)]
         chosen = study.poses[uncertainty_tables.spread_over(study.poses, axes)]
         work["ellipses"] = partial(sampling, chosen, samples=ELLIPSE_SAMPLES)
-    found: dict[str, xr.Dataset] = {}
+    results: dict[str, xr.Dataset] = {}
     missing: dict[str, str] = {}
     for name, of in work.items():
         try:
             with progress(name.replace("_", " "), UNITS.get(name, "poses")) as report:
-                found[name] = of(progress=report)
+                results[name] = of(progress=report)
         except RequestError as refusal:
             missing[name] = _why(refusal)
         else:
-            if found[name].attrs.get("interrupted"):
+            if results[name].attrs.get("interrupted"):
                 raise KeyboardInterrupt  # of a report nothing is wanted then
-    if "ellipses" in found:
-        there = found["ellipses"]["ellipse"].notnull().all(("axis", "other_axis")).values
-        found["ellipses"] = found["ellipses"].isel(pose=there)
+    if "ellipses" in results:
+        there = results["ellipses"]["ellipse"].notnull().all(("axis", "other_axis")).values
+        results["ellipses"] = results["ellipses"].isel(pose=there)
         if not there.any():
-            missing["ellipses"] = f"{found.pop('ellipses').attrs['not_assembled']}."
+            missing["ellipses"] = f"{results.pop('ellipses').attrs['not_assembled']}."
     return replace(
         study,
         sampled=_at_95(study),
-        worst_case=found.get("worst_case"),
-        monte_carlo=found.get("monte_carlo"),
-        ellipses=found.get("ellipses"),
-        bounds=found.get("bounds"),
-        shares=found.get("shares"),
+        worst_case=results.get("worst_case"),
+        monte_carlo=results.get("monte_carlo"),
+        ellipses=results.get("ellipses"),
+        bounds=results.get("bounds"),
+        shares=results.get("shares"),
         missing=missing,
     )
 

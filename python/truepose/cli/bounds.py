@@ -61,8 +61,8 @@ def command(region: str | None, gap: float | None, truncate: float | None, **opt
 
     request = Request(**options)
     machine = _steps.read_machine(request)
-    found = _uncertainty.bound(request, machine, region, gap, truncate)
-    result, tables = Result("bounds", machine, found), uncertainty_tables.bounds(machine, found)
+    proven = _uncertainty.bound(request, machine, region, gap, truncate)
+    result, tables = Result("bounds", machine, proven), uncertainty_tables.bounds(machine, proven)
     if region is None and truncate is None:
         answers = _steps.answers_of(machine, BEFORE)
         _steps.deliver(request, result, tables, answers)
@@ -70,5 +70,5 @@ def command(region: str | None, gap: float | None, truncate: float | None, **opt
     # Another set of machines or of poses than the verdict is on: what is proven of that.
     _steps.deliver(request, result, tables)
     if region is not None and request.format == "table":
-        click.echo(uncertainty_tables.sentence(machine, found))
-    return _steps.exit_code(request, _uncertainty.keeps_accuracy(machine, found))
+        click.echo(uncertainty_tables.sentence(machine, proven))
+    return _steps.exit_code(request, _uncertainty.keeps_accuracy(machine, proven))

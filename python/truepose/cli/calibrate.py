@@ -135,7 +135,7 @@ def command(**options: Any) -> int:
         require_writable(request.output, [".nc", ".json", ".csv"], inputs)
     machine = _steps.read_machine(request)
     with waiting("calibration"):
-        found = calibrate(
+        calibration = calibrate(
             machine,
             asked.data,
             identify=options["identify"],
@@ -145,11 +145,11 @@ def command(**options: Any) -> int:
             seed=options["seed"],
             margin=options["margin"],
         )
-        dataset = found.dataset
+        dataset = calibration.dataset
     result = Result("calibrate", machine, dataset)
     failure = None
     try:
-        _write_files(asked, found, result)
+        _write_files(asked, calibration, result)
     except TrueposeError as error:  # the answer is printed all the same
         failure = error
     shown = []
@@ -161,7 +161,7 @@ def command(**options: Any) -> int:
     _steps.deliver(replace(request, output=None), result, shown)
     if failure is not None:
         raise failure
-    return 0 if found.accepted or options["force"] else 1
+    return 0 if calibration.accepted or options["force"] else 1
 
 
 class _Options:
@@ -202,7 +202,7 @@ def _folded(text: str) -> str:
     return textwrap.fill(text, 100)
 
 
-def _write_files(asked: _Options, found: Calibration, result: Result) -> None:
+def _write_files(asked: _Options, calibration: Calibration, result: Result) -> None:
     """All files that are asked for, before anything is printed: a reader may stop reading."""
     from truepose.cli._steps import note_written
     from truepose.reporting import formats
@@ -213,10 +213,10 @@ def _write_files(asked: _Options, found: Calibration, result: Result) -> None:
     if asked.page is not None:
         _write_page(asked.request, result.machine, result.dataset, asked.page)
     if asked.machine_output is not None:
-        _write_machine(asked, found)
+        _write_machine(asked, calibration)
 
 
-def _write_machine(asked: _Options, found: Calibration) -> None:
+def _write_machine(asked: _Options, calibration: Calibration) -> None:
     """The calibrated file, unless the answer is no and nobody forces it."""
     from truepose.calibration.dataset import verdict_of
     from truepose.calibration.result.save import save
@@ -224,7 +224,7 @@ def _write_machine(asked: _Options, found: Calibration) -> None:
 
     assert asked.machine_output is not None
     assert asked.date is not None
-    if not (found.accepted or asked.force):
+    if not (calibration.accepted or asked.force):
         click.echo(
             f"{asked.machine_output} is not written, since the answer is no; --force writes it "
             "with the warning inside.",
@@ -232,7 +232,7 @@ def _write_machine(asked: _Options, found: Calibration) -> None:
         )
         return
     written = save(
-        found,
+        calibration,
         asked.machine_output,
         original=asked.request.machine_file,
         date=asked.date,
@@ -241,10 +241,10 @@ def _write_machine(asked: _Options, found: Calibration) -> None:
     )
     note_written(asked.machine_output)
     said = () if written.calibration is None else written.calibration.warning
-    for each in said:
-        if each != verdict_of(found):  # that is printed as the answer
-            click.echo(f"Warning, inside the file too: {each}.", err=True)
-    if not found.accepted:
+    for line in said:
+        if line != verdict_of(calibration):  # that is printed as the answer
+            click.echo(f"Warning, inside the file too: {line}.", err=True)
+    if not calibration.accepted:
         click.echo("The answer is NO: the file was forced, and says so inside.", err=True)
 
 

@@ -50,9 +50,9 @@ def command(**options: Any) -> int:
 
     request = Request(**options)
     machine = _steps.read_machine(request, [".json", ".csv"])
-    found = check_workspace(machine)
-    out = ~found.usable
-    _steps.refuse_left_out(request, machine, out.nonzero()[0], found.poses[out], found.status[out])
+    check = check_workspace(machine)
+    out = ~check.usable
+    _steps.refuse_left_out(request, machine, out.nonzero()[0], check.poses[out], check.status[out])
     answers: tuple[Answer, ...] = ()
     warnings: list[dict[str, str]] = []
     # Without a source the file may still be asked about its workspace, unless it asks for more.
@@ -71,13 +71,13 @@ def command(**options: Any) -> int:
         from truepose.cli._show import show_answers, show_tables
 
         show_answers(told(machine, answers), gains(answers))
-        show_tables(_tables(machine, found, answers))
+        show_tables(_tables(machine, check, answers))
     else:
-        click.echo(_text(request.format, machine, found, answers, warnings))
+        click.echo(_text(request.format, machine, check, answers, warnings))
     if request.output is not None:
         form = request.output.suffix.lower().removeprefix(".")
         with replacing(request.output) as temporary:
-            text = _text(form, machine, found, answers, warnings)
+            text = _text(form, machine, check, answers, warnings)
             temporary.write_text(text + "\n", encoding="utf-8")
         _steps.note_written(request.output)
     if not written:
@@ -85,7 +85,7 @@ def command(**options: Any) -> int:
     return int(not kept)
 
 
-def _tables(machine: Machine, found: WorkspaceCheck, answers: tuple[Answer, ...]) -> list[Table]:
+def _tables(machine: Machine, check: WorkspaceCheck, answers: tuple[Answer, ...]) -> list[Table]:
     from truepose.reporting import calibrated_files, inputs, tables, workspace_check
     from truepose.sources import not_included_text
 
@@ -97,7 +97,7 @@ def _tables(machine: Machine, found: WorkspaceCheck, answers: tuple[Answer, ...]
         inputs.condition(machine),
         tables.with_not_included(inputs.sources(machine), left_out),
         inputs.deviations(machine),
-        workspace_check.table(machine, found),
+        workspace_check.table(machine, check),
     ]
     return [*shown, tables.answers(machine, answers)] if answers else shown
 
@@ -105,7 +105,7 @@ def _tables(machine: Machine, found: WorkspaceCheck, answers: tuple[Answer, ...]
 def _text(
     form: str,
     machine: Machine,
-    found: WorkspaceCheck,
+    check: WorkspaceCheck,
     answers: tuple[Answer, ...],
     warnings: list[dict[str, str]],
 ) -> str:
@@ -147,7 +147,7 @@ def _text(
                 {"part": part, "why": NO_MATERIAL}
                 for part in not_included(machine, machine.condition)
             ],
-            "workspace": workspace_check.as_data(machine, found),
+            "workspace": workspace_check.as_data(machine, check),
             "answers": rows,
             "warnings": warnings,
         },

@@ -184,16 +184,16 @@ class _Reading:
 
     def position(self, option: str, text: str) -> dict[str, float]:
         """Coordinates by axis, m and rad, of "x=10,y=2 in". Raises `RequestError`."""
-        found = {}
-        for part in filter(None, (each.strip() for each in text.split(","))):
+        offsets = {}
+        for part in filter(None, (part_text.strip() for part_text in text.split(","))):
             name, equals, value = part.partition("=")
             axis = name.strip().lower()
             if not equals:
                 raise self._refusal(option, part, "an axis and a coordinate, such as x=10")
-            if axis in found:
+            if axis in offsets:
                 raise self._refusal(option, part, "every axis once")
-            found[axis] = self._quantity(option, value, "angle" if axis in "abc" else "length")
-        return found
+            offsets[axis] = self._quantity(option, value, "angle" if axis in "abc" else "length")
+        return offsets
 
     def _quantity(self, option: str, text: str, dimension: str) -> float:
         from truepose.errors import ReadingError
@@ -288,16 +288,16 @@ def _as_json(proof: Proof, *, written: bool) -> Mapping[str, object]:
     """The proof for programs, m and rad; the start in the program's own mm and degrees."""
 
     def of(errors: Errors) -> dict[str, object]:
-        found: dict[str, object] = {}
+        answer: dict[str, object] = {}
         for kind in ("position", "orientation"):
             worst = getattr(errors, kind)
-            found[kind] = worst and {
+            answer[kind] = worst and {
                 "maximum": worst.value,
                 "rms": getattr(errors, f"{kind}_rms"),
                 "line": worst.line,
                 "pose": dict(zip(proof.commanded, worst.pose, strict=True)),
             }
-        return found
+        return answer
 
     return {
         "command": "gcode",

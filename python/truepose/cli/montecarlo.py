@@ -74,7 +74,7 @@ def command(
 
     request = Request(**options)
     machine = _steps.read_machine(request)
-    found = _uncertainty.sample(
+    result = _uncertainty.sample(
         request,
         machine,
         samples=samples,
@@ -84,6 +84,6 @@ def command(
         sampling=sampling,
     )
     _steps.deliver(
-        request, Result("montecarlo", machine, found), uncertainty_tables.sampled(machine, found)
+        request, Result("montecarlo", machine, result), uncertainty_tables.sampled(machine, result)
     )
-    return INTERRUPTED if found.attrs["interrupted"] else 0
+    return INTERRUPTED if result.attrs["interrupted"] else 0

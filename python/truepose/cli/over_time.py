@@ -31,6 +31,8 @@ def command(**options: Any) -> int:
 
     request = Request(**options)
     machine = _steps.read_machine(request)
-    found = _steps.over_time(request, machine)
-    _steps.deliver(request, Result("over-time", machine, found), [tables.over_time(machine, found)])
+    result = _steps.over_time(request, machine)
+    _steps.deliver(
+        request, Result("over-time", machine, result), [tables.over_time(machine, result)]
+    )
     return 0

@@ -143,9 +143,9 @@ def command(
             require_writable(path, endings or [path.suffix.lower()], [request.machine_file])
     seconds, speed = _seconds(machine, dwell), _speed(machine, feed)
     chosen = _instruments(machine, instruments)
-    compared = [_instruments(machine, (each,)) for each in others]
+    compared = [_instruments(machine, (other,)) for other in others]
     with progress("plan", "starts") as report:
-        found = plan(
+        planned = plan(
             machine,
             chosen,
             count,
@@ -158,12 +158,14 @@ def command(
     text = None
     if program is not None:
         text = program_text(
-            machine, found.poses, instruments=found.instruments, dwell=seconds, feed=speed
+            machine, planned.poses, instruments=planned.instruments, dwell=seconds, feed=speed
         )
-    form = template_text(machine, found.poses, found.instruments) if template is not None else None
-    _steps.deliver(request, Result("plan", machine, found.dataset), planning.tables(found))
+    form = (
+        template_text(machine, planned.poses, planned.instruments) if template is not None else None
+    )
+    _steps.deliver(request, Result("plan", machine, planned.dataset), planning.tables(planned))
     if request.format == "table":
-        for sentence in planning.sentences(found):
+        for sentence in planning.sentences(planned):
             click.echo(sentence)
     for other in compared:
         with progress("comparison", "instruments") as report:
@@ -188,16 +190,16 @@ def _instruments(machine: Machine, texts: tuple[str, ...]) -> tuple[Instrument, 
     from truepose.calibration.planning.instruments import distinct, instruments_named
     from truepose.errors import RequestError
 
-    found: list[Instrument] = []
+    instruments: list[Instrument] = []
     problems: list[Problem] = []
     for text in texts:
         try:
-            found += instruments_named(machine, text)
+            instruments += instruments_named(machine, text)
         except RequestError as failure:
             problems += failure.problems
     if problems:
         raise RequestError(*problems)
-    return distinct(machine, tuple(found))
+    return distinct(machine, tuple(instruments))
 
 
 def _write(path: Path | None, text: str | None) -> None:

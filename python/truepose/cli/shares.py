@@ -47,8 +47,8 @@ def command(samples: int | None, seed: int, **options: Any) -> int:
 
     request = Request(**options)
     machine = _steps.read_machine(request)
-    found = _uncertainty.share(request, machine, samples=samples, seed=seed)
+    result = _uncertainty.share(request, machine, samples=samples, seed=seed)
     _steps.deliver(
-        request, Result("shares", machine, found), variance_shares.shares(machine, found)
+        request, Result("shares", machine, result), variance_shares.shares(machine, result)
     )
     return 0

@@ -33,11 +33,11 @@ def command(**options: Any) -> int:
 
     request = Request(**options)
     machine = _steps.read_machine(request)
-    found = _steps.strain(request, machine)
-    study = Study(machine, found, strain=found)  # of its first result only the poses are read
+    result = _steps.strain(request, machine)
+    study = Study(machine, result, strain=result)  # of its first result only the poses are read
     _steps.deliver(
         request,
-        Result("strain", machine, found),
+        Result("strain", machine, result),
         [*tables.strain(study), tables.poses_left_out(study)],
     )
     return 0

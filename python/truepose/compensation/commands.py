@@ -31,6 +31,7 @@ from truepose.machine import Condition, Machine
 from truepose.runs.displacement import ParameterDeviation, displacement, sum_deviations
 from truepose.runs.poses import BLOCK, OK, requested_poses
 from truepose.sources import PoseBlock, acting
+from truepose.spatial import rotate_quaternions
 
 MOST_PASSES = 12
 """Passes after which the pose that is reached is taken for one that does not settle.
@@ -294,7 +295,7 @@ class ActualMachine:
         if self._angular:
             turn = np.zeros((len(error), 3))
             turn[:, self._into_angular] = error[:, self._angular]
-            moved[:, 3:] = _turned(placements[:, 3:], turn)
+            moved[:, 3:] = rotate_quaternions(placements[:, 3:], turn)
         poses = self.machine.kernel.pose_of(moved)
         found = np.ascontiguousarray(poses[:, self.commanded])
         if self._angles:
@@ -342,24 +343,6 @@ def _first(*statuses: Codes) -> Codes:
     for status in statuses[1:]:
         np.copyto(found, status, where=found == OK)
     return found
-
-
-def _turned(quaternions: Floats, turns: Floats) -> Floats:
-    """(n, 4) w x y z of rotations turned on by rotation vectors (n, 3) in the base frame."""
-    half = 0.5 * np.linalg.norm(turns, axis=1)
-    # sin(x) / x, of 2 * half the angle: exact at 0 as well.
-    v = turns * (0.5 * np.sinc(half / np.pi))[:, np.newaxis]
-    u, (x, y, z) = np.cos(half), v.T
-    w, a, b, c = quaternions.T
-    return np.stack(
-        [
-            u * w - x * a - y * b - z * c,
-            u * a + x * w + y * c - z * b,
-            u * b - x * c + y * w + z * a,
-            u * c + x * b - y * a + z * w,
-        ],
-        axis=1,
-    )
 
 
 def _joints(machine: Machine, joints: ArrayLike) -> Floats:

@@ -43,7 +43,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Flags, Floats
-from truepose.compensation.motion import Motion, norm
+from truepose.compensation.motion import Motion
 from truepose.compensation.quadratic import quadratic
 from truepose.compensation.remainder_closures import Closures
 from truepose.compensation.remainder_guides import Guides
@@ -53,6 +53,7 @@ from truepose.machine import Machine
 from truepose.runs.first_order import rows_of
 from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
+from truepose.spatial import norm
 
 FEW = 512
 """Poses at once: what is worked on stays in the cache."""

@@ -23,10 +23,11 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.compensation import majorants
-from truepose.compensation.motion import Motion, Names, Tilt, norm, skew
+from truepose.compensation.motion import Motion, Names, Tilt
 from truepose.compensation.remainder_closures import Closures, Products, turned_about
-from truepose.compensation.remainder_struts import CLOSED, across_of, carried_about
+from truepose.compensation.remainder_struts import CLOSED, carried_about
 from truepose.machine import Guide, Machine
+from truepose.spatial import norm, skew, tangents
 
 KINDS = ("plane", "line", "universal")
 """Kinds of guide that are known here."""
@@ -115,12 +116,12 @@ class Guides:
         tilt, tilts = self._tilt(guide, "axis", motion)
         axis = motion.rotation @ tilt.axis[:, :, np.newaxis]
         axis = axis[:, :, 0]
-        tangents = tilt.tangents @ np.swapaxes(motion.rotation, 1, 2)
+        ways = tilt.tangents @ np.swapaxes(motion.rotation, 1, 2)
         arm, own = self._own(guide, motion)
         seen = motion.values(origin) - motion.position
         along = ((seen - arm) * axis).sum(axis=1)
         off = seen - arm - along[:, np.newaxis] * axis
-        across = np.stack(across_of(axis), axis=1)
+        across = tangents(axis)
 
         moves = motion.rotation @ own
         base = np.broadcast_to(np.eye(3), (len(arm), 3, 3))
@@ -143,7 +144,7 @@ class Guides:
             found = carried + (more + carried) * skewed + lever * askew * tilted * skewed
             return np.repeat(np.maximum(found - signed, 0.0), 2, axis=1)
 
-        other = np.swapaxes(tangents @ np.swapaxes(across, 1, 2), 1, 2) @ tilts
+        other = np.swapaxes(ways @ np.swapaxes(across, 1, 2), 1, 2) @ tilts
         both = np.broadcast_to(slide[:, np.newaxis], (len(arm), 2, 1, slide.shape[2]))
         return Closures(
             sensitivity @ np.swapaxes(across, 1, 2),
@@ -159,7 +160,7 @@ class Guides:
         platform, of_platform = self._tilt(guide, "platform_axis", motion)
         on_frame = np.broadcast_to(frame.axis, motion.position.shape)
         on_platform = (motion.rotation @ platform.axis[:, :, np.newaxis])[:, :, 0]
-        tangents = platform.tangents @ np.swapaxes(motion.rotation, 1, 2)
+        ways = platform.tangents @ np.swapaxes(motion.rotation, 1, 2)
         opened = (frame.tangents @ on_platform[:, :, np.newaxis])[:, :, 0]
 
         turn = norm(motion.turn_reach)[:, np.newaxis]
@@ -172,7 +173,7 @@ class Guides:
             found = majorants.turn_bent(whole) + swung * other + one * (other + swung * (1 + other))
             return np.asarray(np.maximum(found - signed, 0.0))
 
-        leans = np.swapaxes(tangents, 1, 2) @ of_platform
+        leans = np.swapaxes(ways, 1, 2) @ of_platform
         carried = skew(on_platform) @ (np.swapaxes(frame.tangents, 1, 2) @ of_frame)
         carried = carried - skew(on_frame) @ leans
         size = np.square(opened).sum(axis=1, keepdims=True)

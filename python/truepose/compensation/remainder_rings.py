@@ -20,10 +20,11 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.compensation import majorants
-from truepose.compensation.motion import Motion, Names, cross, norm, skew
+from truepose.compensation.motion import Motion, Names
 from truepose.compensation.remainder_closures import Closures, Products, turned_about
 from truepose.compensation.remainder_struts import CLOSED, Bases
 from truepose.machine import Machine
+from truepose.spatial import cross, norm, skew
 
 
 class Rings:

@@ -30,10 +30,11 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.compensation import majorants
-from truepose.compensation.motion import Motion, Names, Tilt, cross, norm, skew
+from truepose.compensation.motion import Motion, Names, Tilt
 from truepose.compensation.remainder_closures import Closures, Products, turned_about
 from truepose.machine import Machine
 from truepose.machine.parts import Drive
+from truepose.spatial import cross, norm, rotate_about, skew, tangents
 
 CLOSED = 1e-8
 """By how much of its length a strut may miss where the machine stands: rounding, and no more."""
@@ -158,12 +159,7 @@ class Bases:
         origin = self._names.point(f"{drive.part}.origin")
         axis, sine, cosine = tilt.axis, np.sin(angle)[:, None], np.cos(angle)[:, None]
 
-        def turned(vector: Floats) -> Floats:
-            along = (axis * vector).sum(axis=1, keepdims=True) * axis
-            turned: Floats = along + cosine * (vector - along) + sine * cross(axis, vector)
-            return turned
-
-        arm = turned(base)
+        arm = rotate_about(base, axis, angle[:, None])
         across = cross(axis, arm)
         slopes = [(at, factor * across) for at, factor in factors]
         for number, at in enumerate(tilts):
@@ -174,7 +170,7 @@ class Bases:
         form = self._way(motion, joint, drive)
         second: list[_Second] = [(0.5 * cross(axis, across), form, form)]
         for at, direction in zip(point, np.eye(3), strict=True):
-            moved = turned(np.broadcast_to(direction, axis.shape))
+            moved = rotate_about(direction, axis, angle[:, None])
             slopes.append((int(at), moved))
             second.append((cross(axis, moved), form, motion.forms([at])[:, 0]))
         for at, direction in zip(origin, np.eye(3), strict=True):
@@ -300,7 +296,7 @@ class Struts:
     def _across(self, motion: Motion, unit: Floats, arm: Floats, bases: list[_Base]) -> Floats:
         """(n, s, 2, v) forms of the relative motion across each strut."""
         n, count = unit.shape[:2]
-        frame = np.stack(across_of(unit), axis=2)  # (n, s, 2, 3)
+        frame = tangents(unit)  # (n, s, 2, 3)
         flat = frame.reshape(n, 2 * count, 3)
         rows = motion.of_platform(flat, np.repeat(arm, 2, axis=1))
         own = (flat @ motion.rotation).reshape(n, count, 2, 3)
@@ -349,11 +345,3 @@ def _second(motion: Motion, bases: list[_Base], unit: Floats) -> list[Products]:
             for form, given in zip(forms, pair, strict=True):
                 form[:, at, number] = given
     return [Products(coefficient, *forms)]
-
-
-def across_of(unit: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (..., 3) across unit vectors, and across each other."""
-    least = np.argmin(np.abs(unit), axis=-1)
-    first = np.eye(3)[least] - np.take_along_axis(unit, least[..., None], -1) * unit
-    first = first / norm(first)[..., np.newaxis]
-    return first, cross(unit, first)

@@ -84,7 +84,7 @@ def limbs(machine: Machine, controller: str, kind: str) -> list[Limb]:
         raise no_pose_left(machine, home[np.newaxis, :], left_out, of_file=True)
     centres = machine.kernel.joint_centres(joints, placements)[0]
     number = 2 if len(machine.dof) > 3 else 1
-    found = []
+    delta_limbs = []
     for index, drive in enumerate(machine.drives):
         rods = [at for at, strut in enumerate(machine.struts) if strut.drive == drive.name]
         if len(rods) != number:
@@ -95,7 +95,7 @@ def limbs(machine: Machine, controller: str, kind: str) -> list[Limb]:
             raise refused(f"rods of drive {drive.name} that are not parallel, or not equal")
         origin = vector(machine, f"{drive.part}.origin")
         axis = np.array(drive.fields["axis"], np.float64)
-        found.append(
+        delta_limbs.append(
             Limb(
                 drive,
                 index,
@@ -107,7 +107,7 @@ def limbs(machine: Machine, controller: str, kind: str) -> list[Limb]:
                 float(joints[0, index]),
             )
         )
-    return found
+    return delta_limbs
 
 
 def tower_order(angles: Floats) -> list[int]:

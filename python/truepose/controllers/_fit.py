@@ -38,6 +38,7 @@ from truepose.files.wording import counted
 from truepose.machine import Machine
 from truepose.machine.condition import STANDARD_GRAVITY
 from truepose.runs.poses import OK, PoseRun, no_pose_left, pose_in_words
+from truepose.spatial import angle_between
 from truepose.version import version
 
 MOST_FITTED = 2000
@@ -206,10 +207,10 @@ def fit(machine: Machine, model: SmallModel, *, most_evaluations: int = 1000) ->
         suited, _ = _solved(as_designed, model, chosen, FEW)
         designed, _ = _assess(as_designed, model, suited, poses)
         _require_alike(machine, designed, poses)
-    found, solution = _solved(actual, model, chosen, most_evaluations)
-    printed = model.printed(found)
-    values = model.taken(printed)
-    before, _ = _assess(actual, model, model.taken(model.printed(start)), poses)
+    fitted, solution = _solved(actual, model, chosen, most_evaluations)
+    printed = model.format(fitted)
+    values = model.parse(printed)
+    before, _ = _assess(actual, model, model.parse(model.format(start)), poses)
     after, joints = _assess(actual, model, values, poses)
     return ModelFit(
         printed,
@@ -340,8 +341,8 @@ class _FitProblem:
 
     def values(self, change: Floats) -> Floats:
         """The model's numbers, SI."""
-        found: Floats = self._start + self._size * change
-        return found
+        values: Floats = self._start + self._size * change
+        return values
 
     def residual(self, change: Floats) -> Floats:
         joints = self._model.joints(self.values(change), self._poses)
@@ -365,8 +366,8 @@ class _FitProblem:
         step = np.zeros(joints.shape[1])
         step[at] = self._joint_steps[at]
         ahead, behind = self._error(joints + step), self._error(joints - step)
-        found: Floats = (ahead - behind) / (2.0 * step[at])
-        return found
+        slope: Floats = (ahead - behind) / (2.0 * step[at])
+        return slope
 
     def _error(self, joints: Floats) -> Floats:
         """(n, n_row) error of the commanded freedoms, weighed; NaN where the tool is nowhere."""
@@ -374,8 +375,8 @@ class _FitProblem:
             return np.full((len(joints), len(self._rows)), np.nan)
         error, status = self._actual.error(self._known, np.ascontiguousarray(joints))
         error[status != OK] = np.nan
-        found: Floats = error[:, self._rows] * self._unit
-        return found
+        residual: Floats = error[:, self._rows] * self._unit
+        return residual
 
 
 def _usable(machine: Machine, actual: ActualMachine) -> tuple[Floats, int]:
@@ -414,7 +415,7 @@ def _assess(
     machine = actual.machine
     parts = [_errors(actual, model, values, poses[rows]) for rows in blocks(len(poses))]
     position, orientation, parasitic, joints = (
-        np.concatenate(each) for each in zip(*parts, strict=True)
+        np.concatenate(columns) for columns in zip(*parts, strict=True)
     )
     turns = any(name in "abc" for name in machine.commanded)
     can_turn = any(name not in "xyz" for name in machine.components)
@@ -460,23 +461,12 @@ def _errors(
     linear = [at for at, name in enumerate(actual.machine.commanded) if name in "xyz"]
     position = np.linalg.norm((reached - poses)[:, linear], axis=1)
     kernel = actual.machine.kernel
-    orientation = angle_between(kernel.placement_of(poses), kernel.placement_of(reached))
+    asked_for, got = kernel.placement_of(poses), kernel.placement_of(reached)
+    orientation = angle_between(asked_for[:, 3:], got[:, 3:])
     known = actual.known(poses)
     error, _ = actual.error(known, joints)
     turning = [at for at, name in enumerate(actual.machine.components) if name not in "xyz"]
     return position, orientation, np.linalg.norm(error[:, turning], axis=1), joints
-
-
-def angle_between(one: Floats, other: Floats) -> Floats:
-    """(n,) angle, rad, between the unit quaternions of placements (n, 7).
-
-    By the chord between them, which keeps its digits where the angle is small.
-    """
-    a, b = one[:, 3:], other[:, 3:]
-    side = np.where(np.sum(a * b, axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    chord = np.linalg.norm(a - side * b, axis=1)
-    angles: Floats = 4.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
-    return angles
 
 
 def extent(values: Floats, poses: Floats, even: Flags | None = None) -> Extent:
@@ -514,8 +504,8 @@ def _condition(machine: Machine) -> str:
     known = machine.condition
 
     def vector(name: str, values: Sequence[float], dimension: str) -> list[str]:
-        each = [in_file_units(machine, value, dimension) for value in values]
-        return [f"{name} {', '.join(each)}"] if any(values) else []
+        shown = [in_file_units(machine, value, dimension) for value in values]
+        return [f"{name} {', '.join(shown)}"] if any(values) else []
 
     def degrees(kelvin: float) -> str:
         return in_file_units(machine, kelvin, "temperature")
@@ -576,4 +566,4 @@ def _highest(extent: Extent | None) -> float:
     return 0.0 if extent is None else extent.highest
 
 
-__all__ = ["Error", "Extent", "ModelFit", "angle_between", "extent", "fit", "heading"]
+__all__ = ["Error", "Extent", "ModelFit", "extent", "fit", "heading"]

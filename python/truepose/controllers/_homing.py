@@ -67,11 +67,11 @@ def switches(
 
 def switch_words(machine: Machine, places: Floats) -> str:
     """Where the switches trip, for people: of each drive its name and coordinate, (n_joint,)."""
-    each = [
+    switches = [
         f"{drive.name} {in_file_units(machine, float(place), drive.coordinate)}"
         for drive, place in zip(machine.drives, places, strict=True)
     ]
-    return f"switches trip at {', '.join(each)}"
+    return f"switches trip at {', '.join(switches)}"
 
 
 def _bad_switches(

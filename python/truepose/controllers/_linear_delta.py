@@ -63,9 +63,9 @@ class LinearDelta:
         with np.errstate(invalid="ignore"):  # out of reach is NaN
             rise = np.sqrt(arms**2 - across)
         heights = z + rise + numbers[TILT][0] * x + numbers[TILT][1] * y
-        found = np.empty((len(poses), 3))
-        found[:, self.order] = self.switch + (heights - numbers[HEIGHTS]) / self.gain
-        return found
+        joints = np.empty((len(poses), 3))
+        joints[:, self.order] = self.switch + (heights - numbers[HEIGHTS]) / self.gain
+        return joints
 
     def in_order(self, order: list[int]) -> LinearDelta:
         """The same with its towers counted in another order."""
@@ -79,9 +79,9 @@ class LinearDelta:
     @property
     def switches(self) -> Floats:
         """(3,) coordinates e_i, m, in the machine's order."""
-        found = np.empty(3)
-        found[self.order] = self.switch
-        return found
+        angles = np.empty(3)
+        angles[self.order] = self.switch
+        return angles
 
     def names(self) -> list[str]:
         """Names of the drives, tower by tower."""
@@ -100,28 +100,30 @@ def linear_delta(
 
     Raises `RequestError`: controller-cannot, bad-option.
     """
-    found = limbs(machine, controller, "slider")
-    for limb in found:
+    towers = limbs(machine, controller, "slider")
+    for limb in towers:
         if abs(limb.axis[2]) < math.cos(LEAN):
             raise _refused(machine, controller, f"drive {limb.drive.name}, which is not upright")
         if limb.base[2] + limb.origin[2] <= limb.platform[2] + machine.home[2]:
             raise _refused(machine, controller, f"carriage {limb.drive.name} below the platform")
     # The carriages at home as seen with the effector shrunk to the tool point, base frame.
-    heads = np.array([limb.origin + limb.base - limb.platform for limb in found])
+    heads = np.array([limb.origin + limb.base - limb.platform for limb in towers])
     radii, angles = np.hypot(heads[:, 0], heads[:, 1]), np.arctan2(heads[:, 1], heads[:, 0])
-    arms = np.array([limb.length for limb in found])
+    arms = np.array([limb.length for limb in towers])
     if not surrounded(angles):
         raise _refused(machine, controller, f"towers at {_degrees(angles)} degrees", AROUND)
     if not (arms > radii.mean()).all():
         shown = f"rods of {arms.min() / MM:.6g} mm, towers {radii.mean() / MM:.6g} mm"
         raise _refused(machine, controller, f"{shown} off the z axis", AROUND)
-    up = np.array([math.copysign(1.0, limb.axis[2]) for limb in found])
-    ends = [limb.drive.travel[1 if sense > 0 else 0] for limb, sense in zip(found, up, strict=True)]
+    up = np.array([math.copysign(1.0, limb.axis[2]) for limb in towers])
+    ends = [
+        limb.drive.travel[1 if sense > 0 else 0] for limb, sense in zip(towers, up, strict=True)
+    ]
     switch = switches(machine, options, ends, controller)
     gain = up * scales(machine)
     nominal = np.zeros(COUNT)
     nominal[RADIUS], nominal[ANGLES], nominal[ARMS] = radii.mean(), angles, arms
-    nominal[HEIGHTS] = heads[:, 2] + gain * (switch - [limb.home for limb in found])
+    nominal[HEIGHTS] = heads[:, 2] + gain * (switch - [limb.home for limb in towers])
     return LinearDelta(machine, np.arange(3), gain, switch, nominal)
 
 
@@ -135,21 +137,23 @@ def parameters(delta: LinearDelta, *, tilt: bool = False) -> tuple[Parameter, ..
     sizes = [1.0] + [1.0 / radius] * 3 + [1.0] * 6 + [1.0 / radius] * 2
     count = COUNT if tilt else TILT.start
     return tuple(
-        Parameter(*each)
-        for each in zip(names[:count], delta.nominal[:count].tolist(), sizes[:count], strict=True)
+        Parameter(*parameter)
+        for parameter in zip(
+            names[:count], delta.nominal[:count].tolist(), sizes[:count], strict=True
+        )
     )
 
 
 def endstop(numbers: Floats) -> Floats:
     """(3,) height of the tool at x = y = 0 at which each carriage trips its endstop, m."""
-    found: Floats = numbers[HEIGHTS] - np.sqrt(numbers[ARMS] ** 2 - numbers[RADIUS] ** 2)
-    return found
+    heights: Floats = numbers[HEIGHTS] - np.sqrt(numbers[ARMS] ** 2 - numbers[RADIUS] ** 2)
+    return heights
 
 
 def heights(endstops: Floats, arms: Floats, radius: float) -> Floats:
     """(3,) heights of the carriages at the endstops: `endstop` undone."""
-    found: Floats = endstops + np.sqrt(arms**2 - radius**2)
-    return found
+    joints: Floats = endstops + np.sqrt(arms**2 - radius**2)
+    return joints
 
 
 def untilted(values: Floats) -> Floats:

@@ -70,15 +70,15 @@ def exported(machine: Machine, model: JointModel, kinematics: str, joints: int) 
 
     Raises `RequestError`: controller-cannot, no-workspace, no-pose-left.
     """
-    found = fit(machine, model)
-    lines = heading(machine, found, f"LinuxCNC {kinematics}")
-    hal = [*(f"# {line}" for line in lines), f"# in {model.unit}", *model.hal(found.printed)]
-    ini = ini_head(lines, kinematics, joints, model.unit) + model.ini(found.values, found.printed)
+    fitted = fit(machine, model)
+    lines = heading(machine, fitted, f"LinuxCNC {kinematics}")
+    hal = [*(f"# {line}" for line in lines), f"# in {model.unit}", *model.hal(fitted.printed)]
+    ini = ini_head(lines, kinematics, joints, model.unit) + model.ini(fitted.values, fitted.printed)
     files = {
         f"{stem(machine)}_{kinematics}.hal": "\n".join([*hal, ""]),
         f"{stem(machine)}_{kinematics}.ini": "\n".join([*ini, ""]),
     }
-    return Export(files, found.statement(machine))
+    return Export(files, fitted.statement(machine))
 
 
 def ini_joint(

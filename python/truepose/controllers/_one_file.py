@@ -32,10 +32,10 @@ def in_one_file(
 
     Raises `RequestError`: controller-cannot, no-workspace, no-pose-left.
     """
-    found = fit(machine, model)
-    lines = [f"{comment} {line}" for line in (*heading(machine, found, controller), *notes)]
-    text = "\n".join([*lines, *model.block(found.printed), ""])
-    return Export({f"{stem(machine)}_{ending}": text}, found.statement(machine))
+    fitted = fit(machine, model)
+    lines = [f"{comment} {line}" for line in (*heading(machine, fitted, controller), *notes)]
+    text = "\n".join([*lines, *model.block(fitted.printed), ""])
+    return Export({f"{stem(machine)}_{ending}": text}, fitted.statement(machine))
 
 
 __all__ = ["BlockModel", "in_one_file"]

@@ -65,11 +65,11 @@ class SmallModel(Protocol):
         """
         ...
 
-    def printed(self, values: Floats) -> Printed:
+    def format(self, values: Floats) -> Printed:
         """The numbers to be written, rounded as they will stand there."""
         ...
 
-    def taken(self, printed: Printed) -> Floats:
+    def parse(self, printed: Printed) -> Floats:
         """(n_parameter,) what the controller makes of the numbers written: `printed` undone."""
         ...
 

@@ -461,7 +461,7 @@ class _Reader:
                 self._refuse(
                     Fault(
                         "unknown-choice",
-                        f"{shown_value(cell)} is none of the words that the column takes",
+                        f"{shown_value(cell)} is not one of the words that this column allows",
                         found=shown_value(cell),
                         expected=one_of(column.words),
                         hint=did_you_mean(cell, column.words),

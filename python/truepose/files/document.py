@@ -88,18 +88,18 @@ class Document:
 
     def key(self, path: str) -> Key:
         """The key that `path` names, as far as the document goes along with it."""
-        found: list[str | int] = []
+        parts: list[str | int] = []
         value: Any = self.data
         words = path.split(".")
         while words:
             step = _step(value, words)
             if step is None:
-                return (*found, ".".join(words)) if isinstance(value, dict) else tuple(found)
+                return (*parts, ".".join(words)) if isinstance(value, dict) else tuple(parts)
             part, taken = step
-            found.append(part)
+            parts.append(part)
             value = _item(value, part)
             words = words[taken:]
-        return tuple(found)
+        return tuple(parts)
 
     def value(self, key: Key) -> Any:
         """What stands at `key`; None where there is nothing."""
@@ -178,18 +178,18 @@ def _lines(text: str) -> dict[Key, int]:
 def _not_toml(reason: str, file: str, text: str) -> Problem:
     """The place is at the end of tomllib's message: "(at line 3, column 5)"."""
     match = re.search(r"\s*\(at (?:line (\d+), column \d+|end of document)\)\s*$", reason)
-    line, found = None, None
+    line, faulty = None, None
     if match is not None:
         reason = reason[: match.start()]
         all_lines = text.splitlines()
         line = int(match[1]) if match[1] else max(len(all_lines), 1)
-        found = all_lines[line - 1].strip()[:80] if line <= len(all_lines) else None
+        faulty = all_lines[line - 1].strip()[:80] if line <= len(all_lines) else None
     return Problem(
         "not-toml",
         f"the file is not TOML: {reason}",
         file,
         line,
-        found=found or None,
+        found=faulty or None,
         expected=_KIND.phrase,
     )
 

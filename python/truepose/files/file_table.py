@@ -50,7 +50,7 @@ def _in_order(value: list[str]) -> list[str]:
         refuse(
             Fault(
                 "duplicate-name",
-                f"{', '.join(doubled)} is there more than once",
+                f"{', '.join(doubled)} appears more than once",
                 found=shown_value(value),
                 expected="every freedom once",
             )
@@ -59,7 +59,7 @@ def _in_order(value: list[str]) -> list[str]:
         refuse(
             Fault(
                 "freedom-order",
-                "the freedoms are not in their order",
+                "the freedoms are not in the order x y z a b c",
                 found=shown_value(value),
                 expected=f"the order {' '.join(FREEDOMS)}",
                 hint="poses list their coordinates in this order",

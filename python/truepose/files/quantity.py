@@ -149,10 +149,10 @@ class _Stiffness(_Quantity):
         if units.read(value, self.dimension) == 0.0:
             raise QuantityError(
                 "not-positive",
-                "a stiffness of zero would carry nothing",
+                "a stiffness of zero cannot carry a load",
                 found=shown_value(value),
                 expected=f"{DIMENSIONS[self.dimension].phrase} above zero",
-                hint="leave the key away for what is rigid; what carries nothing is no strut",
+                hint="leave the key out where the strut is rigid",
             )
         return super().read(value, units)
 
@@ -171,14 +171,14 @@ class _Series(_Stiffness):
                 found="{}",
                 expected='one or more, such as { screw = "80 N/um", nut = "200 N/um" }',
             )
-        each = []
+        stiffnesses = []
         for name, entry in value.items():
             try:
-                each.append(super().read(entry, units))
+                stiffnesses.append(super().read(entry, units))
             except QuantityError as error:
                 error.message = f"{name}: {error.message}"
                 raise
-        return 1.0 / sum(1.0 / stiffness for stiffness in each)
+        return 1.0 / sum(1.0 / stiffness for stiffness in stiffnesses)
 
     def json_schema(self) -> JsonSchemaValue:
         one = super().json_schema()
@@ -203,7 +203,7 @@ class _PerAxis(_Stiffness):
                 expected="one stiffness, or [x, y, z]",
                 hint="inf is a rigid one",
             )
-        x, y, z = (super(_PerAxis, self).read(each, units) for each in value)
+        x, y, z = (super(_PerAxis, self).read(component, units) for component in value)
         return (x, y, z)
 
     def json_schema(self) -> JsonSchemaValue:
@@ -231,7 +231,7 @@ class _Gradient(_Quantity):
                 found=shown_value(value),
                 expected="one gradient, or [x, y, z]",
             )
-        x, y, z = (super(_Gradient, self).read(each, units) for each in value)
+        x, y, z = (super(_Gradient, self).read(component, units) for component in value)
         return (x, y, z)
 
 
@@ -339,7 +339,7 @@ def quantity(dimension: str, *, sign: Sign = "any") -> Any:
     return Annotated[float, _Quantity(dimension, sign)]
 
 
-_NO_ERROR = "no machine is without error; leave the key away where nothing is asked"
+_NO_ERROR = "no machine is without error; leave the key out where nothing is asked"
 
 Length = Annotated[float, _Quantity("length")]
 PositiveLength = Annotated[float, _Quantity("length", "positive")]

@@ -56,7 +56,7 @@ def _read_error(value: object, units: UnitSystem) -> float:
     if abs(ratio) >= 1.0:
         raise QuantityError(
             "not-a-fraction",
-            "an error as large as what it is an error of",
+            "an error as large as the quantity itself",
             found=shown_value(value),
             expected='a ratio between -1 and 1, such as "12 ppm"',
             hint="a bare number is a plain ratio, neither ppm nor um/m",
@@ -88,7 +88,7 @@ class _Ratio(FileType):
     """A ratio that is known, or known within limits; an error, so less than the whole."""
 
     def read(self, value: Any, units: UnitSystem) -> Band:
-        return read_within(value, lambda each: _read_error(each, units), "a ratio", known=True)
+        return read_within(value, lambda limit: _read_error(limit, units), "a ratio", known=True)
 
     def json_schema(self) -> JsonSchemaValue:
         return one_or_limits(self.dimension) | {"x-known": True}
@@ -99,7 +99,7 @@ class _Slope(FileType):
     """An angle between straight lines, as a tolerance."""
 
     def read(self, value: Any, units: UnitSystem) -> Band:
-        return read_within(value, lambda each: read_slope(each, units), "a slope", known=False)
+        return read_within(value, lambda limit: read_slope(limit, units), "a slope", known=False)
 
     def json_schema(self) -> JsonSchemaValue:
         return one_or_limits(self.dimension) | {"x-slope": True}

@@ -145,7 +145,7 @@ def shown_units(declared: Mapping[str, FileUnit]) -> ShownUnits:
 
 
 def _is_one_of(scale: float, scales: tuple[float, ...]) -> bool:
-    return any(math.isclose(scale, each, rel_tol=ALIKE) for each in scales)
+    return any(math.isclose(scale, usual, rel_tol=ALIKE) for usual in scales)
 
 
 METRIC = ShownUnits()

@@ -140,7 +140,7 @@ def _read_band(value: object, dimension: str, units: UnitSystem) -> Tolerance:
             found=shown_value(value),
             expected="[lower limit, upper limit], one half band, or a class of a standard",
         )
-    band = read_within(value, lambda each: units.read(each, dimension), phrase, known=False)
+    band = read_within(value, lambda limit: units.read(limit, dimension), phrase, known=False)
     return Tolerance(dimension, outright=band)
 
 
@@ -255,9 +255,9 @@ def _distribution(table: Mapping[str, Any]) -> str:
     if word not in DISTRIBUTIONS:
         raise QuantityError(
             "unknown-choice" if isinstance(word, str) else "wrong-type",
-            f"distribution: {shown_value(word)} is none of the words that it takes",
+            f"distribution: {shown_value(word)} is not one of the allowed words",
             found=shown_value(word),
-            expected=one_of(f'"{each}"' for each in DISTRIBUTIONS),
+            expected=one_of(f'"{name}"' for name in DISTRIBUTIONS),
             hint=did_you_mean(word, DISTRIBUTIONS) if isinstance(word, str) else None,
         )
     if "standard_deviation" in table and word not in ENDLESS:
@@ -351,7 +351,7 @@ def _values(table: Mapping[str, Any], dimension: str, units: UnitSystem) -> tupl
     if "values" not in table:
         return ()
     listed = _filled_list(table["values"], DIMENSIONS[dimension].plural)
-    return tuple(units.read(each, dimension) for each in listed)
+    return tuple(units.read(text, dimension) for text in listed)
 
 
 def _probabilities(table: Mapping[str, Any], distribution: str) -> tuple[float, ...]:
@@ -373,7 +373,7 @@ def _probabilities(table: Mapping[str, Any], distribution: str) -> tuple[float, 
     listed = _read_key(
         "probabilities", lambda: _filled_list(table["probabilities"], "plain numbers")
     )
-    return tuple(_plain(each, "probabilities", such_as="0.5") for each in listed)
+    return tuple(_plain(text, "probabilities", such_as="0.5") for text in listed)
 
 
 def _filled_list(value: object, phrase: str) -> list[Any]:
@@ -412,7 +412,7 @@ def _group(table: Mapping[str, Any]) -> tuple[str | None, float]:
     if isinstance(sign, bool) or sign not in (-1, 1):
         raise QuantityError(
             "unknown-choice",
-            f"sign: {shown_value(sign)} is no sign",
+            f"sign: {shown_value(sign)} is not a sign",
             found=shown_value(sign),
             expected="1 or -1",
         )

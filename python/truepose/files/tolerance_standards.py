@@ -115,7 +115,9 @@ def half_band(designation: str, nominal: float, dimension: str = "length") -> fl
     """
     name = canonical(designation, dimension)
     standard = next(
-        each for each in STANDARDS if each.dimension == dimension and name in designations_of(each)
+        standard
+        for standard in STANDARDS
+        if standard.dimension == dimension and name in designations_of(standard)
     )
     key = name.removeprefix(standard.prefix)
     # The tables' limits are whole tenths of a millimetre; 0.003 m / 1e-3 must not fall above 3.

@@ -66,10 +66,10 @@ def meant(values: ArrayLike, offset: float = 0.0) -> Floats:
     power = 10.0 ** np.where(usual, np.abs(places), 0)
     digits = np.rint(np.where(places >= 0, size * power, size / power))
     few = np.copysign(np.where(places >= 0, digits / power, digits * power), given)
-    found: Floats = np.where(
+    values_meant: Floats = np.where(
         usual & (np.abs(few - given) <= ROUNDED * np.maximum(size, abs(offset))), few, given
     )
-    return found
+    return values_meant
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class UnitSystem:
         if abs(result) > LARGEST:
             raise QuantityError(
                 "too-large",
-                f"expected {wanted.phrase}, found a number of no size that anything has",
+                f"expected {wanted.phrase}, found a number far too large for any machine",
                 found=shown_value(value),
                 expected=f"a number of at most {LARGEST:g} in SI units: {_expected(wanted)}",
             )

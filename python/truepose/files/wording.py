@@ -8,7 +8,7 @@ from difflib import get_close_matches
 
 def nearest(word: str, possible: Iterable[str]) -> str | None:
     """The possible word that `word` most likely means, or None."""
-    words = {each.lower(): each for each in possible}
+    words = {word.lower(): word for word in possible}
     near = get_close_matches(word.lower(), words, n=1, cutoff=0.6)
     return words[near[0]] if near else None
 

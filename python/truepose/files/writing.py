@@ -24,7 +24,7 @@ def require_writable(path: Path, endings: Collection[str], inputs: Collection[Pa
         raise _refusal(
             Fault(
                 "output-ending",
-                "the ending of the output file does not say what to write",
+                "the ending of the output file is not one that can be written",
                 found=ending or "no ending",
                 expected=one_of(sorted(endings)),
             ),
@@ -79,7 +79,7 @@ def require_new(path: Path) -> None:
         raise _refusal(
             Fault(
                 "output-exists",
-                "there is such a file already, and it is not touched",
+                "the file exists already and is not overwritten",
                 found=str(path),
                 expected="a name that is free",
                 hint="give another name: --output FILE",

@@ -51,10 +51,10 @@ def kernel(described: Described) -> KernelMachine:
 
 def problems(described: Described, machine: KernelMachine) -> list[Problem]:
     """What is wrong with the machine as a whole: rigid limbs that strain, motions left free."""
-    found = list(_rigid(described, machine)) if machine.overconstrained else []
+    problems = list(_rigid(described, machine)) if machine.overconstrained else []
     if described.guides and (free := _free_motions(machine)) is not None and len(free):
-        found.append(_loose(described, machine, free))
-    return found
+        problems.append(_loose(described, machine, free))
+    return problems
 
 
 def _built(document: Document, description: dict[str, Any]) -> KernelMachine:
@@ -195,7 +195,7 @@ def _loose(described: Described, machine: KernelMachine, free: np.ndarray) -> Pr
     return described.document.problem(
         Fault(
             "loose-platform",
-            "the guides do not hold what the struts leave free",
+            "the struts leave motions free that the guides do not hold",
             found=f"at home the platform can still move: {motions}",
             expected="closures that hold every freedom of the platform",
             hint=f"look at where {names} point and stand; two closures may hold the same motion",

@@ -34,11 +34,11 @@ _NOTHING: Vector = (0.0, 0.0, 0.0)
 
 def drives(validated: Validated) -> tuple[Drive, ...]:
     """Every `[[drive]]`."""
-    found = []
+    parts = []
     for common, geometry in _rows(validated, DriveTable, "drive"):
         kind = drive_kinds()[common.kind]
         fields: dict[str, Any] = dict(geometry)
-        found.append(
+        parts.append(
             Drive(
                 common.name,
                 common.kind,
@@ -56,7 +56,7 @@ def drives(validated: Validated) -> tuple[Drive, ...]:
                 fields=fields,
             )
         )
-    return tuple(found)
+    return tuple(parts)
 
 
 def _carriage(row: DriveTable) -> Body:
@@ -71,14 +71,14 @@ def guides(validated: Validated) -> tuple[Guide, ...]:
 
 def _rows(validated: Validated, model: type[Model], table: str) -> list[tuple[Model, FileTable]]:
     """What every row of a table says in common, and in the model of its kind."""
-    own = [each for each in validated.geometry.get(table, []) if each is not None]
+    own = [model for model in validated.geometry.get(table, []) if model is not None]
     return list(zip(validated.rows(model), own, strict=True))
 
 
 def struts(validated: Validated) -> tuple[Strut, ...]:
     """Every `[[strut]]`."""
     rows, own = validated.rows(StrutTable), validated.rows(strut_geometry())
-    axes = [tuple(getattr(each, "ring_axis", None) or ()) for each in own]
+    axes = [tuple(getattr(model, "ring_axis", None) or ()) for model in own]
     return tuple(
         _strut(row, axis if any(axis) else None) for row, axis in zip(rows, axes, strict=True)
     )

@@ -55,10 +55,10 @@ def workspace(
         home = {freedom: getattr(table.home, freedom) for freedom in FREEDOMS}
     commanded = tuple(machine.commanded or machine.dof)
     making = _Making(document, validated, data_files, problems, commanded, home)
-    found = making.made(table)
-    if found is not None and table.home is None:
-        home = dict(zip(commanded, _middle(found).tolist(), strict=True))
-    return found, home
+    workspace = making.made(table)
+    if workspace is not None and table.home is None:
+        home = dict(zip(commanded, _middle(workspace).tolist(), strict=True))
+    return workspace, home
 
 
 def too_large(document: Document, size: float, key: Key) -> Problem | None:
@@ -76,10 +76,10 @@ def too_large(document: Document, size: float, key: Key) -> Problem | None:
     )
 
 
-def _middle(found: Workspace) -> Floats:
-    if found.listed is None:
-        return np.array([axis.centre for axis in found.axes])
-    middle: Floats = 0.5 * (found.listed.min(axis=0) + found.listed.max(axis=0))
+def _middle(workspace: Workspace) -> Floats:
+    if workspace.listed is None:
+        return np.array([axis.centre for axis in workspace.axes])
+    middle: Floats = 0.5 * (workspace.listed.min(axis=0) + workspace.listed.max(axis=0))
     return middle
 
 
@@ -104,12 +104,12 @@ class _Making:
             "poses": lambda: self._rows(table.poses, ("workspace", "poses")),
             "path": lambda: self._path(table.path),
         }
-        found = makers[way]()
-        if found is None:
+        poses = makers[way]()
+        if poses is None:
             return None
-        if isinstance(found, tuple):
-            return Workspace(found, line=line)
-        return Workspace(listed=found, line=line, is_path=way == "path")
+        if isinstance(poses, tuple):
+            return Workspace(poses, line=line)
+        return Workspace(listed=poses, line=line, is_path=way == "path")
 
     def _stays(self, freedom: str) -> GridAxis:
         value = self.home.get(freedom, 0.0)

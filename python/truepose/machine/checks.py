@@ -32,7 +32,7 @@ MOST_CLOSURES = 12
 
 def check(document: Document, validated: Validated) -> list[Problem]:
     """Every problem between the tables of a document."""
-    return [problem for each in _CHECKS for problem in each(document, validated)]
+    return [problem for check in _CHECKS for problem in check(document, validated)]
 
 
 def _rows(document: Document, table: str) -> list[dict[str, Any]]:
@@ -47,7 +47,7 @@ def _freedoms(document: Document) -> tuple[list[str], list[str]] | None:
     table = document.data.get("machine")
     if not isinstance(table, dict):
         return None
-    found = []
+    freedoms = []
     for key in ("dof", "commanded"):
         names = table.get(key, table.get("dof"))
         if not isinstance(names, list) or not names:
@@ -56,8 +56,8 @@ def _freedoms(document: Document) -> tuple[list[str], list[str]] | None:
             return None
         if len(set(names)) < len(names):
             return None
-        found.append(names)
-    return found[0], found[1]
+        freedoms.append(names)
+    return freedoms[0], freedoms[1]
 
 
 def _distinct_names(document: Document, validated: Validated) -> Iterator[Problem]:

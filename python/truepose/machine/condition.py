@@ -18,6 +18,7 @@ from truepose.errors import Problem, RequestError
 from truepose.files.units import UnitSystem, default_units, shown_value
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine.parts import Vector, is_body
+from truepose.spatial import tangents
 
 if TYPE_CHECKING:
     from truepose.machine.temperature_log import TemperatureLog
@@ -66,12 +67,7 @@ class Envelope:
         """(3 or 2, 3) orthogonal unit vectors that span the directions, base axes."""
         if self.normal is None:
             return np.eye(3)
-        normal = np.array(self.normal)
-        # The base axis that leans least along the normal gives the steadiest first direction.
-        axis = np.eye(3)[np.argmin(np.abs(normal))]
-        first = axis - (axis @ normal) * normal
-        first /= np.linalg.norm(first)
-        return np.stack([first, np.cross(normal, first)])
+        return tangents(self.normal)
 
     @property
     def wrenches(self) -> Floats:

@@ -82,7 +82,7 @@ def _require_schema(document: Document) -> None:
         document.problem(
             Fault(
                 "unsupported-schema",
-                "this version reads no such machine file",
+                "this version of truepose does not read such a machine file",
                 found=shown_value(schema),
                 expected=str(SCHEMA),
                 hint="a newer version of truepose may read it"
@@ -187,13 +187,13 @@ def _condition(
     """The condition with its temperature log and the keys that sources bring."""
     table = validated.table(ConditionTable)
     source_tables = [validated.table(model) or model() for model in of_sources]
-    found = build_parts.condition(table, source_tables)
+    condition = build_parts.condition(table, source_tables)
     if table is None or table.temperature_log is None:
-        return found
+        return condition
     carriages = [drive.carriage.part for drive in drives if drive.carriage is not None]
     rows = [*(drive.part for drive in drives), *(strut.part for strut in struts)]
     parts = [*rows, *carriages, *BODIES]
     log = read_temperature_log(
-        data_files, table.temperature_log, parts, table.time, found.part_temperatures
+        data_files, table.temperature_log, parts, table.time, condition.part_temperatures
     )
-    return found if log is None else found.replace(temperature_log=log)
+    return condition if log is None else condition.replace(temperature_log=log)

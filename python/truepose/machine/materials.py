@@ -7,6 +7,14 @@ machine file: `modulus` and `expansion` win over those of `material`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import AfterValidator, WithJsonSchema
+
+from truepose.errors import Fault
+from truepose.files.quantity import refuse
+from truepose.files.units import shown_value
+from truepose.files.wording import did_you_mean, one_of
 
 
 @dataclass(frozen=True)
@@ -57,3 +65,25 @@ MATERIALS: dict[str, Material] = {
         ),
     )
 }
+
+
+def _known_material(value: str) -> str:
+    if value not in MATERIALS:
+        refuse(
+            Fault(
+                "unknown-material",
+                f"unknown material {shown_value(value)}",
+                found=shown_value(value),
+                expected=one_of(f'"{name}"' for name in MATERIALS),
+                hint=did_you_mean(value, MATERIALS) or "give modulus and expansion outright",
+            )
+        )
+    return value
+
+
+MaterialName = Annotated[
+    str,
+    AfterValidator(_known_material),
+    WithJsonSchema({"type": "string", "enum": list(MATERIALS)}),
+]
+"""The name of a material, wherever a table takes one."""

@@ -111,7 +111,11 @@ class Machine:
         return f"<Machine {self.name!r}: {' '.join(self.dof)}, {len(self.struts)} struts>"
 
     def __reduce__(self) -> tuple[Callable[..., Machine], tuple[dict[str, Any]]]:
-        state = {each.name: getattr(self, each.name) for each in fields(self) if each.init}
+        state = {
+            attribute.name: getattr(self, attribute.name)
+            for attribute in fields(self)
+            if attribute.init
+        }
         for name in _MAPPINGS:
             state[name] = dict(state[name])
         return _restored, (state,)

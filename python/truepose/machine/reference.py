@@ -102,7 +102,7 @@ def _inlined(schema: Json) -> Json:
 
     def clean(value: Any) -> Any:
         if isinstance(value, list):
-            return [clean(each) for each in value]
+            return [clean(member) for member in value]
         if not isinstance(value, dict):
             return value
         if "$ref" in value:
@@ -113,7 +113,7 @@ def _inlined(schema: Json) -> Json:
             for key, entry in value.items()
             if not (key == "title" and isinstance(entry, str)) and not _is_no_default(key, entry)
         }
-        choices = [each for each in cleaned.get("anyOf", ()) if each != {"type": "null"}]
+        choices = [choice for choice in cleaned.get("anyOf", ()) if choice != {"type": "null"}]
         # TOML has no null: a key that may be left out takes only its other choice.
         if len(choices) == 1:
             del cleaned["anyOf"]
@@ -206,7 +206,7 @@ def _sentence(text: str) -> str:
 
 def _shown(value: Any) -> str:
     if isinstance(value, list | tuple):
-        return "`[" + ", ".join(f"{each:g}" for each in value) + "]`"
+        return "`[" + ", ".join(f"{number:g}" for number in value) + "]`"
     if isinstance(value, bool):
         return "`true`" if value else "`false`"
     return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"

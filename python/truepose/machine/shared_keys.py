@@ -60,12 +60,12 @@ def problems(document: Document) -> list[Problem]:
         return []
     if not isinstance(tables, dict):
         return [_not_tables(document, (EACH,), tables)]
-    found = []
+    problems = []
     for table, common in tables.items():
         key: Key = (EACH, table)
         if table not in ARRAY_TABLES or table not in document.data:
             known = table in ARRAY_TABLES
-            found.append(
+            problems.append(
                 document.problem(
                     Fault(
                         "unknown-key",
@@ -78,9 +78,9 @@ def problems(document: Document) -> list[Problem]:
                 )
             )
         elif not isinstance(common, dict):
-            found.append(_not_tables(document, key, common))
+            problems.append(_not_tables(document, key, common))
         elif "name" in common:
-            found.append(
+            problems.append(
                 document.problem(
                     Fault(
                         "unknown-key",
@@ -91,7 +91,7 @@ def problems(document: Document) -> list[Problem]:
                     (*key, "name"),
                 )
             )
-    return found
+    return problems
 
 
 def _not_tables(document: Document, key: Key, value: object) -> Problem:

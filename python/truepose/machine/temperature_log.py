@@ -111,7 +111,7 @@ def _bad(found: str, expected: str) -> RequestError:
     return RequestError(
         Problem(
             "bad-condition",
-            "this is no temperature log",
+            "this is not a temperature log",
             path="condition.temperature_log",
             found=found,
             expected=expected,
@@ -123,7 +123,7 @@ def _outside(log: TemperatureLog, time: float) -> Problem:
     first, last = log.span
     return Problem(
         "outside-log",
-        "the temperature log does not reach to this time",
+        "the temperature log does not cover this time",
         path="condition.time",
         found=f"{time:.10g} s",
         expected=f"a time from {first:.10g} s to {last:.10g} s",
@@ -147,12 +147,12 @@ def read_temperature_log(
     table = data_files.read(name, columns, _KEY)
     if table is None:
         return None
-    found = [*_not_ascending(table), *_too_cold(table)]
+    problems = [*_not_ascending(table), *_too_cold(table)]
     document = data_files.document
     given = [*fixed, DEFAULT_PART] if _default_is_set(document) else fixed
-    found += [_twice(document, part, name) for part in given if part in table.numbers]
+    problems += [_twice(document, part, name) for part in given if part in table.numbers]
     if len(table.columns) == 1:
-        found.append(
+        problems.append(
             table.problem(
                 Fault(
                     "missing-column",
@@ -162,8 +162,8 @@ def read_temperature_log(
                 )
             )
         )
-    data_files.problems += found
-    if found:
+    data_files.problems += problems
+    if problems:
         return None
     times = table.numbers[TIME]
     log = TemperatureLog(times, {n: v for n, v in table.numbers.items() if n != TIME}, name)
@@ -237,7 +237,7 @@ def _time_outside(document: Document, log: TemperatureLog, time: float, unit: Fi
     return document.problem(
         Fault(
             "outside-log",
-            "the temperature log does not reach to this time",
+            "the temperature log does not cover this time",
             found=asked,
             expected=f"a time from {first} to {last}",
         ),

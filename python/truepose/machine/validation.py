@@ -113,13 +113,13 @@ def _units(document: Document, problems: list[Problem]) -> UnitSystem:
     if not isinstance(table, dict):
         problems.append(_not_a_table(document, ("units",), table))
         return UnitSystem({})
-    filled, found = _fill(document, ("units",), UnitsTable, table, None)
-    broken = {str(key[1]) for key, _ in found if len(key) > 1}
-    if found:
+    filled, faults = _fill(document, ("units",), UnitsTable, table, None)
+    broken = {str(key[1]) for key, _ in faults if len(key) > 1}
+    if faults:
         # The good ones stay in force, so that each bare number is not reported as well.
         good = {key: value for key, value in table.items() if key not in broken}
         filled, _ = _fill(document, ("units",), UnitsTable, good, None)
-    problems += [problem for _, problem in found]
+    problems += [problem for _, problem in faults]
     declared: dict[str, FileUnit] = {}
     if filled is not None:
         declared = {name: getattr(filled, name) for name in filled.model_fields_set}
@@ -137,8 +137,8 @@ def _single(
     if not isinstance(value, dict):
         problems.append(_not_a_table(document, (table,), value))
         return
-    filled, found = _share_out(document, (table,), models, value, validated)
-    problems += found
+    filled, faults = _share_out(document, (table,), models, value, validated)
+    problems += faults
     validated.tables |= {model: one for model, one in filled.items() if one is not None}
 
 
@@ -168,8 +168,8 @@ def _array(
                 # Which keys it may have is not known without its kind: check only the common ones.
                 common = {name for model in models for name in model.model_fields}
                 row = {name: value for name, value in row.items() if name in common}
-        filled, found = _share_out(document, key, of_row, row, validated, coordinate)
-        problems += found
+        filled, faults = _share_out(document, key, of_row, row, validated, coordinate)
+        problems += faults
         for model in models:
             validated.every_row.setdefault(model, []).append(filled[model])
         if kinds:
@@ -210,7 +210,7 @@ def _share_out(
     """
     named = {name for model in models for name in model.model_fields}
     filled: dict[type[BaseModel], BaseModel | None] = {}
-    found: list[tuple[Key, Problem]] = []
+    of_keys: list[tuple[Key, Problem]] = []
     for model in models:
         free = takes_every_key(model)
         share = {
@@ -219,7 +219,7 @@ def _share_out(
             if name in model.model_fields or (free and name not in named)
         }
         filled[model], of_model = _fill(document, key, model, share, validated.units, coordinate)
-        found += of_model
+        of_keys += of_model
     problems = []
     if not any(takes_every_key(model) for model in models):
         unknown = [name for name in value if name not in named]
@@ -227,12 +227,12 @@ def _share_out(
         # "lenght" is one mistake: not also a missing "length".
         meant = {nearest(name, named - value.keys()) for name in unknown}
         validated.misspelt |= {(*key, name) for name in meant if name is not None}
-        found = [
+        of_keys = [
             (where, problem)
-            for where, problem in found
+            for where, problem in of_keys
             if not (problem.code == "missing-key" and where in validated.misspelt)
         ]
-    return filled, problems + [problem for _, problem in found]
+    return filled, problems + [problem for _, problem in of_keys]
 
 
 def _fill(
@@ -248,25 +248,25 @@ def _fill(
     try:
         return model.model_validate(dict(value), context=context), []
     except ValidationError as error:
-        found = []
+        located = []
         for entry in error.errors(include_url=False):
             where = _where(document, key, entry["loc"])
             problem = _problem(document, where, model, cast("dict[str, Any]", entry))
-            found.append((where, problem))
-        return None, _without_misspelt(found)
+            located.append((where, problem))
+        return None, _without_misspelt(located)
 
 
-def _without_misspelt(found: list[tuple[Key, Problem]]) -> list[tuple[Key, Problem]]:
+def _without_misspelt(located: list[tuple[Key, Problem]]) -> list[tuple[Key, Problem]]:
     """A misspelt "lenght" is one mistake: not also a missing "length" beside it."""
-    missing = [where for where, problem in found if problem.code == "missing-key"]
+    missing = [where for where, problem in located if problem.code == "missing-key"]
     meant = set()
-    for where, problem in found:
+    for where, problem in located:
         if problem.code == "unknown-key":
             beside = [str(key[-1]) for key in missing if key[:-1] == where[:-1]]
             meant.add((*where[:-1], nearest(str(where[-1]), beside)))
     return [
         (where, problem)
-        for where, problem in found
+        for where, problem in located
         if not (problem.code == "missing-key" and where in meant)
     ]
 
@@ -318,7 +318,7 @@ def _problem(
         return document.problem(
             Fault(
                 "unknown-choice",
-                f"{shown_value(value)} is none of the words that it takes",
+                f"{shown_value(value)} is not one of the allowed words",
                 found=shown_value(value),
                 expected=context["expected"],
             ),

@@ -166,7 +166,7 @@ def told(machine: Machine, answers: Sequence[Answer]) -> tuple[Told, ...]:
 def gains(answers: Sequence[Answer]) -> tuple[str, ...]:
     """What compensation does to each quantity, in a sentence; empty without both states."""
     sentences = []
-    by = {(each.state, each.quantity): each for each in answers}
+    by = {(answer.state, answer.quantity): answer for answer in answers}
     for (state, quantity), before in by.items():
         after = by.get((AFTER, quantity))
         if state != BEFORE or after is None:

@@ -47,7 +47,7 @@ def calibration(machine: Machine) -> Table | None:
     ]
     if made.residual_rms_held_out is not None:
         rows.append(("rms of those not used", f"{made.residual_rms_held_out:.4g}"))
-    rows += [("WARNING", " ".join(each.split())) for each in made.warning]
+    rows += [("WARNING", " ".join(warning.split())) for warning in made.warning]
     return Table(
         "calibration",
         "Calibration",
@@ -58,13 +58,13 @@ def calibration(machine: Machine) -> Table | None:
     )
 
 
-def tables(found: xr.Dataset, units: ShownUnits) -> list[Table]:
+def tables(result: xr.Dataset, units: ShownUnits) -> list[Table]:
     """Where the two files come from, what differs of the parameters, and at the tool."""
-    return [_files(found), _parameters(found, units), _tool(found, units)]
+    return [_files(result), _parameters(result, units), _tool(result, units)]
 
 
-def _files(found: xr.Dataset) -> Table:
-    said = found.attrs
+def _files(result: xr.Dataset) -> Table:
+    said = result.attrs
     rows = [
         (what, *(str(said[f"{which}_{key}"]) or MISSING for which in ("old", "new")))
         for what, key in (
@@ -80,21 +80,21 @@ def _files(found: xr.Dataset) -> Table:
     return Table("files", "The two files", ("", "old", "new"), tuple(rows), words=3)
 
 
-def _parameters(found: xr.Dataset, units: ShownUnits) -> Table:
-    normalised = found["normalised_difference"].values
+def _parameters(result: xr.Dataset, units: ShownUnits) -> Table:
+    normalised = result["normalised_difference"].values
     order = np.argsort(-np.abs(normalised), kind="stable")
     order = order[normalised[order] != 0.0]
     rows = []
     for at in order[:MOST_LISTED]:
-        unit = str(found["parameter_units"].values[at])
+        unit = str(result["parameter_units"].values[at])
         shown, fine = units.of(unit), units.small(unit)
         old, new, difference, _, _, deviation, ratio = (
-            float(found[name].values[at]) for name in _COLUMNS
+            float(result[name].values[at]) for name in _COLUMNS
         )
         rows.append(
             (
-                str(found["parameter"].values[at]),
-                "changed" if found["parameter_changed"].values[at] else "",
+                str(result["parameter"].values[at]),
+                "changed" if result["parameter_changed"].values[at] else "",
                 f"{number(old * shown.per_si, 6)} {shown.label}",
                 f"{number(new * shown.per_si, 6)} {shown.label}",
                 f"{number(difference * fine.per_si, 3)} {fine.label}",
@@ -102,7 +102,7 @@ def _parameters(found: xr.Dataset, units: ShownUnits) -> Table:
                 number(ratio, 2),
             )
         )
-    said = found.attrs
+    said = result.attrs
     more = len(order) - len(rows)
     note = (
         f"A parameter changed where it differs by more than {said['parameter_limit']:.2f} standard "
@@ -123,16 +123,16 @@ def _parameters(found: xr.Dataset, units: ShownUnits) -> Table:
     )
 
 
-def _tool(found: xr.Dataset, units: ShownUnits) -> Table:
-    commanded = [str(name)[5:] for name in found.coords if str(name).startswith("pose_")]
+def _tool(result: xr.Dataset, units: ShownUnits) -> Table:
+    commanded = [str(name)[5:] for name in result.coords if str(name).startswith("pose_")]
     rows = []
-    for at, quantity in enumerate(found["quantity"].values):
-        sizes = found["moved"].values[:, at]
+    for at, quantity in enumerate(result["quantity"].values):
+        sizes = result["moved"].values[:, at]
         worst = where_highest(sizes)
         scale = units.error(str(quantity))
         unit, factor = scale.label, scale.per_si
-        pose = [float(found[f"pose_{name}"].values[worst]) for name in commanded]
-        deviation = float(found["moved_uncertainty"].values[worst, at])
+        pose = [float(result[f"pose_{name}"].values[worst]) for name in commanded]
+        deviation = float(result["moved_uncertainty"].values[worst, at])
         rows.append(
             (
                 str(quantity),
@@ -149,7 +149,7 @@ def _tool(found: xr.Dataset, units: ShownUnits) -> Table:
         tuple(rows),
         words=2,
         note="Commanded as the old file has the machine, driven as the new one has it, over "
-        f"{found.attrs['poses_used']} poses of the workspace.",
+        f"{result.attrs['poses_used']} poses of the workspace.",
     )
 
 
@@ -162,7 +162,7 @@ def csv_text(result: Result) -> Iterator[str]:
     changed = result.dataset["parameter_changed"].values
     for at, name in enumerate(result.dataset["parameter"].values):
         numbers = [float(values[column].array[at]) for column in _COLUMNS]
-        shown = [repr(each) if np.isfinite(each) else "" for each in numbers]
+        shown = [repr(value) if np.isfinite(value) else "" for value in numbers]
         units = values["old"].unit(at)
         writer.writerow([str(name), units, *shown, str(bool(changed[at])).lower()])
     yield buffer.getvalue()

@@ -39,33 +39,33 @@ _FLAGS = {
 }
 
 
-def tables(found: xr.Dataset, units: ShownUnits) -> list[Table]:
+def tables(result: xr.Dataset, units: ShownUnits) -> list[Table]:
     """All that there is to say, in the order of the terminal, where the last is seen first."""
     return _there(
-        suspicions(found),
-        outliers(found),
-        unknowns(found, units),
-        instruments(found, units),
-        undetermined(found),
-        residuals(found, units),
-        tool(found, units),
-        warning_lines(found),
-        next_measurement(found, units),
+        suspicions(result),
+        outliers(result),
+        unknowns(result, units),
+        instruments(result, units),
+        undetermined(result),
+        residuals(result, units),
+        tool(result, units),
+        warning_lines(result),
+        next_measurement(result, units),
     )
 
 
-def of_page(found: xr.Dataset, units: ShownUnits) -> list[Table]:
+def of_page(result: xr.Dataset, units: ShownUnits) -> list[Table]:
     """The same for the page, where the first are seen first."""
     return _there(
-        suspicions(found),
-        undetermined(found),
-        next_measurement(found, units),
-        warning_lines(found),
-        tool(found, units),
-        residuals(found, units),
-        unknowns(found, units, bars=False),
-        instruments(found, units),
-        outliers(found),
+        suspicions(result),
+        undetermined(result),
+        next_measurement(result, units),
+        warning_lines(result),
+        tool(result, units),
+        residuals(result, units),
+        unknowns(result, units, bars=False),
+        instruments(result, units),
+        outliers(result),
     )
 
 
@@ -73,17 +73,17 @@ def _there(*every: Table | None) -> list[Table]:
     return [table for table in every if table is not None]
 
 
-def json_attribute(found: xr.Dataset, name: str) -> Any:
+def json_attribute(result: xr.Dataset, name: str) -> Any:
     """An attribute that holds JSON; None where there is nothing."""
-    text = str(found.attrs[name])
+    text = str(result.attrs[name])
     return json.loads(text) if text else None
 
 
-def suspicions(found: xr.Dataset) -> Table | None:
+def suspicions(result: xr.Dataset) -> Table | None:
     """What the measurements look like before anything is fitted."""
     rows = [
-        (each["code"], "yes" if each["refuses"] else "no", each["sentence"])
-        for each in json_attribute(found, "suspicions")
+        (suspicion["code"], "yes" if suspicion["refuses"] else "no", suspicion["sentence"])
+        for suspicion in json_attribute(result, "suspicions")
     ]
     if not rows:
         return None
@@ -97,25 +97,25 @@ def suspicions(found: xr.Dataset) -> Table | None:
     )
 
 
-def outliers(found: xr.Dataset) -> Table | None:
+def outliers(result: xr.Dataset) -> Table | None:
     """Readings that do not fit, the worst first."""
-    every = json_attribute(found, "outliers")
+    every = json_attribute(result, "outliers")
     if not every:
         return None
-    in_file = any(each["line"] for each in every)
+    in_file = any(row["line"] for row in every)
     rows = [
         (
-            each["instrument"],
-            each["what"],
-            str(each["line"] if in_file else each["row"]),
-            number(each["sigmas"], 1),
+            row["instrument"],
+            row["what"],
+            str(row["line"] if in_file else row["row"]),
+            number(row["sigmas"], 1),
         )
-        for each in every[:MOST_LISTED]
+        for row in every[:MOST_LISTED]
     ]
     note = "They count less in the fit, unless the robust loss is switched off."
-    if not _odd(found).any():
+    if not _odd(result).any():
         note = (
-            f"{len(every)} of {found.attrs['observations']} readings: these are no odd ones, the "
+            f"{len(every)} of {result.attrs['observations']} readings: these are no odd ones, the "
             "data or the model are wrong as a whole."
         )
     if len(every) > len(rows):
@@ -130,25 +130,25 @@ def outliers(found: xr.Dataset) -> Table | None:
     )
 
 
-def unknowns(found: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> Table:
+def unknowns(result: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> Table:
     """What was found of the machine, and how much of it the measurements say, with bars of text."""
     values = {
-        name: found[name].values
+        name: result[name].values
         for name in (
             "value", "standard_uncertainty", "prior_uncertainty", "data_share", "nominal",
             "identified",
         )
     }  # fmt: skip
-    units = [str(unit) for unit in found["unknown_units"].values]
-    shown = _shown(found)
+    units = [str(unit) for unit in result["unknown_units"].values]
+    shown = _shown(result)
     rows = []
     for at in shown:
         unit = units[at]
         share = float(values["data_share"][at])
         rows.append(
             (
-                str(found["unknown_label"].values[at]),
-                _flag(found, at),
+                str(result["unknown_label"].values[at]),
+                _flag(result, at),
                 _value(float(values["nominal"][at]), unit, shown_in),
                 _value(float(values["identified"][at]), unit, shown_in),
                 signed(float(values["value"][at]), unit, shown_in),
@@ -157,7 +157,7 @@ def unknowns(found: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> T
                 f"{bar(share)} {100.0 * share:4.0f}" if bars else f"{100.0 * share:.0f}",
             )
         )
-    more = found.sizes["unknown"] - len(rows)
+    more = result.sizes["unknown"] - len(rows)
     note = (
         "±: standard uncertainty. From the data: how much of the value the "
         "measurements say; the rest is its tolerance."
@@ -179,25 +179,25 @@ def unknowns(found: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> T
     )  # fmt: skip
 
 
-def _shown(found: xr.Dataset) -> list[int]:
-    count = found.sizes["unknown"]
+def _shown(result: xr.Dataset) -> list[int]:
+    count = result.sizes["unknown"]
     if count <= MOST_UNKNOWNS:
         return list(range(count))
-    order = np.argsort(-found["data_share"].values, kind="stable")[:MOST_UNKNOWNS]
+    order = np.argsort(-result["data_share"].values, kind="stable")[:MOST_UNKNOWNS]
     return sorted(order.tolist())
 
 
-def _flag(found: xr.Dataset, at: int) -> str:
-    off = abs(float(found["value"].values[at]) - float(found["prior_mean"].values[at]))
-    half = float(found["prior_half"].values[at])
-    after = float(found["standard_uncertainty"].values[at])
+def _flag(result: xr.Dataset, at: int) -> str:
+    off = abs(float(result["value"].values[at]) - float(result["prior_mean"].values[at]))
+    half = float(result["prior_half"].values[at])
+    after = float(result["standard_uncertainty"].values[at])
     if not math.isfinite(after):
         return "open"
-    if after > float(found["prior_uncertainty"].values[at]):
+    if after > float(result["prior_uncertainty"].values[at]):
         return "less certain"
     if math.isfinite(half) and off > half:
         return "off tolerance"
-    if float(found["data_share"].values[at]) < RESTS:
+    if float(result["data_share"].values[at]) < RESTS:
         return "mostly tolerance"
     return ""
 
@@ -229,18 +229,18 @@ def _uncertainty(value: float, unit: str, units: ShownUnits) -> str:
     return "open" if math.isinf(value) else quantity(value, unit, units=units)
 
 
-def instruments(found: xr.Dataset, units: ShownUnits) -> Table | None:
+def instruments(result: xr.Dataset, units: ShownUnits) -> Table | None:
     """Where the instruments stand, their targets, what they add."""
-    values = found["instrument_value"].values
+    values = result["instrument_value"].values
     if not values.size:
         return None
     rows = [
         (
-            str(found["instrument_unknown_label"].values[at]),
-            signed(float(value), str(found["instrument_unknown_units"].values[at]), units),
+            str(result["instrument_unknown_label"].values[at]),
+            signed(float(value), str(result["instrument_unknown_units"].values[at]), units),
             _uncertainty(
-                float(found["instrument_uncertainty"].values[at]),
-                str(found["instrument_unknown_units"].values[at]),
+                float(result["instrument_uncertainty"].values[at]),
+                str(result["instrument_unknown_units"].values[at]),
                 units,
             ),
         )
@@ -255,13 +255,15 @@ def instruments(found: xr.Dataset, units: ShownUnits) -> Table | None:
     )
 
 
-def undetermined(found: xr.Dataset) -> Table | None:
+def undetermined(result: xr.Dataset) -> Table | None:
     """What could not be determined, in sentences."""
-    rows = [(f"{sentence(each)}.",) for each in json_attribute(found, "undetermined")]
+    rows = [(f"{sentence(direction)}.",) for direction in json_attribute(result, "undetermined")]
     if not rows:
         return None
-    condition = float(found.attrs["condition_number"])
-    seen = f"Rank of the identification Jacobian: {found.attrs['rank']} of {found.sizes['unknown']}"
+    condition = float(result.attrs["condition_number"])
+    seen = (
+        f"Rank of the identification Jacobian: {result.attrs['rank']} of {result.sizes['unknown']}"
+    )
     if math.isfinite(condition):
         seen += f", condition number {condition:.3g}"
     return Table(
@@ -273,22 +275,22 @@ def undetermined(found: xr.Dataset) -> Table | None:
     )
 
 
-def residuals(found: xr.Dataset, shown_in: ShownUnits) -> Table:
+def residuals(result: xr.Dataset, shown_in: ShownUnits) -> Table:
     """Root mean squares of what was read less what was predicted, for each instrument and unit."""
-    instrument = found["row_instrument"].values[found["observation_row"].values]
-    units = found["observation_units"].values
-    names = found["observation_what"].values
-    sigma = found["uncertainty"].values
-    named = _odd(found)
+    instrument = result["row_instrument"].values[result["observation_row"].values]
+    units = result["observation_units"].values
+    names = result["observation_what"].values
+    sigma = result["uncertainty"].values
+    named = _odd(result)
     rows = []
     for name, unit in dict.fromkeys(zip(instrument.tolist(), units.tolist(), strict=True)):
         mine = (instrument == name) & (units == unit)
         scale = Shown("", 1.0) if unit == "1" else shown_in.small(unit)
         factor, shown = scale.per_si, scale.label
-        what = listed(list(dict.fromkeys(_plain(each) for each in names[mine].tolist())))
+        what = listed(list(dict.fromkeys(_plain(name) for name in names[mine].tolist())))
         mine &= ~named
         sizes = [
-            rms(found[key].values[mine] * (sigma[mine] if normalised else 1.0)) * factor
+            rms(result[key].values[mine] * (sigma[mine] if normalised else 1.0)) * factor
             for key, normalised in (
                 ("residual_before", False),
                 ("residual_after", False),
@@ -296,7 +298,7 @@ def residuals(found: xr.Dataset, shown_in: ShownUnits) -> Table:
                 ("held_out_after", True),
             )
         ]
-        places = 6 if unit == "1" else decimals_for([each for each in sizes if each == each], 4)
+        places = 6 if unit == "1" else decimals_for([size for size in sizes if size == size], 4)
         rows.append(
             (
                 str(name),
@@ -304,10 +306,10 @@ def residuals(found: xr.Dataset, shown_in: ShownUnits) -> Table:
                 str(int(mine.sum())),
                 number(rms(sigma[mine]) * factor, places),
                 *(number(size, places) for size in sizes),
-                number(rms(found["normalised_after"].values[mine]), 2),
+                number(rms(result["normalised_after"].values[mine]), 2),
             )
         )
-    kind, folds = found.attrs["validation"], found.attrs["folds"]
+    kind, folds = result.attrs["validation"], result.attrs["folds"]
     how = {
         "none": "Too few rows to hold any out.",
         "folds": f"Held out: each of {folds} folds of the rows predicted by the others.",
@@ -329,9 +331,9 @@ def residuals(found: xr.Dataset, shown_in: ShownUnits) -> Table:
     )  # fmt: skip
 
 
-def _odd(found: xr.Dataset) -> np.ndarray:
+def _odd(result: xr.Dataset) -> np.ndarray:
     """(n_observation,) readings that do not fit, where they are few: none where many do not."""
-    sizes = found["standardised"].values
+    sizes = result["standardised"].values
     flags: np.ndarray = np.abs(sizes) >= OUTLIER
     return flags if flags.sum() <= FEW * np.isfinite(sizes).sum() else np.zeros_like(flags)
 
@@ -347,29 +349,29 @@ def rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(there**2))) if there.size else float("nan")
 
 
-def tool(found: xr.Dataset, units: ShownUnits) -> Table:
+def tool(result: xr.Dataset, units: ShownUnits) -> Table:
     """Standard uncertainty at the tool before and after, over the workspace."""
     rows = []
-    names = [str(name) for name in found["quantity"].values]
+    names = [str(name) for name in result["quantity"].values]
     for at, name in enumerate(names):
         unit = units.error(name)
         rows.append(
             (
                 f"{name}, {unit.label}",
                 *_of_tool(
-                    found["tool_size_before"].values[:, at] * unit.per_si,
-                    found["tool_size_after"].values[:, at] * unit.per_si,
+                    result["tool_size_before"].values[:, at] * unit.per_si,
+                    result["tool_size_after"].values[:, at] * unit.per_si,
                 ),
             )
         )
-    for at, component in enumerate(found["component"].values):
+    for at, component in enumerate(result["component"].values):
         unit = units.error(str(component))
         before, after = (
-            found[f"tool_{when}"].values[:, at] * unit.per_si for when in ("before", "after")
+            result[f"tool_{when}"].values[:, at] * unit.per_si for when in ("before", "after")
         )
         rows.append((f"{component}, {unit.label}", *_of_tool(before, after)))
     note = "Standard uncertainty of where the tool is, over the poses of the workspace."
-    if found.attrs["relative"]:
+    if result.attrs["relative"]:
         note += " Where the machine as a whole stands in the instrument's frame is not in it."
     return Table(
         "tool",
@@ -382,10 +384,10 @@ def tool(found: xr.Dataset, units: ShownUnits) -> Table:
 
 def _of_tool(before: Floats, after: Floats) -> tuple[str, ...]:
     sizes = [_worst(before), _worst(after), _rms_or_open(before), _rms_or_open(after)]
-    places = decimals_for([each for each in sizes if math.isfinite(each)], 4)
+    places = decimals_for([size for size in sizes if math.isfinite(size)], 4)
     ratio = sizes[1] / sizes[0] if sizes[0] > 0.0 and math.isfinite(sizes[1]) else float("nan")
     return (
-        *("open" if math.isinf(each) else number(each, places) for each in sizes),
+        *("open" if math.isinf(size) else number(size, places) for size in sizes),
         number(ratio, 2),
     )
 
@@ -402,15 +404,17 @@ def _rms_or_open(sizes: Floats) -> float:
     return float("inf") if np.isinf(sizes).any() else rms(sizes)
 
 
-def warning_lines(found: xr.Dataset) -> Table | None:
+def warning_lines(result: xr.Dataset) -> Table | None:
     """Warnings."""
-    rows = [(f"{sentence(each['sentence'])}.",) for each in json_attribute(found, "warnings")]
+    rows = [
+        (f"{sentence(warning['sentence'])}.",) for warning in json_attribute(result, "warnings")
+    ]
     return Table("heed", "To heed", ("",), tuple(rows)) if rows else None
 
 
-def next_measurement(found: xr.Dataset, units: ShownUnits) -> Table | None:
+def next_measurement(result: xr.Dataset, units: ShownUnits) -> Table | None:
     """The cheapest measurement that would turn the verdict."""
-    remedy = json_attribute(found, "remedy")
+    remedy = json_attribute(result, "remedy")
     if remedy is None:
         return None
     note = ""
@@ -441,11 +445,13 @@ def csv_text(result: Result) -> Iterator[str]:
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(["of", "unknown", "label", "units", *names])
     for at, name in enumerate(found["unknown"].values.tolist()):
-        cells = [_cell(columns[each].array[at]) for each in names]
+        cells = [_cell(columns[column].array[at]) for column in names]
         unit = _unit(columns["value"], at)
         writer.writerow(["machine", name, found["unknown_label"].values[at], unit, *cells])
     for at, name in enumerate(found["instrument_unknown"].values.tolist()):
-        cells = [_cell(instrument[each].array[at]) if each in instrument else "" for each in names]
+        cells = [
+            _cell(instrument[column].array[at]) if column in instrument else "" for column in names
+        ]
         unit = _unit(instrument["value"], at)
         label = found["instrument_unknown_label"].values[at]
         writer.writerow(["instrument", name, label, unit, *cells])

@@ -41,7 +41,7 @@ def how_far(study: Study) -> list[HowFar]:
     """
     rows = []
     worst_cases = _linear_maxima(study)
-    sampled = {(each.state, each.quantity): each for each in study.sampled}
+    sampled = {(answer.state, answer.quantity): answer for answer in study.sampled}
     for answer in study.accuracy:
         share = sampled.get((answer.state, answer.quantity))
         worst = answer.coverage is None
@@ -60,24 +60,24 @@ def _linear_maxima(study: Study) -> Mapping[str, Mapping[str, float]]:
     """By state and quantity, m and rad: the largest over all poses."""
     return {
         state: {
-            str(quantity): float(np.nanmax(found["linear_maximum"].values[:, at]))
-            for at, quantity in enumerate(found["quantity"].values)
+            str(quantity): float(np.nanmax(result["linear_maximum"].values[:, at]))
+            for at, quantity in enumerate(result["quantity"].values)
         }
-        for state, found in ((BEFORE, study.budget), (AFTER, study.compensation))
-        if found is not None
+        for state, result in ((BEFORE, study.budget), (AFTER, study.compensation))
+        if result is not None
     }
 
 
 def share_note(study: Study) -> str:
     """What 95 % is, and how it was found."""
     said = "95 %: so many of all machines stay below it at the worst pose, sampled, solved exactly"
-    found = [each.coverage for each in study.sampled if each.coverage is not None]
-    if not found:
+    coverages = [answer.coverage for answer in study.sampled if answer.coverage is not None]
+    if not coverages:
         return f"{said}."
-    draws = max(each.draws for each in found)
-    sampled = {each.sampled for each in found}
+    draws = max(coverage.draws for coverage in coverages)
+    sampled = {coverage.sampled for coverage in coverages}
     up_to = "up to " if len(sampled) > 1 else ""
-    poses = counted(found[0].poses, "pose")
+    poses = counted(coverages[0].poses, "pose")
     return f"{said}: {draws:,} machines at {up_to}{max(sampled):,} of {poses}."
 
 

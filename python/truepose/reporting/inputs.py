@@ -131,7 +131,7 @@ def machine_data(it: Machine) -> dict[str, object]:
 
 def source_data(it: Machine) -> list[dict[str, object]]:
     """The sources and what they do at the usable pose nearest the middle, for programs."""
-    found = {source.name: deviation for source, deviation in _deviations_at_middle(it)}
+    deviations = {source.name: deviation for source, deviation in _deviations_at_middle(it)}
     listed: list[dict[str, object]] = []
     for source in _sources(it):
         entry: dict[str, object] = {
@@ -140,8 +140,8 @@ def source_data(it: Machine) -> list[dict[str, object]]:
             "acts": source.acts(it.condition),
             "deviations": [],
         }
-        if source.name in found:
-            deviation = found[source.name]
+        if source.name in deviations:
+            deviation = deviations[source.name]
             lower, upper = deviation.ends
             entry["deviations"] = [
                 {

@@ -46,7 +46,10 @@ def render(study: Study, machine_text: str = "") -> str:
     left_out = tables.poses_left_out(study)
     if left_out is not None:
         results.append(left_out)
-    drawn = [(each, _embedded(each.name, each.figure)) for each in draw(study)]
+    drawn = [
+        (drawn_figure, _embedded(drawn_figure.name, drawn_figure.figure))
+        for drawn_figure in draw(study)
+    ]
     return environment.get_template("page.html.jinja").render(
         study=study,
         machine=study.machine,

@@ -40,7 +40,10 @@ def curve(plan: Plan) -> Table:
     number_of[0] = 0
     number_of[plan.rank] = np.arange(1, count + 1)
     header = ["poses", "pose added"]
-    columns = [[str(each) for each in shown], ["" if n == 0 else str(number_of[n]) for n in shown]]
+    columns = [
+        [str(count) for count in shown],
+        ["" if n == 0 else str(number_of[n]) for n in shown],
+    ]
     for at, (name, unit) in enumerate(_quantities(plan)):
         header += [f"{name} rms, {unit.label}", f"highest, {unit.label}"]
         columns += [

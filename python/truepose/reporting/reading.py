@@ -20,33 +20,33 @@ def percent_text(probability: float) -> str:
     return f"{100.0 * probability:.6g} %"
 
 
-def components(found: xr.Dataset) -> list[str]:
+def components(result: xr.Dataset) -> list[str]:
     """Names of the error components of a result."""
-    return [str(name) for name in found["component"].values]
+    return [str(name) for name in result["component"].values]
 
 
-def quantities(found: xr.Dataset) -> list[str]:
+def quantities(result: xr.Dataset) -> list[str]:
     """Names of the magnitudes of a result: position, orientation."""
-    return [str(name) for name in found["quantity"].values]
+    return [str(name) for name in result["quantity"].values]
 
 
-def position_of(found: xr.Dataset) -> list[int]:
+def position_of(result: xr.Dataset) -> list[int]:
     """Indices of the components that say where the tool is, or how it turns if it only does."""
-    names = components(found)
+    names = components(result)
     return [at for at, name in enumerate(names) if is_position(name)] or list(range(len(names)))
 
 
-def poses_of(machine: Machine, found: xr.Dataset) -> Floats:
+def poses_of(machine: Machine, result: xr.Dataset) -> Floats:
     """(n_pose, n_commanded) poses of a result, m and rad."""
-    return np.stack([found[f"pose_{name}"].values for name in machine.commanded], axis=-1)
+    return np.stack([result[f"pose_{name}"].values for name in machine.commanded], axis=-1)
 
 
-def at_text(machine: Machine, found: xr.Dataset, pose: int) -> str:
+def at_text(machine: Machine, result: xr.Dataset, pose: int) -> str:
     """One pose of a result for people, counted in the result."""
-    return pose_text(poses_of(machine, found)[pose], machine.commanded, machine.shown)
+    return pose_text(poses_of(machine, result)[pose], machine.commanded, machine.shown)
 
 
-def worst_pose(found: xr.Dataset, magnitude: str) -> int:
+def worst_pose(result: xr.Dataset, magnitude: str) -> int:
     """Index of the pose at which a magnitude (pose, quantity) of the position is highest."""
-    sizes = np.asarray(found[magnitude].values)[:, 0]
+    sizes = np.asarray(result[magnitude].values)[:, 0]
     return where_highest(sizes) if np.isfinite(sizes).any() else 0

@@ -121,33 +121,37 @@ class Result:
                 moved[row, column], second = self._converted(once, other)
                 units.append(_product(first, second))
         same = tuple(dict.fromkeys(units))
-        found = np.moveaxis(moved, (0, 1), axes)
+        rows = np.moveaxis(moved, (0, 1), axes)
         if len(same) == 1:
-            return Values(dims, found, same, (), long_name)
-        return Values(dims, found, tuple(units), axes, long_name)
+            return Values(dims, rows, same, (), long_name)
+        return Values(dims, rows, tuple(units), axes, long_name)
 
     def variables(self) -> list[str]:
         """Names of what was computed, also what xarray takes for a coordinate by its name."""
-        coordinates = [str(name) for name, each in self.dataset.coords.items() if each.ndim > 1]
+        coordinates = [
+            str(name) for name, coordinate in self.dataset.coords.items() if coordinate.ndim > 1
+        ]
         return [*coordinates, *map(str, self.dataset.data_vars)]
 
     def coordinates(self) -> list[str]:
         """Names of what labels the variables, without the poses left out."""
-        names = [str(name) for name, each in self.dataset.coords.items() if each.ndim <= 1]
+        names = [
+            str(name) for name, coordinate in self.dataset.coords.items() if coordinate.ndim <= 1
+        ]
         return [name for name in names if not name.startswith("left_out") and not _is_units(name)]
 
     def accuracy(self) -> dict[str, dict[str, object]]:
         """The accuracy asked of position and orientation, those that are asked."""
         asked = self.machine.accuracy
-        found = {}
+        columns = {}
         for name, value, si in (
             ("position", asked.target, "m"),
             ("orientation", asked.angle_target, "rad"),
         ):
             if value is not None:
                 converted, unit = in_file_units(self.machine, value, si)
-                found[name] = {"target": converted, "units": unit}
-        return found
+                columns[name] = {"target": converted, "units": unit}
+        return columns
 
     def labels(self, dim: str) -> list[str]:
         """Names along a dimension, or its numbers as text where it has no names.

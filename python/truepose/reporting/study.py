@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 def warnings_of(dataset: xr.Dataset) -> list[dict[str, str]]:
     """What a result warns of: `code` and `sentence` of each, without its full stop."""
-    found: list[dict[str, str]] = json.loads(dataset.attrs.get("warnings") or "[]")
-    return found
+    warnings: list[dict[str, str]] = json.loads(dataset.attrs.get("warnings") or "[]")
+    return warnings
 
 
 @dataclass(frozen=True)

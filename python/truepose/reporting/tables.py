@@ -167,16 +167,16 @@ MOMENTS = 9
 """Moments of an error over time shown to people, evenly spaced."""
 
 
-def over_time(machine: Machine, found: xr.Dataset) -> Table:
+def over_time(machine: Machine, result: xr.Dataset) -> Table:
     """The error at the first of the poses, at some moments of the temperature log and the worst."""
     units = machine.shown
-    times, error = found["time"].values, found["error"].values[:, 0]
-    components = [str(name) for name in found["component"].values]
+    times, error = result["time"].values, result["error"].values[:, 0]
+    components = [str(name) for name in result["component"].values]
     size = np.linalg.norm(error[:, [is_position(name) for name in components]], axis=1)
     worst = where_highest(size)
     shown = np.unique(np.linspace(0, len(times) - 1, min(MOMENTS, len(times))).astype(int))
     rows = [*shown, worst]
-    pose = np.array([found[f"pose_{name}"].values[0] for name in machine.commanded])
+    pose = np.array([result[f"pose_{name}"].values[0] for name in machine.commanded])
     columns = [
         [*(number(times[row] / 60.0, 2) for row in shown), f"{times[worst] / 60.0:.2f} (worst)"],
         *(
@@ -207,31 +207,31 @@ def strain(study: Study) -> list[Table]:
 
 def internal_forces(study: Study) -> Table:
     """What each source's misfit makes of force inside the structure, and what clearances take."""
-    found = study.strained
-    order = np.argsort(-found["highest_force_rigid"].values, kind="stable")
+    strained = study.strained
+    order = np.argsort(-strained["highest_force_rigid"].values, kind="stable")
     commanded, units = study.machine.commanded, study.units
     small, force_unit = units.small_length, units.force
-    poses = np.stack([found[f"pose_{name}"].values for name in commanded], axis=-1)
+    poses = np.stack([strained[f"pose_{name}"].values for name in commanded], axis=-1)
     closures, places = [], []
     for source in order:
-        force = np.abs(found["force"].values[:, source])
+        force = np.abs(strained["force"].values[:, source])
         if not force.any():
-            force = np.abs(found["force_rigid"].values[:, source])
+            force = np.abs(strained["force_rigid"].values[:, source])
         pose, closure = divmod(where_highest(force.ravel()), force.shape[1])
-        closures.append(str(found["closure"].values[closure]))
+        closures.append(str(strained["closure"].values[closure]))
         places.append(pose_text(poses[pose], commanded, units))
 
     def highest(name: str) -> Floats:
-        return np.asarray(np.abs(found[name].values[:, order]).max(axis=(0, 2)))
+        return np.asarray(np.abs(strained[name].values[:, order]).max(axis=(0, 2)))
 
     columns = [
-        [str(name) for name in found["source"].values[order]],
-        [str(verdict) for verdict in found["verdict"].values[order]],
+        [str(name) for name in strained["source"].values[order]],
+        [str(verdict) for verdict in strained["verdict"].values[order]],
         closures,
         places,
         column(highest("force") * force_unit.per_si),
         column(highest("force_rigid") * force_unit.per_si),
-        column(found["remaining"].values[order] * 100, 1),
+        column(strained["remaining"].values[order] * 100, 1),
         column(highest("absorbed") * small.per_si),
         column(highest("strain") * small.per_si),
     ]
@@ -259,11 +259,11 @@ def internal_forces(study: Study) -> Table:
 
 def closure_forces(study: Study) -> Table:
     """What each closure carries with all sources at their shifts and all loads."""
-    found = study.strained
+    strained = study.strained
     small, unit = study.units.small_length, study.units.force
-    force = found["overall_force"].values * unit.per_si
+    force = strained["overall_force"].values * unit.per_si
     absorbed, strain = (
-        np.abs(found[f"overall_{name}"].values).max(axis=0) * small.per_si
+        np.abs(strained[f"overall_{name}"].values).max(axis=0) * small.per_si
         for name in ("absorbed", "strain")
     )
     return Table(
@@ -278,7 +278,7 @@ def closure_forces(study: Study) -> Table:
         ),
         tuple(
             zip(
-                [str(name) for name in found["closure"].values],
+                [str(name) for name in strained["closure"].values],
                 column(force.min(axis=0), decimals_for(force)),
                 column(force.max(axis=0), decimals_for(force)),
                 column(absorbed),
@@ -290,25 +290,25 @@ def closure_forces(study: Study) -> Table:
     )
 
 
-def answers(machine: Machine, found: Sequence[Answer]) -> Table:
+def answers(machine: Machine, answered: Sequence[Answer]) -> Table:
     """What the machine can do against the accuracy asked: the three known numbers of each."""
-    shares = {each.coverage.probability for each in found if each.coverage is not None}
+    shares = {answer.coverage.probability for answer in answered if answer.coverage is not None}
     rows = [
         (
-            each.name,
-            each.word,
+            line.name,
+            line.word,
             *(
-                each.text(one.value, side)
+                line.text(one.value, side)
                 for one, side in (
-                    (each.answer.witness, 0),
-                    (each.answer.linear, 0),
-                    (each.answer.bound, 1),
+                    (line.answer.witness, 0),
+                    (line.answer.linear, 0),
+                    (line.answer.bound, 1),
                 )
             ),
-            each.asked,
-            each.at(each.told),
+            line.asked,
+            line.at(line.told),
         )
-        for each in told(machine, found)
+        for line in told(machine, answered)
     ]
     names: Sequence[str] = NUMBERS
     if shares:

@@ -83,32 +83,32 @@ def _named(machine: Machine, name: str) -> str:
     return f"{name}, {machine.shown.error(name).label}"
 
 
-def sampled(machine: Machine, found: xr.Dataset) -> list[Table]:
+def sampled(machine: Machine, result: xr.Dataset) -> list[Table]:
     """What the samples say at the pose where the position is farthest off, and over all poses."""
-    pose = worst_pose(found, "magnitude_upper")
-    tables = [_sampled_at(machine, found, pose)]
-    if found.sizes["pose"] > 1:
-        tables.append(_sampled_over(machine, found))
+    pose = worst_pose(result, "magnitude_upper")
+    tables = [_sampled_at(machine, result, pose)]
+    if result.sizes["pose"] > 1:
+        tables.append(_sampled_over(machine, result))
     return tables
 
 
-def _sampled_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
-    names = components(found)
+def _sampled_at(machine: Machine, result: xr.Dataset, pose: int) -> Table:
+    names = components(result)
     ends = ("lower", "upper", "shortest_lower", "shortest_upper", "minimum", "maximum")
     kinds = ("mean", "standard_deviation", *ends)
-    values = np.stack([found[kind].values[pose] for kind in kinds], axis=-1)
+    values = np.stack([result[kind].values[pose] for kind in kinds], axis=-1)
     rows = [
         (_named(machine, name), *column(row * machine.shown.error(name).per_si))
         for name, row in zip(names, values, strict=True)
     ]
-    for at, name in enumerate(quantities(found)):
+    for at, name in enumerate(quantities(result)):
         mean, upper, most = (
-            found[f"magnitude_{kind}"].values[pose, at] for kind in ("mean", "upper", "maximum")
+            result[f"magnitude_{kind}"].values[pose, at] for kind in ("mean", "upper", "maximum")
         )
         cells = [mean, np.nan, np.nan, upper, np.nan, upper, np.nan, most]
         scaled = np.array(cells) * machine.shown.error(name).per_si
         rows.append((_named(machine, name), *column(scaled)))
-    percent = percent_text(float(found.attrs["probability"]))
+    percent = percent_text(float(result.attrs["probability"]))
     return Table(
         "sampled",
         f"Sampled error, {percent} coverage intervals",
@@ -124,94 +124,95 @@ def _sampled_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
             "largest sample",
         ),
         tuple(rows),
-        note=f"At {at_text(machine, found, pose)}, where the position is farthest off. "
+        note=f"At {at_text(machine, result, pose)}, where the position is farthest off. "
         f"{percent} of the samples lie in this coverage interval, as many below as above it; the "
         "shortest interval with as many is beside it. Of a magnitude, as many lie below its end. "
-        + _drawn(found, pose),
+        + _drawn(result, pose),
     )
 
 
-def _drawn(found: xr.Dataset, pose: int) -> str:
+def _drawn(result: xr.Dataset, pose: int) -> str:
     """How many samples, how drawn, and how many of them the machine could not follow."""
-    count, failed = int(found["samples"].values[pose]), int(found["failed"].values[pose])
-    how = "scrambled Sobol points" if found.attrs["sampling"] == "sobol" else "samples"
-    text = f"{count:,} {how}, seed {found.attrs['seed']}."
-    if found.attrs.get("digits"):
-        digits = counted(int(found.attrs["digits"]), "digit")
+    count, failed = int(result["samples"].values[pose]), int(result["failed"].values[pose])
+    how = "scrambled Sobol points" if result.attrs["sampling"] == "sobol" else "samples"
+    text = f"{count:,} {how}, seed {result.attrs['seed']}."
+    if result.attrs.get("digits"):
+        digits = counted(int(result.attrs["digits"]), "digit")
         text += f" As many as make {digits} of the standard deviation stable (JCGM 101, 7.9)."
     if failed:
         text += (
             f" {not_assembled_text(failed, count + failed)}: they count as beyond both ends of "
             "every interval, and are in no mean, standard deviation or extreme."
         )
-    if found.attrs.get("interrupted"):
+    if result.attrs.get("interrupted"):
         text += " Interrupted: fewer than were asked for."
     return text
 
 
-def _sampled_over(machine: Machine, found: xr.Dataset) -> Table:
-    names = components(found)
-    far = np.maximum(np.abs(found["lower"].values), np.abs(found["upper"].values))
-    spread = found["standard_deviation"].values
-    most = np.maximum(np.abs(found["minimum"].values), np.abs(found["maximum"].values))
+def _sampled_over(machine: Machine, result: xr.Dataset) -> Table:
+    names = components(result)
+    far = np.maximum(np.abs(result["lower"].values), np.abs(result["upper"].values))
+    spread = result["standard_deviation"].values
+    most = np.maximum(np.abs(result["minimum"].values), np.abs(result["maximum"].values))
     rows = []
     for at, name in enumerate(names):
         pose = where_highest(far[:, at])
         sizes = np.array([spread[:, at].max(), far[pose, at], most[:, at].max()])
         cells = column(sizes * machine.shown.error(name).per_si)
-        rows.append((_named(machine, name), at_text(machine, found, pose), *cells))
-    for at, name in enumerate(quantities(found)):
-        upper = found["magnitude_upper"].values[:, at]
+        rows.append((_named(machine, name), at_text(machine, result, pose), *cells))
+    for at, name in enumerate(quantities(result)):
+        upper = result["magnitude_upper"].values[:, at]
         pose = where_highest(upper)
-        largest = found["magnitude_maximum"].values[:, at].max()
+        largest = result["magnitude_maximum"].values[:, at].max()
         cells = column(np.array([np.nan, upper[pose], largest]) * machine.shown.error(name).per_si)
-        rows.append((_named(machine, name), at_text(machine, found, pose), *cells))
+        rows.append((_named(machine, name), at_text(machine, result, pose), *cells))
     return Table(
         "sampled_over",
-        f"Sampled error over {found.sizes['pose']:,} poses",
+        f"Sampled error over {result.sizes['pose']:,} poses",
         (
             "",
             "farthest at",
             "highest standard deviation",
-            f"farthest of {percent_text(float(found.attrs['probability']))}",
+            f"farthest of {percent_text(float(result.attrs['probability']))}",
             "farthest sample",
         ),
         tuple(rows),
         words=2,
-        note="Farthest: the end of the coverage interval that is farther from zero." + _lost(found),
+        note="Farthest: the end of the coverage interval that is farther from zero."
+        + _lost(result),
     )
 
 
-def _lost(found: xr.Dataset) -> str:
+def _lost(result: xr.Dataset) -> str:
     """How many samples could not be assembled anywhere, and where too many for an interval."""
-    lost = str(found.attrs.get("not_assembled", "none"))
+    lost = str(result.attrs.get("not_assembled", "none"))
     if lost == "none":
         return ""
-    none = int(np.isnan(found["magnitude_upper"].values[:, 0]).sum())
+    none = int(np.isnan(result["magnitude_upper"].values[:, 0]).sum())
     where = f"; at {counted(none, 'pose')} so many that no interval is left" if none else ""
     return f" Of all samples {lost}{where}."
 
 
-def bounds(machine: Machine, found: xr.Dataset) -> list[Table]:
+def bounds(machine: Machine, result: xr.Dataset) -> list[Table]:
     """What is proven: at poses or over a region, and where nothing could be."""
-    if "pose" not in found.sizes:
-        return [_region(machine, found)]
-    tables = [_bounds_at(machine, found, worst_pose(found, "magnitude"))]
-    unproven = _unproven(machine, found)
+    if "pose" not in result.sizes:
+        return [_region(machine, result)]
+    tables = [_bounds_at(machine, result, worst_pose(result, "magnitude"))]
+    unproven = _unproven(machine, result)
     return tables if unproven is None else [*tables, unproven]
 
 
-def _bounds_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
+def _bounds_at(machine: Machine, result: xr.Dataset, pose: int) -> Table:
     rows = []
-    for at, name in enumerate(components(found)):
-        ends = [found[f"{kind}lower"].values[pose, at] for kind in ("", "reached_")]
-        tops = [found[f"{kind}upper"].values[pose, at] for kind in ("reached_", "")]
-        linear = found["linear"].values[pose, at]
+    for at, name in enumerate(components(result)):
+        ends = [result[f"{kind}lower"].values[pose, at] for kind in ("", "reached_")]
+        tops = [result[f"{kind}upper"].values[pose, at] for kind in ("reached_", "")]
+        linear = result["linear"].values[pose, at]
         row = np.array([ends[0], ends[1], tops[0], tops[1], linear])
         cells = rounded(row * machine.shown.error(name).per_si, (-1, 1, -1, 1, 0))
         rows.append((_named(machine, name), *cells))
-    for at, name in enumerate(quantities(found)):
-        size = [found[f"{kind}magnitude"].values[pose, at] for kind in ("reached_", "")]
+    for at, name in enumerate(quantities(result)):
+        size = [result[f"{kind}magnitude"].values[pose, at] for kind in ("reached_", "")]
         row = np.array([np.nan, np.nan, *size, np.nan]) * machine.shown.error(name).per_si
         rows.append((_named(machine, name), *rounded(row, (0, 0, -1, 1, 0))))
     return Table(
@@ -219,32 +220,34 @@ def _bounds_at(machine: Machine, found: xr.Dataset, pose: int) -> Table:
         "Proven bounds",
         ("", "never below", "reached", "reached", "never above", "linear worst case"),
         tuple(rows),
-        note=f"At {at_text(machine, found, pose)}, where the position's bound is highest. For "
+        note=f"At {at_text(machine, result, pose)}, where the position's bound is highest. For "
         "every deviation inside the bands the tool is there and nowhere else, and its error "
         "between these ends, rounding included; the error that is reached shows how much of the "
-        "bound is used." + _taken_to_end(found),
+        "bound is used." + _taken_to_end(result),
     )
 
 
-def _taken_to_end(found: xr.Dataset) -> str:
+def _taken_to_end(result: xr.Dataset) -> str:
     """Where bounds take distributions without ends to end, as a sentence; nothing without any."""
-    where = found.attrs.get("truncate", "none")
+    where = result.attrs.get("truncate", "none")
     if where == "none":
         return ""
-    kinds = " and ".join(each.split(":")[0] for each in str(found.attrs["unbounded"]).split("; "))
+    kinds = " and ".join(
+        entry.split(":")[0] for entry in str(result.attrs["unbounded"]).split("; ")
+    )
     if where == "as stated":
         return f" Deviations without ends are taken at their stated k sigma: {kinds}."
     return f" Deviations without ends ({kinds}) are taken to end at {where:g} standard deviations."
 
 
-def _unproven(machine: Machine, found: xr.Dataset) -> Table | None:
+def _unproven(machine: Machine, result: xr.Dataset) -> Table | None:
     """Poses without a proof and why; None where all have one."""
-    status = np.array([str(each) for each in found["status"].values])
+    status = np.array([str(code) for code in result["status"].values])
     lost = np.flatnonzero(status != PROVEN)
     if lost.size == 0:
         return None
     rows = [
-        (at_text(machine, found, int(pose)), unproven_text(status[pose]))
+        (at_text(machine, result, int(pose)), unproven_text(status[pose]))
         for pose in lost[:MOST_LISTED]
     ]
     more = f" The first {MOST_LISTED} are listed." if lost.size > MOST_LISTED else ""
@@ -258,9 +261,9 @@ def _unproven(machine: Machine, found: xr.Dataset) -> Table | None:
     )
 
 
-def _region(machine: Machine, found: xr.Dataset) -> Table:
+def _region(machine: Machine, result: xr.Dataset) -> Table:
     rows = []
-    for name, bound, reached, where in region_answers(found):
+    for name, bound, reached, where in region_answers(result):
         per_si = machine.shown.error(name).per_si
         least = abs(reached) * per_si
         most = abs(bound) * per_si
@@ -276,18 +279,18 @@ def _region(machine: Machine, found: xr.Dataset) -> Table:
                 *column(np.array([gap]), 1),
             )
         )
-    name, bound, reached, _ = region_answers(found)[0]
-    asked = float(found.attrs["gap"])
+    name, bound, reached, _ = region_answers(result)[0]
+    asked = float(result.attrs["gap"])
     open_ = (
         ""
         if bound <= reached * (1.0 + asked)
         else (f" The gap asked, {percent_text(asked)}, was not reached.")
     )
-    status = str(found["status"].values)
+    status = str(result["status"].values)
     proof = (
-        f"Proven over the whole region, cut into {int(found['boxes'].values):,} boxes."
+        f"Proven over the whole region, cut into {int(result['boxes'].values):,} boxes."
         if status == PROVEN
-        else f"Not proven: {_unproven_where(machine, found)}."
+        else f"Not proven: {_unproven_where(machine, result)}."
     )
     return Table(
         "region",
@@ -298,43 +301,43 @@ def _region(machine: Machine, found: xr.Dataset) -> Table:
         note=proof
         + open_
         + " Every pose in the region, not only those of a grid; the error's sign left "
-        "out." + _taken_to_end(found),
+        "out." + _taken_to_end(result),
     )
 
 
-def region_answers(found: xr.Dataset) -> list[tuple[str, float, float, Floats]]:
+def region_answers(result: xr.Dataset) -> list[tuple[str, float, float, Floats]]:
     """Name, bound, what is reached and where (n_commanded,), of every component and quantity.
 
     Of a component's two ends the one that is farther from zero.
     """
     answers: list[tuple[str, float, float, Floats]] = []
-    for at, name in enumerate(quantities(found)):
-        size, reached = (float(found[f"{k}magnitude"].values[at]) for k in ("", "reached_"))
-        answers.append((name, size, reached, np.asarray(found["where_magnitude"].values[at])))
-    for at, name in enumerate(components(found)):
-        low, high = float(found["lower"].values[at]), float(found["upper"].values[at])
+    for at, name in enumerate(quantities(result)):
+        size, reached = (float(result[f"{k}magnitude"].values[at]) for k in ("", "reached_"))
+        answers.append((name, size, reached, np.asarray(result["where_magnitude"].values[at])))
+    for at, name in enumerate(components(result)):
+        low, high = float(result["lower"].values[at]), float(result["upper"].values[at])
         side = "upper" if not abs(low) > abs(high) else "lower"
-        reached = float(found[f"reached_{side}"].values[at])
+        reached = float(result[f"reached_{side}"].values[at])
         bound = high if side == "upper" else low
-        where = found["where" if side == "upper" else "where_lower"].values[at]
+        where = result["where" if side == "upper" else "where_lower"].values[at]
         answers.append((name, bound, reached, np.asarray(where)))
     return answers
 
 
-def _unproven_where(machine: Machine, found: xr.Dataset) -> str:
+def _unproven_where(machine: Machine, result: xr.Dataset) -> str:
     """Why a region has no proof, and a pose of it where that is so."""
-    reason = unproven_text(str(found["status"].values))
-    pose = np.asarray(found["where_unproven"].values)
+    reason = unproven_text(str(result["status"].values))
+    pose = np.asarray(result["where_unproven"].values)
     if not np.isfinite(pose).all():
         return reason
     return f"{reason} at {pose_text(pose, machine.commanded, machine.shown)}"
 
 
-def sentence(machine: Machine, found: xr.Dataset) -> str:
+def sentence(machine: Machine, result: xr.Dataset) -> str:
     """A region's answer in words."""
-    name, bound, reached, where = region_answers(found)[0]
-    if str(found["status"].values) != PROVEN or not np.isfinite(bound):
-        return f"No bound is proven over this region: {_unproven_where(machine, found)}."
+    name, bound, reached, where = region_answers(result)[0]
+    if str(result["status"].values) != PROVEN or not np.isfinite(bound):
+        return f"No bound is proven over this region: {_unproven_where(machine, result)}."
     unit = machine.shown.error(name)
     most, least = rounded(np.array([bound, reached]) * unit.per_si, (1, -1))
     what = "deviate" if name == "position" else "turn"

@@ -33,63 +33,63 @@ class Blame:
     confidence: dict[str, Floats]
 
 
-def blame(found: xr.Dataset, pose: int, of: str = "parameter", part: str = "position") -> Blame:
+def blame(result: xr.Dataset, pose: int, of: str = "parameter", part: str = "position") -> Blame:
     """Who makes how much of the variance of a vector at one pose.
 
     The shares of the components, weighted with their variances (Lamboni, Monod & Makowski 2011,
     "Multivariate sensitivity analysis to measure global contribution of input factors in dynamic
     models", equation 11). `of` is "parameter" or "source", `part` "position" or "orientation".
     """
-    names = components(found)
+    names = components(result)
     among = [at for at, name in enumerate(names) if is_position(name) == (part == "position")]
-    variance = np.asarray(found["standard_deviation"].values)[pose, among] ** 2
+    variance = np.asarray(result["standard_deviation"].values)[pose, among] ** 2
     total = float(variance.sum())
     weight = variance / total if total > 0 else np.zeros_like(variance)
     before = "" if of == "parameter" else "source_"
 
     def weighted(name: str) -> Floats:
-        values = np.asarray(found[before + name].values)[pose][:, among]
+        values = np.asarray(result[before + name].values)[pose][:, among]
         return np.asarray(np.where(weight > 0, values, 0.0) @ weight)
 
-    kinds = [kind for kind in ("first", "total", "linear", "shapley") if before + kind in found]
+    kinds = [kind for kind in ("first", "total", "linear", "shapley") if before + kind in result]
     values = {kind: weighted(kind) for kind in kinds}
     # Components are estimated from the same samples: their errors may all have one sign.
     half = {
         kind: weighted(f"{kind}_confidence")
         for kind in kinds
-        if f"{before}{kind}_confidence" in found
+        if f"{before}{kind}_confidence" in result
     }
     order = np.argsort(-values["shapley" if "shapley" in values else "total"], kind="stable")
-    labels = [str(name) for name in found[of].values]
+    labels = [str(name) for name in result[of].values]
     return Blame(
         tuple(labels[at] for at in order),
-        {kind: each[order] for kind, each in values.items()},
-        {kind: each[order] for kind, each in half.items()},
+        {kind: column[order] for kind, column in values.items()},
+        {kind: column[order] for kind, column in half.items()},
     )
 
 
-def spread_pose(found: xr.Dataset) -> int:
+def spread_pose(result: xr.Dataset) -> int:
     """Index of the pose at which the position of the tool spreads most."""
-    among = position_of(found)
-    return where_highest(np.linalg.norm(found["standard_deviation"].values[:, among], axis=1))
+    among = position_of(result)
+    return where_highest(np.linalg.norm(result["standard_deviation"].values[:, among], axis=1))
 
 
-def parts_of(found: xr.Dataset) -> list[str]:
+def parts_of(result: xr.Dataset) -> list[str]:
     """Position, orientation or both: what the components of a result are of."""
-    lengths = [is_position(name) for name in components(found)]
+    lengths = [is_position(name) for name in components(result)]
     return ["position"] * any(lengths) + ["orientation"] * (not all(lengths))
 
 
-def shares(machine: Machine, found: xr.Dataset) -> list[Table]:
+def shares(machine: Machine, result: xr.Dataset) -> list[Table]:
     """Who makes the spread, by parameter and by source, where it is largest."""
-    pose = spread_pose(found)
-    parts = parts_of(found)
-    tables = [_shares(machine, found, pose, "parameter", part) for part in parts]
-    return [*tables, *(_shares(machine, found, pose, "source", part) for part in parts)]
+    pose = spread_pose(result)
+    parts = parts_of(result)
+    tables = [_shares(machine, result, pose, "parameter", part) for part in parts]
+    return [*tables, *(_shares(machine, result, pose, "source", part) for part in parts)]
 
 
-def _shares(machine: Machine, found: xr.Dataset, pose: int, of: str, part: str) -> Table:
-    who = blame(found, pose, of, part)
+def _shares(machine: Machine, result: xr.Dataset, pose: int, of: str, part: str) -> Table:
+    who = blame(result, pose, of, part)
     header, cells = [of], []
     for kind, title in (
         ("first", "first, %"),
@@ -112,13 +112,13 @@ def _shares(machine: Machine, found: xr.Dataset, pose: int, of: str, part: str) 
     first = ""
     if of == "parameter" and rows:
         first = f" To be tightened first: {who.names[0]}."
-        if part == parts_of(found)[0] and found.sizes["pose"] > 1:
-            name, share = first_to_tighten(found)
+        if part == parts_of(result)[0] and result.sizes["pose"] > 1:
+            name, share = first_to_tighten(result)
             first += (
-                f" Over all {found.sizes['pose']:,} poses together: {name}, {100 * share:.1f} % of "
-                "the variance."
+                f" Over all {result.sizes['pose']:,} poses together: {name}, {100 * share:.1f} % "
+                "of the variance."
             )
-    failed = int(found["failed"].values[pose])
+    failed = int(result["failed"].values[pose])
     lost = (
         f" At this pose {counted(failed, 'base sample')} could not be assembled: the shares are "
         "those of the machines that could."
@@ -130,7 +130,7 @@ def _shares(machine: Machine, found: xr.Dataset, pose: int, of: str, part: str) 
         f"Shares of the {part}'s variance, by {of}",
         tuple(header),
         rows,
-        note=f"At {at_text(machine, found, pose)}, where the tool spreads most, of the variances "
+        note=f"At {at_text(machine, result, pose)}, where the tool spreads most, of the variances "
         "of all components together. First: what would go if this one were known; total: what "
         "would stay if all others were; linear: to first order." + first + more + lost,
     )

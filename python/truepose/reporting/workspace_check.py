@@ -95,12 +95,12 @@ def check_workspace(machine: Machine) -> WorkspaceCheck:
 
 def _reasons(machine: Machine, poses: Floats) -> tuple[SkipReason, ...]:
     """Causes by part and side, the one that stops most poses first."""
-    found: dict[tuple[str, str, str, bool], list[float]] = {}
+    by_cause: dict[tuple[str, str, str, bool], list[float]] = {}
     for pose in poses[:: max(1, -(-len(poses) // EXPLAINED))]:
         for cause in machine.kernel.explain(pose):
             amount = float(cause["amount"])
             what, name, unit = (str(cause[key]) for key in ("what", "name", "unit"))
-            found.setdefault((what, name, unit, amount < 0.0), []).append(amount)
+            by_cause.setdefault((what, name, unit, amount < 0.0), []).append(amount)
     reasons = [
         SkipReason(
             what,
@@ -109,24 +109,24 @@ def _reasons(machine: Machine, poses: Floats) -> tuple[SkipReason, ...]:
             min(amounts) if what == "singular" else max(amounts, key=abs),
             unit,
         )
-        for (what, name, unit, _), amounts in found.items()
+        for (what, name, unit, _), amounts in by_cause.items()
     ]
     return tuple(sorted(reasons, key=lambda reason: -reason.count))
 
 
-def table(machine: Machine, found: WorkspaceCheck) -> Table:
+def table(machine: Machine, check: WorkspaceCheck) -> Table:
     """The workspace for people."""
-    usable = int(found.usable.sum())
-    rows = [("poses", f"{len(found.poses):,}"), ("usable", f"{usable:,}")]
-    names, counts = np.unique(found.status[~found.usable], return_counts=True)
+    usable = int(check.usable.sum())
+    rows = [("poses", f"{len(check.poses):,}"), ("usable", f"{usable:,}")]
+    names, counts = np.unique(check.status[~check.usable], return_counts=True)
     rows += [
         (str(name).replace("_", " "), f"{count:,}")
         for name, count in zip(names, counts, strict=True)
     ]
-    rows += [("because", reason.text(machine.shown)) for reason in found.reasons[:MOST_LISTED]]
+    rows += [("because", reason.text(machine.shown)) for reason in check.reasons[:MOST_LISTED]]
     if usable:
-        where = pose_text(found.worst_pose, machine.commanded, machine.shown)
-        rows.append(("worst conditioning", f"{found.worst_conditioning:.3g} at {where}"))
+        where = pose_text(check.worst_pose, machine.commanded, machine.shown)
+        rows.append(("worst conditioning", f"{check.worst_conditioning:.3g} at {where}"))
     return Table(
         "workspace",
         "Workspace",
@@ -137,19 +137,19 @@ def table(machine: Machine, found: WorkspaceCheck) -> Table:
     )
 
 
-def as_data(machine: Machine, found: WorkspaceCheck) -> dict[str, Any]:
+def as_data(machine: Machine, check: WorkspaceCheck) -> dict[str, Any]:
     """The workspace for programs, in the units of the machine's file."""
-    names, counts = np.unique(found.status, return_counts=True)
+    names, counts = np.unique(check.status, return_counts=True)
     reasons = []
-    for reason in found.reasons:
+    for reason in check.reasons:
         amount, units = in_file_units(machine, reason.amount, reason.unit)
         reasons.append({**vars(reason), "amount": amount, "unit": units})
-    worst = dict(zip(machine.commanded, found.worst_pose.tolist(), strict=True))
+    worst = dict(zip(machine.commanded, check.worst_pose.tolist(), strict=True))
     pose = pose_in_file_units(machine, worst)
     return {
-        "poses": len(found.poses),
+        "poses": len(check.poses),
         "status": dict(zip(map(str, names), map(int, counts), strict=True)),
         "reasons": reasons,
-        "worst_conditioning": found.worst_conditioning if found.usable.any() else None,
-        "worst_pose": pose if found.usable.any() else None,
+        "worst_conditioning": check.worst_conditioning if check.usable.any() else None,
+        "worst_pose": pose if check.usable.any() else None,
     }

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
+from truepose.spatial import rotate_about
 
 if TYPE_CHECKING:
     from truepose._kernel import Machine as KernelMachine
@@ -32,6 +33,4 @@ def of_base_side(
     scale, offset = nominal[f"{drive.part}.scale"], nominal[f"{drive.part}.offset"]
     angle = scale * joints[:, [kernel.joints.index(drive.name)]] + offset
     axis = np.asarray(drive.fields["axis"], np.float64)
-    along = (axis @ given) * axis
-    ahead = np.cross(axis, given)
-    return np.asarray(along + np.cos(angle) * (given - along) + np.sin(angle) * ahead)
+    return rotate_about(given, axis, angle)

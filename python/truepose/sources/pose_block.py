@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from truepose.arrays import Codes, Flags, Floats, Indices
+from truepose.spatial import quaternion_to_matrix
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Machine
@@ -99,7 +100,7 @@ class PoseBlock:
     @cached_property
     def rotations(self) -> Floats:
         """(n, 3, 3) platform axes -> base axes."""
-        return rotations_of(self.placements)
+        return quaternion_to_matrix(self.placements[:, 3:])
 
     @cached_property
     def tool_wrench(self) -> Floats:
@@ -256,14 +257,3 @@ class PoseBlock:
 
 _OF_COMMAND = ("corrected", "drive_joints")
 """What of a block depends on where its drives are sent to."""
-
-
-def rotations_of(placements: Floats) -> Floats:
-    """(n, 3, 3) platform axes -> base axes, of the unit quaternions in `placements` (n, 7)."""
-    w, x, y, z = placements[:, 3:].T
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)

@@ -25,7 +25,8 @@ from truepose.files.file_table import FileTable
 from truepose.files.quantity import Direction, Length
 from truepose.machine.parts import Vector
 from truepose.sources.deviation import Deviation
-from truepose.sources.pose_block import PoseBlock, rotations_of
+from truepose.sources.pose_block import PoseBlock
+from truepose.spatial import quaternion_to_matrix
 
 if TYPE_CHECKING:
     from truepose._kernel import Machine as KernelMachine
@@ -208,4 +209,5 @@ def _home(kernel: KernelMachine) -> tuple[Floats, Floats] | None:
         return None
     centres = kernel.joint_centres(joints, placements)
     along = centres[:, :, 1] - centres[:, :, 0]
-    return rotations_of(placements), along / np.linalg.norm(along, axis=-1, keepdims=True)
+    along /= np.linalg.norm(along, axis=-1, keepdims=True)
+    return quaternion_to_matrix(placements[:, 3:]), along

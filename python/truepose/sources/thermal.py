@@ -26,6 +26,7 @@ from truepose.sources._expansion import ASKED_BY, located, silent, twice
 from truepose.sources._growth import Growth, along_line
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
+from truepose.spatial import rotate_about
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -194,8 +195,8 @@ class _Moved:
         for strut in self._carried(drive):
             base = self._point(strut, "base")
             if drive.coordinate == "angle":
-                leaning = np.cross(frame.turn(origin), _turned(base, axis, way))
-                self._shift(f"{strut.part}.base", _turned(leaning, axis, -way))
+                leaning = np.cross(frame.turn(origin), rotate_about(base, axis, way))
+                self._shift(f"{strut.part}.base", rotate_about(leaning, axis, -way))
                 continue
             carriage = origin + way * axis
             bending = frame.displacement(carriage) - frame.displacement(self._held_at(drive))
@@ -277,14 +278,6 @@ class _Moved:
 
 
 _DRIVEN = ("scale", "offset")
-
-
-def _turned(vectors: Floats, axis: Floats, angle: Floats) -> Floats:
-    """(n, 3) `vectors` (3,) or (n, 3) turned about the unit `axis` (3,) by `angle` (n, 1), rad."""
-    given = np.atleast_2d(vectors)
-    along = (given @ axis)[:, np.newaxis] * axis
-    across = given - along
-    return np.asarray(along + np.cos(angle) * across + np.sin(angle) * np.cross(axis, given))
 
 
 __all__ = ["Thermal"]

@@ -28,13 +28,13 @@ from truepose.calibration.data_checks import (
     nominal_readings,
     suspicions,
 )
-from truepose.calibration.data_checks.nominal import turned
 from truepose.calibration.data_checks.too_few import last_digit
 from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.instruments import REGISTRY, Frame
 from truepose.calibration.measurements import Measurements
 from truepose.machine import Machine
+from truepose.spatial import vector_to_matrix
 
 ALL = sorted(path.stem for path in MACHINES.glob("*.toml"))
 SOME = {"planar_two_slider", "tricept", "hexapod"}
@@ -225,7 +225,12 @@ def test_axis_order(name: str) -> None:
     data = good(machine(name), "pose")
     at = np.stack([column(data, each) for each in "abc"], axis=1)
     a, b, c = data.value[at].T
-    rotation = np.stack([turned(z) @ turned(y) @ turned(x) for x, y, z in _vectors(a, b, c)])
+    rotation = np.stack(
+        [
+            vector_to_matrix(z) @ vector_to_matrix(y) @ vector_to_matrix(x)
+            for x, y, z in _vectors(a, b, c)
+        ]
+    )
     # The same rotation in angles of R = Rx(a) Ry(b) Rz(c).
     other = np.column_stack(
         [
@@ -271,7 +276,7 @@ def test_another_frame_than_stated(name: str) -> None:
     m = machine(name)
     made = made_measurements(m, "position", poses_within(m, COUNT), values="nominal")
     turn = np.array([0.0, 0.0, 0.3]) if len(m.dof) < 6 and "z" not in m.dof else [0.2, -0.1, 0.3]
-    setup = Placement(np.array([0.3, -0.2, 0.0]), turned(np.asarray(turn)), np.zeros(3))
+    setup = Placement(np.array([0.3, -0.2, 0.0]), vector_to_matrix(np.asarray(turn)), np.zeros(3))
     found = first(name, with_noise(made, shown(m, m, made, [setup]), 3))
     assert found.code == "other-frame"
     assert "another frame" in found.sentence

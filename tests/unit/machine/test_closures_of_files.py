@@ -168,7 +168,7 @@ def test_planes_that_are_parallel_leave_the_platform_loose(tmp_path: Path) -> No
     (problem,) = problems_of(tmp_path, text)
     assert problem.code == "loose-platform"
     assert (problem.path, problem.line) == ("guide.g1", line_of(text, "[[guide]]"))
-    assert problem.message == "guide.g1: the guides do not hold what the struts leave free"
+    assert problem.message == "guide.g1: the struts leave motions free that the guides do not hold"
     assert "look at where g1, g2, g3 point and stand" in str(problem.hint)
     assert problem.expected == "closures that hold every freedom of the platform"
     assert is_free(text, str(problem.found), tmp_path)

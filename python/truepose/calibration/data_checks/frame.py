@@ -9,6 +9,7 @@ import numpy as np
 from truepose.calibration.data_checks._base import Hypothesis, OfMend, View
 from truepose.calibration.data_checks.nominal import Placement
 from truepose.calibration.data_checks.placement import Free
+from truepose.spatial import rotation_angle
 
 
 def suppose_target(view: View) -> Iterator[Hypothesis]:
@@ -36,8 +37,7 @@ def suppose_frame(view: View) -> Iterator[Hypothesis]:
     judged = view.judge(free=free)
     stated, found = Placement.stated(instrument), judged.setup
     off = float(np.linalg.norm(found.origin - stated.origin))
-    trace = float(np.trace(found.rotation @ stated.rotation.T))
-    turn = float(np.arccos(np.clip((trace - 1.0) / 2.0, -1.0, 1.0)))
+    turn = float(rotation_angle(found.rotation @ stated.rotation.T))
     words = (
         f"the readings are in another frame than stated: its origin {view.amount(off, 'm')} away, "
         f"turned by {view.amount(turn, 'rad')}"

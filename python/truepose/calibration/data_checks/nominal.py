@@ -17,12 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.calibration.identification.frames import rotation_matrix
 from truepose.calibration.instruments._base import Frame, Instrument
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Machine
-from truepose.sources.pose_block import rotations_of
+from truepose.spatial import matrix_to_euler, quaternion_to_matrix
 
 X, A, DISTANCE, LENGTH, DIRECTION, ANGLE = (
     OBSERVABLES.index(name) for name in ("x", "a", "distance", "length", "direction.x", "angle")
@@ -45,7 +44,7 @@ class Geometry:
     def of(cls, machine: Machine, joints: Floats, placements: Floats) -> Geometry:
         """Of joints (n, n_joint) and the placements (n, 7) that they lead to."""
         centres = machine.kernel.joint_centres(joints, placements)
-        return cls(placements[:, :3], rotations_of(placements), centres)
+        return cls(placements[:, :3], quaternion_to_matrix(placements[:, 3:]), centres)
 
     def rows(self, rows: Indices) -> Geometry:
         """These rows only."""
@@ -64,7 +63,7 @@ class Placement:
     def stated(cls, instrument: Instrument) -> Placement:
         """As the measurements declare it; where something is unknown, where its search starts."""
         frame: Frame = instrument.frame
-        rotation = rotation_matrix(frame.rotation)
+        rotation = quaternion_to_matrix(frame.rotation)
         return cls(np.array(frame.origin), rotation, np.array(instrument.target))
 
 
@@ -88,7 +87,7 @@ def read(
         value[of_point] = table[row[of_point], column[of_point]]
     of_angle = (observable >= A) & (observable < DISTANCE)
     if of_angle.any():
-        angles = angles_of(setup.rotation.T @ turned)
+        angles = matrix_to_euler(setup.rotation.T @ turned)
         value[of_angle] = angles[row[of_angle], observable[of_angle] - A]
     of_strut = observable >= LENGTH
     if of_strut.any():
@@ -152,22 +151,3 @@ def nominal_readings(
             measurements.strut[mine],
         )
     return value
-
-
-def angles_of(rotations: Floats) -> Floats:
-    """(n, 3) angles a b c of rotations (n, 3, 3), R = Rz(c) Ry(b) Rx(a), |b| at most pi/2."""
-    a = np.arctan2(rotations[:, 2, 1], rotations[:, 2, 2])
-    b = np.arctan2(-rotations[:, 2, 0], np.hypot(rotations[:, 0, 0], rotations[:, 1, 0]))
-    c = np.arctan2(rotations[:, 1, 0], rotations[:, 0, 0])
-    return np.column_stack([a, b, c])
-
-
-def turned(vector: Floats) -> Floats:
-    """(3, 3) rotation of a rotation vector (3,), rad (Rodrigues)."""
-    angle = float(np.linalg.norm(vector))
-    if angle == 0.0:
-        return np.eye(3)
-    x, y, z = vector / angle
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    rotation: Floats = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * (cross @ cross)
-    return rotation

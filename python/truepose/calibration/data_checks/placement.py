@@ -22,10 +22,10 @@ from truepose.calibration.data_checks.nominal import (
     Placement,
     X,
     read,
-    turned,
 )
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.observables import UNITS
+from truepose.spatial import register, vector_to_matrix
 
 ENOUGH = 2.0
 """Residuals, in what is allowed, below which no other start is tried."""
@@ -119,7 +119,9 @@ def fit_instrument(
         target = start.target
         if free.target:
             target = target + unknown[axes.size : axes.size + 3]
-        return Placement(start.origin + moved[:3], turned(moved[3:]) @ start.rotation, target)
+        return Placement(
+            start.origin + moved[:3], vector_to_matrix(moved[3:]) @ start.rotation, target
+        )
 
     def residual_of(start: Placement, unknown: Floats) -> Floats:
         predicted = read(
@@ -184,7 +186,7 @@ def _starts(
         # Seen along an axis, a tilt changes nothing to first order: a search may stand still there.
         for axis in axes:
             for angle in (-TILT, TILT):
-                tilt = turned(angle * np.eye(3)[axis])
+                tilt = vector_to_matrix(angle * np.eye(3)[axis])
                 yield Placement(first.origin, tilt @ first.rotation, first.target)
 
 
@@ -230,13 +232,8 @@ def _start(geometry: Geometry, instrument: Instrument, readings: Readings, free:
         return stated
     points = (geometry.points + geometry.rotations @ stated.target)[full][:, axes]
     seen = table[full][:, axes]
-    u, _, v = np.linalg.svd((points - points.mean(axis=0)).T @ (seen - seen.mean(axis=0)))
-    proper = np.ones(len(axes))
-    proper[-1] = np.sign(np.linalg.det(u @ v))
-    rotation = np.eye(3)
-    rotation[np.ix_(axes, axes)] = (u * proper) @ v
-    origin = stated.origin.copy()
-    origin[axes] = points.mean(axis=0) - rotation[np.ix_(axes, axes)] @ seen.mean(axis=0)
+    rotation, origin = np.eye(3), stated.origin.copy()
+    rotation[np.ix_(axes, axes)], origin[axes] = register(points, seen)
     return Placement(origin, rotation, stated.target)
 
 

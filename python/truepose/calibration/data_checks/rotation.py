@@ -7,9 +7,9 @@ from itertools import permutations
 
 import numpy as np
 
-from truepose.arrays import Floats, Indices
+from truepose.arrays import Indices
 from truepose.calibration.data_checks._base import Hypothesis, MeasuredColumn, OfMend, View
-from truepose.calibration.data_checks.nominal import angles_of
+from truepose.spatial import euler_to_matrix_in_order, matrix_to_euler
 
 OURS = "zyx"
 """R = Rz(c) Ry(b) Rx(a): extrinsic x y z, which is intrinsic z y x."""
@@ -22,7 +22,9 @@ def suppose_sign(view: View) -> Iterator[Hypothesis]:
     if len(columns) == 3:
         at = _table(view, columns)
         turned = view.readings.value.copy()
-        turned[at] = angles_of(np.swapaxes(_rotation(view.readings.value[at], OURS), 1, 2))
+        turned[at] = matrix_to_euler(
+            np.swapaxes(euler_to_matrix_in_order(view.readings.value[at], OURS), 1, 2)
+        )
         words = "a, b and c are of the inverse rotation (base in the platform's axes)"
         yield Hypothesis(words, names, view.judge(turned))
         yield from _negative(view, columns, "a, b and c are turned the other way")
@@ -41,7 +43,7 @@ def suppose_order(view: View) -> Iterator[Hypothesis]:
         if word == OURS:
             continue
         value = view.readings.value.copy()
-        value[at] = angles_of(_rotation(view.readings.value[at], word))
+        value[at] = matrix_to_euler(euler_to_matrix_in_order(view.readings.value[at], word))
         product = " ".join(f"R{axis}({'abc'['xyz'.index(axis)]})" for axis in word)
         words = f"a, b and c are of R = {product} instead of R = Rz(c) Ry(b) Rx(a)"
         yield Hypothesis(words, ("a", "b", "c"), view.judge(value))
@@ -63,21 +65,6 @@ def _negative(view: View, columns: list[MeasuredColumn], words: str) -> Iterator
     for column in columns:
         value[column.at] *= -1.0
     yield Hypothesis(words, tuple(column.name for column in columns), view.judge(value))
-
-
-def _rotation(angles: Floats, order: str) -> Floats:
-    """(m, 3, 3) product of turns about the axes, left to right, by angles (m, 3) a b c."""
-    result = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
-    for axis in order:
-        k = "xyz".index(axis)
-        i, j = (k + 1) % 3, (k + 2) % 3
-        turn = np.zeros((len(angles), 3, 3))
-        turn[:, k, k] = 1.0
-        turn[:, i, i] = turn[:, j, j] = np.cos(angles[:, k])
-        turn[:, j, i] = np.sin(angles[:, k])
-        turn[:, i, j] = -turn[:, j, i]
-        result = result @ turn
-    return result
 
 
 SIGN = OfMend("rotation-sign", "angles turned the other way", suppose_sign)

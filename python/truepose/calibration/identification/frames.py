@@ -19,7 +19,13 @@ from truepose.calibration.instruments._base import Frame
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Machine
-from truepose.sources.pose_block import rotations_of
+from truepose.spatial import (
+    euler_to_matrix,
+    matrix_to_quaternion,
+    nearest_rotation,
+    quaternion_to_matrix,
+    vector_to_matrix,
+)
 
 _NUMBER = {name: number for number, name in enumerate(OBSERVABLES)}
 _ORIGIN, _ROTATION = slice(0, 3), slice(3, 6)
@@ -62,7 +68,7 @@ def rotated_starts(machine: Machine, measurements: Measurements, number: int) ->
         return []
     points, _ = _looked_at(measurements, number)
     read = _table(measurements, number)
-    rotation = rotation_matrix(frame.rotation)
+    rotation = quaternion_to_matrix(frame.rotation)
     return [
         _replaced(measurements, number, _with_origin(frame, turn @ rotation, points, read))
         for turn in _turns(axes)
@@ -75,12 +81,12 @@ def rebase_frame(measurements: Measurements, unknowns: Unknowns, values: Floats)
         moved = np.array([0.0 if at is None else values[at] for at in own[:6]])
         frame = measurements.instruments[number].frame
         # The kernel's rotation unknowns: the quaternion (1, turn / 2), not of length 1.
-        turn = np.concatenate([[1.0], 0.5 * moved[_ROTATION]])
-        w, x, y, z = (turn / np.linalg.norm(turn)).tolist()
+        quaternion = np.concatenate([[1.0], 0.5 * moved[_ROTATION]])
+        turn = quaternion_to_matrix(quaternion / np.linalg.norm(quaternion))
         frame = dataclasses.replace(
             frame,
             origin=tuple((np.array(frame.origin) + moved[_ORIGIN]).tolist()),
-            rotation=quaternion_of(rotation_matrix((w, x, y, z)) @ rotation_matrix(frame.rotation)),
+            rotation=matrix_to_quaternion(turn @ quaternion_to_matrix(frame.rotation)),
         )
         measurements = _replaced(measurements, number, frame)
     return measurements
@@ -97,19 +103,14 @@ def _turns(axes: np.ndarray) -> list[Floats]:
                     found.append(cube)
         return found
     if axes.size == 1:
-        return [_turn(np.eye(3)[axes[0]], eighth * np.pi / 4.0) for eighth in range(1, 8)]
+        eighths = np.arange(1, 8)[:, np.newaxis] * np.pi / 4.0
+        return list(vector_to_matrix(eighths * np.eye(3)[axes[0]]))
     first, second = np.eye(3)[axes]
     return [
-        _turn(np.cos(way) * first + np.sin(way) * second, angle)
+        vector_to_matrix(angle * (np.cos(way) * first + np.sin(way) * second))
         for angle in (np.pi / 3.0, np.pi / 1.5, np.pi)
         for way in np.arange(8) * np.pi / 4.0
     ]
-
-
-def _turn(axis: Floats, angle: float) -> Floats:
-    """(3, 3) about a unit axis (3,) by an angle, rad."""
-    x, y, z = (np.sin(0.5 * angle) * axis).tolist()
-    return rotation_matrix((float(np.cos(0.5 * angle)), x, y, z))
 
 
 def _replaced(measurements: Measurements, number: int, frame: Frame) -> Measurements:
@@ -121,7 +122,7 @@ def _replaced(measurements: Measurements, number: int, frame: Frame) -> Measurem
 def _looked_at(measurements: Measurements, number: int) -> tuple[Floats, Floats]:
     """Target points (n, 3) in the base frame and rotations (n, 3, 3) of an instrument's rows."""
     rows = np.flatnonzero(measurements.instrument == number)
-    rotations = rotations_of(measurements.placements[rows])
+    rotations = quaternion_to_matrix(measurements.placements[rows, 3:])
     arm = rotations @ np.array(measurements.instruments[number].target)
     return measurements.placements[rows, :3] + arm, rotations
 
@@ -137,7 +138,7 @@ def _closed_forms(machine: Machine, measurements: Measurements, number: int) -> 
     if "distance" in read and unknown[_ORIGIN].any():
         return _by_distances(frame, points, read["distance"])
     if not unknown[_ROTATION].any():
-        return [_with_origin(frame, rotation_matrix(frame.rotation), points, read)]
+        return [_with_origin(frame, quaternion_to_matrix(frame.rotation), points, read)]
     if any(f"direction.{axis}" in read for axis in "xyz"):
         product = _of_directions(machine, measurements, number)
     elif all(angle in read for angle in "abc"):
@@ -155,11 +156,11 @@ def _rotation_by(frame: Frame, product: Floats) -> Floats | None:
         return nearest_rotation(product)
     if axes.size != 1:
         return None
-    rotation = rotation_matrix(frame.rotation)
+    rotation = quaternion_to_matrix(frame.rotation)
     i, j = (axes[0] + 1) % 3, (axes[0] + 2) % 3
     turned = product @ rotation.T
     angle = np.arctan2(turned[j, i] - turned[i, j], turned[i, i] + turned[j, j])
-    return _turn(np.eye(3)[axes[0]], float(angle)) @ rotation
+    return vector_to_matrix(angle * np.eye(3)[axes[0]]) @ rotation
 
 
 def _with_origin(frame: Frame, rotation: Floats, points: Floats, read: dict[str, Floats]) -> Frame:
@@ -172,7 +173,7 @@ def _with_origin(frame: Frame, rotation: Floats, points: Floats, read: dict[str,
         away = [np.nanmean(seen[:, at] - read["xyz"[at]]) for at in axes]
         origin[free] += np.linalg.lstsq(rotation.T[axes][:, free], np.array(away), rcond=1e-6)[0]
     return dataclasses.replace(
-        frame, origin=tuple(origin.tolist()), rotation=quaternion_of(rotation)
+        frame, origin=tuple(origin.tolist()), rotation=matrix_to_quaternion(rotation)
     )
 
 
@@ -200,7 +201,7 @@ def _of_points(frame: Frame, points: Floats, read: dict[str, Floats]) -> Floats 
     about = np.flatnonzero(frame.unknown[_ROTATION])
     if unread:
         across = about.size == 1 and len(unread) == 1
-        along = across and abs(rotation_matrix(frame.rotation)[about[0], unread[0]])
+        along = across and abs(quaternion_to_matrix(frame.rotation)[about[0], unread[0]])
         if not along > _ALONG:
             return None
     seen = np.zeros_like(points)
@@ -220,7 +221,7 @@ def _of_angles(rotations: Floats, read: dict[str, Floats]) -> Floats | None:
     whole = np.isfinite(angles).all(axis=1)
     if not whole.any():
         return None
-    product: Floats = np.einsum("nij,nkj->ik", rotations[whole], euler_matrices(angles[whole]))
+    product: Floats = np.einsum("nij,nkj->ik", rotations[whole], euler_to_matrix(angles[whole]))
     return product
 
 
@@ -284,57 +285,3 @@ def _of_directions(machine: Machine, measurements: Measurements, number: int) ->
             product += np.outer(along[row, strut], [seen[0], seen[1], seen[2]])
             count += 1
     return product if count > 1 else None
-
-
-def nearest_rotation(product: Floats) -> Floats:
-    """(3, 3) the rotation R for which trace(R^T product) is largest."""
-    left, _, right = np.linalg.svd(product)
-    sign = np.sign(np.linalg.det(left @ right))
-    rotation: Floats = left @ np.diag([1.0, 1.0, sign]) @ right
-    return rotation
-
-
-def euler_matrices(angles: Floats) -> Floats:
-    """(n, 3, 3) of angles a, b, c (n, 3), rad: R = Rz(c) Ry(b) Rx(a)."""
-    (sa, sb, sc), (ca, cb, cc) = np.sin(angles).T, np.cos(angles).T
-    rows = [
-        [cb * cc, sa * sb * cc - ca * sc, ca * sb * cc + sa * sc],
-        [cb * sc, sa * sb * sc + ca * cc, ca * sb * sc - sa * cc],
-        [-sb, sa * cb, ca * cb],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
-
-
-def rotation_matrix(quaternion: tuple[float, float, float, float]) -> Floats:
-    """(3, 3) of a unit quaternion w x y z."""
-    placement = np.array([[0.0, 0.0, 0.0, *quaternion]])
-    matrix: Floats = rotations_of(placement)[0]
-    return matrix
-
-
-def quaternion_of(rotation: Floats) -> tuple[float, float, float, float]:
-    """Unit quaternion w x y z, w >= 0, of a rotation (3, 3)."""
-    m = rotation
-    # 4 times each squared component; the largest is safe to divide by (S. W. Shepperd, 1978).
-    squares = np.array(
-        [
-            1.0 + m[0, 0] + m[1, 1] + m[2, 2],
-            1.0 + m[0, 0] - m[1, 1] - m[2, 2],
-            1.0 - m[0, 0] + m[1, 1] - m[2, 2],
-            1.0 - m[0, 0] - m[1, 1] + m[2, 2],
-        ]
-    )
-    skew = (m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1])
-    even = (m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[1, 2] + m[2, 1])
-    rows = [
-        [squares[0], skew[0], skew[1], skew[2]],
-        [skew[0], squares[1], even[0], even[1]],
-        [skew[1], even[0], squares[2], even[2]],
-        [skew[2], even[1], even[2], squares[3]],
-    ]
-    row = np.array(rows[int(np.argmax(squares))])
-    row /= np.linalg.norm(row)
-    if row[0] < 0.0:
-        row = -row
-    w, x, y, z = row.tolist()
-    return (w, x, y, z)

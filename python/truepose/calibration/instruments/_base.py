@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.spatial import Quaternion
 
 Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
 End = Literal["base", "platform"]
 Freedoms = tuple[bool, bool, bool, bool, bool, bool]
 

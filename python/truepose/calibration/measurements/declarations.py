@@ -24,7 +24,7 @@ import numpy as np
 
 from truepose._kernel import toml_lines
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument, Kind
-from truepose.calibration.instruments._base import Quaternion, Vector
+from truepose.calibration.instruments._base import Vector
 from truepose.calibration.observables import OBSERVABLES, UNITS
 from truepose.errors import Fault, Problem
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
@@ -32,6 +32,7 @@ from truepose.files.document import Document, Key
 from truepose.files.units import QuantityError, UnitSystem, shown_value, type_phrase
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
+from truepose.spatial import Quaternion, euler_to_quaternion
 
 LINE_END = re.compile(r"\r\n|\r|\n")
 _MARK = "#:"
@@ -348,7 +349,7 @@ class _Reader:
     def _rotation(self, key: Key, value: Any) -> Quaternion:
         """Three angles a b c, or the four numbers of a unit quaternion w x y z."""
         if not isinstance(value, list) or len(value) != 4:
-            return quaternion_of(self._three(key, value, "angle"))
+            return euler_to_quaternion(self._three(key, value, "angle"))
         w, x, y, z = (self._number((*key, at), entry, "ratio") for at, entry in enumerate(value))
         size = math.hypot(w, x, y, z)
         if abs(size - 1.0) > NEARLY:
@@ -549,17 +550,3 @@ class _Reader:
 
 def _dimension(observable: str) -> str:
     return BY_UNIT[UNITS[OBSERVABLES.index(observable)]]
-
-
-def quaternion_of(angles: Vector) -> Quaternion:
-    """Unit quaternion w x y z of R = Rz(c) Ry(b) Rx(a), angles a b c in rad."""
-    (ca, cb, cc), (sa, sb, sc) = (
-        [math.cos(0.5 * each) for each in angles],
-        [math.sin(0.5 * each) for each in angles],
-    )
-    return (
-        cc * cb * ca + sc * sb * sa,
-        cc * cb * sa - sc * sb * ca,
-        cc * sb * ca + sc * cb * sa,
-        sc * cb * ca - cc * sb * sa,
-    )

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.machine import Drive, Guide, Machine
+from truepose.spatial import tangents
 
 _FIRST, _SECOND = ".u", ".v"
 
@@ -45,19 +46,6 @@ def directions(machine: Machine) -> Iterator[PartDirection]:
         other = names.index(name.removesuffix(_FIRST) + _SECOND)
         axis = np.array(rows[path].fields[key], np.float64)
         yield PartDirection(table, part, key, (column, other), axis / np.linalg.norm(axis))
-
-
-def tangents(axis: ArrayLike) -> Floats:
-    """(2, 3) the unit vectors in which a direction with the unit `axis` (3,) deviates."""
-    unit = np.asarray(axis, np.float64)
-    least = 0
-    for k in (1, 2):  # the first of equal ones, as the kernel takes it
-        if abs(unit[k]) < abs(unit[least]):
-            least = k
-    first = -unit[least] * unit
-    first[least] += 1.0
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(unit, first)])
 
 
 def tilted(axis: ArrayLike, deviation: ArrayLike) -> Floats:

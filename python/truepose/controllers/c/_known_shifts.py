@@ -148,16 +148,16 @@ def _probe(machine: Machine, condition: Condition) -> PoseBlock:
     low, high = poses.min(axis=0) - margin, poses.max(axis=0) + margin
     random = np.random.default_rng(0)
     scattered = low + (high - low) * random.random((SCATTERED, len(low)))
-    found: list[PoseBlock] = list(PoseRun(machine, np.concatenate([chosen, scattered]), condition))
-    if not found or found[0].indices.size < FEWEST:
+    blocks: list[PoseBlock] = list(PoseRun(machine, np.concatenate([chosen, scattered]), condition))
+    if not blocks or blocks[0].indices.size < FEWEST:
         raise unsupported_machine(
             "a controller",
             machine,
-            f"{found[0].indices.size if found else 0} usable poses about the workspace",
+            f"{blocks[0].indices.size if blocks else 0} usable poses about the workspace",
             f"at least {FEWEST}, from which to find how the sources follow from the pose",
             "truepose check says why poses cannot be used",
         )
-    return found[0]
+    return blocks[0]
 
 
 def _expanding(machine: Machine) -> Iterator[str]:

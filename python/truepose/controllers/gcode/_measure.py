@@ -48,7 +48,7 @@ class Measure:
             orientation[refused] = np.inf
         return position, orientation
 
-    def weighed(self, sizes: tuple[Floats, Floats]) -> Floats:
+    def combined(self, sizes: tuple[Floats, Floats]) -> Floats:
         """(n,) m: the larger of a position and an orientation times the characteristic length."""
         position, orientation = sizes
         if not self.has_orientation:

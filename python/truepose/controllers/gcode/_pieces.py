@@ -69,10 +69,10 @@ def joined(pieces: list[Pieces]) -> Pieces:
     none = np.empty(0)
     table = [*pieces, Pieces(none.astype(np.intp), none.astype(np.intp), none, none)]
     return Pieces(
-        np.concatenate([each.begin for each in table]),
-        np.concatenate([each.end for each in table]),
-        np.concatenate([each.size for each in table]),
-        np.concatenate([each.weight for each in table]),
+        np.concatenate([pieces.begin for pieces in table]),
+        np.concatenate([pieces.end for pieces in table]),
+        np.concatenate([pieces.size for pieces in table]),
+        np.concatenate([pieces.weight for pieces in table]),
     )
 
 

@@ -71,10 +71,10 @@ def of_uncommanded_axis(axes: Axes, moves: Moves, file: Path) -> RequestError | 
     columns = axes.uncommanded
     moved = moves.start[:, columns] != moves.end[:, columns]
     both = np.isnan(moves.start[:, columns]) & np.isnan(moves.end[:, columns])
-    found = np.argwhere(moved & ~both)
-    if not found.size:
+    places = np.argwhere(moved & ~both)
+    if not places.size:
         return None
-    move, column = found[0]
+    move, column = places[0]
     letter = AXES[columns[column]]
     return _refusal(
         "gcode-axis",

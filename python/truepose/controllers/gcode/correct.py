@@ -333,10 +333,10 @@ class _Writing:
     def _prove_waiting(self) -> None:
         """Read back, block by block, what was written, and compare."""
         for moves, divided in self._waiting:
-            found = self._back.read(len(divided.points))
-            if len(found) != len(divided.points):
+            read_back = self._back.read(len(divided.points))
+            if len(read_back) != len(divided.points):
                 raise AssertionError("fewer blocks can be read back than were written")
-            self.proving.add(moves, divided, found.start, found.end)
+            self.proving.add(moves, divided, read_back.start, read_back.end)
         self._waiting.clear()
 
 
@@ -354,11 +354,11 @@ def _quick_turns() -> Iterator[None]:
         sys.setswitchinterval(interval)
 
 
-def _moves_of(found: GcodeMoves) -> Moves | None:
+def _moves_of(moves: GcodeMoves) -> Moves | None:
     """The moves as arrays, each made once; None behind the last."""
-    if not len(found):
+    if not len(moves):
         return None
-    return Moves(found.line, found.kind, found.start, found.end, found.length, found.points)
+    return Moves(moves.line, moves.kind, moves.start, moves.end, moves.length, moves.points)
 
 
 @contextmanager
@@ -465,7 +465,7 @@ def _named(
     position: Positions, what: str, refuse: Callable[[str, object, str], None]
 ) -> dict[str, float]:
     """Coordinates by the axes' letters, mm and degrees."""
-    found = {}
+    coordinates = {}
     for name, value in position.items():
         letter = name.upper()
         if len(letter) != 1 or letter not in AXES:
@@ -473,8 +473,8 @@ def _named(
         elif not np.isfinite(value):
             refuse(what, value, "finite coordinates, m and rad")
         else:
-            found[letter] = float(value) / scale_of(letter)
-    return found
+            coordinates[letter] = float(value) / scale_of(letter)
+    return coordinates
 
 
 __all__ = ["SYSTEMS", "Positions", "correct_program"]

@@ -333,8 +333,8 @@ class _Batch:
     def _points_in(self, size: Floats) -> Indices:
         """(n,) how many interior points pieces of a size (n,) are looked at: odd, so the middle."""
         halves = np.ceil(size / (2.0 * self.spacing)).astype(np.intp)
-        found: Indices = 2 * np.maximum(halves, 1) - 1
-        return found
+        counts: Indices = 2 * np.maximum(halves, 1) - 1
+        return counts
 
     def _in_blocks(self, pieces: Pieces) -> list[slice]:
         """Pieces that are looked at together: so many that they have about a block of points."""
@@ -368,11 +368,11 @@ class _Batch:
         step = t[:, np.newaxis]
         commands = nodes.commands[begin]
         commands = commands + (nodes.commands[end] - commands) * step
-        off = self.measure.weighed(self.measure.at_commands(known, commands))
+        off = self.measure.combined(self.measure.at_commands(known, commands))
         if self.limits.interpolation == "either":
             joints = nodes.joints[begin]
             joints = joints + (nodes.joints[end] - joints) * step
-            off = np.maximum(off, self.measure.weighed(self.measure.at_joints(known, joints)))
+            off = np.maximum(off, self.measure.combined(self.measure.at_joints(known, joints)))
         worst = np.maximum.reduceat(off, first)
 
         held = self._holds(worst)
@@ -478,11 +478,11 @@ class _Batch:
         ):
             # A stretch may bend: what counts are its pieces.
             within = slice(first[way], last[way] + 1)
-            each = singularity_crossings(
+            crossings = singularity_crossings(
                 self.actual, nodes.asked[begins[within]], nodes.asked[ends[within]]
             )
-            if each.size:
-                at = ends[within][each[0]]
+            if crossings.size:
+                at = ends[within][crossings[0]]
                 raise CannotCorrect(
                     int(nodes.move[at]),
                     float(nodes.share[at]),
@@ -546,9 +546,14 @@ class _Batch:
         ]
         looked_at += [
             PathPoints(
-                piece[each.end], each.share, each.weight, each.poses, each.known, at_ends=False
+                piece[points.end],
+                points.share,
+                points.weight,
+                points.poses,
+                points.known,
+                at_ends=False,
             )
-            for each in self.looked
+            for points in self.looked
         ]
         last = ends[-1]
         return Divided(

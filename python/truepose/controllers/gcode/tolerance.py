@@ -104,15 +104,15 @@ def error_before(division: Division, batches: Iterable[Moves]) -> tuple[float, .
     measure: Measure = division.measure
     position, orientation = measure.at_joints(known, known.block.joints)
     length = division.actual.machine.characteristic_length
-    found = []
+    tolerances = []
     for present, sizes in (
         (measure.has_position, position),
         (measure.has_orientation, orientation * length),
     ):
         finite = sizes[np.isfinite(sizes)]
         if present and finite.size:
-            found.append(float(finite.max()))
-    return tuple(found)
+            tolerances.append(float(finite.max()))
+    return tuple(tolerances)
 
 
 def _some_poses(division: Division, batches: Iterable[Moves]) -> Floats:

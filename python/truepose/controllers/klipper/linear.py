@@ -49,24 +49,24 @@ class KlipperLinear(TowerModel):
         super().__init__(linear_delta(machine, options, "klipper"))
         self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
 
-    def printed(self, values: Floats) -> Printed:
+    def format(self, values: Floats) -> Printed:
         """Numbers by section and key, mm and degrees."""
         numbers = untilted(values)
-        found = {"printer.delta_radius": fixed(float(numbers[RADIUS][0]) / MM, self._digits)}
-        each = zip(
+        settings = {"printer.delta_radius": fixed(float(numbers[RADIUS][0]) / MM, self._digits)}
+        towers = zip(
             STEPPERS,
             np.degrees(numbers[ANGLES]) % 360.0,
             numbers[ARMS] / MM,
             endstop(numbers) / MM,
             strict=True,
         )
-        for letter, angle, arm, height in each:
-            found[f"stepper_{letter}.angle"] = fixed(angle, ANGLE_DIGITS)
-            found[f"stepper_{letter}.arm_length"] = fixed(arm, self._digits)
-            found[f"stepper_{letter}.position_endstop"] = fixed(height, self._digits)
-        return found
+        for letter, angle, arm, height in towers:
+            settings[f"stepper_{letter}.angle"] = fixed(angle, ANGLE_DIGITS)
+            settings[f"stepper_{letter}.arm_length"] = fixed(arm, self._digits)
+            settings[f"stepper_{letter}.position_endstop"] = fixed(height, self._digits)
+        return settings
 
-    def taken(self, printed: Printed) -> Floats:
+    def parse(self, printed: Printed) -> Floats:
         """(10,) the model's values of printed numbers."""
 
         def of(key: str) -> Floats:

@@ -54,8 +54,8 @@ class Rotary:
     def __init__(self, machine: Machine, options: Mapping[str, float | str]) -> None:
         """Raises `RequestError`: controller-cannot, bad-option."""
         self._machine = machine
-        found = limbs(machine, "klipper", "crank")
-        for limb in found:
+        arms = limbs(machine, "klipper", "crank")
+        for limb in arms:
             if abs(limb.axis[2]) > math.sin(LEAN):
                 raise unsupported_machine(
                     "klipper",
@@ -64,30 +64,30 @@ class Rotary:
                     "a delta with level axes of its cranks",
                     INSTEAD,
                 )
-        up = np.array([_sense(limb) for limb in found])
-        ends = [limb.drive.travel[1 if u > 0.0 else 0] for limb, u in zip(found, up, strict=True)]
+        up = np.array([_sense(limb) for limb in arms])
+        ends = [limb.drive.travel[1 if u > 0.0 else 0] for limb, u in zip(arms, up, strict=True)]
         self.switches = switches(machine, options, ends, "klipper")
         """(3,) joint coordinates, rad, where the endstops trip."""
         # By how much each arm rises for a radian of its coordinate.
         self._gain = up * scales(machine)
         self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
-        self._start = self._nominal(found)
+        self._start = self._nominal(arms)
         self._check_endstops()
 
-    def _nominal(self, found: list[Limb]) -> Floats:
+    def _nominal(self, limbs: list[Limb]) -> Floats:
         start = np.empty(ENDS.stop)
-        outwards = [_outwards(limb) for limb in found]
+        outwards = [_outwards(limb) for limb in limbs]
         shoulders = [
-            limb.origin + limb.axis * float(limb.axis @ limb.base) - limb.platform for limb in found
+            limb.origin + limb.axis * float(limb.axis @ limb.base) - limb.platform for limb in limbs
         ]
-        arms = [limb.base - limb.axis * float(limb.axis @ limb.base) for limb in found]
+        arms = [limb.base - limb.axis * float(limb.axis @ limb.base) for limb in limbs]
         start[RADIUS] = np.mean([s @ o for s, o in zip(shoulders, outwards, strict=True)])
         start[HEIGHT] = np.mean([s[2] for s in shoulders])
         start[ANGLES] = [math.atan2(o[1], o[0]) for o in outwards]
         start[UPPER] = [np.linalg.norm(arm) for arm in arms]
-        start[LOWER] = [limb.length for limb in found]
+        start[LOWER] = [limb.length for limb in limbs]
         at_home = [math.atan2(arm[2], arm @ o) for arm, o in zip(arms, outwards, strict=True)]
-        start[ENDS] = at_home + self._gain * (self.switches - [limb.home for limb in found])
+        start[ENDS] = at_home + self._gain * (self.switches - [limb.home for limb in limbs])
         if start[RADIUS] <= 0.0:
             raise unsupported_machine(
                 "klipper",
@@ -113,7 +113,7 @@ class Rotary:
             trips = _endstop(self._start)
         back = np.full(3, np.nan)
         if np.isfinite(trips).all():
-            back = self.taken(self.printed(self._start))[ENDS]
+            back = self.parse(self.format(self._start))[ENDS]
         for drive, off in zip(
             self._machine.drives, np.abs(wrapped(back - self._start[ENDS])), strict=True
         ):
@@ -136,23 +136,24 @@ class Rotary:
         turn = 1.0 / (float(self._start[RADIUS]) + arm)
         sizes = [1.0, 1.0] + [turn] * 3 + [1.0] * 6 + [1.0 / arm] * 3
         return tuple(
-            Parameter(*each) for each in zip(names, self._start.tolist(), sizes, strict=True)
+            Parameter(*parameter)
+            for parameter in zip(names, self._start.tolist(), sizes, strict=True)
         )
 
     def joints(self, values: Floats, poses: Floats) -> Floats:
         """(n, 3) joint coordinates, rad, for poses (n, 3)."""
         arms = _arm_angles(values, poses)
         # As Klipper counts: both angles between -pi and pi, their difference not brought there.
-        found: Floats = self.switches + (arms - wrapped(values[ENDS])) / self._gain
-        return found
+        joints: Floats = self.switches + (arms - wrapped(values[ENDS])) / self._gain
+        return joints
 
-    def printed(self, values: Floats) -> Printed:
+    def format(self, values: Floats) -> Printed:
         """Numbers by section and key, mm and degrees."""
-        found = {
+        settings = {
             "printer.shoulder_radius": fixed(values[RADIUS] / MM, self._digits),
             "printer.shoulder_height": fixed(values[HEIGHT] / MM, self._digits),
         }
-        each = zip(
+        steppers = zip(
             STEPPERS,
             np.degrees(values[ANGLES]) % 360.0,
             values[UPPER] / MM,
@@ -160,14 +161,14 @@ class Rotary:
             _endstop(values) / MM,
             strict=True,
         )
-        for letter, angle, upper, lower, height in each:
-            found[f"stepper_{letter}.angle"] = fixed(angle, ANGLE_DIGITS)
-            found[f"stepper_{letter}.upper_arm_length"] = fixed(upper, self._digits)
-            found[f"stepper_{letter}.lower_arm_length"] = fixed(lower, self._digits)
-            found[f"stepper_{letter}.position_endstop"] = fixed(height, self._digits)
-        return found
+        for letter, angle, upper, lower, height in steppers:
+            settings[f"stepper_{letter}.angle"] = fixed(angle, ANGLE_DIGITS)
+            settings[f"stepper_{letter}.upper_arm_length"] = fixed(upper, self._digits)
+            settings[f"stepper_{letter}.lower_arm_length"] = fixed(lower, self._digits)
+            settings[f"stepper_{letter}.position_endstop"] = fixed(height, self._digits)
+        return settings
 
-    def taken(self, printed: Printed) -> Floats:
+    def parse(self, printed: Printed) -> Floats:
         """(14,) the model's values of printed numbers."""
 
         def of(key: str) -> Floats:
@@ -208,8 +209,8 @@ def _outwards(limb: Limb) -> Floats:
     seen = limb.origin + limb.axis * float(limb.axis @ limb.base) - limb.platform
     # An arm that is driven from the middle still points to where its elbow is.
     side = float(across @ seen) or float(across @ limb.base)
-    found: Floats = across if side > 0.0 else -across
-    return found
+    turned: Floats = across if side > 0.0 else -across
+    return turned
 
 
 def _sense(limb: Limb) -> float:
@@ -236,16 +237,16 @@ def _arm_angles(values: Floats, poses: Floats) -> Floats:
         swing = np.arccos(between / (2.0 * upper * size))
     middle = np.arctan2(upward, outward)
     one, other = middle + swing, middle - swing
-    found: Floats = np.where(np.cos(one) >= np.cos(other), one, other)
-    return wrapped(found)
+    angle: Floats = np.where(np.cos(one) >= np.cos(other), one, other)
+    return wrapped(angle)
 
 
 def _endstop(values: Floats) -> Floats:
     """(3,) height of the tool at x = y = 0 with each arm at its endstop, m."""
     elbow_out = values[RADIUS] + values[UPPER] * np.cos(values[ENDS])
     elbow_up = values[HEIGHT] + values[UPPER] * np.sin(values[ENDS])
-    found: Floats = elbow_up - np.sqrt(values[LOWER] ** 2 - elbow_out**2)
-    return found
+    height: Floats = elbow_up - np.sqrt(values[LOWER] ** 2 - elbow_out**2)
+    return height
 
 
 __all__ = ["Rotary"]

@@ -135,8 +135,8 @@ class _Judge:
             inside = (joints - self._margin >= low) & (joints + self._margin <= high)
         sound &= inside.all(axis=1)
         conditioning = np.zeros(len(poses))
-        found, status = machine.conditioning(poses[sound], status=True)
-        conditioning[sound] = np.where(status_ok(status), found, 0.0)
+        there, status = machine.conditioning(poses[sound], status=True)
+        conditioning[sound] = np.where(status_ok(status), there, 0.0)
         sound &= conditioning >= NEAR_SINGULAR * self.home
         back, status = machine.forward(joints[sound], status=True)
         unit = np.where(np.array(self._description.freedoms) < 3, machine.characteristic_length, 1)

@@ -35,6 +35,7 @@ from truepose.controllers._small_model import (
     vector,
 )
 from truepose.machine import Machine
+from truepose.spatial import euler_to_matrix
 
 PINS = "genhexkins"
 STRUTS = 6
@@ -76,23 +77,25 @@ class _Model:
             for axis in "xyz"
         ]
         names += [f"length {strut}" for strut in range(STRUTS)]
-        return tuple(Parameter(*each) for each in zip(names, self._start.tolist(), strict=True))
+        return tuple(
+            Parameter(*parameter) for parameter in zip(names, self._start.tolist(), strict=True)
+        )
 
     def joints(self, values: Floats, poses: Floats) -> Floats:
         """(n, 6) joint coordinates, m, in the order of the drives, for poses (n, 6), m, rad."""
         longer = self.lengths(values, poses) - values[2 * COORDINATES :]
-        found: Floats = self.switches + longer / self._gain
-        return found
+        joints: Floats = self.switches + longer / self._gain
+        return joints
 
     def lengths(self, values: Floats, poses: Floats) -> Floats:
         """(n, 6) lengths of the struts, m: LinuxCNC's joint values."""
         base = values[:COORDINATES].reshape(STRUTS, 3)
         platform = values[COORDINATES : 2 * COORDINATES].reshape(STRUTS, 3)
-        turned = np.einsum("nij,kj->nki", _rotations(poses[:, 3:]), platform)
-        found: Floats = np.linalg.norm(poses[:, np.newaxis, :3] + turned - base, axis=2)
-        return found
+        turned = np.einsum("nij,kj->nki", euler_to_matrix(poses[:, 3:]), platform)
+        lengths: Floats = np.linalg.norm(poses[:, np.newaxis, :3] + turned - base, axis=2)
+        return lengths
 
-    def printed(self, values: Floats) -> Printed:
+    def format(self, values: Floats) -> Printed:
         """Pins, and HOME_OFFSET of the joints, in the block's unit."""
         words = [
             f"{PINS}.{end}.{strut}.{axis}"
@@ -104,7 +107,7 @@ class _Model:
         scale, digits = SCALE[self.unit], digits_of(self.machine, self.unit)
         return {word: fixed(v / scale, digits) for word, v in zip(words, values, strict=True)}
 
-    def taken(self, printed: Printed) -> Floats:
+    def parse(self, printed: Printed) -> Floats:
         """(42,) the model's values, m, of printed numbers."""
         return np.array([float(text) for text in printed.values()]) * SCALE[self.unit]
 
@@ -163,17 +166,6 @@ def _check(machine: Machine) -> None:
         "a hexapod: six telescopic struts and x y z a b c commanded",
         INSTEAD,
     )
-
-
-def _rotations(angles: Floats) -> Floats:
-    """(n, 3, 3) R = Rz(c) Ry(b) Rx(a) of angles (n, 3), rad."""
-    (ca, cb, cc), (sa, sb, sc) = np.cos(angles.T), np.sin(angles.T)
-    rows = [
-        [cb * cc, sa * sb * cc - ca * sc, ca * sb * cc + sa * sc],
-        [cb * sc, sa * sb * sc + ca * cc, ca * sb * sc - sa * cc],
-        [-sb, sa * cb, ca * cb],
-    ]
-    return np.moveaxis(np.array(rows), 2, 0)
 
 
 __all__ = ["LinuxCncGenhexkins"]

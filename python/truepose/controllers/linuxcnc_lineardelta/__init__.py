@@ -87,13 +87,13 @@ class _Model:
         """(n, 3) joint coordinates, m, in the machine's order, for poses (n, 3), m."""
         return self.delta.joints(self._all(values), poses)
 
-    def printed(self, values: Floats) -> Printed:
+    def format(self, values: Floats) -> Printed:
         """Pins, and HOME_OFFSET of the joints, in the block's unit."""
         words = ["R", "L", *(f"JOINT_{joint} HOME_OFFSET" for joint in range(3))]
         scale, digits = SCALE[self.unit], digits_of(self.delta.machine, self.unit)
         return {word: fixed(v / scale, digits) for word, v in zip(words, values, strict=True)}
 
-    def taken(self, printed: Printed) -> Floats:
+    def parse(self, printed: Printed) -> Floats:
         """(5,) the model's values, m, of printed numbers."""
         return np.array([float(text) for text in printed.values()]) * SCALE[self.unit]
 

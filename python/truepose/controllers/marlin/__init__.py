@@ -88,7 +88,7 @@ class _Model(TowerModel):
             )
         )
 
-    def printed(self, values: Floats) -> Printed:
+    def format(self, values: Floats) -> Printed:
         """Numbers by command and word, mm and degrees."""
         numbers = untilted(values)
         trips, arms = endstop(numbers), numbers[ARMS]
@@ -96,14 +96,16 @@ class _Model(TowerModel):
         lengths = {"L": float(arms.mean()), "R": float(numbers[RADIUS][0])}
         lengths["H"] = height + self._probe
         lengths |= dict(zip(TRIMS, arms - arms.mean(), strict=True))
-        found = {f"M665 {word}": fixed(v / MM, self._digits) for word, v in lengths.items()}
+        settings = {f"M665 {word}": fixed(v / MM, self._digits) for word, v in lengths.items()}
         turned = np.degrees(wrapped(numbers[ANGLES] - TOWERS))
-        found |= {f"M665 {w}": fixed(v, ANGLE_DIGITS) for w, v in zip(AXES, turned, strict=True)}
+        settings |= {f"M665 {w}": fixed(v, ANGLE_DIGITS) for w, v in zip(AXES, turned, strict=True)}
         lowered = (height - trips) / MM
-        found |= {f"M666 {w}": fixed(v, self._digits) for w, v in zip(AXES, lowered, strict=True)}
-        return found
+        settings |= {
+            f"M666 {w}": fixed(v, self._digits) for w, v in zip(AXES, lowered, strict=True)
+        }
+        return settings
 
-    def taken(self, printed: Printed) -> Floats:
+    def parse(self, printed: Printed) -> Floats:
         """(10,) the model's values, SI, of printed numbers."""
 
         def of(code: str, words: str) -> Floats:

@@ -23,7 +23,7 @@ from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats
 from truepose.compensation.commands import corrected_poses, has_joints
 from truepose.controllers._export import Export, Option
-from truepose.controllers._fit import Extent, angle_between, extent
+from truepose.controllers._fit import Extent, extent
 from truepose.controllers._small_model import ascii_only, fixed, stem
 from truepose.controllers.pose_map.grid import COUNT, Grid, grid_of
 from truepose.errors import Problem, RequestError
@@ -32,6 +32,7 @@ from truepose.files.wording import counted
 from truepose.machine import Machine
 from truepose.runs.dataset import provenance
 from truepose.runs.poses import OK, pose_in_words
+from truepose.spatial import angle_between
 
 FINEST = 1e-10
 """m and rad to which corrections are written, and finer."""
@@ -67,8 +68,8 @@ class NodeCorrections:
     def corrections_si(self) -> Floats:
         """(n_node, n_commanded) m and rad."""
         scale = np.array([unit.scale for unit in self.units])
-        found: Floats = self.corrections * scale
-        return found
+        scaled: Floats = self.corrections * scale
+        return scaled
 
 
 def pose_map(machine: Machine, grid: Grid) -> NodeCorrections:
@@ -121,41 +122,41 @@ class Commandable:
     points: int
 
 
-def assess(found: NodeCorrections) -> MapErrors:
+def assess(nodes: NodeCorrections) -> MapErrors:
     """Compare interpolated with exact corrections between the nodes.
 
     The rms is that over points scattered all over the box. The largest is looked for from the worst
     of those and of the middles of the cells, where a smooth correction is worst, by steps at random
     that shrink.
     """
-    grid = found.grid
+    grid = nodes.grid
     middles = grid.centres()
     chosen = np.unique(np.linspace(0, len(middles) - 1, min(len(middles), CENTRES)).astype(np.intp))
-    scattered = _compare(found, grid.scattered(SCATTERED, SEED))
+    scattered = _compare(nodes, grid.scattered(SCATTERED, SEED))
     if not len(scattered.points):
         raise RequestError(
             Problem(
                 "no-pose-left",
                 "no cell of the pose map lies within the machine's reach",
-                file=found.machine.file,
+                file=nodes.machine.file,
                 found=f"{SCATTERED} points in cells with a node out of reach",
                 expected="a workspace within the machine's reach, or more nodes",
             )
         )
-    first = [scattered, _compare(found, middles[chosen])]
-    turns = any(name in "abc" for name in found.machine.commanded)
+    first = [scattered, _compare(nodes, middles[chosen])]
+    turns = any(name in "abc" for name in nodes.machine.commanded)
     kinds = [_POSITION, _ORIENTATION] if turns else [_POSITION]
-    allowed = sum(int(each.allowed.sum()) for each in first)
-    some_out = allowed < sum(len(each.points) for each in first)
+    allowed = sum(int(compared.allowed.sum()) for compared in first)
+    some_out = allowed < sum(len(compared.points) for compared in first)
     if some_out and allowed:
         kinds += [_only_allowed(of) for of in kinds]
-    every = [*first, *(each for of in kinds for each in _search(found, first, of))]
-    points = np.concatenate([each.points for each in every])
+    every = [*first, *(compared for of in kinds for compared in _search(nodes, first, of))]
+    points = np.concatenate([compared.points for compared in every])
     even = np.arange(len(points)) < len(scattered.points)
-    within = np.concatenate([each.allowed for each in every])
+    within = np.concatenate([compared.allowed for compared in every])
 
     def over(of: _Of, chosen: Flags) -> Extent:
-        values = np.concatenate([of(each) for each in every])[chosen]
+        values = np.concatenate([of(compared) for compared in every])[chosen]
         # The scattered ones alone are even; where none of them is left, all have to do.
         spread = even[chosen] if even[chosen].any() else np.ones(len(values), np.bool_)
         return extent(values, points[chosen], spread)
@@ -173,7 +174,7 @@ def assess(found: NodeCorrections) -> MapErrors:
         orientation(all_of),
         commandable,
         len(np.unique(points, axis=0)),
-        sum(each.left_out for each in every),
+        sum(compared.left_out for compared in every),
     )
 
 
@@ -198,13 +199,13 @@ _ORIENTATION: _Of = attrgetter("orientation")
 
 
 def _only_allowed(of: _Of) -> _Of:
-    return lambda each: np.where(each.allowed, of(each), 0.0)
+    return lambda compared: np.where(compared.allowed, of(compared), 0.0)
 
 
-def _compare(found: NodeCorrections, points: Floats) -> _Compared:
-    machine = found.machine
+def _compare(nodes: NodeCorrections, points: Floats) -> _Compared:
+    machine = nodes.machine
     exact, status = corrected_poses(machine, points)
-    added = found.grid.interpolated(found.corrections_si, points)
+    added = nodes.grid.interpolated(nodes.corrections_si, points)
     usable = has_joints(status) & np.isfinite(added).all(axis=1)
     at, exact, added = points[usable], exact[usable], points[usable] + added[usable]
     linear = [column for column, name in enumerate(machine.commanded) if name in "xyz"]
@@ -212,18 +213,18 @@ def _compare(found: NodeCorrections, points: Floats) -> _Compared:
     return _Compared(
         at,
         np.linalg.norm((added - exact)[:, linear], axis=1),
-        angle_between(place(added), place(exact)),
+        angle_between(place(added)[:, 3:], place(exact)[:, 3:]),
         status[usable] == OK,
         int((~usable).sum()),
     )
 
 
-def _search(found: NodeCorrections, first: Sequence[_Compared], of: _Of) -> list[_Compared]:
+def _search(nodes: NodeCorrections, first: Sequence[_Compared], of: _Of) -> list[_Compared]:
     """More points about the worst ones: rounds of random steps, each half as long as the last."""
-    points = np.concatenate([each.points for each in first])
-    values = np.concatenate([of(each) for each in first])
-    ends = np.array([(axis.start, axis.stop) for axis in found.grid.axes])
-    cell = (ends[:, 1] - ends[:, 0]) / np.maximum(np.array(found.grid.shape) - 1, 1)
+    points = np.concatenate([compared.points for compared in first])
+    values = np.concatenate([of(compared) for compared in first])
+    ends = np.array([(axis.start, axis.stop) for axis in nodes.grid.axes])
+    cell = (ends[:, 1] - ends[:, 0]) / np.maximum(np.array(nodes.grid.shape) - 1, 1)
     generator = np.random.default_rng(SEED)
     tried: list[_Compared] = []
     for round_ in range(ROUNDS):
@@ -231,7 +232,7 @@ def _search(found: NodeCorrections, first: Sequence[_Compared], of: _Of) -> list
         points, values = points[worst], values[worst]
         steps = generator.uniform(-1.0, 1.0, (STEPS, *points.shape)) * cell * 0.5 ** (round_ + 1)
         moved = np.clip((points + steps).reshape(-1, len(ends)), ends[:, 0], ends[:, 1])
-        tried.append(_compare(found, moved))
+        tried.append(_compare(nodes, moved))
         points = np.concatenate([points, tried[-1].points])
         values = np.concatenate([values, of(tried[-1])])
     return tried
@@ -250,23 +251,23 @@ class PoseMap:
 
         Raises `RequestError`: bad-option, no-workspace, grid-too-large, no-pose-left.
         """
-        found = pose_map(machine, grid_of(machine, str(options["count"])))
-        judged = assess(found)
-        head = _head(found)
-        lines = statement(found, judged)
+        nodes = pose_map(machine, grid_of(machine, str(options["count"])))
+        judged = assess(nodes)
+        head = _head(nodes)
+        lines = statement(nodes, judged)
         name = f"{stem(machine)}_pose_map"
         files = {
-            f"{name}.csv": _csv(found, head, lines),
-            f"{name}.json": _json(found, judged, head),
+            f"{name}.csv": _csv(nodes, head, lines),
+            f"{name}.json": _json(nodes, judged, head),
         }
         return Export(files, lines)
 
 
-def statement(found: NodeCorrections, judged: MapErrors) -> tuple[str, ...]:
+def statement(nodes: NodeCorrections, judged: MapErrors) -> tuple[str, ...]:
     """Lines for the user."""
-    machine = found.machine
-    count = " x ".join(str(number) for number in found.grid.shape)
-    lines = [f"{counted(len(found.status), 'node')} ({count}); {USE}"]
+    machine = nodes.machine
+    count = " x ".join(str(number) for number in nodes.grid.shape)
+    lines = [f"{counted(len(nodes.status), 'node')} ({count}); {USE}"]
     if judged.points == 1:
         lines.append("one node: there is nothing to interpolate")
     else:
@@ -278,11 +279,11 @@ def statement(found: NodeCorrections, judged: MapErrors) -> tuple[str, ...]:
             f"where the machine may be commanded to, at {counted(where.points, 'point')} of them: "
             f"{_both(machine, where)}"
         )
-    lines.append(f"the corrections at the nodes: {_words(machine, _sizes(found), 'm')}")
+    lines.append(f"the corrections at the nodes: {_words(machine, _sizes(nodes), 'm')}")
     if judged.points > 1:
         points = counted(judged.points, "point")
         lines.append(f"compared with exact corrections at {points} between the nodes")
-    names, counts = np.unique(found.status[found.status != OK], return_counts=True)
+    names, counts = np.unique(nodes.status[nodes.status != OK], return_counts=True)
     for code, number in zip(names, counts, strict=True):
         what = str(STATUS[code]).replace("_", " ")
         be, instead = ("is", "it has") if number == 1 else ("are", "they have")
@@ -294,12 +295,12 @@ def statement(found: NodeCorrections, judged: MapErrors) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _sizes(found: NodeCorrections) -> Extent:
+def _sizes(nodes: NodeCorrections) -> Extent:
     """How far corrections move the tool point."""
-    linear = [at for at, name in enumerate(found.machine.commanded) if name in "xyz"]
-    sizes = np.linalg.norm(found.corrections_si[:, linear], axis=1)
+    linear = [at for at, name in enumerate(nodes.machine.commanded) if name in "xyz"]
+    sizes = np.linalg.norm(nodes.corrections_si[:, linear], axis=1)
     have = np.isfinite(sizes)
-    return extent(sizes[have], found.grid.nodes[have])
+    return extent(sizes[have], nodes.grid.nodes[have])
 
 
 def _instead(code: int) -> str:
@@ -315,19 +316,19 @@ def _both(machine: Machine, judged: MapErrors | Commandable) -> str:
     return text
 
 
-def _words(machine: Machine, found: Extent, unit: str) -> str:
+def _words(machine: Machine, extent: Extent, unit: str) -> str:
     shown = machine.shown.small(unit)
     places = 2 if shown.per_si >= 1e6 else 4
-    highest, rms = (f"{v * shown.per_si:.{places}f}" for v in (found.highest, found.rms))
+    highest, rms = (f"{v * shown.per_si:.{places}f}" for v in (extent.highest, extent.rms))
     return (
-        f"at most {highest} {shown.label} (at {pose_in_words(machine, found.at)}), "
+        f"at most {highest} {shown.label} (at {pose_in_words(machine, extent.at)}), "
         f"rms {rms} {shown.label}"
     )
 
 
-def _head(found: NodeCorrections) -> dict[str, object]:
+def _head(nodes: NodeCorrections) -> dict[str, object]:
     """What the map is of and how it is to be read, for both formats."""
-    known = provenance(found.machine, found.machine.condition)
+    known = provenance(nodes.machine, nodes.machine.condition)
     given = {key: known[key] for key in ("truepose_version", "machine", "machine_file")}
     return {
         "format": "truepose pose map 1",
@@ -343,7 +344,7 @@ def _head(found: NodeCorrections) -> dict[str, object]:
     }
 
 
-def _csv(found: NodeCorrections, head: Mapping[str, object], lines: tuple[str, ...]) -> str:
+def _csv(nodes: NodeCorrections, head: Mapping[str, object], lines: tuple[str, ...]) -> str:
     out = io.StringIO()
     for key, value in head.items():
         text = value if isinstance(value, str) else json.dumps(value)
@@ -355,31 +356,30 @@ def _csv(found: NodeCorrections, head: Mapping[str, object], lines: tuple[str, .
     columns = [
         f"{what}{name} ({unit.label})"
         for what in ("", "add_")
-        for name, unit in zip(found.machine.commanded, found.units, strict=True)
+        for name, unit in zip(nodes.machine.commanded, nodes.units, strict=True)
     ]
     rows.writerow([*columns, "status"])
-    nodes = found.grid.nodes
-    for node, added, code in zip(nodes, found.corrections, found.status, strict=True):
+    for node, added, code in zip(nodes.grid.nodes, nodes.corrections, nodes.status, strict=True):
         place = [
-            f"{value / unit.scale:.12g}" for value, unit in zip(node, found.units, strict=True)
+            f"{value / unit.scale:.12g}" for value, unit in zip(node, nodes.units, strict=True)
         ]
         numbers = [
             "" if math.isnan(value) else fixed(value, places)
-            for value, places in zip(added, found.digits, strict=True)
+            for value, places in zip(added, nodes.digits, strict=True)
         ]
         rows.writerow([*place, *numbers, STATUS[code]])
     return out.getvalue()
 
 
-def _json(found: NodeCorrections, judged: MapErrors, head: Mapping[str, object]) -> str:
-    machine = found.machine
+def _json(nodes: NodeCorrections, judged: MapErrors, head: Mapping[str, object]) -> str:
+    machine = nodes.machine
     axes = [
         {"name": name, "unit": unit.label, "nodes": [float(f"{v / unit.scale:.12g}") for v in axis]}
-        for name, unit, axis in zip(machine.commanded, found.units, found.grid.values, strict=True)
+        for name, unit, axis in zip(machine.commanded, nodes.units, nodes.grid.values, strict=True)
     ]
     columns = {
         name: [None if math.isnan(value) else float(value) for value in column]
-        for name, column in zip(machine.commanded, found.corrections.T, strict=True)
+        for name, column in zip(machine.commanded, nodes.corrections.T, strict=True)
     }
     document = {
         **head,
@@ -389,7 +389,7 @@ def _json(found: NodeCorrections, judged: MapErrors, head: Mapping[str, object])
         },
         "axes": axes,
         "corrections": columns,
-        "status": [STATUS[code] for code in found.status],
+        "status": [STATUS[code] for code in nodes.status],
     }
     # One key a line: a column of numbers reads better, and shorter, along it.
     lines = [f"{json.dumps(k)}: {json.dumps(v, allow_nan=False)}" for k, v in document.items()]
@@ -404,8 +404,8 @@ def _errors(judged: MapErrors | Commandable) -> dict[str, object]:
     }
 
 
-def _plain(found: Extent) -> dict[str, object]:
-    return {"highest": found.highest, "rms": found.rms, "highest_at": found.at.tolist()}
+def _plain(extent: Extent) -> dict[str, object]:
+    return {"highest": extent.highest, "rms": extent.rms, "highest_at": extent.at.tolist()}
 
 
 __all__ = ["NodeCorrections", "PoseMap", "assess", "pose_map"]

@@ -87,8 +87,8 @@ class Grid:
                 high = corner >> bit & 1
                 weight = weight * (share[at] if high else 1.0 - share[at])
                 index[at] = lower[at] + high
-            found = values[tuple(reversed(index))]
-            total += np.where(weight[:, np.newaxis] > 0.0, weight[:, np.newaxis] * found, 0.0)
+            node_values = values[tuple(reversed(index))]
+            total += np.where(weight[:, np.newaxis] > 0.0, weight[:, np.newaxis] * node_values, 0.0)
         return total
 
 

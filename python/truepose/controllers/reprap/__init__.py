@@ -52,24 +52,24 @@ class _Model(TowerModel):
         super().__init__(delta.in_order(tower_order(delta.nominal[ANGLES])), tilt=True)
         self._digits = LENGTH_DIGITS + more_decimals(machine.characteristic_length, SMALL)
 
-    def printed(self, values: Floats) -> Printed:
+    def format(self, values: Floats) -> Printed:
         """Numbers by command and word, mm, degrees and percent."""
         trips = endstop(values)
         height = float(trips.mean())
-        found = {
+        settings = {
             "M665 R": fixed(values[RADIUS][0] / MM, self._digits),
             "M665 H": fixed(height / MM, self._digits),
         }
         turned = np.degrees(wrapped(values[ANGLES] - TOWERS))
         for at, axis in enumerate(AXES):
-            found[f"M665 L{axis}"] = fixed(values[ARMS][at] / MM, self._digits)
-            found[f"M665 {axis}"] = fixed(turned[at], ANGLE_DIGITS)
-            found[f"M666 {axis}"] = fixed((trips[at] - height) / MM, self._digits)
+            settings[f"M665 L{axis}"] = fixed(values[ARMS][at] / MM, self._digits)
+            settings[f"M665 {axis}"] = fixed(turned[at], ANGLE_DIGITS)
+            settings[f"M666 {axis}"] = fixed((trips[at] - height) / MM, self._digits)
         for axis, tilt in zip(TILTS, values[TILT], strict=True):
-            found[f"M666 {axis}"] = fixed(tilt / PERCENT, TILT_DIGITS)
-        return found
+            settings[f"M666 {axis}"] = fixed(tilt / PERCENT, TILT_DIGITS)
+        return settings
 
-    def taken(self, printed: Printed) -> Floats:
+    def parse(self, printed: Printed) -> Floats:
         """(12,) the model's values, SI, of printed numbers."""
 
         def of(words: list[str]) -> Floats:

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import Expansion, Mass, Point
-from truepose.machine.tables.material import MaterialName
+from truepose.machine.materials import MaterialName
 
 _ORIGIN = (0.0, 0.0, 0.0)
 

@@ -133,7 +133,7 @@ class ConditionTable(FileTable):
             refuse(
                 Fault(
                     "missing-key",
-                    "a time, but no temperature_log to look it up in",
+                    "a time is given, but no temperature_log",
                     found="no temperature_log",
                     expected='temperature_log = "file.csv"',
                 )

@@ -8,8 +8,8 @@ from pydantic import Field
 
 from truepose.files.file_table import FileTable, PartName
 from truepose.files.quantity import Expansion, Mass
+from truepose.machine.materials import MaterialName
 from truepose.machine.tables.body import CarriageTable
-from truepose.machine.tables.material import MaterialName
 
 
 class DriveTable(FileTable):

@@ -14,8 +14,8 @@ from truepose.files.quantity import (
     Modulus,
     Stiffness,
 )
+from truepose.machine.materials import MaterialName
 from truepose.machine.tables.joint import JointTable
-from truepose.machine.tables.material import MaterialName
 
 
 class StrutTable(FileTable):

@@ -25,7 +25,7 @@ def place(study: Study, component: int) -> dict[str, int]:
 
 def panels(study: Study) -> go.Figure:
     """Empty panels, one for each error component, sharing the pose number."""
-    columns = [len(each) for each in (study.positions, study.rotations) if each]
+    columns = [len(components) for components in (study.positions, study.rotations) if components]
     rows = max(columns)
     return make_subplots(
         rows=rows,

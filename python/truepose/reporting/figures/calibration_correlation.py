@@ -36,9 +36,9 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """A heat map of the correlation matrix."""
-    found = study.calibrated
-    names = found["unknown_label"].values[:MOST_DRAWN].tolist()
-    values = found["correlation"].values[:MOST_DRAWN, :MOST_DRAWN]
+    result = study.calibrated
+    names = result["unknown_label"].values[:MOST_DRAWN].tolist()
+    values = result["correlation"].values[:MOST_DRAWN, :MOST_DRAWN]
     named = len(names) <= MOST_NAMED
     places = list(range(len(names)))
     figure = go.Figure(
@@ -88,8 +88,8 @@ def figure(study: Study) -> go.Figure:
 
 def _strongest(study: Study) -> tuple[str, str, float] | None:
     """The two unknowns that are correlated most, where that is strong."""
-    found = study.calibrated
-    values = np.nan_to_num(found["correlation"].values.copy())
+    result = study.calibrated
+    values = np.nan_to_num(result["correlation"].values.copy())
     np.fill_diagonal(values, 0.0)
     if not values.size:
         return None
@@ -97,5 +97,5 @@ def _strongest(study: Study) -> tuple[str, str, float] | None:
     value = float(values[first, second])
     if abs(value) < STRONG:
         return None
-    names = found["unknown_label"].values
+    names = result["unknown_label"].values
     return str(names[first]), str(names[second]), value

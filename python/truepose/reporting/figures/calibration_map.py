@@ -31,9 +31,9 @@ def caption(_: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """Two maps over the measured poses, each with its own scale."""
-    found = study.calibrated
+    result = study.calibrated
     names = study.machine.commanded
-    poses = np.stack([found[f"row_{name}"].values for name in names], axis=-1)
+    poses = np.stack([result[f"row_{name}"].values for name in names], axis=-1)
     places = places_of(poses, names, study.units)
     kinds = [("before", "normalised_before"), ("after", "normalised_after")]
     spatial = len(places.axes) == 3
@@ -46,7 +46,7 @@ def figure(study: Study) -> go.Figure:
     )
     finish(figure, HEIGHT, margin=_MARGINS[spatial])
     for number, (_, name) in enumerate(kinds):
-        sizes = _by_place(study, found[name].values, places.of_pose, len(places.points))
+        sizes = _by_place(study, result[name].values, places.of_pose, len(places.points))
         drawn = np.flatnonzero(np.isfinite(sizes))
         axis = "coloraxis" if number == 0 else "coloraxis2"
         trace = map_trace(places, drawn, sizes, "stated uncertainties", axis)

@@ -39,8 +39,8 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """One row of panels for each unit: before and after on one scale, then after alone."""
-    found = study.calibrated
-    units = list(dict.fromkeys(found["observation_units"].values.tolist()))
+    result = study.calibrated
+    units = list(dict.fromkeys(result["observation_units"].values.tolist()))
     figure = make_subplots(
         rows=len(units),
         cols=2,
@@ -48,18 +48,18 @@ def figure(study: Study) -> go.Figure:
         vertical_spacing=0.25 / len(units),
         column_titles=["before and after", "after, enlarged"],
     )
-    rows = found["observation_row"].values
-    lines = found["row_line"].values
+    rows = result["observation_row"].values
+    lines = result["row_line"].values
     in_file = bool((lines > 0).all())
-    where = (lines if in_file else found["row"].values)[rows]
+    where = (lines if in_file else result["row"].values)[rows]
     labels = _labels(study)
-    sigma = found["uncertainty"].values
+    sigma = result["uncertainty"].values
     for number, unit in enumerate(units):
-        mine = found["observation_units"].values == unit
+        mine = result["observation_units"].values == unit
         scale = Shown("1", 1.0) if unit == "1" else study.units.small(unit)
         factor, shown = scale.per_si, scale.label
         sets = {
-            name: (found[name].values * (sigma if normalised else 1.0))[mine] * factor
+            name: (result[name].values * (sigma if normalised else 1.0))[mine] * factor
             for name, normalised in (
                 ("residual_before", False),
                 ("residual_after", False),
@@ -92,8 +92,8 @@ def figure(study: Study) -> go.Figure:
                 )  # fmt: skip
         figure.update_yaxes(title_text=f"residual, {shown}", row=number + 1, col=1)
         fit = mine & ~_named(study)
-        after = (found["normalised_after"].values * sigma)[fit] * factor
-        held_out = (found["held_out_after"].values * sigma)[fit] * factor
+        after = (result["normalised_after"].values * sigma)[fit] * factor
+        held_out = (result["held_out_after"].values * sigma)[fit] * factor
         reach = np.abs(np.concatenate([after, held_out, 2.5 * sigma[mine] * factor]))
         most = 1.08 * float(np.nanmax(reach))
         figure.update_yaxes(range=[-most, most], row=number + 1, col=2)
@@ -111,12 +111,12 @@ def _named(study: Study) -> np.ndarray:
 
 def _labels(study: Study) -> np.ndarray:
     """(n_observation,) what each reading is: "tracker, x"."""
-    found = study.calibrated
-    names = found["row_instrument"].values[found["observation_row"].values]
+    result = study.calibrated
+    names = result["row_instrument"].values[result["observation_row"].values]
     return np.array(
         [
             f"{name}, {what}"
-            for name, what in zip(names, found["observation_what"].values, strict=True)
+            for name, what in zip(names, result["observation_what"].values, strict=True)
         ],
         dtype=np.str_,
     )
@@ -147,7 +147,7 @@ def _points(
 def _band(at: np.ndarray, sigma: Floats) -> list[go.Scatter]:
     """Twice the stated uncertainty either side, the largest at each row."""
     where = np.unique(at)
-    half = COVERAGE * np.array([sigma[at == each].max() for each in where])
+    half = COVERAGE * np.array([sigma[at == place].max() for place in where])
     # Half a row further at both ends, so that points at the ends lie in it too.
     where = np.concatenate([[where[0] - 0.5], where, [where[-1] + 0.5]])
     half = np.concatenate([half[:1], half, half[-1:]])

@@ -21,14 +21,14 @@ _MARGINS = {True: {"l": 5, "r": 5, "t": 40, "b": 5}, False: {"l": 65, "r": 60, "
 
 def caption(study: Study) -> str:
     """What the colour is, and what is not in it."""
-    found = study.calibrated
+    result = study.calibrated
     what = _quantity(study)
     text = (
         f"Standard uncertainty of the tool's {what} over the workspace. Before: from the "
         "tolerances. After: from the measurements, and the tolerances where they were used. "
         "The two scales differ."
     )
-    if found.attrs["relative"]:
+    if result.attrs["relative"]:
         text += " Where the machine as a whole stands in the instrument's frame is not in it."
     if not np.isfinite(_sizes(study, "before")).any():
         text += " Not every unknown has a tolerance, so there is no before."
@@ -39,10 +39,10 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """Two maps over the workspace, each with its own scale."""
-    found = study.calibrated
+    result = study.calibrated
     names = study.machine.commanded
     places = places_of(
-        np.stack([found[f"pose_{name}"].values for name in names], axis=-1), names, study.units
+        np.stack([result[f"pose_{name}"].values for name in names], axis=-1), names, study.units
     )
     kinds = [when for when in ("before", "after") if np.isfinite(_sizes(study, when)).any()]
     spatial = len(places.axes) == 3

@@ -37,10 +37,10 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """One line for each unknown: its bar, and its change."""
-    found = study.calibrated
+    result = study.calibrated
     drawn = _drawn(study)
-    names = found["unknown_label"].values[drawn]
-    share = np.nan_to_num(found["data_share"].values[drawn])
+    names = result["unknown_label"].values[drawn]
+    share = np.nan_to_num(result["data_share"].values[drawn])
     figure = make_subplots(rows=1, cols=2, shared_yaxes=True, horizontal_spacing=0.04)
     for values, name, colour in (
         (share, "from the measurements", DATA),
@@ -68,8 +68,8 @@ def figure(study: Study) -> go.Figure:
             },
             text=[
                 signed(
-                    float(found["value"].values[at]),
-                    str(found["unknown_units"].values[at]),
+                    float(result["value"].values[at]),
+                    str(result["unknown_units"].values[at]),
                     study.units,
                 )
                 for at in drawn
@@ -109,11 +109,11 @@ def _drawn(study: Study) -> np.ndarray:
 
 def _in_half_bands(study: Study) -> tuple[np.ndarray, np.ndarray]:
     """(n,) change from the middle of the band and its uncertainty; NaN without a band."""
-    found = study.calibrated
-    half = found["prior_half"].values
+    result = study.calibrated
+    half = result["prior_half"].values
     known = np.where(np.isfinite(half), half, np.nan)
-    spread = found["standard_uncertainty"].values
-    change = found["value"].values - found["prior_mean"].values
+    spread = result["standard_uncertainty"].values
+    change = result["value"].values - result["prior_mean"].values
     return change / known, np.where(np.isfinite(spread), spread, np.nan) / known
 
 

@@ -47,10 +47,10 @@ class Panel:
 
 def caption(study: Study) -> str:
     """What an ellipse holds, and how much larger it is drawn."""
-    found = study.ellipses
-    assert found is not None
-    percent = percent_text(float(found.attrs["probability"]))
-    spatial = found.sizes["axis"] > 2
+    result = study.ellipses
+    assert result is not None
+    percent = percent_text(float(result.attrs["probability"]))
+    spatial = result.sizes["axis"] > 2
     shadow = (
         f" Each is the shadow of an ellipsoid that holds {percent} of the samples, and so holds "
         "somewhat more; the panels show poses of the middle planes."
@@ -61,15 +61,15 @@ def caption(study: Study) -> str:
         f"Where the tool really is: the ellipse holds {percent} of the samples of the position "
         f"error, drawn {_magnified(study):,.0f} times as large as the workspace; the line leads "
         "from the commanded place to the mean. A long ellipse is a direction in which the machine "
-        f"is unsure. {int((found['samples'] + found['failed']).values[0]):,} samples a pose."
+        f"is unsure. {int((result['samples'] + result['failed']).values[0]):,} samples a pose."
         + shadow
-        + _lost(found)
+        + _lost(result)
     )
 
 
-def _lost(found: xr.Dataset) -> str:
+def _lost(result: xr.Dataset) -> str:
     """How many samples could not be assembled, where any could not."""
-    lost = str(found.attrs.get("not_assembled", "none"))
+    lost = str(result.attrs.get("not_assembled", "none"))
     if lost == "none":
         return ""
     return f" Of all samples {lost}; where too many failed, no ellipse is drawn."
@@ -77,16 +77,16 @@ def _lost(found: xr.Dataset) -> str:
 
 def figure(study: Study) -> go.Figure:
     """One panel for each pair of axes, equal scale on both."""
-    found = study.ellipses
-    assert found is not None
-    names = [str(name) for name in found["axis"].values]
+    result = study.ellipses
+    assert result is not None
+    names = [str(name) for name in result["axis"].values]
     panels = _panels(study)
     times = _magnified(study)
     figure = make_subplots(rows=1, cols=len(panels), horizontal_spacing=0.09)
     for at, panel in enumerate(panels, start=1):
         drawn = [panel.places]
         for nth, pose in enumerate(panel.poses):
-            centre, outline = ellipse(found, pose, panel.axes)
+            centre, outline = ellipse(result, pose, panel.axes)
             place = panel.places[nth]
             first = at == 1 and nth == 0
             _draw(figure, place, centre, outline, times, at, study.units, first=first)
@@ -123,15 +123,15 @@ def _ranges(points: Floats, units: ShownUnits) -> list[list[float]]:
     return [[float(a - room), float(b + room)] for a, b in zip(low, high, strict=True)]
 
 
-def ellipse(found: xr.Dataset, pose: int, axes: tuple[int, int]) -> tuple[Floats, Floats]:
+def ellipse(result: xr.Dataset, pose: int, axes: tuple[int, int]) -> tuple[Floats, Floats]:
     """Centre (2,) and outline (n, 2) about it, m, of one pose's ellipse in the plane of two axes.
 
     The shadow of {e : (e - c)^T E^-1 (e - c) <= 1} on a plane has that part of E: points are
     c + L (cos, sin) with L L^T = E.
     """
     pair = list(axes)
-    centre = np.asarray(found["ellipse_centre"].values)[pose, pair]
-    shape = np.asarray(found["ellipse"].values)[pose][np.ix_(pair, pair)]
+    centre = np.asarray(result["ellipse_centre"].values)[pose, pair]
+    shape = np.asarray(result["ellipse"].values)[pose][np.ix_(pair, pair)]
     # An ellipse may be a line: the square root of what is not negative, never Cholesky's.
     sizes, directions = np.linalg.eigh(shape)
     root = directions * np.sqrt(np.maximum(sizes, 0.0))
@@ -141,12 +141,12 @@ def ellipse(found: xr.Dataset, pose: int, axes: tuple[int, int]) -> tuple[Floats
 
 def _panels(study: Study) -> list[Panel]:
     """The planes of two axes, each with the poses nearest to the middle of what it hides."""
-    found = study.ellipses
-    assert found is not None
-    names = [str(name) for name in found["axis"].values]
-    every = np.stack([found[f"pose_{name}"].values for name in names], axis=-1)
+    result = study.ellipses
+    assert result is not None
+    names = [str(name) for name in result["axis"].values]
+    every = np.stack([result[f"pose_{name}"].values for name in names], axis=-1)
     others = [name for name in study.machine.commanded if not is_position(name)]
-    turned = [found[f"pose_{name}"].values for name in others]
+    turned = [result[f"pose_{name}"].values for name in others]
     panels = []
     for pair in combinations(range(len(names)), 2):
         hidden = [every[:, at] for at in range(len(names)) if at not in pair] + turned
@@ -178,13 +178,13 @@ def _magnified(study: Study) -> float:
 
     As large as they can be without touching their neighbours.
     """
-    found = study.ellipses
-    assert found is not None
+    result = study.ellipses
+    assert result is not None
     most = np.inf
     for panel in _panels(study):
         reach = 0.0
         for pose in panel.poses:
-            centre, outline = ellipse(found, pose, panel.axes)
+            centre, outline = ellipse(result, pose, panel.axes)
             reach = max(reach, float(np.linalg.norm(outline, axis=1).max()))
             reach = max(reach, float(np.linalg.norm(centre + outline, axis=1).max()) / 2)
         gap = _gap(panel.places)

@@ -24,12 +24,12 @@ ASKED = "#B23A48"
 
 def caption(study: Study) -> str:
     """Which pose, how many samples, and what the colours are."""
-    found = study.monte_carlo
-    assert found is not None
-    pose = worst_pose(found, "magnitude_upper")
-    percent = percent_text(float(found.attrs["probability"]))
-    failed = int(found["failed"].values[pose])
-    count = int(found["samples"].values[pose])
+    result = study.monte_carlo
+    assert result is not None
+    pose = worst_pose(result, "magnitude_upper")
+    percent = percent_text(float(result.attrs["probability"]))
+    failed = int(result["failed"].values[pose])
+    count = int(result["samples"].values[pose])
     lost = (
         f" {not_assembled_text(failed, count + failed)}: they are in no bar and no interval, "
         "and the bars add up to the rest."
@@ -38,7 +38,7 @@ def caption(study: Study) -> str:
     )
     return (
         f"Exact error of {count:,} samples of all bands at "
-        f"{at_text(study.machine, found, pose)}, the pose of those sampled where the position is "
+        f"{at_text(study.machine, result, pose)}, the pose of those sampled where the position is "
         f"farthest off. Dark: the {percent} coverage interval; the line is the mean. Of a "
         f"magnitude, {percent} lie below the end of the dark part." + lost
     )
@@ -46,9 +46,9 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """One panel for each component and magnitude: share of the samples, % a bar."""
-    found = study.monte_carlo
-    assert found is not None
-    pose = worst_pose(found, "magnitude_upper")
+    result = study.monte_carlo
+    assert result is not None
+    pose = worst_pose(result, "magnitude_upper")
     rows = _rows(study)
     columns = max(map(len, rows))
     figure = make_subplots(
@@ -58,7 +58,7 @@ def figure(study: Study) -> go.Figure:
         vertical_spacing=0.22 if len(rows) > 1 else 0.0,
         horizontal_spacing=0.07,
     )
-    levels = np.asarray(found["level"].values, np.float64)
+    levels = np.asarray(result["level"].values, np.float64)
     for row, names in enumerate(rows, start=1):
         for at, name in enumerate(names, start=1):
             panel = {"row": row, "col": at}
@@ -66,11 +66,11 @@ def figure(study: Study) -> go.Figure:
             unit = study.units.error(name)
             per_si = unit.per_si
             _draw(figure, levels, values * per_si, interval * per_si, mean * per_si, panel)
-            title = f"|{name}|" if name in quantities(found) else f"error in {name}"
+            title = f"|{name}|" if name in quantities(result) else f"error in {name}"
             figure.update_xaxes(title_text=f"{title}, {unit.label}", zeroline=False, **panel)
             if at == 1:
                 figure.update_yaxes(title_text="samples, %", **panel)
-    _add_legend(figure, percent_text(float(found.attrs["probability"])))
+    _add_legend(figure, percent_text(float(result.attrs["probability"])))
     finish(
         figure,
         90 + (PANEL_HEIGHT + 30) * len(rows),
@@ -97,18 +97,18 @@ def _rows(study: Study) -> list[list[str]]:
 
 def _of(study: Study, name: str, pose: int) -> tuple[Floats, Floats, float]:
     """Quantiles (n_level,), both ends of the coverage interval and the mean, m or rad."""
-    found = study.monte_carlo
-    assert found is not None
-    sizes = quantities(found)
+    result = study.monte_carlo
+    assert result is not None
+    sizes = quantities(result)
     if name in sizes:
         at = sizes.index(name)
-        values = np.asarray(found["magnitude_quantile"].values)[pose, at]
-        upper = found["magnitude_upper"].values[pose, at]
-        return values, np.array([-np.inf, upper]), float(found["magnitude_mean"].values[pose, at])
+        values = np.asarray(result["magnitude_quantile"].values)[pose, at]
+        upper = result["magnitude_upper"].values[pose, at]
+        return values, np.array([-np.inf, upper]), float(result["magnitude_mean"].values[pose, at])
     at = study.components.index(name)
-    ends = [found[end].values[pose, at] for end in ("lower", "upper")]
-    values = np.asarray(found["quantile"].values)[pose, at]
-    return values, np.array(ends), float(found["mean"].values[pose, at])
+    ends = [result[end].values[pose, at] for end in ("lower", "upper")]
+    values = np.asarray(result["quantile"].values)[pose, at]
+    return values, np.array(ends), float(result["mean"].values[pose, at])
 
 
 def histogram(levels: Floats, quantiles: Floats, bars: int = BARS) -> tuple[Floats, Floats]:
@@ -172,7 +172,7 @@ def _draw(
 
 def _colours(middle: Floats, interval: Floats) -> list[str]:
     inside: Flags = (middle >= interval[0]) & (middle <= interval[1])
-    return [WITHIN if each else OUTSIDE for each in inside]
+    return [WITHIN if is_inside else OUTSIDE for is_inside in inside]
 
 
 def _add_legend(figure: go.Figure, percent: str) -> None:

@@ -37,10 +37,10 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """One panel for each error component, and one for the temperatures."""
-    columns = [each for each in (study.positions, study.rotations) if each]
+    columns = [components for components in (study.positions, study.rotations) if components]
     rows = max(map(len, columns))
     specs: list[list[dict[str, int] | None]] = [
-        [{} if row < len(each) else None for each in columns] for row in range(rows)
+        [{} if row < len(components) else None for components in columns] for row in range(rows)
     ]
     specs.append([{"colspan": len(columns)}, *[None] * (len(columns) - 1)])
     figure = make_subplots(

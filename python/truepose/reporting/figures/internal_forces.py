@@ -38,9 +38,9 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """Bars a source and lines a closure, N."""
-    found = study.strained
-    order = np.argsort(found["highest_force_rigid"].values, kind="stable")
-    names = [str(name) for name in found["source"].values[order]]
+    result = study.strained
+    order = np.argsort(result["highest_force_rigid"].values, kind="stable")
+    names = [str(name) for name in result["source"].values[order]]
     bars = BAR * max(len(names), 1) + 40
     figure = make_subplots(
         rows=2, cols=1, row_heights=[bars, PANEL], vertical_spacing=80 / (bars + PANEL)
@@ -51,12 +51,12 @@ def figure(study: Study) -> go.Figure:
     ):
         figure.add_trace(
             go.Bar(
-                x=small(found[variable].values[order]),
+                x=small(result[variable].values[order]),
                 y=names,
                 orientation="h",
                 name=name,
                 marker={"color": colour},
-                customdata=[str(verdict) for verdict in found["verdict"].values[order]],
+                customdata=[str(verdict) for verdict in result["verdict"].values[order]],
                 hovertemplate="%{y}: %{x:.3f} N, %{customdata}",
             ),
             row=1,
@@ -64,10 +64,10 @@ def figure(study: Study) -> go.Figure:
         )
     force = _overall(study)
     drawn = _drawn(force)
-    for index, closure in enumerate(found["closure"].values):
+    for index, closure in enumerate(result["closure"].values):
         figure.add_trace(
             go.Scatter(
-                x=found["pose"].values[drawn],
+                x=result["pose"].values[drawn],
                 y=small(force[drawn, index]),
                 name=str(closure),
                 mode="lines",

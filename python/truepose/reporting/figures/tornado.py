@@ -31,14 +31,14 @@ FRONT, BACK = 0.38, 0.72
 
 def caption(study: Study) -> str:
     """What a share is, and what is not drawn."""
-    found = study.shares
-    assert found is not None
-    pose = at_text(study.machine, found, spread_pose(found))
-    count = found.sizes["parameter"]
+    result = study.shares
+    assert result is not None
+    pose = at_text(study.machine, result, spread_pose(result))
+    count = result.sizes["parameter"]
     left = f" The {MOST_BARS} largest of {count} are drawn." if count > MOST_BARS else ""
     shapley = (
         " Some are correlated, so that first and total need not add up: Shapley shares do."
-        if "shapley" in found
+        if "shapley" in result
         else ""
     )
     return (
@@ -51,15 +51,15 @@ def caption(study: Study) -> str:
 
 def figure(study: Study) -> go.Figure:
     """Horizontal bars, %, of position and, where the platform turns, of orientation."""
-    found = study.shares
-    assert found is not None
-    pose = spread_pose(found)
+    result = study.shares
+    assert result is not None
+    pose = spread_pose(result)
     parts = [
         part
         for part, there in (("position", study.positions), ("orientation", study.rotations))
         if there
     ]
-    shared = [blame(found, pose, "parameter", part) for part in parts]
+    shared = [blame(result, pose, "parameter", part) for part in parts]
     # The names of the right panel stand between both.
     longest = max(map(len, _shortened(shared[-1].names[:MOST_BARS])))
     figure = make_subplots(

@@ -64,20 +64,20 @@ def figure(study: Study) -> go.Figure:
     figure = make_subplots(
         rows=rows,
         cols=columns,
-        subplot_titles=[each.title for each in maps],
+        subplot_titles=[map_.title for map_ in maps],
         specs=[[{"type": "scene" if spatial else "xy"}] * columns] * rows,
         horizontal_spacing=0.03 if spatial else 0.09,
         vertical_spacing=0.08 if spatial else 0.3 / rows,
     )
-    for number, each in enumerate(maps):
+    for number, map_ in enumerate(maps):
         figure.add_trace(
-            map_trace(places, drawn, each.worst, unit.label),
+            map_trace(places, drawn, map_.worst, unit.label),
             row=number // columns + 1,
             col=number % columns + 1,
         )
     finish(figure, 80 + TITLE_MARGIN + ROW_HEIGHT[len(places.axes)] * rows)
     label_map_axes(figure, places, len(maps))
-    highest = max(float(np.nanmax(each.worst)) for each in maps)
+    highest = max(float(np.nanmax(map_.worst)) for map_ in maps)
     figure.update_layout(
         coloraxis={
             "colorscale": COLOUR_SCALE,

@@ -120,9 +120,9 @@ def _interleaved(
         None if column.overall is None else column.overall[block].tolist() for column in columns
     ]
     for at, lead in enumerate(leading):
-        alone = [each[at] for each in values]
+        alone = [column[at] for column in values]
         for number, source in enumerate(sources):
-            cells = (each[number] if isinstance(each, list) else each for each in alone)
+            cells = (cell[number] if isinstance(cell, list) else cell for cell in alone)
             yield [*lead, source, *map(_cell, cells)]
         together = (
             "" if isinstance(one, list) and all_ is None else one if all_ is None else all_[at]
@@ -161,7 +161,7 @@ def _headers(result: Result, name: str, values: Values, rows: int) -> Iterator[s
     labels = [result.labels(dim) for dim in values.dims[rows:]]
     for index in np.ndindex(*map(len, labels)):
         unit = values.unit(*(index[axis - rows] for axis in values.mixed))
-        words = (each[at] for each, at in zip(labels, index, strict=True))
+        words = (label[at] for label, at in zip(labels, index, strict=True))
         title = "_".join([name, *words])
         yield title if unit == "1" else f"{title} [{unit}]"
 
@@ -187,7 +187,7 @@ def _shares(result: Result) -> Iterator[str]:
         for of, before in (("parameter", ""), ("source", "source_")):
             cells = [_cells_of(result, before + name, at, of) for name in kinds]
             for row, label in enumerate(result.labels(of)):
-                shares = [cell for each in cells for cell in each[row]]
+                shares = [cell for column in cells for cell in column[row]]
                 yield _lines([[*where, of, label, *shares, *[""] * len(others)]])
         values = (value[at].item() for name in alone for value, _ in _each(result, name, 1))
         yield _lines([[*where, "all", "", *[""] * len(headers), *map(_cell, values)]])
@@ -197,7 +197,7 @@ def _shares(result: Result) -> Iterator[str]:
 def _left_out(result: Result, blank: int) -> str:
     """The poses that cannot be used, with their status and so many empty cells."""
     names = ("pose", "status", *result.machine.commanded)
-    return _lines([[*(each[name] for name in names), *[""] * blank] for each in result.left_out()])
+    return _lines([[*(row[name] for name in names), *[""] * blank] for row in result.left_out()])
 
 
 def _each(result: Result, name: str, rows: int) -> Iterator[tuple[NDArray[np.generic], str]]:
@@ -231,12 +231,12 @@ def _region(result: Result) -> Iterator[str]:
         ("component", ends, ["where_lower", "where"]),
         ("quantity", ["", "magnitude", "", "reached_magnitude"], ["", "where_magnitude"]),
     ):
-        found = {kind: result.values(kind) for kind in (*kinds, *where) if kind}
+        values = {kind: result.values(kind) for kind in (*kinds, *where) if kind}
         nowhere = [""] * len(machine.commanded)
         for row, name in enumerate(result.labels(dim)):
-            unit = found[kinds[1]].unit(*[row] * len(found[kinds[1]].mixed))
-            cells = [_cell(float(found[kind].array[row])) if kind else "" for kind in kinds]
-            at = [found[kind].array[row].tolist() if kind else nowhere for kind in where]
+            unit = values[kinds[1]].unit(*[row] * len(values[kinds[1]].mixed))
+            cells = [_cell(float(values[kind].array[row])) if kind else "" for kind in kinds]
+            at = [values[kind].array[row].tolist() if kind else nowhere for kind in where]
             yield _lines([[name, unit, *cells, *(_cell(c) for place in at for c in place), *last]])
 
 

@@ -71,10 +71,10 @@ def corrected_poses(
     found = np.full(table.shape, np.nan)
     status = np.empty(len(table), np.uint8)
     for rows in blocks(len(table)):
-        known = actual.known(table[rows])
+        known = actual.deviations_at(table[rows])
         command = actual.command(known)
         found[rows][known.block.indices] = command.poses
-        status[rows] = known.spread(command.status)
+        status[rows] = known.expand_status(command.status)
     return found, status
 
 
@@ -150,16 +150,16 @@ class PoseDeviations:
     status: Codes
     followed: bool = False
 
-    def spread(self, status: Codes) -> Codes:
+    def expand_status(self, status: Codes) -> Codes:
         """(n,) of all poses, from `status` (m,) of those in the block.
 
         That their nominal joints are out of travel does not count: what is commanded does.
         """
         if len(status) == len(self.status):
             return status
-        spread = self.status.copy()
-        spread[self.block.indices] = status
-        return spread
+        statuses = self.status.copy()
+        statuses[self.block.indices] = status
+        return statuses
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +197,9 @@ class ActualMachine:
         length = machine.characteristic_length
         self.unit = np.array([length if name in "xyz" else 1.0 for name in machine.commanded])
 
-    def known(self, poses: Floats, moved: ParameterDeviation | None = None) -> PoseDeviations:
+    def deviations_at(
+        self, poses: Floats, moved: ParameterDeviation | None = None
+    ) -> PoseDeviations:
         """What is known at `poses` (n, n_commanded).
 
         `moved`: the deviations there, where they are known already; for poses that have joints.
@@ -269,10 +271,10 @@ class ActualMachine:
             if not left.size:
                 break
             poses = found[left]
-            known = self.known(poses)
+            known = self.deviations_at(poses)
             at, placements = known.block.indices, known.block.placements
             error, solved = self.error(known, joints[left[at]])
-            status[left] = known.spread(solved)
+            status[left] = known.expand_status(solved)
             found[left[at]] = self.poses_from(placements, error, poses[at])
             step = np.abs((found[left] - poses) / self.unit).max(axis=1)
             # Steps shrink by one factor: the next one is foretold from the last two.

@@ -105,16 +105,16 @@ def _correct(
     the shifts, then those at edges of the bands.
     """
     after, deviations, corrected = corrected_deviations(block, sources, nominal)
-    spread = variables_of(machine, sources, deviations)
-    middle, effects, at_middle = first_order(machine, after, spread)
+    variables = variables_of(machine, sources, deviations)
+    middle, effects, at_middle = first_order(machine, after, variables)
     kinds = list(quantities(machine.components).values())
-    bounds = remainder.bound(after, spread, middle, effects)
+    bounds = remainder.bound(after, variables, middle, effects)
     values = {
         "joint": after.joints,
         "joint_nominal": block.joints,
         "residual_middle": middle,
-        "bound": np.maximum(*spread.domain.reach(effects)),
-        "linear_maximum": largest(middle, effects, spread.domain, kinds).length,
+        "bound": np.maximum(*variables.domain.reach(effects)),
+        "linear_maximum": largest(middle, effects, variables.domain, kinds).length,
         "remainder": bounds.norms,
         "second_order": bounds.components,
         "proven": bounds.proven,

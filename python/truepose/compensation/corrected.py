@@ -42,9 +42,9 @@ ROUNDING = 1e-13
 def corrected(
     machine: Machine, block: PoseBlock, sources: Sequence[Source]
 ) -> tuple[PoseBlock, Variables, np.ndarray]:
-    """The block with the corrected joints, the spread of all sources there, and a status (n,).
+    """The block with the corrected joints, the variables of all sources there, and a status (n,).
 
-    The spread is one about the shifts at that command. Statuses are the kernel's: not_converged
+    The variables are about the shifts at that command. Statuses are the kernel's: not_converged
     also where the command does not settle.
     """
     first = [source.deviation(machine, block.condition, block) for source in sources]

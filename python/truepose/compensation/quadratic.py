@@ -1,6 +1,6 @@
 """What closures do to the tool in second order: a quadratic form, bounded.
 
-In z, the v variables of a spread and the m components of e, which the platform moves beyond the
+In z, the v variables of a pose and the m components of e, which the platform moves beyond the
 linear model:
 
     second order of a component = z . H z,    |z . H z| <= sum of |H[j, k]| |z[j]| |z[k]|

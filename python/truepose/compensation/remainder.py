@@ -106,10 +106,12 @@ class Remainder:
         self._parameters = np.concatenate([part.parameters for part in parts])
         self._known = not machine.kernel.overconstrained and all(part.known for part in parts)
 
-    def bound(self, block: PoseBlock, spread: Variables, value: Floats, effects: Floats) -> Bounds:
-        """At the poses of a block, with the value (n, m) and the effects (n, m, v) of its spread.
+    def bound(
+        self, block: PoseBlock, variables: Variables, value: Floats, effects: Floats
+    ) -> Bounds:
+        """At the poses of a block, with its value (n, m) and effects (n, m, v) of the variables.
 
-        Those that `truepose.runs.first_order` has of the same block and spread.
+        Those that `truepose.runs.first_order` has of the same block and variables.
         """
         n, m = value.shape
         quantities = len({name.startswith("r") for name in self._machine.components})
@@ -120,18 +122,18 @@ class Remainder:
         elif self._known:
             for start in range(0, n, FEW):
                 poses = slice(start, start + FEW)
-                found = self._some(block, spread, (value, effects), poses)
+                found = self._some(block, variables, (value, effects), poses)
                 components[poses], norms[poses] = found
         proven = np.isfinite(components).all(axis=1) & np.isfinite(norms).all(axis=1)
         components[~proven], norms[~proven] = np.nan, np.nan
         return Bounds(components, norms, np.asarray(proven, np.bool_))
 
     def _some(
-        self, block: PoseBlock, spread: Variables, first: tuple[Floats, Floats], poses: slice
+        self, block: PoseBlock, variables: Variables, first: tuple[Floats, Floats], poses: slice
     ) -> tuple[Floats, Floats]:
         """Components (n, m) and norms (n, q) at some poses; not finite where not proven."""
-        motion = Motion.at(self._machine, block, spread, first, poses)
-        parameters, shift = spread.shift
+        motion = Motion.at(self._machine, block, variables, first, poses)
+        parameters, shift = variables.shift
         sensitivity, _ = self._machine.kernel.sensitivity_moved(
             block.joints[poses],
             block.placements[poses],

@@ -297,18 +297,18 @@ def _together(
 
     From the `error` (n, n_component) with all of them at their shifts.
     """
-    moves = variables_of(machine, sources, deviations)
+    variables = variables_of(machine, sources, deviations)
     n_pose = block.indices.size
     status = np.full(n_pose, OK, np.uint8)
-    if not moves.names:
+    if not variables.names:
         return lengths(error, kinds), status
     far = np.empty((n_pose, len(kinds)))
-    parameters, shift = moves.shift
+    parameters, shift = variables.shift
     for start in range(0, n_pose, FEW):
         poses = slice(start, start + FEW)
         moved = (parameters, np.ascontiguousarray(rows_of(shift, poses)))
-        effects, status[poses] = effects_at(machine, block, moves, moved, poses)
-        far[poses] = largest(error[poses], effects, moves.domain, kinds).length
+        effects, status[poses] = effects_at(machine, block, variables, moved, poses)
+        far[poses] = largest(error[poses], effects, variables.domain, kinds).length
     return far, status
 
 

@@ -1,4 +1,4 @@
-"""Spread: what all sources leave unknown at the poses of a block, as one set of variables.
+"""Variables: what all sources leave unknown at the poses of a block, as one set of variables.
 
     deviation of the parameters = shift + sum over columns of half_width t[variable],   t in the
     domain
@@ -39,7 +39,7 @@ class Variables:
     `shift`: parameters, each once, and their values (n or 1, k0) where all variables are 0;
     `alone`: the same of each source.
     `columns` (k,): kernel parameter of each column that has a band; one may repeat.
-    `variables` (k,): which variable moves the column; `half_width` (n or 1, k): its deviation,
+    `variable_of` (k,): which variable moves the column; `half_width` (n or 1, k): its deviation,
     m, rad or 1, where that variable is +1. `distributions`, `names` (unique) and `sources` of
     the n_variable variables, and the `domain` that they lie in. `streams`, `numbers`
     (n_variable,): identity for random numbers, whatever else acts: `stream_of` the source's name,
@@ -50,7 +50,7 @@ class Variables:
     shift: ParameterDeviation
     alone: tuple[ParameterDeviation, ...]
     columns: Indices
-    variables: Indices
+    variable_of: Indices
     half_width: Floats
     distributions: tuple[Distribution, ...]
     names: tuple[str, ...]
@@ -73,7 +73,7 @@ class Variables:
         """
         if self.domain.symmetric:
             return self
-        middle, half = self.domain.middle[self.variables], self.domain.half[self.variables]
+        middle, half = self.domain.middle[self.variable_of], self.domain.half[self.variable_of]
         half = half * (1.0 + ROUNDING)
         ones = np.ones(len(self.names))
         return dataclasses.replace(
@@ -99,7 +99,7 @@ class Variables:
     def parameters_moved(self, t: Floats) -> ParameterDeviation:
         """Parameters, each once, and their deviations (s, k) where the variables are t (s, v).
 
-        Of a spread at one pose.
+        Of the variables at one pose.
         """
         parameters, shift, moves = self._matrix
         return parameters, shift + np.asarray(t, np.float64) @ moves
@@ -109,10 +109,12 @@ class Variables:
         """Parameters (k,), shift (1, k), and what each variable moves (n_variable, k), one pose."""
         parameters, shift = self.shift
         if len(shift) != 1 or len(self.half_width) != 1:
-            raise ValueError("a spread over several poses; take one of them with at()")
+            raise ValueError("variables over several poses; take one of them with at()")
         every = np.union1d(parameters, self.columns).astype(np.intp)
         moves = np.zeros((len(self.names), every.size))
-        np.add.at(moves, (self.variables, np.searchsorted(every, self.columns)), self.half_width[0])
+        np.add.at(
+            moves, (self.variable_of, np.searchsorted(every, self.columns)), self.half_width[0]
+        )
         centre = np.zeros((1, every.size))
         centre[:, np.searchsorted(every, parameters)] = shift
         moved = centre[0].astype(np.bool_) | moves.any(axis=0)
@@ -137,21 +139,21 @@ def variables_of(
     first = np.cumsum([0, *counts])
     names = [name for part in parts for name in part.names]
     owners = [part.source for part in parts for _ in part.names]
-    swings = [part.half_width for part in parts]
-    rows = max((len(swing) for swing in swings), default=1)
+    half_widths = [part.half_width for part in parts]
+    rows = max((len(table) for table in half_widths), default=1)
     empty = np.empty(0, np.intp)
     alone = tuple((part.deviation.parameters, part.deviation.shift) for part in parts)
     return Variables(
         shift=sum_deviations(alone),
         alone=alone,
         columns=np.concatenate([empty, *(part.columns for part in parts)]),
-        variables=np.concatenate(
-            [empty, *(part.variables + at for part, at in zip(parts, first[:-1], strict=True))]
+        variable_of=np.concatenate(
+            [empty, *(part.variable_of + at for part, at in zip(parts, first[:-1], strict=True))]
         ),
         half_width=np.concatenate(
             [
                 np.empty((rows, 0)),
-                *(np.broadcast_to(each, (rows, each.shape[1])) for each in swings),
+                *(np.broadcast_to(each, (rows, each.shape[1])) for each in half_widths),
             ],
             axis=1,
         ),
@@ -191,7 +193,7 @@ class _Part:
     stream: int
     deviation: Deviation
     columns: Indices
-    variables: Indices
+    variable_of: Indices
     half_width: Floats
     numbers: Indices
     names: tuple[str, ...]
@@ -217,7 +219,7 @@ def _part(machine: Machine, source: Source, deviation: Deviation) -> _Part:
         stream=stream_of(source.name),
         deviation=deviation,
         columns=columns,
-        variables=variables,
+        variable_of=variables,
         half_width=deviation.signed_half[:, banded],
         numbers=numbers,
         names=tuple(names),

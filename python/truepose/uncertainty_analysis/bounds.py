@@ -143,26 +143,26 @@ def _at_poses(
 def proven_bounds(
     machine: Machine,
     block: PoseBlock,
-    moves: Variables,
+    variables: Variables,
     most_boxes: int = 1,
     targets: ArrayLike | None = None,
 ) -> dict[str, np.ndarray]:
     """`lower`, `upper`, `magnitude`, `status` (`SCHEMA`) and `boxes` at the n poses of a block.
 
-    `moves` has every single variable in [-1, 1]. The box of variables is divided, into at most
+    `variables` has every single variable in [-1, 1]. The box of variables is divided, into at most
     `most_boxes` parts, where it cannot be proven as a whole, and where a magnitude lies above its
     `targets` (n or 1, n_quantity), m and rad; `boxes` (n,) says how many were looked at.
     """
-    shifted, shift = moves.shift
+    shifted, shift = variables.shift
     lower, upper, magnitude, status, boxes = machine.kernel.bounds_at(
         block.joints,
         block.placements,
         shifted,
         np.ascontiguousarray(shift),
-        moves.columns,
-        moves.variables.tolist(),
-        np.ascontiguousarray(moves.half_width),
-        [members.tolist() for members in moves.directions],
+        variables.columns,
+        variables.variable_of.tolist(),
+        np.ascontiguousarray(variables.half_width),
+        [members.tolist() for members in variables.directions],
         most_boxes,
         targets,
     )
@@ -178,19 +178,23 @@ def proven_bounds(
 def _bounded(
     machine: Machine,
     block: PoseBlock,
-    moves: Variables,
+    variables: Variables,
     order: tuple[Floats, Floats],
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Every variable over the poses of a block, and a reason (n,) of each where it is unusable."""
     value, effects = order
     kinds = list(quantities(machine.components).values())
-    found = worst_corners(ExactError(machine, block, moves), value, effects, moves.domain, kinds)
+    found = worst_corners(
+        ExactError(machine, block, variables), value, effects, variables.domain, kinds
+    )
     m = len(machine.components)
-    proven = proven_bounds(machine, block, moves)
+    proven = proven_bounds(machine, block, variables)
     hard = np.asarray((proven["status"] != PROVEN) & (found.status == OK), np.bool_)
     if hard.any():
         asked = CLOSE * found.most[hard, 2 * m :]
-        divided = proven_bounds(machine, block.select(hard), moves.select(hard), MOST_BOXES, asked)
+        divided = proven_bounds(
+            machine, block.select(hard), variables.select(hard), MOST_BOXES, asked
+        )
         for name, found_in_parts in divided.items():
             proven[name][hard] = found_in_parts
     values = {
@@ -198,6 +202,6 @@ def _bounded(
         "reached_lower": -found.most[:, m : 2 * m],
         "reached_upper": found.most[:, :m],
         "reached_magnitude": found.most[:, 2 * m :],
-        "linear": worst(value, moves.domain.reach(effects)),
+        "linear": worst(value, variables.domain.reach(effects)),
     }
     return values, of_band(found.status)

@@ -115,7 +115,7 @@ def bounds_over_region(
         of = _known(machine, condition, source, block)
         (yielding if getattr(source, "over_region", None) == "wrench" else shifts).extend(of)
     every = variables_at(machine, block, sources)
-    moves = ends.truncated(every)
+    variables = ends.truncated(every)
     shifts.extend(_middles(every))
     found = machine.kernel.bounds_over(
         sides,
@@ -124,9 +124,9 @@ def bounds_over_region(
         tuple(float(value) for value in condition.wrench),
         list(
             zip(
-                moves.columns.tolist(),
-                moves.variables.tolist(),
-                moves.half_width[0].tolist(),
+                variables.columns.tolist(),
+                variables.variable_of.tolist(),
+                variables.half_width[0].tolist(),
                 strict=True,
             )
         ),
@@ -161,10 +161,10 @@ def bounds_over_region(
     )
 
 
-def _middles(moves: Variables) -> list[Affine]:
+def _middles(variables: Variables) -> list[Affine]:
     """By how much the middles of bands lie off their shifts, of listed values of no symmetry."""
-    offsets = moves.half_width[0] * moves.domain.middle[moves.variables]
-    columns = zip(moves.columns.tolist(), offsets.tolist(), strict=True)
+    offsets = variables.half_width[0] * variables.domain.middle[variables.variable_of]
+    columns = zip(variables.columns.tolist(), offsets.tolist(), strict=True)
     return [(column, (value, value), 0.0, 0) for column, value in columns if value != 0.0]
 
 

@@ -95,7 +95,7 @@ class WorstCorners:
     status: np.ndarray
     search: str = field(default="every vertex")
 
-    def take(self, poses: Indices, targets: Floats, status: np.ndarray, each: int) -> None:
+    def update(self, poses: Indices, targets: Floats, status: np.ndarray, each: int) -> None:
         """Results at `each` corners for every one of `poses` (r,): targets (r, 2 m + q)."""
         np.maximum.at(self.most, poses, targets)
         np.add.at(self.evaluated, poses, each)
@@ -155,7 +155,7 @@ def _every(evaluate: Evaluate, targets: Targets, found: WorstCorners, t: Floats)
         poses = np.arange(start, min(start + step, len(found.most)))
         outputs, status = evaluate(np.repeat(poses, len(t)), np.tile(t, (poses.size, 1)))
         reached = targets.of(outputs).reshape(poses.size, len(t), targets.count)
-        found.take(poses, reached.max(axis=1), _first_bad(status, poses.size), len(t))
+        found.update(poses, reached.max(axis=1), _first_bad(status, poses.size), len(t))
 
 
 def _first_bad(status: np.ndarray, rows: int) -> np.ndarray:
@@ -368,7 +368,7 @@ class _Tried:
         rows, each, n_variable = t.shape
         outputs, status = self.evaluate(np.repeat(self.poses, each), t.reshape(-1, n_variable))
         reached = self.targets.of(outputs).reshape(rows, each, self.targets.count)
-        self.found.take(self.poses, reached.max(axis=1), _first_bad(status, rows), each)
+        self.found.update(self.poses, reached.max(axis=1), _first_bad(status, rows), each)
         found = np.take_along_axis(reached, self.wanted[:, np.newaxis, np.newaxis], axis=2)[..., 0]
         scores: Floats = np.where(np.isfinite(found), found, -np.inf)
         return scores

@@ -80,15 +80,15 @@ class Model(Protocol):
 class MachineModel:
     """The exact error of a machine at one pose of a block, m and rad, base frame."""
 
-    def __init__(self, machine: Machine, block: PoseBlock, moves: Variables, pose: int) -> None:
-        """`moves` of the whole block; `pose`: number of the pose in it."""
+    def __init__(self, machine: Machine, block: PoseBlock, variables: Variables, pose: int) -> None:
+        """`variables` of the whole block; `pose`: number of the pose in it."""
         self.machine, self.block, self.pose = machine, block, pose
-        self.spread = moves.at(pose)
-        self.names, self.sources = moves.names, moves.sources
-        self.distributions, self.correlation = moves.distributions, moves.correlation
-        self.streams, self.numbers = moves.streams, moves.numbers
-        self.directions = moves.directions
-        self.dofs: Floats = np.array([each.degrees for each in moves.distributions], np.float64)
+        self.variables = variables.at(pose)
+        self.names, self.sources = variables.names, variables.sources
+        self.distributions, self.correlation = variables.distributions, variables.correlation
+        self.streams, self.numbers = variables.streams, variables.numbers
+        self.directions = variables.directions
+        self.dofs: Floats = np.array([each.degrees for each in variables.distributions], np.float64)
         self.outputs: tuple[str, ...] = machine.components
         self.output_units = tuple(component_units(machine))
 
@@ -112,7 +112,7 @@ class MachineModel:
     def linear(self) -> LinearModel:
         """Value and slopes where all sources are at their shift."""
         only = slice(self.pose, self.pose + 1)
-        value, effects, _ = first_order(self.machine, self.block, self.spread, only)
+        value, effects, _ = first_order(self.machine, self.block, self.variables, only)
         return LinearModel(value[0], effects[0])
 
     def evaluate(self, t: Floats) -> tuple[Floats, Flags]:
@@ -121,7 +121,7 @@ class MachineModel:
         fine = np.empty(len(t), np.bool_)
         for start in range(0, len(t), PART):
             part = slice(start, start + PART)
-            moved = self.spread.parameters_moved(t[part])
+            moved = self.variables.parameters_moved(t[part])
             count = len(moved[1])
             joints = np.repeat(self.joints, count, axis=0)
             placements = np.repeat(self.placement, count, axis=0)

@@ -302,8 +302,8 @@ def _of_machine(
 class _MachineSampler(Sampler):
     """A machine at some poses; columns of its tallies: components, magnitudes, ellipse distance."""
 
-    def __init__(self, machine: Machine, block: PoseBlock, moves: Variables) -> None:
-        self.machine, self.block, self.spread = machine, block, moves
+    def __init__(self, machine: Machine, block: PoseBlock, variables: Variables) -> None:
+        self.machine, self.block, self.variables = machine, block, variables
         self._study = self._studied(None)
         kinds = quantities(machine.components)
         self._kinds = list(kinds.values())
@@ -312,16 +312,16 @@ class _MachineSampler(Sampler):
         self._unwhitened = (self._origins()[0], self._widths())
 
     def _studied(self, whitening: Floats | None) -> Study:
-        shifted, shift = self.spread.shift
+        shifted, shift = self.variables.shift
         return Study(
             self.machine.kernel,
             self.block.joints,
             self.block.placements,
             shifted,
             np.ascontiguousarray(shift),
-            self.spread.columns,
-            self.spread.variables.tolist(),
-            np.ascontiguousarray(self.spread.half_width),
+            self.variables.columns,
+            self.variables.variable_of.tolist(),
+            np.ascontiguousarray(self.variables.half_width),
             whitening,
         )
 
@@ -332,8 +332,8 @@ class _MachineSampler(Sampler):
 
     def _widths(self) -> Floats:
         """(n, n_column) bins of the order of a hundredth of the first-order spread."""
-        _, effects, _ = first_order(self.machine, self.block, self.spread)
-        sigmas = np.array([each.sigmas for each in self.spread.distributions])
+        _, effects, _ = first_order(self.machine, self.block, self.variables)
+        sigmas = np.array([each.sigmas for each in self.variables.distributions])
         deviation = np.sqrt(np.square(effects / sigmas).sum(axis=2)) if sigmas.size else 0.0
         deviation = np.nan_to_num(np.broadcast_to(deviation, effects.shape[:2]))
         parts = [np.linalg.norm(deviation[:, kind], axis=1) for kind in self._kinds]

@@ -118,20 +118,20 @@ def _of_machine(
     kinds = list(quantities(machine.components).values())
     endless = Endless()
     for block in run:
-        moves = variables_at(machine, block, run.sources)
-        value, effects, status = first_order(machine, block, moves)
-        shifted = at_shifts(machine, block, moves.alone, moves.shift)
+        variables = variables_at(machine, block, run.sources)
+        value, effects, status = first_order(machine, block, variables)
+        shifted = at_shifts(machine, block, variables.alone, variables.shift)
         usable = run.keep(block.indices, shifted, status)
         found = worst_corners(
-            _only(usable, ExactError(machine, block, moves)),
+            _only(usable, ExactError(machine, block, variables)),
             value[usable],
             effects[usable],
-            moves.domain,
+            variables.domain,
             kinds,
         )
-        values = _values(found, value[usable], effects[usable], moves.domain, kinds)
+        values = _values(found, value[usable], effects[usable], variables.domain, kinds)
         run.fill(block.select(usable), values, of_band(found.status))
-        endless.note(moves.names, moves.distributions)
+        endless.note(variables.names, variables.distributions)
     result = run.dataset(
         over_all={"search": np.array(rows.arrays["search"], np.str_)},
         coords=quantity_coords(machine, "what the norm is taken of"),
@@ -140,11 +140,11 @@ def _of_machine(
 
 
 def _only(
-    usable: np.ndarray, mover: Callable[[Indices, Floats], tuple[Floats, np.ndarray]]
+    usable: np.ndarray, exact_error: Callable[[Indices, Floats], tuple[Floats, np.ndarray]]
 ) -> Callable[[Indices, Floats], tuple[Floats, np.ndarray]]:
-    """The mover with poses counted among the usable ones."""
+    """The exact error with poses counted among the usable ones."""
     numbers = np.flatnonzero(usable)
-    return lambda poses, t: mover(numbers[poses], t)
+    return lambda poses, t: exact_error(numbers[poses], t)
 
 
 def _values(

@@ -246,7 +246,7 @@ def _at_pose(state: State, kind: str, columns: Indices) -> Witness:
         pose=state.block.requested[number],
         number=number,
         joints=state.block.joints[0],
-        spread=state.variables,
+        variables=state.variables,
         t=t,
         error=error,
         size=size,
@@ -320,13 +320,13 @@ def _answer(
             rests_on = f"{REMAINDER}, {ENGINE} ({proof.boxes:,} boxes)" if by_engine else REMAINDER
         else:
             answer, rests_on = UNDECIDED, _why_open(bound, proof)
-    rests_on += _ends_taken(witness.spread)
+    rests_on += _ends_taken(witness.variables)
     return Answer(kind, name, target, answer, seen, linear, bound, rests_on, witness)
 
 
-def _ends_taken(spread: Variables) -> str:
+def _ends_taken(variables: Variables) -> str:
     """Where distributions without ends are taken to end; empty where all have ends."""
-    endless = dict.fromkeys(str(each) for each in spread.distributions if not each.bounded)
+    endless = dict.fromkeys(str(each) for each in variables.distributions if not each.bounded)
     return f"; taken to end there: {'; '.join(endless)}" if endless else ""
 
 

@@ -86,8 +86,8 @@ class _Tried:
 
 
 def _tried(state: State, columns: Indices, t: Floats) -> _Tried:
-    mover = ExactError(state.machine, state.block, state.variables)
-    error, status = mover(np.zeros(len(t), np.intp), t.copy())
+    exact_error = ExactError(state.machine, state.block, state.variables)
+    error, status = exact_error(np.zeros(len(t), np.intp), t.copy())
     size = np.sqrt(np.square(error[:, columns]).sum(axis=1))
     return _Tried(t, error, np.where(status == OK, size, np.inf), status)
 

@@ -93,8 +93,8 @@ class Population:
             yield from self._kept[name]
             return
         found: list[State] = []
-        for block, moves in self._blocks():
-            state = self._state(name, block, moves)
+        for block, variables in self._blocks():
+            state = self._state(name, block, variables)
             if len(self.table) <= BLOCK:
                 found.append(state)
             yield state
@@ -117,12 +117,12 @@ class Population:
         if none:
             raise run.no_pose_left()
 
-    def _state(self, name: str, block: PoseBlock, moves: Variables) -> State:
+    def _state(self, name: str, block: PoseBlock, variables: Variables) -> State:
         if name == BEFORE:
             fine = np.full(block.indices.size, OK, np.uint8)
-            return State(name, self.machine, block, moves, fine)
-        commanded, moves, status = corrected(self.machine, block, self.sources)
-        return State(name, self.machine, commanded, moves, status)
+            return State(name, self.machine, block, variables, fine)
+        commanded, variables, status = corrected(self.machine, block, self.sources)
+        return State(name, self.machine, commanded, variables, status)
 
 
 @dataclass(frozen=True)

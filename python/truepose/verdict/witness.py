@@ -66,7 +66,7 @@ class Witness:
     """One machine inside the set at one pose, in a state: `BEFORE` or `AFTER` compensation.
 
     `machine` is the nominal one in the condition of the run; `pose` (n_commanded,), m or rad, and
-    its `number` in the run; `joints` (n_joint,) as commanded there; `spread` the variables at this
+    its `number` in the run; `joints` (n_joint,) as commanded there; `variables` those at this
     pose alone (`Variables.at`) and `t` (n_variable,) their values. `error` (n_component,), m
     and rad, is exact, its part `quantity` ("position" or "orientation") of length `size`. Of a
     machine that cannot be assembled `error` is None, `size` is inf and `status` the kernel's
@@ -80,7 +80,7 @@ class Witness:
     pose: Floats
     number: int
     joints: Floats
-    spread: Variables
+    variables: Variables
     t: Floats
     error: Floats | None
     size: float
@@ -90,7 +90,7 @@ class Witness:
     @property
     def moved(self) -> ParameterDeviation:
         """Parameters (k,), each once, and their deviations (1, k) from nominal."""
-        return self.spread.parameters_moved(np.asarray(self.t, np.float64)[np.newaxis])
+        return self.variables.parameters_moved(np.asarray(self.t, np.float64)[np.newaxis])
 
     @property
     def components(self) -> Indices:
@@ -102,20 +102,22 @@ class Witness:
         """(n_parameter,) deviation from each source alone; their sum is all of it."""
         names = [source.name for source in acting(self.machine, self.machine.condition)]
         found = {name: np.zeros(len(self.machine.parameters)) for name in names}
-        for name, (parameters, shift) in zip(names, self.spread.alone, strict=True):
+        for name, (parameters, shift) in zip(names, self.variables.alone, strict=True):
             np.add.at(found[name], parameters, shift[0])
-        moves = self.spread.half_width[0] * self.t[self.spread.variables]
-        for column, variable in enumerate(self.spread.variables):
-            found[self.spread.sources[variable]][self.spread.columns[column]] += moves[column]
+        deviations = self.variables.half_width[0] * self.t[self.variables.variable_of]
+        for column, variable in enumerate(self.variables.variable_of):
+            found[self.variables.sources[variable]][self.variables.columns[column]] += deviations[
+                column
+            ]
         return found
 
     @property
     def force(self) -> Floats | None:
         """(3,) N, base axes, of the force of unknown direction; None where there is none."""
         envelope = self.machine.condition.envelope
-        if envelope is None or not self.spread.directions:
+        if envelope is None or not self.variables.directions:
             return None
-        (members,) = self.spread.directions
+        (members,) = self.variables.directions
         return np.asarray(envelope.force * (self.t[members] @ envelope.directions))
 
     @cached_property
@@ -134,7 +136,7 @@ class Witness:
 
         Of a machine that cannot be assembled the length of what it moves the tool by.
         """
-        _, effects, _ = first_order(self.machine, self.block, self.spread)
+        _, effects, _ = first_order(self.machine, self.block, self.variables)
         along = np.nan_to_num(effects[0][self.components]) * self.t
         if self.error is None or not self.size > 0.0:
             return np.asarray(np.sqrt(np.square(along).sum(axis=0)))
@@ -143,11 +145,11 @@ class Witness:
     def causes(self) -> list[Cause]:
         """Every variable, the one with the largest part in the error first."""
         known = self.error is not None and self.size > 0.0
-        directed = [int(v) for members in self.spread.directions for v in members]
+        directed = [int(v) for members in self.variables.directions for v in members]
         shares = self._parts / self.size if known else np.full(len(self._parts), math.nan)
         found = [
             (float(abs(self._parts[v])), self._cause(v, float(shares[v])))
-            for v in range(len(self.spread.names))
+            for v in range(len(self.variables.names))
             if v not in directed
         ]
         force = self.force
@@ -160,29 +162,32 @@ class Witness:
         return [cause for _, cause in sorted(found, key=lambda each: -each[0])]
 
     def _cause(self, variable: int, share: float) -> Cause:
-        spread, machine = self.spread, self.machine
-        columns = np.flatnonzero(spread.variables == variable)
-        source, swing = spread.sources[variable], float(spread.half_width[0, columns[0]])
-        parameter = int(spread.columns[columns[0]])
+        variables, machine = self.variables, self.machine
+        columns = np.flatnonzero(variables.variable_of == variable)
+        source, swing = variables.sources[variable], float(variables.half_width[0, columns[0]])
+        parameter = int(variables.columns[columns[0]])
         value = float(self.t[variable])
         same = [
             column
-            for column in np.flatnonzero(spread.columns == parameter)
-            if spread.sources[spread.variables[column]] == source
+            for column in np.flatnonzero(variables.columns == parameter)
+            if variables.sources[variables.variable_of[column]] == source
         ]
         # Where a source has several bands on a parameter its middle is none of theirs alone.
         deviation = swing * value
         if len(same) == 1:
             deviation = float(self.by_source[source][parameter])
-        distribution = spread.distributions[variable]
-        lower, upper = float(spread.domain.lower[variable]), float(spread.domain.upper[variable])
+        distribution = variables.distributions[variable]
+        lower, upper = (
+            float(variables.domain.lower[variable]),
+            float(variables.domain.upper[variable]),
+        )
         room = AT_END * (upper - lower)
         end = 1.0 if value >= upper - room else -1.0 if value <= lower + room else 0.0
         end *= math.copysign(1.0, swing)
         return Cause(
             source,
             machine.parameters[parameter],
-            len({int(spread.columns[column]) for column in columns}) - 1,
+            len({int(variables.columns[column]) for column in columns}) - 1,
             {1.0: "upper", -1.0: "lower"}.get(end, ""),
             deviation,
             machine.units[parameter],

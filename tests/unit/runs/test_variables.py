@@ -67,7 +67,7 @@ def test_variables_are_those_that_have_a_band(tmp_path: Path) -> None:
     assert found.names == (f"first: {one}", two, f"second: {one}")
     assert found.sources == ("first", "first", "second")
     assert found.columns.tolist() == [1, 2, 1]
-    assert found.variables.tolist() == [0, 1, 2]
+    assert found.variable_of.tolist() == [0, 1, 2]
     assert found.numbers.tolist() == [1, 2, 1]
     assert found.distributions == (UNIFORM, UNIFORM, TRIANGULAR)
     assert found.correlation is None
@@ -134,7 +134,7 @@ def test_identities_do_not_hang_on_what_else_acts(tmp_path: Path) -> None:
 
 def _firsts(found: Variables) -> list[int]:
     """The first column of each variable."""
-    return [found.variables.tolist().index(number) for number in range(len(found.names))]
+    return [found.variable_of.tolist().index(number) for number in range(len(found.names))]
 
 
 def test_a_pose_of_it_moves_the_parameters_as_the_deviations_say(tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ class Boxed:
             shifted,
             shift,
             self.moves.columns,
-            self.moves.variables.tolist(),
+            self.moves.variable_of.tolist(),
             self.moves.half_width,
         )
         m = len(self.machine.components)

@@ -303,7 +303,7 @@ class Studied:
             shifted,
             shift,
             self.moves.columns,
-            self.moves.variables.tolist(),
+            self.moves.variable_of.tolist(),
             self.moves.half_width,
             whitening,
         )

@@ -121,7 +121,9 @@ def _correct(
     }
     edges = []
     for name, side in (("residual_lower", -1.0), ("residual_upper", +1.0)):
-        moved = sum_deviations([(each.parameters, each.at_edge(side)) for each in deviations])
+        moved = sum_deviations(
+            [(deviation.parameters, deviation.at_edge(side)) for deviation in deviations]
+        )
         values[name], status = displacement(machine, after.joints, after.placements, moved)
         edges.append(status)
     return values, [corrected, at_middle], edges

@@ -62,7 +62,9 @@ def corrected_deviations(
     joints, deviations, status = corrected_joints(
         block,
         first,
-        lambda known: sum_deviations([(each.parameters, each.shift) for each in known]),
+        lambda known: sum_deviations(
+            [(deviation.parameters, deviation.shift) for deviation in known]
+        ),
         (
             lambda sent: [
                 source.deviation(block.machine, block.condition, sent) for source in sources

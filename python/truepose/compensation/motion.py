@@ -157,11 +157,11 @@ class Motion:
 
     @cached_property
     def _movers(self) -> dict[int, list[tuple[int, Floats]]]:
-        found: dict[int, list[tuple[int, Floats]]] = {}
+        movers: dict[int, list[tuple[int, Floats]]] = {}
         columns, variables = self.columns.tolist(), self.variable_of.tolist()
         for at, (parameter, variable) in enumerate(zip(columns, variables, strict=True)):
-            found.setdefault(parameter, []).append((variable, self.half_width[:, at]))
-        return found
+            movers.setdefault(parameter, []).append((variable, self.half_width[:, at]))
+        return movers
 
     def forms(self, parameters: Sequence[int] | Indices) -> Floats:
         """(n or 1, k, v + m) linear forms of some parameters."""

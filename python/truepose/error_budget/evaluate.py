@@ -149,8 +149,8 @@ def budget(
 
     for block in run:
         deviations = [source.deviation(machine, run.condition, block) for source in sources]
-        for found, deviation in zip(distributions, deviations, strict=True):
-            found.update((str(deviation.distribution[k]), None) for k in deviation.banded)
+        for names, deviation in zip(distributions, deviations, strict=True):
+            names.update((str(deviation.distribution[k]), None) for k in deviation.banded)
         room = rows.room(block.indices.size)
         values, shifted, edges = _evaluate(machine, block, sources, deviations, room)
         usable = run.fill(block, values, *shifted, *map(of_band, edges))
@@ -175,7 +175,7 @@ def budget(
         "source": label("source", [source.name for source in sources], "error source"),
         "distribution": label(
             "source",
-            [" / ".join(found) or "none" for found in distributions],
+            [" / ".join(names) or "none" for names in distributions],
             "distribution inside the band",
         ),
         **quantity_coords(machine, "what is compared"),
@@ -200,7 +200,9 @@ def _evaluate(
     coordinate, defined = percent.coordinates(machine, block.placements)
     per_error = percent.per_error(coordinate, defined)
     of_source = ("pose", "source")
-    values = {name: room[name] for name, each in SCHEMA.items() if each.dims[:2] == of_source}
+    values = {
+        name: room[name] for name, variable in SCHEMA.items() if variable.dims[:2] == of_source
+    }
     shifted: list[np.ndarray] = []
     at_edges: list[np.ndarray] = []
     nominal: list[np.ndarray] = []

@@ -90,9 +90,9 @@ def _errors(thermal: Thermal, block: PoseBlock, times: Floats) -> tuple[Floats, 
         )
         deviation = thermal.deviation(machine, block.condition, many)
         moved = displacement.sum_deviations([(deviation.parameters, deviation.shift)])
-        found, failed = displacement.displacement(machine, many.joints, many.placements, moved)
+        errors, failed = displacement.displacement(machine, many.joints, many.placements, moved)
         shape = (moments.size, n_pose)
-        error[:, start : start + chunk] = found.reshape(*shape, -1).swapaxes(0, 1)
+        error[:, start : start + chunk] = errors.reshape(*shape, -1).swapaxes(0, 1)
         status = np.where(status == OK, failed.reshape(shape).max(axis=0), status)
     return error, status
 

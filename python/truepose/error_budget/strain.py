@@ -196,7 +196,7 @@ def _evaluate(
             values["force"][:, at, closures] = rest.force[:, closures]
             values["absorbed"][:, at, closures] = rest.absorbed[:, closures]
             values["strain"][:, at, closures] = rest.strain[:, closures]
-    shifts = [(each.parameters, each.shift) for each in deviations]
+    shifts = [(deviation.parameters, deviation.shift) for deviation in deviations]
     wrench = block.tool_wrench + block.own_wrench
     rest = _settle(block, sum_deviations([*shifts, *_own_weight(block)]), gaps, wrench)
     values["overall_force"] = rest.force

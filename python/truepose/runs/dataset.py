@@ -125,7 +125,7 @@ def assemble(
 ) -> xr.Dataset:
     """The Dataset of `schema`: `rows` over poses, `over_all` what has no pose, more `coords`."""
     values, units = {**rows.arrays, **(over_all or {})}, _units(machine)
-    data = {name: data_variable(each, values[name], units) for name, each in schema.items()}
+    data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
         **_machine_coords(machine, schema),
         **_pose_coords(machine, rows, poses),
@@ -142,7 +142,7 @@ def region_dataset(
 ) -> xr.Dataset:
     """The Dataset of a result over a continuous region, which has no dim pose."""
     units = _units(machine)
-    data = {name: data_variable(each, values[name], units) for name, each in schema.items()}
+    data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
         "component": label("component", list(machine.components), "component of the error"),
         "component_units": label("component", component_units(machine), "unit of the component"),
@@ -296,7 +296,9 @@ def _condition(condition: Condition) -> dict[str, object]:
             "default": condition.default_temperature,
             **condition.part_temperatures,
         },
-        "gradient_K_per_m": {part: list(each) for part, each in condition.gradients.items()},
+        "gradient_K_per_m": {
+            part: list(gradient) for part, gradient in condition.gradients.items()
+        },
         "temperature_log": condition.temperature_log is not None,
         "time_s": condition.time,
         "force_N": list(condition.force),

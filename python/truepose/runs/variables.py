@@ -92,7 +92,7 @@ class Variables:
         return dataclasses.replace(
             self,
             shift=_rows(self.shift, poses),
-            alone=tuple(_rows(each, poses) for each in self.alone),
+            alone=tuple(_rows(shift, poses) for shift in self.alone),
             half_width=self.half_width if len(self.half_width) == 1 else self.half_width[poses],
         )
 
@@ -153,18 +153,18 @@ def variables_of(
         half_width=np.concatenate(
             [
                 np.empty((rows, 0)),
-                *(np.broadcast_to(each, (rows, each.shape[1])) for each in half_widths),
+                *(np.broadcast_to(table, (rows, table.shape[1])) for table in half_widths),
             ],
             axis=1,
         ),
-        distributions=tuple(each for part in parts for each in part.distributions),
+        distributions=tuple(distribution for part in parts for distribution in part.distributions),
         names=_unique(names, owners),
         sources=tuple(owners),
         streams=np.repeat([part.stream for part in parts], counts).astype(np.intp),
         numbers=np.concatenate([empty, *(part.numbers for part in parts)]),
         correlation=_correlation(parts, first),
         domain=Domain.of(
-            [each for part in parts for each in part.distributions],
+            [distribution for part in parts for distribution in part.distributions],
             [
                 members + at
                 for part, at in zip(parts, first[:-1], strict=True)
@@ -207,7 +207,7 @@ def _part(machine: Machine, source: Source, deviation: Deviation) -> _Part:
     first = [int(banded[np.flatnonzero(variables == at)[0]]) for at in range(numbers.size)]
     names = []
     for at, column in enumerate(first):
-        moved = [machine.parameters[each] for each in columns[variables == at]]
+        moved = [machine.parameters[parameter] for parameter in columns[variables == at]]
         group = deviation.group_names.get(int(deviation.groups[column]))
         direction = any(at in members for members in deviation.domain.directions)
         if len(moved) == 1 and not direction:
@@ -248,12 +248,12 @@ def _unique(names: Sequence[str], owners: Sequence[str]) -> tuple[str, ...]:
 
 def _correlation(parts: Sequence[_Part], first: Indices) -> Floats | None:
     """The sources' own, side by side: causes of different sources are independent."""
-    found = [part.deviation.banded_correlation for part in parts]
-    if all(each is None for each in found):
+    correlations = [part.deviation.banded_correlation for part in parts]
+    if all(correlation is None for correlation in correlations):
         return None
     matrix = np.eye(int(first[-1]))
-    for at, each in enumerate(found):
-        if each is not None:
+    for at, correlation in enumerate(correlations):
+        if correlation is not None:
             own = slice(int(first[at]), int(first[at + 1]))
-            matrix[own, own] = each
+            matrix[own, own] = correlation
     return matrix

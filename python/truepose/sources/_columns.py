@@ -64,5 +64,5 @@ class Columns:
 def _side_by_side(columns: list[ArrayLike]) -> np.ndarray[Any, np.dtype[np.float64]]:
     if not columns:
         return np.empty((1, 0))
-    each = np.broadcast_arrays(*(np.atleast_1d(np.asarray(one, np.float64)) for one in columns))
-    return np.stack(each, axis=1)
+    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(one, np.float64)) for one in columns))
+    return np.stack(arrays, axis=1)

@@ -184,14 +184,14 @@ def _bounded(
     """Every variable over the poses of a block, and a reason (n,) of each where it is unusable."""
     value, effects = order
     kinds = list(quantities(machine.components).values())
-    found = worst_corners(
+    corners = worst_corners(
         ExactError(machine, block, variables), value, effects, variables.domain, kinds
     )
     m = len(machine.components)
     proven = proven_bounds(machine, block, variables)
-    hard = np.asarray((proven["status"] != PROVEN) & (found.status == OK), np.bool_)
+    hard = np.asarray((proven["status"] != PROVEN) & (corners.status == OK), np.bool_)
     if hard.any():
-        asked = CLOSE * found.most[hard, 2 * m :]
+        asked = CLOSE * corners.most[hard, 2 * m :]
         divided = proven_bounds(
             machine, block.select(hard), variables.select(hard), MOST_BOXES, asked
         )
@@ -199,9 +199,9 @@ def _bounded(
             proven[name][hard] = found_in_parts
     values = {
         **{name: values for name, values in proven.items() if name in SCHEMA},
-        "reached_lower": -found.most[:, m : 2 * m],
-        "reached_upper": found.most[:, :m],
-        "reached_magnitude": found.most[:, 2 * m :],
+        "reached_lower": -corners.most[:, m : 2 * m],
+        "reached_upper": corners.most[:, :m],
+        "reached_magnitude": corners.most[:, 2 * m :],
         "linear": worst(value, variables.domain.reach(effects)),
     }
-    return values, of_band(found.status)
+    return values, of_band(corners.status)

@@ -88,7 +88,9 @@ class MachineModel:
         self.distributions, self.correlation = variables.distributions, variables.correlation
         self.streams, self.numbers = variables.streams, variables.numbers
         self.directions = variables.directions
-        self.dofs: Floats = np.array([each.degrees for each in variables.distributions], np.float64)
+        self.dofs: Floats = np.array(
+            [distribution.degrees for distribution in variables.distributions], np.float64
+        )
         self.outputs: tuple[str, ...] = machine.components
         self.output_units = tuple(component_units(machine))
 
@@ -152,17 +154,17 @@ class FunctionModel:
         _check_arguments(function, self.inputs)
         self.names = tuple(self.inputs)
         self.sources = self.names
-        each = tuple(self.inputs.values())
-        self.distributions = tuple(one.distribution for one in each)
+        given = tuple(self.inputs.values())
+        self.distributions = tuple(one.distribution for one in given)
         self.correlation = correlation_matrix(self.names, correlation)
         self.directions: tuple[Indices, ...] = ()
-        self.streams: Indices = np.zeros(len(each), np.intp)
-        self.numbers: Indices = np.arange(len(each), dtype=np.intp)
+        self.streams: Indices = np.zeros(len(given), np.intp)
+        self.numbers: Indices = np.arange(len(given), dtype=np.intp)
         self.dofs: Floats = np.array(
-            [min(one.dof, one.distribution.degrees) for one in each], np.float64
+            [min(one.dof, one.distribution.degrees) for one in given], np.float64
         )
-        self._centre = np.array([one.centre for one in each], np.float64)
-        self._half = np.array([one.half for one in each], np.float64)
+        self._centre = np.array([one.centre for one in given], np.float64)
+        self._half = np.array([one.half for one in given], np.float64)
         self.outputs, self._value = self._probe()
         self.output_units = ("1",) * len(self.outputs)
 

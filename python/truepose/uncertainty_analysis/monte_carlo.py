@@ -292,10 +292,10 @@ def _of_machine(
     if axes:
         coords["axis"] = label("axis", axes, "component of the position error")
         coords["other_axis"] = label("other_axis", axes, "the other component")
-    found = run.dataset(coords=coords)
-    found.attrs |= {**asked.attrs, "interrupted": int(interrupted)}
-    return found.assign_attrs(
-        not_assembled=lost_text(found["failed"], found["samples"] + found["failed"])
+    dataset = run.dataset(coords=coords)
+    dataset.attrs |= {**asked.attrs, "interrupted": int(interrupted)}
+    return dataset.assign_attrs(
+        not_assembled=lost_text(dataset["failed"], dataset["samples"] + dataset["failed"])
     )
 
 
@@ -333,7 +333,7 @@ class _MachineSampler(Sampler):
     def _widths(self) -> Floats:
         """(n, n_column) bins of the order of a hundredth of the first-order spread."""
         _, effects, _ = first_order(self.machine, self.block, self.variables)
-        sigmas = np.array([each.sigmas for each in self.variables.distributions])
+        sigmas = np.array([distribution.sigmas for distribution in self.variables.distributions])
         deviation = np.sqrt(np.square(effects / sigmas).sum(axis=2)) if sigmas.size else 0.0
         deviation = np.nan_to_num(np.broadcast_to(deviation, effects.shape[:2]))
         parts = [np.linalg.norm(deviation[:, kind], axis=1) for kind in self._kinds]
@@ -496,15 +496,17 @@ def _of_function(model: FunctionModel, asked: _Options, progress: Progress | Non
             )
         )
     values = statistics(drawn.tallies, len(model.outputs), asked.probability)
-    found = function_dataset(
+    dataset = function_dataset(
         SCHEMA,
         {name: value[0] for name, value in values.items()},
         model,
         coords={"level": label("level", LEVELS, "share of the samples")},
     )
-    found.attrs |= {**asked.attrs, "interrupted": int(drawn.interrupted)}
-    return found.assign_attrs(
-        not_assembled=lost_text(found["failed"], found["samples"] + found["failed"], plain=True)
+    dataset.attrs |= {**asked.attrs, "interrupted": int(drawn.interrupted)}
+    return dataset.assign_attrs(
+        not_assembled=lost_text(
+            dataset["failed"], dataset["samples"] + dataset["failed"], plain=True
+        )
     )
 
 

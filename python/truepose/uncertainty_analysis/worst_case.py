@@ -122,15 +122,15 @@ def _of_machine(
         value, effects, status = first_order(machine, block, variables)
         shifted = at_shifts(machine, block, variables.alone, variables.shift)
         usable = run.keep(block.indices, shifted, status)
-        found = worst_corners(
+        corners = worst_corners(
             _only(usable, ExactError(machine, block, variables)),
             value[usable],
             effects[usable],
             variables.domain,
             kinds,
         )
-        values = _values(found, value[usable], effects[usable], variables.domain, kinds)
-        run.fill(block.select(usable), values, of_band(found.status))
+        values = _values(corners, value[usable], effects[usable], variables.domain, kinds)
+        run.fill(block.select(usable), values, of_band(corners.status))
         endless.note(variables.names, variables.distributions)
     result = run.dataset(
         over_all={"search": np.array(rows.arrays["search"], np.str_)},
@@ -148,7 +148,7 @@ def _only(
 
 
 def _values(
-    found: WorstCorners,
+    corners: WorstCorners,
     value: Floats,
     effects: Floats,
     domain: Domain,
@@ -156,16 +156,16 @@ def _values(
 ) -> dict[str, np.ndarray]:
     """Every variable over n poses, from exact values (n, m) and effects (n, m, v) at the shifts."""
     n_pose, n_output, _ = effects.shape
-    upper, lower = found.most[:, :n_output], -found.most[:, n_output : 2 * n_output]
+    upper, lower = corners.most[:, :n_output], -corners.most[:, n_output : 2 * n_output]
     return {
         "linear": worst(value, domain.reach(effects)),
         "exact": np.maximum(np.abs(lower), np.abs(upper)),
         "exact_lower": lower,
         "exact_upper": upper,
         "magnitude_linear": largest(value, effects, domain, quantities).length,
-        "magnitude_exact": found.most[:, 2 * n_output :],
-        "search": np.full(n_pose, found.search, object),
-        "vertices": found.evaluated,
+        "magnitude_exact": corners.most[:, 2 * n_output :],
+        "search": np.full(n_pose, corners.search, object),
+        "vertices": corners.evaluated,
     }
 
 
@@ -178,18 +178,18 @@ def _of_function(function: Callable[..., Any], inputs: Any) -> xr.Dataset:
         return outputs, np.where(fine, OK, OK + 1).astype(np.uint8)
 
     domain = Domain.of(model.distributions)
-    found = worst_corners(evaluate, law.value[np.newaxis], law.effects[np.newaxis], domain)
-    if found.status[0] != OK:
+    corners = worst_corners(evaluate, law.value[np.newaxis], law.effects[np.newaxis], domain)
+    if corners.status[0] != OK:
         raise RequestError(
             Problem(
                 "not-finite",
                 "the function has no finite value at a corner of the bands",
-                found=f"not finite at some of {found.evaluated[0]} corners",
+                found=f"not finite at some of {corners.evaluated[0]} corners",
                 expected="finite values wherever the inputs can be",
                 hint="narrow the bands, or keep them off where the function is not defined",
             )
         )
-    values = _values(found, law.value[np.newaxis], law.effects[np.newaxis], domain, [])
+    values = _values(corners, law.value[np.newaxis], law.effects[np.newaxis], domain, [])
     schema = {
         name: variable for name, variable in SCHEMA.items() if "quantity" not in variable.dims
     }

@@ -180,10 +180,10 @@ class OneValues:
 
     def _sensor(self, path: str, row: Row) -> Row:
         readings = {
-            each.drive: each
+            reading.drive: reading
             for source in self._machine.sources
             if isinstance(source, Sensor)
-            for each in source.readings
+            for reading in source.readings
         }
         band = readings[path].scale_error
         row = _without(row, ("resolution",))
@@ -193,10 +193,10 @@ class OneValues:
 
     def _actuator(self, path: str, row: Row) -> Row:
         actuations = {
-            each.drive: each
+            actuation.drive: actuation
             for source in self._machine.sources
             if isinstance(source, Actuator)
-            for each in source.actuations
+            for actuation in source.actuations
         }
         of = actuations[path]
         if of.table is not None:
@@ -214,25 +214,29 @@ class OneValues:
 
     def _guideway(self, path: str, row: Row) -> Row:
         rails = {
-            each.drive: each
+            rail.drive: rail
             for source in self._machine.sources
             if isinstance(source, Guideway)
-            for each in source.rails
+            for rail in source.rails
         }
         rail = rails[path]
         named = [key for key in _LEANS if key in row]
         unknown = [key for key, lean in zip(named, rail.leans, strict=True) if lean.band.half > 0.0]
         row = _without(row, unknown)
         shapes = row.get("straightness", [])
-        known = [each for each, shape in zip(shapes, rail.shapes, strict=True) if shape.known]
+        known = [
+            row_of_shape
+            for row_of_shape, shape in zip(shapes, rail.shapes, strict=True)
+            if shape.known
+        ]
         row = _without(row, ("straightness",)) | ({"straightness": known} if known else {})
         stays = ("straightness", "table", *_LEANS)
         return row if any(key in row for key in stays) else {}
 
     def _shared(self, table: str) -> Any:
         """What `[each.*]` says for the rows of a table; empty where it says nothing."""
-        each = self._text.toml.get(EACH, {})
-        return each.get(table, {})
+        shared = self._text.toml.get(EACH, {})
+        return shared.get(table, {})
 
     def _take_out(self, table: str, key: str) -> None:
         """Take a key out of a table, or of every row of it."""
@@ -273,11 +277,11 @@ def _edit_in_place(row: Any, key: str, new: Row) -> None:
     elif _plain(old) == new:
         return
     elif isinstance(old, Table):
-        for each in [each for each in old if each not in new]:
-            del old[each]
-        for each, value in new.items():
-            if _plain(old.get(each)) != value:
-                old[each] = _value(value)
+        for name in [name for name in old if name not in new]:
+            del old[name]
+        for name, value in new.items():
+            if _plain(old.get(name)) != value:
+                old[name] = _value(value)
     else:
         row[key] = _value(new)
 
@@ -298,7 +302,7 @@ def _value(value: Any) -> Item:
 def _text_of(value: Any) -> str:
     if isinstance(value, Mapping):
         keys = ", ".join(
-            f"{tomlkit.key(key).as_string()} = {_text_of(each)}" for key, each in value.items()
+            f"{tomlkit.key(key).as_string()} = {_text_of(entry)}" for key, entry in value.items()
         )
         return f"{{ {keys} }}" if keys else "{}"
     if isinstance(value, list):

@@ -92,14 +92,14 @@ class Population:
         if name in self._kept:
             yield from self._kept[name]
             return
-        found: list[State] = []
+        walked: list[State] = []
         for block, variables in self._blocks():
             state = self._state(name, block, variables)
             if len(self.table) <= BLOCK:
-                found.append(state)
+                walked.append(state)
             yield state
-        if found:
-            self._kept[name] = found
+        if walked:
+            self._kept[name] = walked
 
     def at(self, name: str, numbers: Indices) -> Iterator[State]:
         """The population at the poses numbered so in the run, those in one block together."""

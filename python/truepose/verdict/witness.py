@@ -101,15 +101,15 @@ class Witness:
     def by_source(self) -> Mapping[str, Floats]:
         """(n_parameter,) deviation from each source alone; their sum is all of it."""
         names = [source.name for source in acting(self.machine, self.machine.condition)]
-        found = {name: np.zeros(len(self.machine.parameters)) for name in names}
+        by_source = {name: np.zeros(len(self.machine.parameters)) for name in names}
         for name, (parameters, shift) in zip(names, self.variables.alone, strict=True):
-            np.add.at(found[name], parameters, shift[0])
+            np.add.at(by_source[name], parameters, shift[0])
         deviations = self.variables.half_width[0] * self.t[self.variables.variable_of]
         for column, variable in enumerate(self.variables.variable_of):
-            found[self.variables.sources[variable]][self.variables.columns[column]] += deviations[
-                column
-            ]
-        return found
+            by_source[self.variables.sources[variable]][self.variables.columns[column]] += (
+                deviations[column]
+            )
+        return by_source
 
     @property
     def force(self) -> Floats | None:
@@ -147,7 +147,7 @@ class Witness:
         known = self.error is not None and self.size > 0.0
         directed = [int(v) for members in self.variables.directions for v in members]
         shares = self._parts / self.size if known else np.full(len(self._parts), math.nan)
-        found = [
+        causes = [
             (float(abs(self._parts[v])), self._cause(v, float(shares[v])))
             for v in range(len(self.variables.names))
             if v not in directed
@@ -158,8 +158,8 @@ class Witness:
             part = float(self._parts[directed].sum())
             share = part / self.size if known else math.nan
             x, y, z = force.tolist()
-            found.append((abs(part), Cause("loads", "", 0, "", 0.0, "N", 0.0, share, (x, y, z))))
-        return [cause for _, cause in sorted(found, key=lambda each: -each[0])]
+            causes.append((abs(part), Cause("loads", "", 0, "", 0.0, "N", 0.0, share, (x, y, z))))
+        return [cause for _, cause in sorted(causes, key=lambda ranked: -ranked[0])]
 
     def _cause(self, variable: int, share: float) -> Cause:
         variables, machine = self.variables, self.machine

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from drive_kinds import fields, fields_of, is_place, is_strut, lengths_of, turns, vectors_of
 from reference_kinematics import Reference, tangents
 
 Description = dict[str, Any]
@@ -28,8 +29,8 @@ PER_METRE = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 PER_RADIAN = {"rad": 1.0, "deg": math.pi / 180.0}
 NEWTON_PER_METRE = {"N/um": 1e6, "N/mm": 1e3, "N/m": 1.0}
 # Fields of drives, struts and guides by what they measure. Directions are numbers without a unit.
-POINTS = ("origin", "base", "platform")
-DIRECTIONS = ("axis", "ring_axis", "normal", "base_axis", "platform_axis")
+POINTS = fields("length", shape=3)
+DIRECTIONS = fields("direction")
 MACHINES = Path(__file__).parent.parent / "machines"
 
 
@@ -125,14 +126,19 @@ def description_of(path: Path) -> Description:
         return points | {name: list(entry[name]) for name in DIRECTIONS if name in entry}
 
     def drive(entry: Mapping[str, Any]) -> Description:
-        one = radian if entry["kind"] == "crank" else metre
+        coordinate = radian if turns(entry["kind"]) else metre
+        units = {"length": metre, "angle": radian, "coordinate": coordinate, "scale": 1.0}
         return {
             "name": entry["name"],
             "kind": entry["kind"],
-            "travel": [float(end) * one for end in entry["travel"]],
+            "travel": [float(end) * coordinate for end in entry["travel"]],
             "working_mode": entry.get("working_mode"),
-            "offset": float(entry.get("offset", 0.0)) * one,
-            "scale": float(entry.get("scale", 1.0)),
+            **{
+                field["name"]: float(entry.get(field["name"], field["default"]))
+                * units[field["dimension"]]
+                for field in fields_of(entry["kind"])
+                if field["shape"] == 0
+            },
             **geometry(entry),
         }
 
@@ -201,13 +207,12 @@ def moved(
     result = copy.deepcopy(description)
     with_drive = {drive["name"]: drive for drive in result["drives"]}
     for drive in result["drives"]:
-        if drive["kind"] == "telescopic":
-            continue
-        drive["origin"] = (rotation @ np.array(drive.get("origin", [0, 0, 0])) + shift).tolist()
-        drive["axis"] = (rotation @ np.array(drive["axis"])).tolist()
+        for key in vectors_of(drive["kind"]):
+            from_frame = shift if is_place(key) else 0.0
+            drive[key] = (rotation @ np.array(drive.get(key, [0, 0, 0])) + from_frame).tolist()
     for strut in result["struts"]:
         # A base on a carriage or an arm is told from the drive's origin: it only turns.
-        on_carriage = strut["drive"] and with_drive[strut["drive"]]["kind"] != "telescopic"
+        on_carriage = strut["drive"] and not is_strut(with_drive[strut["drive"]]["kind"])
         base = rotation @ np.array(strut["base"])
         strut["base"] = (base if on_carriage else base + shift).tolist()
         if "base_axis" in strut:
@@ -231,9 +236,8 @@ def scaled(description: Description, factor: float) -> Description:
         for name, value in result["home"].items()
     }
     for drive in result["drives"]:
-        length_coordinate = drive["kind"] != "crank"
-        for field in ("origin", "travel", "offset"):
-            if field in drive and (field == "origin" or length_coordinate):
+        for field in lengths_of(drive["kind"]):
+            if field in drive:
                 drive[field] = (factor * np.array(drive[field])).tolist()
     for limb in (*result["struts"], *result["guides"]):
         for field in (*POINTS, "length", "ring_radius"):

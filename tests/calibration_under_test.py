@@ -19,8 +19,14 @@ from truepose.machine import Machine
 
 Floats = NDArray[np.float64]
 
-UNKNOWN_FRAMES = ("position", "pose", "distance", "contact", "plane", "strut-direction")
-"""Kinds that are tried with a frame that is to be found."""
+KNOWN_FRAMES = ("coordinate", "orientation", "joint-angle")
+"""Kinds that are tried in the machine's own frame; that of the others, if any, is to be found."""
+
+AT_TOOL = ("contact", "plane")
+"""Kinds that are tried with the tool point as their target."""
+
+BIASED = ("joint-angle", "strut-length")
+"""Kinds that are tried with a constant to be found in what they read."""
 
 
 def kinds_for(machine: Machine) -> list[str]:
@@ -46,16 +52,16 @@ class CalibrationUnderTest:
     def measurements(self) -> Measurements:
         """What the machine as filed shows."""
         poses = poses_within(self.machine, self.rows, seed=self.seed % 1000)
-        frame = "unknown" if self.kind in UNKNOWN_FRAMES else "base"
+        known = REGISTRY[self.kind].frame is None or self.kind in KNOWN_FRAMES
         return made_measurements(
             self.machine,
             self.kind,
             poses,
-            frame=frame,
+            frame="base" if known else "unknown",
             uncertainty=self.uncertainty,
             values="nominal",
-            target=(0.0, 0.0, 0.0) if self.kind in ("contact", "plane") else (0.02, -0.01, 0.03),
-            bias_unknown=self.kind in ("joint-angle", "strut-length"),
+            target=(0.0, 0.0, 0.0) if self.kind in AT_TOOL else (0.02, -0.01, 0.03),
+            bias_unknown=self.kind in BIASED,
         )
 
     @cached_property

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from drive_kinds import has_carriage, is_strut, turns
 from machine_file import File, Row, rows_of
 
 Random = np.random.Generator
@@ -140,7 +141,7 @@ def _thermal(file: File, parameters: Parameters, random: Random) -> None:
     scaled = set()
     for strut in rows_of(file, "strut"):
         drive = carried.get(strut.get("drive", ""), {"kind": ""})
-        if drive["kind"] == "telescopic" and random.uniform() < 0.25:
+        if is_strut(drive["kind"]) and random.uniform() < 0.25:
             # A scale along the strut measures its length; its own growth does not count.
             strut["expansion"] = "0 1/K"
             scaled.add(drive["name"])
@@ -150,7 +151,7 @@ def _thermal(file: File, parameters: Parameters, random: Random) -> None:
         else:
             strut["expansion"] = f"{random.uniform(1.0, 25.0):.4f}e-6 1/K"
     for drive in carried.values():
-        if drive["kind"] != "telescopic" and random.uniform() < 0.7:
+        if not is_strut(drive["kind"]) and random.uniform() < 0.7:
             _grows(drive, random)
     for body in ("frame", "platform", "tool"):
         # The tool is one thing with the platform unless it is said what it is made of.
@@ -184,7 +185,7 @@ def _anchor(file: File, random: Random) -> list[float]:
 def _gradient(file: File, parameters: Parameters, random: Random) -> None:
     """Gradients along parts that grow, in K/m; those of bodies have three components."""
     parts = [("strut", row) for row in rows_of(file, "strut")]
-    parts += [("drive", row) for row in rows_of(file, "drive") if row["kind"] == "slider"]
+    parts += [("drive", row) for row in rows_of(file, "drive") if has_carriage(row["kind"])]
     found: Row = {}
     for table, row in parts:
         if _expands(row) and random.uniform() < 0.4:
@@ -205,7 +206,6 @@ def _stiffness(file: File, parameters: Parameters, random: Random) -> None:
     """Something in every limb gives way, and often several things in series."""
     # Of machines with too many closures the struts have one already, and the tests know no other.
     plain = too_many(file)
-    kinds = {row["name"]: row["kind"] for row in rows_of(file, "drive")}
     for strut in rows_of(file, "strut"):
         if plain:
             continue
@@ -226,7 +226,7 @@ def _stiffness(file: File, parameters: Parameters, random: Random) -> None:
     for drive in rows_of(file, "drive"):
         if plain or random.uniform() < 0.4:
             continue
-        unit, most = ("kN m/rad", 60.0) if kinds[drive["name"]] == "crank" else ("N/um", 300.0)
+        unit, most = ("kN m/rad", 60.0) if turns(drive["kind"]) else ("N/um", 300.0)
         names = ("screw", "nut", "bearing")[: int(random.integers(1, 4))]
         drive["stiffness"] = {n: f"{random.uniform(most / 4, most):.3f} {unit}" for n in names}
 
@@ -282,23 +282,23 @@ def _envelope(file: File, parameters: Parameters, random: Random) -> None:
 def _drives(file: File, parameters: Parameters, random: Random) -> None:
     """Errors of sensors and actuators, and backlash."""
     for drive in rows_of(file, "drive"):
-        crank = drive["kind"] == "crank"
-        one = "deg" if crank else "mm"
-        fine = 2e-4 if crank else 1e-3
+        angular = turns(drive["kind"])
+        one = "deg" if angular else "mm"
+        fine = 2e-4 if angular else 1e-3
         if random.uniform() < 0.3:
             drive["feedback"] = "direct"
         else:
             if random.uniform() < 0.5:
                 drive["backlash"] = {"play": f"{random.uniform(1, 6) * fine:.7f} {one}"}
                 if random.uniform() < 0.5:
-                    unit = "N m" if crank else "N"
+                    unit = "N m" if angular else "N"
                     drive["backlash"]["threshold"] = f"{random.uniform(0.5, 40.0):.3f} {unit}"
             if random.uniform() < 0.6:
                 actuator: Row = {"lead_error": _ratio(random)}
                 if random.uniform() < 0.5:
                     actuator["zero_at"] = float(random.uniform(*drive["travel"]))
                 if random.uniform() < 0.5:
-                    period = 1.5 if crank else 5.0
+                    period = 1.5 if angular else 5.0
                     actuator["periodic"] = {
                         "amplitude": f"{random.uniform(0.5, 2.0) * fine:.7f} {one}",
                         "period": period,
@@ -329,7 +329,7 @@ def _ratio(random: Random) -> Any:
 def _guideway(file: File, parameters: Parameters, random: Random) -> None:
     """Carriages that do not run straight, or not where they should point."""
     for drive in rows_of(file, "drive"):
-        if drive["kind"] != "slider" or random.uniform() < 0.2:
+        if not has_carriage(drive["kind"]) or random.uniform() < 0.2:
             continue
         guideway: Row = {}
         if random.uniform() < 0.7:
@@ -367,12 +367,12 @@ def _clearance(file: File, parameters: Parameters, random: Random) -> None:
 
 
 def _screw(file: File, parameters: Parameters, random: Random) -> None:
-    """Screws that turn with their universal joints; on telescopic struts in space."""
+    """Screws that turn with their universal joints; on struts that are drives, in space."""
     if _is_planar(file) or not _turns(file):
         return
     kinds = {row["name"]: row["kind"] for row in rows_of(file, "drive")}
     for strut in rows_of(file, "strut"):
-        if kinds.get(strut.get("drive", "")) == "telescopic" and random.uniform() < 0.6:
+        if is_strut(kinds.get(strut.get("drive", ""), "")) and random.uniform() < 0.6:
             strut["screw"] = {
                 "lead": float(random.choice([-5.0, 4.0, 5.0])),
                 "base_axis": random.normal(size=3).tolist(),

@@ -141,7 +141,8 @@ def random_shifts(name: str, seed: int, size: float, *, scale: float = 2e-4) -> 
         for each in machine.parameters
         if each.startswith(("strut.", "drive.")) and not each.endswith((".u", ".v", ".scale"))
     ]
-    angular = {f"drive.{drive.name}.offset" for drive in machine.drives if drive.kind == "crank"}
+    turning = [drive for drive in machine.drives if drive.coordinate == "angle"]
+    angular = {f"drive.{drive.name}.offset" for drive in turning}
     shifts = {
         each: float(generator.uniform(-size, size)) * (0.1 if each in angular else 1.0)
         for each in names

@@ -17,6 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from drive_kinds import turns
 from machine_file import File
 
 INCH, POUND = 0.0254, 0.45359237
@@ -159,7 +160,7 @@ class _Walk:
             return self.every(value, dimension)
         if isinstance(value, dict):
             kind = _of_kind(schema, value)
-            angular = angular or value.get("kind") == "crank"
+            angular = angular or turns(value.get("kind", ""))
             # A table of any keys has one schema for them all.
             others = kind.get("additionalProperties") or {}
             return {

@@ -41,7 +41,7 @@ def shown(
     poses, status = actual.kernel.forward(measurements.joints, start, status=True)
     assert (status <= 1).all()
     placements = actual.kernel.placement_of(poses)
-    geometry = Geometry.of(actual, measurements.joints, placements)
+    geometry = Geometry.of(actual.kernel, measurements.joints, placements)
     return nominal_readings(nominal, measurements, setups, geometry)
 
 

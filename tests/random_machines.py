@@ -45,6 +45,7 @@ from numpy.typing import NDArray
 
 from build_machine import MACHINES, PER_METRE, machine_files
 from drawn_topics import GEOMETRIC, LOADED, TOPICS, add_topic, too_many
+from drive_kinds import drive_fields, fields_of, is_strut, lengths_of, turns
 from machine_file import File, file_at, loaded, rows_of, text_of
 from machine_under_test import OK, MachineUnderTest
 from reference_kinematics import rotation_by_vector
@@ -212,7 +213,7 @@ def _skeleton(like: str) -> File:
     if shipped["units"]["angle"] != "deg":
         raise ValueError(f"{like}: not in deg")
     kept = {
-        "drive": ("name", "kind", "origin", "axis", "travel", "working_mode", "offset", "scale"),
+        "drive": ("name", "kind", "travel", "working_mode", *drive_fields()),
         "strut": ("name", "drive", "base", "platform", "length", "ring_radius", "ring_axis"),
         "guide": (
             *("name", "kind", "origin", "normal", "platform", "axis"),
@@ -235,9 +236,9 @@ def _skeleton(like: str) -> File:
     _resize(file, PER_METRE[shipped["units"]["length"]] * 1000.0)
     for drive in rows_of(file, "drive"):
         first, last = drive["travel"]
-        crank = drive["kind"] == "crank"
-        room = min(12.0, (350.0 - last + first) / 2) if crank else 60.0 + 0.1 * (last - first)
-        if drive["kind"] == "telescopic":
+        angular = turns(drive["kind"])
+        room = min(12.0, (350.0 - last + first) / 2) if angular else 60.0 + 0.1 * (last - first)
+        if is_strut(drive["kind"]):
             shortest = 0.5 * (first + drive.get("offset", 0.0)) - drive.get("offset", 0.0)
             drive["travel"] = [max(first - room, shortest), last + room]
         else:
@@ -259,11 +260,14 @@ def _move_points(file: File, by: float, random: Random) -> None:
         return np.asarray(by * random.normal(size=3) * free)
 
     for drive in rows_of(file, "drive"):
-        if drive["kind"] == "telescopic":
-            continue
-        moved(drive, "origin", step())
-        if not planar or (drive["kind"] == "slider" and not misfit):
-            moved(drive, "axis", 0.02 * random.normal(size=3) * free)
+        for field in fields_of(drive["kind"]):
+            if field["dimension"] == "length" and field["shape"] == 3:
+                moved(drive, field["name"], step())
+            # An axis of rotation stays across the plane.
+            elif field["dimension"] == "direction" and (
+                not planar or not (turns(drive["kind"]) or misfit)
+            ):
+                moved(drive, field["name"], 0.02 * random.normal(size=3) * free)
     for strut in rows_of(file, "strut"):
         both = step()
         moved(strut, "base", both)
@@ -293,9 +297,7 @@ def _resize(file: File, factor: float) -> None:
 
     times(file["machine"], "tool")
     for drive in rows_of(file, "drive"):
-        times(drive, "origin")
-        if drive["kind"] != "crank":
-            times(drive, "travel", "offset")
+        times(drive, *lengths_of(drive["kind"]))
     for row in rows_of(file, "strut"):
         times(row, "base", "platform", "length", "ring_radius")
     for row in rows_of(file, "guide"):

@@ -1,10 +1,11 @@
 """A machine's kinematics in plain NumPy and SciPy: the second road of the tests.
 
 Nothing here is shared with the kernel. It takes the same description (tests/build_machine.py),
-writes the closures of struts and guides by their formulas, finds the inverse in closed form, or by
-MINPACK where the platform has parasitic freedoms, and the forward solution by MINPACK with a
-numerical Jacobian; where there are more closures than freedoms, the pose of least elastic energy by
-Gauss and Newton. Slow and plain. All in SI and the base frame, R = Rz(c) Ry(b) Rx(a).
+writes the closures of struts and guides by their formulas (a drive's are in tests/drives), finds
+the inverse in closed form, or by MINPACK where the platform has parasitic freedoms, and the forward
+solution by MINPACK with a numerical Jacobian; where there are more closures than freedoms, the pose
+of least elastic energy by Gauss and Newton. Slow and plain. All in SI and the base
+frame, R = Rz(c) Ry(b) Rx(a).
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import fsolve  # type: ignore[import-untyped]
+
+from drive_kinds import formulas
 
 Vector = NDArray[np.float64]
 
@@ -119,6 +122,11 @@ def tangents(direction: ArrayLike) -> Vector:
     return np.array([first, np.cross(axis, first)])
 
 
+def actual_coordinate(drive: Mapping[str, Any], joint: float) -> float:
+    """`scale q + offset` of a drive, m or rad."""
+    return float(drive.get("scale", 1.0) * joint + drive.get("offset", 0.0))
+
+
 class Reference:
     """The machine of a description, with the closures of its struts and guides written out."""
 
@@ -166,14 +174,13 @@ class Reference:
             return base
         i = self.index[strut["drive"]]
         drive = self.drives[i]
-        if drive["kind"] == "telescopic":
-            return base
-        axis = np.array(drive["axis"], float) / np.linalg.norm(drive["axis"])
-        origin = np.array(drive.get("origin", [0.0, 0.0, 0.0]), float)
-        moved = drive.get("scale", 1.0) * joints[i] + drive.get("offset", 0.0)
-        if drive["kind"] == "slider":
-            return np.asarray(origin + base + moved * axis)
-        return np.asarray(origin + turned_about(axis, moved) @ base)
+        return formulas(drive["kind"]).centre(drive, base, actual_coordinate(drive, joints[i]))
+
+    def base_axes(self, strut: Mapping[str, Any], joints: Vector) -> Vector:
+        """(3, 3) axes, as columns, of what carries a strut's base joint: frame, carriage or arm."""
+        foot = self.base_joint({**strut, "base": np.zeros(3)}, joints)
+        heads = [self.base_joint({**strut, "base": axis}, joints) for axis in np.eye(3)]
+        return np.array([head - foot for head in heads]).T
 
     def platform_joint(self, strut: Mapping[str, Any], point: Vector, rotation: Vector) -> Vector:
         """Platform-side joint centre (3,) of a strut, base frame, m.
@@ -195,9 +202,8 @@ class Reference:
         """The length that a strut closes at, m."""
         if strut["length"] is not None:
             return float(strut["length"])
-        drive = self.drives[self.index[strut["drive"]]]
-        coordinate = joints[self.index[strut["drive"]]]
-        return float(drive.get("scale", 1.0) * coordinate + drive.get("offset", 0.0))
+        i = self.index[strut["drive"]]
+        return actual_coordinate(self.drives[i], joints[i])
 
     def closures(self, joints: Vector, point: Vector, rotation: Vector) -> Vector:
         """(n_closure,) residuals, m: of struts distance less length, then those of guides."""
@@ -253,33 +259,12 @@ class Reference:
     def roots(self, drive: Mapping[str, Any], point: Vector, rotation: Vector) -> list[float]:
         """Joint coordinates [in working mode "-", in "+"] that close a drive's first strut.
 
-        One value only for a telescopic drive, none where the strut cannot reach.
+        One value only for a drive that is the strut's length, none where the strut cannot reach.
         """
         strut = next(s for s in self.struts if s["drive"] == drive["name"])
         platform, base = self.platform_joint(strut, point, rotation), np.array(strut["base"], float)
-        scale, offset = drive.get("scale", 1.0), drive.get("offset", 0.0)
-        if drive["kind"] == "telescopic":
-            return [(float(np.linalg.norm(platform - base)) - offset) / scale]
-        axis = np.array(drive["axis"], float) / np.linalg.norm(drive["axis"])
-        span = platform - np.array(drive.get("origin", [0.0, 0.0, 0.0]), float)
-        if drive["kind"] == "slider":
-            span = span - base
-            along = float(span @ axis)
-            under = strut["length"] ** 2 - span @ span + along**2
-            if under < 0:
-                return []
-            moved = [along - math.sqrt(under), along + math.sqrt(under)]
-        else:
-            arm, reach = base - (base @ axis) * axis, span - (span @ axis) * axis
-            cosine = (span @ span + base @ base - strut["length"] ** 2) / 2
-            cosine = (cosine - (span @ axis) * (base @ axis)) / (
-                np.linalg.norm(arm) * np.linalg.norm(reach)
-            )
-            if abs(cosine) > 1:
-                return []
-            towards = math.atan2(float(np.cross(arm, reach) @ axis), float(arm @ reach))
-            moved = [towards - math.acos(cosine), towards + math.acos(cosine)]
-        return [(value - offset) / scale for value in moved]
+        roots = formulas(drive["kind"]).roots(drive, base, platform, strut["length"])
+        return [(value - drive.get("offset", 0.0)) / drive.get("scale", 1.0) for value in roots]
 
     def inverse(self, pose: ArrayLike) -> tuple[Vector, Vector, Vector]:
         """Joints (n_drive,), tool point (3,) and rotation (3, 3) of a commanded pose.

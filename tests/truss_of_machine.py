@@ -14,8 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from calculix import EVERY_WAY, Deck
+from drive_kinds import formulas, has_carriage, is_strut
 from machine_under_test import MachineUnderTest
-from reference_kinematics import rotation_of_quaternion, tangents, turned_about, unit
+from reference_kinematics import (
+    actual_coordinate,
+    rotation_of_quaternion,
+    tangents,
+    unit,
+)
 from truepose.machine import Body, Condition, Drive, Machine, Strut
 
 Vector = NDArray[np.float64]
@@ -69,7 +75,7 @@ class Truss:
         number = self.reference.index[drive.name]
         row = self.reference.drives[number]
         fixed = drive.fixed_at
-        if fixed is None:  # where a telescopic strut would have no length
+        if fixed is None:  # where a strut that is a drive would have no length
             fixed = -row.get("offset", 0.0) / row.get("scale", 1.0)
         travelled = self.joints[number] - fixed
         return float(self.strain(drive) * self.reference.drives[number].get("scale", 1) * travelled)
@@ -105,7 +111,7 @@ class Truss:
         below = [strut.base_joint.stiffness]
         drive = self.drive_of(strut)
         joint = foot = self.foot(strut, start)
-        if drive is not None and drive.kind == "telescopic":
+        if drive is not None and is_strut(drive.kind):
             below.append(drive.held_stiffness)
             joint = self.grown(joint, start, self.measured(drive) * along)
         stiffness = strut.axial_stiffness(length)
@@ -147,25 +153,24 @@ class Truss:
         return next((d for d in self.machine.drives if d.name == strut.drive), None)
 
     def foot(self, strut: Strut, at: Vector) -> int:
-        """The node of a strut's base joint, on the frame, a carriage or a crank's arm."""
+        """The node of a strut's base joint, on the frame, a carriage or an arm."""
         deck, drive, axes = self.deck, self.drive_of(strut), np.eye(3)
         by: list[tuple[int, Vector]] = []
         on_frame, grown = at, np.zeros(3)
-        if drive is not None and drive.kind != "telescopic":
+        if drive is not None and not is_strut(drive.kind):
             number = self.reference.index[drive.name]
             row = self.reference.drives[number]
-            axis, on_frame = unit(row["axis"]), np.array(row.get("origin", np.zeros(3)), float)
-            if drive.kind == "slider":
+            carried = self.reference.struts[self.machine.struts.index(strut)]
+            base, origin = np.array(carried["base"], float), row.get("origin", [0.0, 0.0, 0.0])
+            on_frame = np.array(origin, float)
+            actual = actual_coordinate(row, self.joints[number])
+            way = formulas(drive.kind).slopes(row, base, actual)["offset"]
+            axes = self.reference.base_axes(carried, self.joints)
+            if has_carriage(drive.kind):
                 # The frame has the bearing of the screw, the screw the carriage, that the joint.
-                way = axis
-                held = row.get("scale", 1.0) * drive.fixed_at + row.get("offset", 0.0)
-                on_frame = on_frame + held * axis
-                on_carriage = self.reference.struts[self.machine.struts.index(strut)]["base"]
-                grown = self.measured(drive) * axis + self.growth(drive.carriage, on_carriage)
+                on_frame = on_frame + actual_coordinate(row, drive.fixed_at) * way
+                grown = self.measured(drive) * way + self.growth(drive.carriage, base)
             else:
-                way = np.cross(axis, at - on_frame)
-                angle = row.get("scale", 1.0) * self.joints[number] + row.get("offset", 0.0)
-                axes = turned_about(axis, angle)
                 grown = self.strain(drive) * (at - on_frame)
             if drive.held_stiffness is not None:
                 by.append((self.carriage(drive.name, drive.held_stiffness), way))
@@ -178,7 +183,7 @@ class Truss:
         return deck.shifted(at, by, None)
 
     def carriage(self, name: str, stiffness: float) -> int:
-        """The spring behind a carriage or crank: all its struts share it."""
+        """The spring behind a carriage or an arm: all its struts share it."""
         if name not in self.carriages:
             self.carriages[name] = self.deck.spring(stiffness)
         return self.carriages[name]

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from drive_kinds import is_place, is_strut, vectors_of
 from machine_file import File, Row, rows_of
 from reference_kinematics import angles_of, rotation_of
 
@@ -37,14 +38,14 @@ def turned(
     """
     result = copy.deepcopy(file)
     base, platform = _Frame(rotation, shift), _Frame(rotation, platform_shift)
-    sliders = {row["name"]: row for row in rows_of(result, "drive") if row["kind"] != "telescopic"}
-    for drive in sliders.values():
-        base.point(drive, "origin")
-        base.direction(drive, "axis")
+    carriers = {row["name"]: row for row in rows_of(result, "drive") if not is_strut(row["kind"])}
+    for drive in carriers.values():
+        for key in vectors_of(drive["kind"]):
+            (base.point if is_place(key) else base.direction)(drive, key)
         _guideway(base, drive.get("guideway", {}))
     for strut in rows_of(result, "strut"):
         # What a carriage or an arm carries is told from the drive's origin: it only turns.
-        carried = strut.get("drive") in sliders
+        carried = strut.get("drive") in carriers
         (base.direction if carried else base.point)(strut, "base")
         platform.point(strut, "platform")
         platform.direction(strut, "ring_axis")

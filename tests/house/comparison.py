@@ -36,8 +36,11 @@ def compare_records(
         for root in (old, new)
     ]
     cases = [{case_of(path) for path in paths} for paths in files]
-    differing: dict[str, list[str]] = {}
-    for path in sorted(files[0] | files[1]):
+    differing: dict[str, list[str]] = {
+        case: [f"  only in the {'old' if case in cases[0] else 'new'} record"]
+        for case in sorted(cases[0] ^ cases[1])
+    }
+    for path in sorted(path for path in files[0] | files[1] if case_of(path) not in differing):
         there = [path in paths for paths in files]
         if all(there):
             told = difference(old / path, new / path, relative, mask_sentences)
@@ -80,6 +83,8 @@ def difference(old: Path, new: Path, relative: float, mask: bool) -> list[str]:
 
 def parts_of(name: str, text: str, mask: bool) -> Parts:
     """A file in parts, by its form."""
+    if name.endswith(".exit"):
+        return [("exit", text)]
     if text.startswith(("{", "[")):
         try:
             return list(json_parts(json.loads(text), "", mask))

@@ -49,12 +49,13 @@ def changed(text: str, *edits: tuple[str, str]) -> str:
 
 def recorded_cases() -> list[Case]:
     """Every case, each under a name of its own."""
-    from house import cases_bad, cases_calibration, cases_library, cases_requests
+    from house import cases_bad, cases_calibration, cases_library, cases_programs, cases_requests
 
     sources: tuple[Callable[[], Iterator[Case]], ...] = (
         cases_library.cases,
         cases_calibration.cases,
         cases_requests.cases,
+        cases_programs.cases,
         cases_bad.cases,
     )
     cases = [case for source in sources for case in source()]

@@ -141,7 +141,7 @@ def seconds_of_children() -> float:
 def run_step(step: tuple[str, ...], number: int, place: Path) -> None:
     """One command of a case: `truepose` without its name, or `python FILE ...`."""
     stdout, stderr = place / f"{number}.stdout", place / f"{number}.stderr"
-    if step[0] == "python":
+    if step[:1] == ("python",):
         code = script(step[1:], stdout, stderr)
     else:
         code = in_fork(lambda: command_line(step), stdout, stderr)
@@ -254,7 +254,8 @@ def main() -> int:
     options = parser.parse_args()
     if options.command == "record":
         record(options.folder, options.only, options.jobs)
-        summary(options.folder)
+        if options.only == "*":
+            summary(options.folder)
         return 0
     return compare_records(options.old, options.new, options.relative, options.mask_sentences)
 

@@ -23,6 +23,7 @@ _COMMENTS_AND_TEXT = re.compile(
 _TESTS = re.compile(r"#\[cfg\(test\)\]\s*mod\s+\w+\s*\{")
 _USE = re.compile(r"(?P<public>pub(?:\([^)]*\))?\s+)?\buse\s+(?P<tree>[^;]+);")
 _MODULE = re.compile(r"\bmod\s+\w+\s*;")
+_LIST = re.compile(r"^\w+! \{\n((?: +\w+ => [\w:]+,\n)+)\}", re.MULTILINE)
 _PATH = re.compile(r"(?<![\w:$])[a-z_]\w*(?:::\w+)+")
 
 
@@ -45,6 +46,21 @@ def crates() -> list[Path]:
 def without_comments(text: str) -> str:
     """Rust without its comments, texts and characters."""
     return _COMMENTS_AND_TEXT.sub(" ", text)
+
+
+def list_members(crate: Path) -> dict[str, str]:
+    """File of what a list such as `drives! { Slider => slider::Slider, }` names -> its list's file.
+
+    Paths below the crate's parent; a member's file stands beside that of the list.
+    """
+    members = {}
+    for path in sorted((crate / "src").rglob("*.rs")):
+        for lines in _LIST.findall(without_comments(path.read_text(encoding="utf-8"))):
+            for line in lines.splitlines():
+                module = line.strip(" ,").split("::")[-2]
+                member = path.with_name(f"{module.split()[-1]}.rs").relative_to(crate.parent)
+                members[member.as_posix()] = path.relative_to(crate.parent).as_posix()
+    return members
 
 
 def rust_imports(crate: Path) -> dict[str, set[str]]:

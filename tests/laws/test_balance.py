@@ -17,9 +17,10 @@ import pytest
 from numpy.typing import NDArray
 
 import truepose
+from drive_kinds import formulas, is_strut
 from machine_under_test import MachineUnderTest
 from random_machines import DrawnMachine
-from reference_kinematics import rotation_of, rotation_of_quaternion, turned_about, unit
+from reference_kinematics import actual_coordinate, rotation_of, rotation_of_quaternion
 from truepose.machine import Condition, Machine, Strut
 from truepose.sources import Loads, PoseBlock
 
@@ -150,21 +151,20 @@ class Bodies:
     def base_side(self, at: int, strut: int) -> tuple[Floats, Floats]:
         """(3, 3) axes of what the base joint stands on, (3,) its velocity per speed of the drive.
 
-        Of a telescopic drive, which is in the strut: the strut's direction.
+        Of a drive that is the strut's length: the strut's direction.
         """
         name = self.machine.struts[strut].drive
         if name is None:
             return np.eye(3), np.zeros(3)
-        number = self.under_test.reference.index[name]
-        row = self.under_test.reference.drives[number]
-        if row["kind"] == "telescopic":
+        reference, joints = self.under_test.reference, self.block.joints[at]
+        number = reference.index[name]
+        drive, row = reference.drives[number], reference.struts[strut]
+        if is_strut(drive["kind"]):
             return np.eye(3), self.along[at, strut]
-        axis = unit(row["axis"])
-        if row["kind"] == "slider":
-            return np.eye(3), axis
-        turned = row.get("scale", 1.0) * self.block.joints[at, number] + row.get("offset", 0.0)
-        arm = self.block.centres[at, strut, 0] - np.array(row.get("origin", np.zeros(3)), float)
-        return turned_about(axis, turned), np.cross(axis, arm)
+        slopes = formulas(drive["kind"]).slopes(
+            drive, np.array(row["base"], float), actual_coordinate(drive, joints[number])
+        )
+        return reference.base_axes(row, joints), slopes["offset"]
 
 
 def wrench(force: Floats, arm: Floats) -> Floats:
@@ -226,7 +226,7 @@ def base_sides_balance(bodies: Bodies) -> None:
             if strut.drive is None:
                 continue
             number = machine.joints.index(strut.drive)
-            if machine.drives[number].kind != "telescopic":
+            if not is_strut(machine.drives[number].kind):
                 pull = pull + carriage
             held[at, number] += pull @ way
             sizes[at, number] += np.abs(pull) @ np.abs(way)
@@ -248,7 +248,7 @@ def limbs_give_way_by_what_they_carry(bodies: Bodies) -> None:
             own = resting.weights[k] @ resting.along[at, k]
             drive = next((one for one in machine.drives if one.name == strut.drive), None)
             foot, head = (softness(joint.stiffness) for joint in strut.joints)
-            if drive is not None and drive.kind == "telescopic":
+            if drive is not None and is_strut(drive.kind):
                 foot += softness(drive.held_stiffness)
             body = softness(strut.axial_stiffness(block.lengths[at, k]))
             parts = [

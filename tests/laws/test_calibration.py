@@ -65,7 +65,7 @@ def test_without_noise_the_truth_comes_back(case: CalibrationUnderTest) -> None:
     away = (case.truth(random) - unknowns.prior_mean) / equations.scale
     away -= equations.null_space.T @ (equations.null_space @ away)
     truth = unknowns.prior_mean + equations.scale * away
-    prior = Prior(equations.holding(), unknowns.prior_mean)
+    prior = Prior(equations.gauge_rows(), unknowns.prior_mean)
     solved = problem.solve(problem.predict(truth), prior=prior)
     # Tolerances are some ten micrometres wide: this is a millionth of them, or less.
     size = np.where(np.array(unknowns.units) == "m", case.machine.characteristic_length, 1.0)

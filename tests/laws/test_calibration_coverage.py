@@ -72,7 +72,7 @@ def test_intervals_without_priors_hold_the_truth_as_often_as_they_say() -> None:
     truth = unknowns.prior_mean + equations.scale * away
     read = np.array([problem.predict(values) for values in truth])
     read += problem.measurements.uncertainty * random.standard_normal(read.shape)
-    prior = Prior(equations.holding(), unknowns.prior_mean)
+    prior = Prior(equations.gauge_rows(), unknowns.prior_mean)
     solved = problem.solve(read, prior=prior)
     deviations = np.sqrt(np.diagonal(equations.covariance))
     seen = deviations > 1e-6 * equations.scale

@@ -3,7 +3,7 @@
 How far the tool goes along a direction for a unit of a parameter is the force that a unit load in
 that direction puts on the parameter (Pott & Hiller, "A new approach to error analysis in parallel
 kinematic structures", ARK 2004). The forces are found here as a mechanic would: members by the
-balance of the platform, then what each exerts on its joints, carriages, cranks and guides, dotted
+balance of the platform, then what each exerts on its joints, carriages, arms and guides, dotted
 with how a parameter moves that point. Geometry is the reference's, at the kernel's poses.
 """
 
@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from drive_kinds import formulas, is_strut
 from machine_under_test import OK, MachineUnderTest
-from reference_kinematics import rotation_of_quaternion, tangents, turned_about, unit
+from reference_kinematics import actual_coordinate, rotation_of_quaternion, tangents, unit
 
 Vector = NDArray[np.float64]
 
@@ -133,27 +134,18 @@ class Mechanics:
     def on_base(self, member: Member, force: Vector) -> dict[str, float]:
         """Loads on a base joint, and on the drive that has it, as the strut pulls with `force`."""
         row = member.row
-        at, axes = self.reference.base_joint(row, self.joints), AXES
+        axes = AXES
         found: dict[str, float] = {}
         drive = next((d for d in self.reference.drives if d["name"] == row["drive"]), None)
         if drive is not None:
-            name, coordinate = drive["name"], self.joints[self.reference.index[drive["name"]]]
-            moved = drive.get("scale", 1.0) * coordinate + drive.get("offset", 0.0)
-            if drive["kind"] == "telescopic":
-                along = -force @ member.force
-            else:
-                axis, origin = unit(drive["axis"]), np.array(drive.get("origin", np.zeros(3)))
-                if drive["kind"] == "slider":
-                    along = force @ axis
-                    tilts = [moved * way for way in tangents(axis)]
-                else:
-                    axes = turned_about(axis, moved)
-                    along = axis @ np.cross(at - origin, force)
-                    tilts = [tilted(axis, moved, row["base"], way) for way in tangents(axis)]
-                found |= named(f"drive.{name}.origin", "xyz", force)
-                found |= named(f"drive.{name}.axis", "uv", np.array(tilts) @ force)
-            found[f"drive.{name}.offset"] = float(along)
-            found[f"drive.{name}.scale"] = float(along * coordinate)
+            name, joint = drive["name"], self.joints[self.reference.index[drive["name"]]]
+            actual = actual_coordinate(drive, joint)
+            slopes = formulas(drive["kind"]).slopes(drive, np.array(row["base"], float), actual)
+            if is_strut(drive["kind"]):
+                slopes = {"offset": -member.force}
+            axes = self.reference.base_axes(row, self.joints)
+            found = {f"drive.{name}.{key}": float(force @ way) for key, way in slopes.items()}
+            found[f"drive.{name}.scale"] = found[f"drive.{name}.offset"] * joint
         return found | named(f"strut.{row['name']}.base", "xyz", force @ axes)
 
     def on_directions(self, member: Member, amount: float) -> dict[str, float]:
@@ -186,18 +178,6 @@ class Mechanics:
 def named(field: str, parts: str, values: Vector) -> dict[str, float]:
     """Values of a field's components by their names."""
     return {f"{field}.{part}": float(value) for part, value in zip(parts, values, strict=True)}
-
-
-def tilted(axis: Vector, angle: float, arm: Any, way: Vector) -> Vector:
-    """(3,) how `arm`, turned by `angle` about `axis`, moves as the axis tilts along `way`.
-
-    The change of Rodrigues' formula with its axis, which stays a unit vector.
-    """
-    reach = np.array(arm, float)
-    return np.asarray(
-        np.sin(angle) * np.cross(way, reach)
-        + (1 - np.cos(angle)) * (way * (axis @ reach) + axis * (way @ reach))
-    )
 
 
 def test_unit_wrenches_give_the_sensitivities(machine: MachineUnderTest) -> None:

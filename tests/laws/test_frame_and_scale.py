@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from build_machine import moved, scaled
+from drive_kinds import turns
 from machine_under_test import OK, MachineUnderTest
 from reference_kinematics import angles_of, rotation_by_vector, rotation_of_quaternion
 from sweeps import thinned
@@ -92,7 +93,7 @@ def test_all_lengths_times_k_gives_positions_times_k(
     other = _kernel.Machine(scaled(machine.description, factor))
     by_pose = np.array([factor if name in "xyz" else 1.0 for name in kernel.commanded])
     by_joint = np.array(
-        [1.0 if d["kind"] == "crank" else factor for d in machine.description["drives"]]
+        [1.0 if turns(d["kind"]) else factor for d in machine.description["drives"]]
     )
     found, found_placements, status = other.place(machine.poses * by_pose)
     assert (status == OK).all()

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from build_machine import deviated
+from drive_kinds import turns
 from machine_under_test import OK, MachineUnderTest
 from random_machines import DrawnMachine
 from reference_kinematics import Reference, rotation_of_quaternion, vector_of
@@ -70,7 +71,7 @@ def test_jac_pose_joint_is_the_central_difference(machine: MachineUnderTest) -> 
     assert jacobian.shape == (len(joints), len(kernel.components), len(kernel.joints))
     start = kernel.pose_of(placements)
     for j, drive in enumerate(machine.description["drives"]):
-        unit = 1.0 if drive["kind"] == "crank" else kernel.characteristic_length
+        unit = 1.0 if turns(drive["kind"]) else kernel.characteristic_length
         shift = np.zeros(joints.shape[1])
         shift[j] = STEP * unit
         after = kernel.placement_of(kernel.forward(joints + shift, start))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 import truepose
 from build_machine import MACHINES
+from drive_kinds import is_strut
 from machine_under_test import OK, MachineUnderTest
 from reference_kinematics import rotation_of_quaternion, vector_of
 from truepose import _kernel
@@ -40,7 +41,7 @@ def test_out_of_travel_still_has_its_joints(machine: MachineUnderTest) -> None:
     narrow = copy.deepcopy(machine.description)
     last = narrow["drives"][-1]
     middle = float(np.median(joints[:, -1]))
-    # No more than a crank's turn, for a crank is told in the turn that its travel has.
+    # No more than a turn, for a drive that turns is told in the turn that its travel has.
     last["travel"] = [middle, middle + 3.0]
     found, status = _kernel.Machine(narrow).inverse(machine.poses, status=True)
     outside = joints[:, -1] < middle
@@ -60,12 +61,8 @@ def leaning(machine: MachineUnderTest, strut: int, end: str, axis: NDArray) -> N
         rotation = rotation_of_quaternion(placement[3:])
         base = reference.base_joint(row, joints)
         along = reference.platform_joint(row, placement[:3], rotation) - base
-        if end == "platform":
-            carried = rotation @ axis
-        else:
-            # The axes of a carriage, a crank or the frame: where two points of it are.
-            ends = [reference.base_joint({**row, "base": at}, joints) for at in (axis, 0 * axis)]
-            carried = ends[0] - ends[1]
+        axes = rotation if end == "platform" else reference.base_axes(row, joints)
+        carried = axes @ axis
         angles.append(np.arccos(carried @ along / np.linalg.norm(carried) / np.linalg.norm(along)))
     return np.array(angles)
 
@@ -94,8 +91,8 @@ def test_far_away_is_not_reached(machine: MachineUnderTest) -> None:
     across = [name for name in "xy" if name in commanded] or ["z"]
     away[:, [commanded.index(name) for name in across]] += 50.0
     joints, status = machine.kernel.inverse(away, status=True)
-    telescopic = {drive["kind"] for drive in machine.description["drives"]} == {"telescopic"}
-    follows = telescopic or across == ["z"]
+    stretches = all(is_strut(drive["kind"]) for drive in machine.description["drives"])
+    follows = stretches or across == ["z"]
     tilts = any(guide["kind"] == "line" for guide in machine.description["guides"])
     if tilts:
         # The tube would have to lie level: the solution, if there is one, is far from home.

@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from build_machine import machine_files
+from drive_kinds import is_strut
+from machine_file import file_at, rows_of
 from random_machines import DrawnMachine
 from truepose.machine import Body, Condition, Drive, Machine
 from truepose.sources.thermal import Thermal
@@ -36,7 +38,7 @@ Floats = NDArray[np.float64]
 def of_one_material(machine: Machine, random: np.random.Generator, *, scales: bool) -> Machine:
     """Every part of one expansion and nothing but heat; anchors and bearings anywhere.
 
-    `scales`: telescopic struts are measured by a scale along them that grows, from where their
+    `scales`: struts that are drives are measured by a scale along them that grows, from where their
     length would be 0; else they are their own measure.
     """
     size = machine.characteristic_length
@@ -48,7 +50,7 @@ def of_one_material(machine: Machine, random: np.random.Generator, *, scales: bo
         return (x, y, z)
 
     def measured(drive: Drive) -> Drive:
-        if drive.kind == "telescopic":
+        if is_strut(drive.kind):
             return dataclasses.replace(drive, expansion=ALPHA if scales else None, fixed_at=None)
         first, last = drive.travel
         fixed = first + (last - first) * random.uniform(-1.0, 2.0)
@@ -57,13 +59,13 @@ def of_one_material(machine: Machine, random: np.random.Generator, *, scales: bo
         )
         return dataclasses.replace(drive, expansion=ALPHA, fixed_at=fixed, carriage=made_of)
 
-    telescopic = {drive.name for drive in machine.drives if drive.kind == "telescopic"}
+    stretching = {drive.name for drive in machine.drives if is_strut(drive.kind)}
     return dataclasses.replace(
         machine,
         drives=tuple(map(measured, machine.drives)),
         struts=tuple(
             dataclasses.replace(
-                strut, expansion=0.0 if scales and strut.drive in telescopic else ALPHA
+                strut, expansion=0.0 if scales and strut.drive in stretching else ALPHA
             )
             for strut in machine.struts
         ),
@@ -133,7 +135,11 @@ def test_a_warm_machine_of_one_material_is_a_larger_one(path: Path) -> None:
 
 @pytest.mark.parametrize(
     "path",
-    [path for path in machine_files() if '"telescopic"' in path.read_text(encoding="utf-8")],
+    [
+        path
+        for path in machine_files()
+        if any(is_strut(row["kind"]) for row in rows_of(file_at(path), "drive"))
+    ],
     ids=lambda path: path.stem,
 )
 def test_it_is_where_scales_measure_the_telescopic_struts(path: Path) -> None:

@@ -6,6 +6,7 @@ import copy
 
 import numpy as np
 
+from drive_kinds import is_strut, turns
 from machine_under_test import OK, MachineUnderTest
 from reference_kinematics import Reference
 from truepose import _kernel
@@ -18,13 +19,13 @@ def test_the_other_working_mode_is_the_other_root(machine: MachineUnderTest) -> 
     other = copy.deepcopy(machine.description)
     for drive in other["drives"]:
         drive["working_mode"] = OTHER[drive["working_mode"]]
-        drive["travel"] = [-np.pi, np.pi] if drive["kind"] == "crank" else [-10.0, 10.0]
+        drive["travel"] = [-np.pi, np.pi] if turns(drive["kind"]) else [-10.0, 10.0]
     for strut in other["struts"]:
         # Nor do its joints let a strut lean the other way.
         for end in ("base", "platform"):
             strut.pop(f"{end}_angle_limit", None)
     kernel, reference = _kernel.Machine(other), Reference(other)
-    telescopic = all(drive["kind"] == "telescopic" for drive in other["drives"])
+    one_root = all(is_strut(drive["kind"]) for drive in other["drives"])
     joints, status = kernel.inverse(machine.poses, status=True)
     assert (status == OK).any()
     for pose, found, code in zip(machine.poses, joints, status, strict=True):
@@ -33,14 +34,14 @@ def test_the_other_working_mode_is_the_other_root(machine: MachineUnderTest) -> 
             expected, _, _ = reference.inverse(pose)
             assert np.abs(turned_alike(other, found, expected)).max() < CLOSED
     difference = np.abs(joints[status == OK] - machine.placed[0][status == OK]).max()
-    assert telescopic or difference > 0.1
+    assert one_root or difference > 0.1
 
 
 def turned_alike(description: dict, found: np.ndarray, expected: np.ndarray) -> np.ndarray:
-    """(n_joint,) difference, cranks' to whole turns."""
+    """(n_joint,) difference, of drives that turn to whole turns."""
     difference = found - expected
     for j, drive in enumerate(description["drives"]):
-        if drive["kind"] == "crank":
+        if turns(drive["kind"]):
             turn = 2 * np.pi / drive["scale"]
             difference[j] -= turn * np.round(difference[j] / turn)
     return difference

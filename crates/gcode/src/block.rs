@@ -134,7 +134,7 @@ impl Block {
         let word = &words[index];
         let code = codes::g_code(word.value).map_err(|why| not_taken(word, why))?;
         let group = code.group();
-        // G80 beside a motion code says nothing, and twice no more than once.
+        // G80 beside a motion code has no effect, and twice is the same as once.
         if self.of_group[group] != 0 && code != GCode::NoMotion {
             let other = &words[usize::from(self.of_group[group]) - 1];
             return Err(same_group(word, 'G', other.value));
@@ -244,7 +244,7 @@ impl Block {
         }
     }
 
-    /// Whether a code other than an arc takes the letter.
+    /// Whether a code that is not an arc takes the letter.
     pub fn taken_elsewhere(&self, letter: u8) -> bool {
         self.m_codes.iter().flatten().any(|(code, _)| code.letters.contains(&letter))
             || (letter == b'P' && (self.once == Some(GCode::Dwell) || self.path_blending))

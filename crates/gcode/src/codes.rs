@@ -2,7 +2,7 @@
 
 use crate::settings::Units;
 
-/// What a G code says. Numbers stand times ten: 911 is G91.1.
+/// The meaning of a G code. Numbers are multiplied by ten: 911 is G91.1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GCode {
     Motion(Motion),

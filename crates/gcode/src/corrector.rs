@@ -1,4 +1,4 @@
-//! A program read in batches of moves and written anew with their corrected pieces.
+//! A program read in batches of moves and rewritten with their corrected pieces.
 
 use std::io::{Read, Write};
 use std::ops::Range;
@@ -29,7 +29,7 @@ struct Pending {
     motions: crate::interpreter::Motions,
 }
 
-/// Untouched text, and what it does to the controller's state.
+/// Unchanged text, and its effect on the controller's state.
 #[derive(Clone)]
 struct Before {
     text: Range<usize>,
@@ -44,7 +44,7 @@ impl Before {
     }
 }
 
-/// Writes a program anew: everything in place and in order, moves corrected and divided.
+/// Rewrites a program: everything in place and in order, moves corrected and divided.
 ///
 /// [`read`](Self::read) a batch of moves, [`write`](Self::write) their pieces, until `read` finds
 /// none; then [`finish`](Self::finish).
@@ -85,7 +85,7 @@ impl<R: Read, W: Write> Corrector<R, W> {
     ///
     /// # Errors
     ///
-    /// What the program says cannot be interpreted exactly, or a file cannot be read or written.
+    /// The program cannot be interpreted exactly, or a file cannot be read or written.
     pub fn read(&mut self, most: usize) -> Result<&[Move], Error> {
         if !self.pending.is_empty() {
             return Err(Error::Call("the moves read before have not been written"));
@@ -156,7 +156,7 @@ impl<R: Read, W: Write> Corrector<R, W> {
         Ok(())
     }
 
-    /// Writes what is left of the program, which moves nothing, and gives the output back.
+    /// Writes the rest of the program, which moves nothing, and returns the output.
     ///
     /// # Errors
     ///

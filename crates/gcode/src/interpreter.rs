@@ -37,7 +37,7 @@ pub struct Feed {
     pub units: Option<Units>,
 }
 
-/// What a line does to the position, and what its writing anew has to know.
+/// The effect of a line on the position, and what is needed to rewrite it.
 #[derive(Clone, Debug)]
 pub struct Motions {
     pub motion: Move,

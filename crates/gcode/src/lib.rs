@@ -1,6 +1,6 @@
 //! RS-274/NGC programs as LinuxCNC 2.9 reads them.
 //!
-//! [`Reader`] gives the moves of a program, [`Corrector`] writes the program anew with corrected
+//! [`Reader`] gives the moves of a program, [`Corrector`] rewrites the program with corrected
 //! and divided moves, everything else in place and untouched. Both stream: memory does not grow with
 //! the file. What cannot be interpreted exactly is refused with line and column, never guessed.
 //!

@@ -19,7 +19,7 @@ pub struct Lines<R> {
 pub enum Next {
     /// A line with its end; the last one may have none.
     Line(std::ops::Range<usize>),
-    /// The beginning of a line that is longer than asked for.
+    /// The beginning of a line that is longer than the limit.
     TooLong(std::ops::Range<usize>),
     /// Nothing.
     End,
@@ -68,7 +68,7 @@ impl<R: Read> Lines<R> {
         Ok(&self.buffer[rest])
     }
 
-    /// Moves what is waiting to the front and reads on behind it.
+    /// Moves the unread bytes to the front and reads more behind them.
     fn fill(&mut self) -> io::Result<()> {
         self.buffer.copy_within(self.start..self.end, 0);
         self.end -= self.start;

@@ -25,7 +25,7 @@ impl<R: Read> Reader<R> {
     ///
     /// # Errors
     ///
-    /// What the program says cannot be interpreted exactly, or the input cannot be read.
+    /// The program cannot be interpreted exactly, or the input cannot be read.
     pub fn next_move(&mut self) -> Result<Option<Move>, Error> {
         while !self.interpreter.ended() {
             let action = match self.lines.next(LONGEST_LINE)? {

@@ -1,4 +1,4 @@
-//! One block written anew: in place where that is possible, in several lines where it must be.
+//! One block rewritten: in place where that is possible, else in several lines.
 
 use crate::block::{Block, LARGEST};
 use crate::codes::{FeedMode, Motion};
@@ -32,7 +32,7 @@ const FEED_DIGITS: u32 = 9;
 /// A difference beyond half the last decimal, and beyond the rounding of computing it, counts.
 const HALF: f64 = 0.5 + 1e-6;
 
-/// The block to be written and what it did.
+/// The block to be written and its effect.
 pub struct Source<'a> {
     pub line: &'a [u8],
     pub words: &'a [Word],
@@ -173,7 +173,7 @@ impl Writer {
         }
     }
 
-    /// What has to be done with the block; `None` where it can stay as it is.
+    /// How the block has to be changed; `None` where it can stay as it is.
     fn plan(&self, source: &Source<'_>, points: &[Position]) -> LineResult<Option<Plan>> {
         let Motions { motion, frame, code, feed, reference } = source.motions;
         let named = named_axes(source.words);

@@ -2,7 +2,7 @@
 //!
 //! A machine is a platform pose `X`, joint coordinates `q`, parameters `p` and closures
 //! `g(X, q, p) = 0`; everything else follows from the closures (`ARCHITECTURE.md` in the
-//! repository's root tells the whole way). Pure mathematics: no files, no Python, no clock.
+//! repository's root has the whole way). Pure mathematics: no files, no Python, no clock.
 //! SI units, radians; vectors and wrenches along the base axes, linear part first.
 
 pub mod batch;

@@ -77,14 +77,14 @@ fn no_vertex_of_a_thousand_sets_is_longer() {
             ..Set::default()
         };
         let truth = longest_vertex(&set, components);
-        for found in [
+        for largest in [
             search.farthest::<f64>(&set),
             search.farthest::<truepose_kernel::scalar::Lanes<1>>(&set),
         ] {
-            assert!(found.length >= truth * (1.0 - 1e-12), "case {case}: {found:?} {truth}");
-            assert!(found.length <= truth * (1.0 + 1e-3), "case {case}: {found:?} {truth}");
-            assert!(found.reached <= truth * (1.0 + 1e-12), "case {case}: {found:?} {truth}");
-            climbed += usize::from(found.reached >= truth * (1.0 - 1e-9));
+            assert!(largest.length >= truth * (1.0 - 1e-12), "case {case}: {largest:?} {truth}");
+            assert!(largest.length <= truth * (1.0 + 1e-3), "case {case}: {largest:?} {truth}");
+            assert!(largest.reached <= truth * (1.0 + 1e-12), "case {case}: {largest:?} {truth}");
+            climbed += usize::from(largest.reached >= truth * (1.0 - 1e-9));
         }
     }
     // What is reached is the longest itself: the cones have the climbs begin everywhere that matters.
@@ -141,10 +141,10 @@ fn with_ellipsoids_it_is_that_of_brute_force() {
             }
             truth = truth.max(value);
         }
-        let found = search.farthest::<f64>(&set);
-        assert!(found.length >= truth * (1.0 - 1e-12), "case {case}: {found:?} {truth}");
-        assert!(found.length <= truth * (1.0 + 1e-3), "case {case}: {found:?} {truth}");
-        assert!(found.reached <= found.length);
+        let largest = search.farthest::<f64>(&set);
+        assert!(largest.length >= truth * (1.0 - 1e-12), "case {case}: {largest:?} {truth}");
+        assert!(largest.length <= truth * (1.0 + 1e-3), "case {case}: {largest:?} {truth}");
+        assert!(largest.reached <= largest.length);
     }
 }
 
@@ -153,9 +153,9 @@ fn a_ball_is_as_far_as_its_radius_within_the_stated_gap() {
     let axes = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let mut set = Set { axes, ..Set::default() };
     set.ellipsoids.push(0..3);
-    let found = Search::default().farthest::<f64>(&set);
-    assert!(found.length >= 1.0 && found.length <= 1.0 + STATED, "{found:?}");
-    assert!((found.reached - 1.0).abs() < 1e-12);
+    let largest = Search::default().farthest::<f64>(&set);
+    assert!(largest.length >= 1.0 && largest.length <= 1.0 + STATED, "{largest:?}");
+    assert!((largest.reached - 1.0).abs() < 1e-12);
 }
 
 #[test]
@@ -165,8 +165,8 @@ fn a_point_a_line_and_what_is_no_number() {
     assert_eq!(search.farthest::<f64>(&point).length, 5.0);
     assert_eq!(search.farthest::<f64>(&Set::default()).length, 0.0);
     let line = Set { centre: [-1.0, 0.0, 0.0], segments: vec![[2.0, 0.0, 0.0]], ..Set::default() };
-    let found = search.farthest::<f64>(&line);
-    assert!((found.length - 3.0).abs() < 1e-14 && found.direction[0] < 0.0, "{found:?}");
+    let largest = search.farthest::<f64>(&line);
+    assert!((largest.length - 3.0).abs() < 1e-14 && largest.direction[0] < 0.0, "{largest:?}");
     for wrong in [f64::NAN, f64::INFINITY] {
         let set = Set { segments: vec![[1.0, wrong, 0.0]], ..Set::default() };
         assert!(search.farthest::<f64>(&set).length.is_nan());

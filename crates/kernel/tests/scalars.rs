@@ -2,8 +2,8 @@
 
 use std::path::Path;
 use std::process::Command;
-use truepose_kernel::element::guide::{GuideFrames, GuideKind, GuideLimb};
-use truepose_kernel::element::{Direction, DriveKind, strut};
+use truepose_kernel::element::guide::{GuideFrames, GuideLimb};
+use truepose_kernel::element::{Direction, DriveKind, GuideKind, ParameterGradient, strut};
 use truepose_kernel::scalar::{Dual, Interval, LANES, Lanes, Scalar, Tape, Trace};
 use truepose_kernel::spatial::{quaternion_from_euler, rotation_matrix};
 
@@ -116,18 +116,18 @@ fn the_gradient_that_kinematics_uses_is_the_dual_one() {
             let dual: [Dual<f64, INPUTS>; INPUTS] =
                 std::array::from_fn(|i| Dual::variable(x[i], i));
             let expected = residual(Closure::Driven(kind), &frame(), &dual).parts;
-            let mut places = [0.0; truepose_kernel::element::PLACES];
+            let mut slots = ParameterGradient::default();
             let points = [[x[0], x[1], x[2]], [x[3], x[4], x[5]]];
-            let gradient = kind.gradient(&frame(), &x[7..14], x[14], points, x[6], &mut places);
-            let found: Vec<f64> = places[..3]
+            let gradient = kind.gradient(&frame(), &x[7..14], x[14], points, x[6], &mut slots);
+            let derivatives: Vec<f64> = slots[..3]
                 .iter()
                 .chain(&gradient.centre)
-                .chain(&places[6..14])
+                .chain(&slots[6..14])
                 .chain([&gradient.joint])
                 .copied()
                 .collect();
             for i in 0..INPUTS {
-                assert!((found[i] - expected[i]).abs() < 1e-14, "{kind:?} input {i}");
+                assert!((derivatives[i] - expected[i]).abs() < 1e-14, "{kind:?} input {i}");
             }
         }
     }
@@ -196,8 +196,11 @@ fn a_traced_closure_prints_c_that_equals_f64() {
         assert_eq!(lines.lines().count(), many.len());
         for (line, x) in lines.lines().zip(&many) {
             let expected = residual(kind, &frame(), x);
-            let found = hexadecimal(line);
-            assert!((found - expected).abs() <= 2.0 * f64::EPSILON, "{kind:?}: {line} {expected}");
+            let printed = hexadecimal(line);
+            assert!(
+                (printed - expected).abs() <= 2.0 * f64::EPSILON,
+                "{kind:?}: {line} {expected}"
+            );
         }
     }
 }

@@ -4,6 +4,7 @@ use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethod
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
+use pyo3::types::PyDict;
 use truepose_kernel::batch::Rows;
 
 /// An array of results.
@@ -18,12 +19,14 @@ pub struct Input<'py> {
     pub width: usize,
     /// Product of `leading`.
     pub count: usize,
+    /// The argument's name in messages.
+    what: &'static str,
 }
 
 impl<'py> Input<'py> {
     /// From anything that NumPy takes for a real array. `widths` lists the last dimensions that are
     /// allowed; `what` names the argument and its last dimension in messages.
-    pub fn new(object: &Bound<'py, PyAny>, widths: &[usize], what: &str) -> PyResult<Self> {
+    pub fn new(object: &Bound<'py, PyAny>, widths: &[usize], what: &'static str) -> PyResult<Self> {
         let array = contiguous(object, what)?;
         let shape = array.shape();
         let Some((&width, leading)) = shape.split_last() else {
@@ -39,7 +42,7 @@ impl<'py> Input<'py> {
             return Err(PyValueError::new_err(message));
         }
         let (leading, count) = (leading.to_vec(), leading.iter().product());
-        Ok(Input { array, leading, width, count })
+        Ok(Input { array, leading, width, count, what })
     }
 
     /// The numbers, row after row.
@@ -52,29 +55,23 @@ impl<'py> Input<'py> {
         self.count == 1
     }
 
-    /// The rows from `first` on, or the single row for all samples where `shared`.
-    pub fn rows(&self, first: usize, shared: bool) -> Rows<'_> {
-        if shared {
-            Rows::shared(&self.data()[..self.width])
+    /// A row for each of `count` samples, or one row for all.
+    pub fn rows(&self, count: usize) -> PyResult<Rows<'_>> {
+        if self.count == 1 {
+            Ok(Rows::shared(self.data()))
+        } else if self.count == count {
+            Ok(Rows::each(self.data(), self.width))
         } else {
-            Rows::each(&self.data()[first * self.width..], self.width)
+            let (what, found) = (self.what, self.count);
+            let message =
+                format!("{what}: found {found} rows for {count} samples, expected {count} or 1");
+            Err(PyValueError::new_err(message))
         }
     }
 
-    /// Checks that there is a row for each of `count` samples, or one for all; returns whether one
-    /// serves all.
-    pub fn serves(&self, count: usize, what: &str) -> PyResult<bool> {
-        if self.count == count && count != 1 {
-            Ok(false)
-        } else if self.count == 1 {
-            Ok(true)
-        } else {
-            let message = format!(
-                "{what}: found {} rows for {count} samples, expected {count} or 1",
-                self.count
-            );
-            Err(PyValueError::new_err(message))
-        }
+    /// The same of an argument that may have no columns, of which any number of rows will do.
+    pub fn rows_if_any(&self, count: usize) -> PyResult<Rows<'_>> {
+        if self.width == 0 { Ok(Rows::shared(&[])) } else { self.rows(count) }
     }
 }
 
@@ -113,11 +110,7 @@ fn contiguous<'py>(
 const LARGE: usize = 4096;
 
 /// A new array of the leading shape and further dimensions, to be written whole.
-pub fn output<'py>(
-    py: Python<'py>,
-    leading: &[usize],
-    further: &[usize],
-) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+pub fn output<'py>(py: Python<'py>, leading: &[usize], further: &[usize]) -> PyResult<Array<'py>> {
     let shape: Vec<usize> = leading.iter().chain(further).copied().collect();
     if shape.iter().product::<usize>() < LARGE {
         return Ok(PyArrayDyn::zeros(py, shape, false));
@@ -125,4 +118,27 @@ pub fn output<'py>(
     static EMPTY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let empty = EMPTY.import(py, "numpy", "empty")?;
     Ok(empty.call1((shape,))?.cast_into::<PyArrayDyn<f64>>()?)
+}
+
+/// A new array of these numbers.
+pub fn filled<'py>(
+    py: Python<'py>,
+    leading: &[usize],
+    further: &[usize],
+    numbers: &[f64],
+) -> PyResult<Array<'py>> {
+    let out = output(py, leading, further)?;
+    out.readwrite().as_slice_mut()?.copy_from_slice(numbers);
+    Ok(out)
+}
+
+/// A value that a dict must have; `of` is what the dict describes.
+pub fn required<'py, T>(entry: &Bound<'py, PyDict>, of: &str, key: &str) -> PyResult<T>
+where
+    T: FromPyObjectOwned<'py>,
+{
+    match entry.get_item(key)? {
+        Some(value) => value.extract().map_err(Into::into),
+        None => Err(PyValueError::new_err(format!("{of} has no {key:?}"))),
+    }
 }

@@ -1,18 +1,19 @@
 //! The machine's further methods on blocks: two-dimensional arrays, a status per sample, nothing raised for
 //! a pose.
 
-use crate::arrays::{Array, Input, output};
-use crate::evaluate::{BLOCK, Quantity, codes, in_blocks, part};
+use crate::arrays::{Array, Input, filled, output};
 use crate::machine::Machine;
+use crate::quantity::Quantity;
+use crate::samples::{BLOCK, codes, in_blocks_into, with_codes};
 use numpy::PyArrayMethods;
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use truepose_kernel::Status;
 use truepose_kernel::batch::{self, Deviations, Samples};
-use truepose_kernel::kinematics::{self, Obstacle, Sample, Surroundings};
-use truepose_kernel::machine::chosen;
-use truepose_kernel::spatial::{Pose, rotate, rotation_matrix};
+use truepose_kernel::kinematics::{self, Loads, Obstacle, Sample};
+use truepose_kernel::machine::indices_of;
+use truepose_kernel::spatial::{Pose, add, rotation_matrix};
 
 #[pymethods]
 impl Machine {
@@ -28,24 +29,19 @@ impl Machine {
         values: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let (columns, moved) = (self.columns(columns)?, self.columns(moved)?);
-        let joints = Input::new(joints, &[self.inner.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
+        let posed = self.posed(joints, placements)?;
         let values = Input::new(values, &[moved.len()], "values")?;
-        let count = placements.count;
-        let shared = moved.is_empty() || values.serves(count, "values")?;
+        let count = posed.placements.count;
+        let values = values.rows_if_any(count)?;
+        let samples =
+            Samples { deviations: Deviations { columns: &moved, values }, ..posed.samples(count)? };
         let out = output(py, &[count], &[self.components(), columns.len()])?;
         let status = {
             let mut writable = out.readwrite();
             let data = writable.as_slice_mut()?;
-            let samples = Samples {
-                count,
-                joints: joints.rows(0, joints.serves(count, "joints")?),
-                poses: placements.rows(0, count == 1),
-                deviations: Deviations { columns: &moved, values: values.rows(0, shared) },
-            };
             py.detach(|| batch::moved_sensitivities(&self.inner, &samples, &columns, data))
         };
-        (out, codes(py, &[count], &status)?).into_bound_py_any(py)
+        with_codes(py, out, &status)
     }
 
     /// Loads (n, k) on parameters from forces (n or 1, 3 n_strut), N, base axes, that act on the base-side
@@ -59,33 +55,16 @@ impl Machine {
         columns: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
         let machine = &self.inner;
-        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
+        let posed = self.posed(joints, placements)?;
         let forces = Input::new(forces, &[3 * machine.struts.len()], "forces")?;
         let columns = self.columns(columns)?;
-        let count = joints.count.max(placements.count).max(forces.count);
-        let shared_joints = joints.serves(count, "joints")?;
-        let shared_poses = placements.serves(count, "placements")?;
-        let shared_forces = forces.serves(count, "forces")?;
-        let width = columns.len();
-        let out = output(py, &[count], &[width])?;
-        {
-            let mut writable = out.readwrite();
-            let data = writable.as_slice_mut()?;
-            let (q, x, f) = (joints.data(), placements.data(), forces.data());
-            in_blocks(py, count, |first, size| {
-                let samples = Samples {
-                    count: size,
-                    joints: part(q, machine.drives.len(), first, shared_joints),
-                    poses: part(x, 7, first, shared_poses),
-                    deviations: Deviations::NONE,
-                };
-                let forces = part(f, 3 * machine.struts.len(), first, shared_forces);
-                let out = &mut data[first * width..(first + size) * width];
-                batch::base_loads(machine, &samples, &forces, &columns, out);
-            })?;
-        }
-        Ok(out)
+        let count = posed.count(forces.count);
+        let samples = posed.samples(count)?;
+        let forces = forces.rows(count)?;
+        in_blocks_into(py, &[count], &[columns.len()], |first, size, out| {
+            let (samples, forces) = (samples.part(first, size), forces.starting_at(first));
+            batch::base_loads(machine, &samples, &forces, &columns, out);
+        })
     }
 
     /// (forces (n, n_closure, k), status): what unit deviations of parameters strain in a machine with more
@@ -98,9 +77,9 @@ impl Machine {
         columns: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let columns = self.columns(columns)?;
-        let further = [self.inner.closure_count(), columns.len()];
-        self.at_placements(py, joints, placements, None, &further, |_, _| {
-            Quantity::InternalForces(batch::InternalForces::new(&self.inner, &columns))
+        let (machine, further) = (&self.inner, [self.inner.closure_count(), columns.len()]);
+        self.at_placements(py, joints, placements, None, &further, |_| {
+            Quantity::InternalForces(batch::InternalForces::new(machine, &columns))
         })
     }
 
@@ -120,27 +99,20 @@ impl Machine {
     ) -> PyResult<Bound<'py, PyAny>> {
         let machine = &self.inner;
         let closures = machine.closure_count();
-        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
+        let posed = self.posed(joints, placements)?;
         let columns = self.columns(columns)?;
         let values = Input::new(values, &[columns.len()], "values")?;
         let clearances = Input::new(clearances, &[closures], "clearances")?;
         let wrenches = Input::new(wrenches, &[6], "wrenches")?;
-        let count = joints.count;
-        let shared = |input: &Input<'_>, what| input.serves(count, what);
-        let starts = placements.rows(0, shared(&placements, "placements")?);
-        let values = values.rows(0, shared(&values, "values")?);
-        let gaps = clearances.rows(0, shared(&clearances, "clearances")?);
-        let wrenches = wrenches.rows(0, shared(&wrenches, "wrenches")?);
-        let commands = joints.rows(0, false);
-        let components = chosen(&machine.dof);
-        let errors = output(py, &[count], &[components.len()])?;
-        let tables = [
-            output(py, &[count], &[closures])?,
-            output(py, &[count], &[closures])?,
-            output(py, &[count], &[closures])?,
-        ];
+        let count = posed.joints.count;
+        let Samples { joints: commands, poses: starts, .. } = posed.samples(count)?;
+        let values = values.rows(count)?;
+        let clearances = clearances.rows(count)?;
+        let wrenches = wrenches.rows(count)?;
+        let components = indices_of(&machine.dof);
         let mut status = vec![Status::Ok; count];
+        let mut errors = vec![f64::NAN; count * components.len()];
+        let mut tables = [(); 3].map(|()| vec![f64::NAN; count * closures]);
         for (i, status) in status.iter_mut().enumerate() {
             let mut p = machine.nominal.clone();
             for (&column, value) in columns.iter().zip(values.row(i)) {
@@ -148,34 +120,30 @@ impl Machine {
             }
             let limbs = kinematics::limbs(machine, &p, commands.row(i));
             let start = Pose::from_row(starts.row(i));
-            let mut surroundings = Surroundings::default();
-            surroundings.clearance[..closures].copy_from_slice(gaps.row(i));
-            surroundings.wrench.copy_from_slice(wrenches.row(i));
+            let mut loads = Loads::default();
+            loads.clearance[..closures].copy_from_slice(clearances.row(i));
+            loads.wrench.copy_from_slice(wrenches.row(i));
             let sample = Sample { machine, p: &p, limbs: &limbs };
-            let settled = kinematics::least_energy(&sample, commands.row(i), &start, &surroundings);
-            *status = settled.status;
-            let solved = settled.status == Status::Ok;
-            let error = batch::displacement(&start, &settled.pose);
-            let row = components.iter().map(|&k| error[k]);
-            let keep = |value: f64| if solved { value } else { f64::NAN };
-            for (cell, value) in
-                errors.readwrite().as_slice_mut()?[i * components.len()..].iter_mut().zip(row)
-            {
-                *cell = keep(value);
-            }
-            let found = [settled.forces, settled.absorbed, settled.strain];
-            for (table, found) in tables.iter().zip(found) {
-                let mut writable = table.readwrite();
-                let cells = &mut writable.as_slice_mut()?[i * closures..(i + 1) * closures];
-                for (cell, value) in cells.iter_mut().zip(found) {
-                    *cell = keep(value);
+            let equilibrium = kinematics::least_energy(&sample, commands.row(i), &start, &loads);
+            *status = equilibrium.status;
+            if equilibrium.status == Status::Ok {
+                let error = batch::displacement(&start, &equilibrium.pose);
+                for (cell, &k) in errors[i * components.len()..].iter_mut().zip(&components) {
+                    *cell = error[k];
+                }
+                let rows = [equilibrium.forces, equilibrium.absorbed, equilibrium.strain];
+                for (table, row) in tables.iter_mut().zip(rows) {
+                    table[i * closures..(i + 1) * closures].copy_from_slice(&row[..closures]);
                 }
             }
             if i % BLOCK == 0 {
                 py.check_signals()?;
             }
         }
-        let [forces, absorbed, strain] = tables;
+        let errors = filled(py, &[count], &[components.len()], &errors)?;
+        let table = |numbers: &[f64]| filled(py, &[count], &[closures], numbers);
+        let [forces, absorbed, strain] = &tables;
+        let (forces, absorbed, strain) = (table(forces)?, table(absorbed)?, table(strain)?);
         (errors, forces, absorbed, strain, codes(py, &[count], &status)?).into_bound_py_any(py)
     }
 
@@ -187,35 +155,22 @@ impl Machine {
         placements: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
         let machine = &self.inner;
-        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
-        let shared = joints.serves(placements.count, "joints")?;
+        let posed = self.posed(joints, placements)?;
+        let samples = posed.of_placements()?;
         let width = machine.struts.len();
-        let out = output(py, &[placements.count], &[width, 2, 3])?;
-        {
-            let mut writable = out.readwrite();
-            for (i, cell) in writable.as_slice_mut()?.chunks_exact_mut(6 * width).enumerate() {
-                let limbs =
-                    kinematics::limbs(machine, &machine.nominal, joints.rows(0, shared).row(i));
-                let pose = Pose::from_row(&placements.data()[7 * i..7 * i + 7]);
+        in_blocks_into(py, &[samples.count], &[width, 2, 3], |first, _, out| {
+            for (i, cell) in (first..).zip(out.chunks_exact_mut(6 * width)) {
+                let limbs = kinematics::limbs(machine, &machine.nominal, samples.joints.row(i));
+                let pose = Pose::from_row(samples.poses.row(i));
                 let rotation = rotation_matrix(pose.rotation);
                 let struts = machine.struts.iter().zip(&limbs);
                 for (cell, (strut, limb)) in cell.chunks_exact_mut(6).zip(struts) {
-                    let arm = match &strut.ring {
-                        None => rotate(&rotation, limb.arm),
-                        Some(ring) => {
-                            let radius = machine.nominal[ring.radius];
-                            kinematics::ring_arm(ring, radius, limb, &rotation, pose.position).0
-                        }
-                    };
-                    for k in 0..3 {
-                        cell[k] = limb.base[k];
-                        cell[3 + k] = arm[k] + pose.position[k];
-                    }
+                    let arm = limb.turned_arm(strut, &machine.nominal, &rotation, pose.position);
+                    cell[..3].copy_from_slice(&limb.base);
+                    cell[3..].copy_from_slice(&add(arm, pose.position));
                 }
             }
-        }
-        Ok(out)
+        })
     }
 
     /// The twists (k, 6) of the platform about its tool point that nothing holds at one commanded pose,
@@ -236,9 +191,7 @@ impl Machine {
             return Ok(None);
         }
         let free = kinematics::free_motions(machine, &machine.nominal, &joints, &placed);
-        let out = output(py, &[free.len()], &[6])?;
-        out.readwrite().as_slice_mut()?.copy_from_slice(&free.concat());
-        Ok(Some(out))
+        filled(py, &[free.len()], &[6], &free.concat()).map(Some)
     }
 
     /// What keeps one commanded pose from being used: a list of dicts (what, name, amount, unit).

@@ -39,42 +39,43 @@ impl Machine {
             per_kelvin: per_kelvin.into_iter().map(terms).collect::<PyResult<_>>()?,
             compliance: terms(compliance)?,
         };
-        let found = PyDict::new(py);
+        let functions = PyDict::new(py);
         for function in code::functions(&self.inner, &shifts) {
             let parts = (function.arguments, function.body, function.values);
-            found.set_item(function.name, parts)?;
+            functions.set_item(function.name, parts)?;
         }
-        Ok(found)
+        Ok(functions)
     }
 
     /// What the program round the formulas reads beside parameters: see the stub file.
     #[getter]
     fn control<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let inner = &self.inner;
-        let found = PyDict::new(py);
-        found.set_item("home", inner.home.to_coordinates())?;
-        found.set_item("dof", inner.dof)?;
-        found.set_item("commanded", inner.commanded)?;
-        found.set_item("travel", inner.drives.iter().map(|d| d.travel).collect::<Vec<_>>())?;
+        let control = PyDict::new(py);
+        control.set_item("home", inner.home.to_coordinates())?;
+        control.set_item("dof", inner.dof)?;
+        control.set_item("commanded", inner.commanded)?;
+        control.set_item("travel", inner.drives.iter().map(|d| d.travel).collect::<Vec<_>>())?;
         let turns = |drive: &truepose_kernel::machine::MachineDrive| {
             drive.kind.table().coordinate == truepose_kernel::element::Dimension::Angle
         };
-        found.set_item("turns", inner.drives.iter().map(turns).collect::<Vec<_>>())?;
-        found.set_item("scale", inner.drives.iter().map(|d| d.scale).collect::<Vec<_>>())?;
-        found.set_item(
+        control.set_item("turns", inner.drives.iter().map(turns).collect::<Vec<_>>())?;
+        control.set_item("scale", inner.drives.iter().map(|d| d.scale).collect::<Vec<_>>())?;
+        control.set_item(
             "first_strut",
             inner.drives.iter().map(|d| d.struts[0]).collect::<Vec<_>>(),
         )?;
-        found.set_item("strut_drive", inner.struts.iter().map(|s| s.drive).collect::<Vec<_>>())?;
-        found.set_item("closures", inner.closure_count())?;
-        found.set_item("carrying", inner.carrying().collect::<Vec<_>>())?;
-        found.set_item(
+        control
+            .set_item("strut_drive", inner.struts.iter().map(|s| s.drive).collect::<Vec<_>>())?;
+        control.set_item("closures", inner.closure_count())?;
+        control.set_item("carrying", inner.carrying().collect::<Vec<_>>())?;
+        control.set_item(
             "strut_drives",
             inner.drives.iter().map(|d| d.struts.clone()).collect::<Vec<_>>(),
         )?;
-        found.set_item("regularity_scale", inner.regularity_scale)?;
+        control.set_item("regularity_scale", inner.regularity_scale)?;
         let limits = inner.struts.iter().flat_map(|strut| strut.limits).flatten();
-        found.set_item("joint_limits", limits.count())?;
-        Ok(found)
+        control.set_item("joint_limits", limits.count())?;
+        Ok(control)
     }
 }

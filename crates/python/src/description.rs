@@ -4,8 +4,7 @@ use crate::failure::KernelError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
-use truepose_kernel::element::guide::GuideKind;
-use truepose_kernel::element::{DriveKind, Field};
+use truepose_kernel::element::{DriveKind, Field, GuideKind};
 use truepose_kernel::machine::{FREEDOMS, JointLimit};
 use truepose_kernel::{Description, DriveDescription, GuideDescription, StrutDescription};
 
@@ -72,15 +71,15 @@ fn element_fields(
     table: &Bound<'_, PyDict>,
     fields: &[Field],
 ) -> PyResult<BTreeMap<String, Vec<f64>>> {
-    let mut found = BTreeMap::new();
+    let mut given = BTreeMap::new();
     for field in fields {
         if let Some(value) = optional(table, field.name)? {
             let numbers =
                 if field.shape == 0 { vec![value.extract::<f64>()?] } else { value.extract()? };
-            found.insert(field.name.to_owned(), numbers);
+            given.insert(field.name.to_owned(), numbers);
         }
     }
-    Ok(found)
+    Ok(given)
 }
 
 fn guide(table: &Bound<'_, PyDict>) -> PyResult<GuideDescription> {
@@ -129,7 +128,7 @@ fn strut(table: &Bound<'_, PyDict>) -> PyResult<StrutDescription> {
     })
 }
 
-/// Reads the whole dict; what it may hold is told in `truepose/_kernel.pyi`.
+/// Reads the whole dict; its keys are documented in `truepose/_kernel.pyi`.
 pub fn description(table: &Bound<'_, PyDict>) -> PyResult<Description> {
     let dof: Vec<String> = item(table, "dof", "machine")?.extract()?;
     let commanded = match optional(table, "commanded")? {

@@ -2,8 +2,7 @@
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use truepose_kernel::element::guide::GuideKind;
-use truepose_kernel::element::{DriveKind, ElementTable, strut};
+use truepose_kernel::element::{DriveKind, ElementTable, GuideKind, strut};
 
 fn entry<'py>(py: Python<'py>, table: &ElementTable) -> PyResult<Bound<'py, PyDict>> {
     let entry = PyDict::new(py);

@@ -1,57 +1,25 @@
 //! How calls are evaluated: blocks of samples without the interpreter's lock, one status per sample,
 //! one error or the status in the end.
 
-use crate::arrays::{Array, Input, output};
+use crate::arrays::{Array, Input, filled};
 use crate::failure::pose_error;
 use crate::machine::Machine;
-use numpy::{PyArray1, PyArrayMethods};
+use crate::quantity::Quantity;
+use crate::samples::{Posed, codes, in_blocks, in_blocks_into, with_codes};
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 use truepose_kernel::Status;
-use truepose_kernel::batch::{self, Deviations, FirstOrder, Rows, Samples};
+use truepose_kernel::batch::{self, Deviations, Rows, Samples};
 use truepose_kernel::kinematics::{self, Obstacle};
-use truepose_kernel::machine::chosen;
+use truepose_kernel::machine::indices_of;
 use truepose_kernel::spatial::Pose;
-
-/// Samples between two looks at Ctrl-C.
-pub const BLOCK: usize = 65_536;
 
 /// Joints and poses of commands, with their status.
 pub struct Placed {
     pub joints: Vec<f64>,
     pub poses: Vec<f64>,
     pub status: Vec<Status>,
-}
-
-/// Calls `work(first, size)` for blocks of samples without the GIL, looking at Ctrl-C in between.
-pub fn in_blocks(
-    py: Python<'_>,
-    count: usize,
-    mut work: impl FnMut(usize, usize) + Send,
-) -> PyResult<()> {
-    let mut first = 0;
-    while first < count {
-        let size = BLOCK.min(count - first);
-        py.detach(|| work(first, size));
-        first += size;
-        if first < count {
-            py.check_signals()?;
-        }
-    }
-    Ok(())
-}
-
-pub fn codes<'py>(
-    py: Python<'py>,
-    leading: &[usize],
-    status: &[Status],
-) -> PyResult<Bound<'py, PyAny>> {
-    let numbers: Vec<u8> = status.iter().map(|&status| status as u8).collect();
-    PyArray1::from_vec(py, numbers)
-        .into_any()
-        .call_method1("reshape", (PyTuple::new(py, leading)?,))
 }
 
 impl Machine {
@@ -75,12 +43,24 @@ impl Machine {
         }
     }
 
+    /// Joints and placements of a block.
+    pub fn posed<'py>(
+        &self,
+        joints: &Bound<'py, PyAny>,
+        placements: &Bound<'py, PyAny>,
+    ) -> PyResult<Posed<'py>> {
+        Ok(Posed {
+            joints: Input::new(joints, &[self.inner.drives.len()], "joints")?,
+            placements: Input::new(placements, &[7], "placements")?,
+        })
+    }
+
     /// Joints, poses and status of all commands, for deviated parameters.
     pub fn placed(
         &self,
         py: Python<'_>,
         commands: &Input<'_>,
-        deviation: Option<(&[usize], &Input<'_>)>,
+        deviations: &Deviations<'_>,
     ) -> PyResult<Placed> {
         let (count, width) = (commands.count, self.inner.drives.len());
         let mut placed = Placed {
@@ -88,21 +68,13 @@ impl Machine {
             poses: vec![0.0; count * 7],
             status: vec![Status::Ok; count],
         };
-        let values = deviation.map(|(_, values)| values.serves(count, "values")).transpose()?;
-        let data = commands.data();
-        let inner = deviation.map(|(columns, values)| (columns, values.data(), values.width));
-        let (machine, step) = (&self.inner, commands.width);
+        let rows = Rows::each(commands.data(), commands.width);
+        let machine = &self.inner;
         in_blocks(py, count, |first, size| {
-            let deviations = match inner {
-                Some((columns, data, width)) => {
-                    Deviations { columns, values: part(data, width, first, values == Some(true)) }
-                }
-                None => Deviations::NONE,
-            };
             batch::inverses(
                 machine,
-                &Rows::each(&data[first * step..], step),
-                &deviations,
+                &rows.starting_at(first),
+                &deviations.starting_at(first),
                 &mut placed.joints[first * width..(first + size) * width],
                 &mut placed.poses[first * 7..(first + size) * 7],
                 &mut placed.status[first..first + size],
@@ -115,39 +87,31 @@ impl Machine {
         Input::new(poses, &[self.inner.commanded_count()], "poses")
     }
 
-    /// One first-order quantity at samples that close the struts.
-    pub fn quantity<'py, 'a>(
+    /// Poses in all freedoms or in the commanded ones.
+    pub fn poses<'py>(
+        &self,
+        poses: &Bound<'py, PyAny>,
+        what: &'static str,
+    ) -> PyResult<Input<'py>> {
+        Input::new(poses, &[self.components(), self.inner.commanded_count()], what)
+    }
+
+    /// One first-order quantity at samples that close the struts; `quantity(first)` is that of the samples
+    /// from `first` on.
+    fn quantity<'py, 'a>(
         &self,
         py: Python<'py>,
-        at: At<'_>,
+        samples: &Samples<'_>,
         leading: &[usize],
         further: &[usize],
-        quantity: impl Fn(usize) -> Quantity<'a>,
+        quantity: impl Fn(usize) -> Quantity<'a> + Sync,
     ) -> PyResult<(Array<'py>, Vec<Status>)> {
-        let out = output(py, leading, further)?;
-        let width: usize = further.iter().product();
-        let mut status = vec![Status::Ok; at.count];
-        {
-            let mut writable = out.readwrite();
-            let data = writable.as_slice_mut()?;
-            let mut first = 0;
-            while first < at.count {
-                let size = BLOCK.min(at.count - first);
-                let samples = Samples {
-                    count: size,
-                    joints: part(at.joints, self.inner.drives.len(), first, at.shared_joints),
-                    poses: part(at.poses, 7, first, at.shared_poses),
-                    deviations: Deviations::NONE,
-                };
-                let quantity = quantity(first);
-                let out = &mut data[first * width..(first + size) * width];
-                let status = &mut status[first..first + size];
-                let machine = &self.inner;
-                py.detach(|| quantity.compute(machine, &samples, out, status));
-                first += size;
-                py.check_signals()?;
-            }
-        }
+        let mut status = vec![Status::Ok; samples.count];
+        let machine = &self.inner;
+        let out = in_blocks_into(py, leading, further, |first, size, out| {
+            let status = &mut status[first..first + size];
+            quantity(first).compute(machine, &samples.part(first, size), out, status);
+        })?;
         Ok((out, status))
     }
 
@@ -158,17 +122,17 @@ impl Machine {
         commands: &Input<'py>,
         want_status: bool,
         further: &[usize],
-        quantity: impl Fn(usize) -> Quantity<'a>,
+        quantity: impl Fn(usize) -> Quantity<'a> + Sync,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let placed = self.placed(py, commands, None)?;
-        let at = At {
+        let placed = self.placed(py, commands, &Deviations::NONE)?;
+        let samples = Samples {
             count: commands.count,
-            joints: &placed.joints,
-            poses: &placed.poses,
-            shared_joints: false,
-            shared_poses: false,
+            joints: Rows::each(&placed.joints, self.inner.drives.len()),
+            poses: Rows::each(&placed.poses, 7),
+            deviations: Deviations::NONE,
         };
-        let (out, mut status) = self.quantity(py, at, &commands.leading, further, quantity)?;
+        let (out, mut status) =
+            self.quantity(py, &samples, &commands.leading, further, quantity)?;
         for (status, &inverse) in status.iter_mut().zip(&placed.status) {
             // Out of travel is the least that can be wrong with a pose.
             if !inverse.is_solved() || *status == Status::Ok {
@@ -250,7 +214,7 @@ impl Machine {
     pub fn rows_of_poses(&self, poses: &Input<'_>) -> Vec<f64> {
         let machine = &self.inner;
         let home = machine.home.to_coordinates();
-        let freedoms = chosen(if poses.width == self.components() {
+        let freedoms = indices_of(if poses.width == self.components() {
             &machine.dof
         } else {
             &machine.commanded
@@ -272,10 +236,8 @@ impl Machine {
         placed: &Placed,
     ) -> PyResult<Bound<'py, PyAny>> {
         let count = placed.status.len();
-        let joints = output(py, &[count], &[self.inner.drives.len()])?;
-        joints.readwrite().as_slice_mut()?.copy_from_slice(&placed.joints);
-        let poses = output(py, &[count], &[7])?;
-        poses.readwrite().as_slice_mut()?.copy_from_slice(&placed.poses);
+        let joints = filled(py, &[count], &[self.inner.drives.len()], &placed.joints)?;
+        let poses = filled(py, &[count], &[7], &placed.poses)?;
         (joints, poses, codes(py, &[count], &placed.status)?).into_bound_py_any(py)
     }
 
@@ -286,41 +248,35 @@ impl Machine {
         joints: &Bound<'py, PyAny>,
         placements: &Bound<'py, PyAny>,
         (columns, compliances): (&Bound<'py, PyAny>, &Bound<'py, PyAny>),
-        quantity: impl for<'a> Fn(&'a truepose_kernel::Machine, &[usize], Rows<'a>) -> Quantity<'a>,
+        quantity: impl for<'a> Fn(&'a truepose_kernel::Machine, &[usize], Rows<'a>) -> Quantity<'a>
+        + Sync,
     ) -> PyResult<Bound<'py, PyAny>> {
         let columns = self.columns(columns)?;
         let given = Input::new(compliances, &[columns.len()], "parameter_compliance")?;
         let further = [self.components(), self.components()];
-        let name = Some((&given, "parameter_compliance"));
-        self.at_placements(py, joints, placements, name, &further, |first, shared| {
-            quantity(&self.inner, &columns, given.rows(first, shared))
+        let machine = &self.inner;
+        self.at_placements(py, joints, placements, Some(&given), &further, |rows| {
+            quantity(machine, &columns, rows)
         })
     }
 
-    /// A block's first-order quantity at given joints and placements.
+    /// A block's first-order quantity at given joints and placements, from the rows of `given`.
     pub fn at_placements<'py, 'a>(
         &self,
         py: Python<'py>,
         joints: &Bound<'py, PyAny>,
         placements: &Bound<'py, PyAny>,
-        given: Option<(&Input<'_>, &str)>,
+        given: Option<&'a Input<'_>>,
         further: &[usize],
-        quantity: impl Fn(usize, bool) -> Quantity<'a>,
+        quantity: impl Fn(Rows<'a>) -> Quantity<'a> + Sync,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let joints = Input::new(joints, &[self.inner.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
-        let count = joints.count.max(placements.count).max(given.map_or(1, |(rows, _)| rows.count));
-        let at = At {
-            count,
-            joints: joints.data(),
-            poses: placements.data(),
-            shared_joints: joints.serves(count, "joints")?,
-            shared_poses: placements.serves(count, "placements")?,
-        };
-        let shared = given.map(|(rows, what)| rows.serves(count, what)).transpose()?;
-        let (out, status) = self
-            .quantity(py, at, &[count], further, |first| quantity(first, shared == Some(true)))?;
-        (out, codes(py, &[count], &status)?).into_bound_py_any(py)
+        let posed = self.posed(joints, placements)?;
+        let count = posed.count(given.map_or(1, |rows| rows.count));
+        let samples = posed.samples(count)?;
+        let rows = given.map_or(Ok(Rows::shared(&[])), |given| given.rows(count))?;
+        let quantity = |first| quantity(rows.starting_at(first));
+        let (out, status) = self.quantity(py, &samples, &[count], further, quantity)?;
+        with_codes(py, out, &status)
     }
 }
 
@@ -333,70 +289,5 @@ fn plain_reason(status: Status) -> &'static str {
         Status::NotConverged => "no pose closes the struts near the start",
         Status::JointLimit => "a strut leans beyond the limit of one of its joints",
         Status::BranchLost => "the struts close only beyond a singular pose",
-    }
-}
-
-/// Rows of `data` from sample `first` on, or its one row for all.
-pub fn part(data: &[f64], width: usize, first: usize, shared: bool) -> Rows<'_> {
-    if shared { Rows::shared(&data[..width]) } else { Rows::each(&data[first * width..], width) }
-}
-
-/// Samples that close the struts.
-#[derive(Clone, Copy)]
-pub struct At<'a> {
-    pub count: usize,
-    pub joints: &'a [f64],
-    pub poses: &'a [f64],
-    pub shared_joints: bool,
-    pub shared_poses: bool,
-}
-
-/// Any of the kernel's first-order quantities.
-pub enum Quantity<'a> {
-    Sensitivity(batch::Sensitivity<'a>),
-    JointJacobian(batch::JointJacobian),
-    Forces(batch::Forces<'a>),
-    Loads(batch::Loads<'a>),
-    Compliance(batch::Compliance<'a>),
-    Stiffness(batch::Stiffness<'a>),
-    InternalForces(batch::InternalForces<'a>),
-}
-
-impl Quantity<'_> {
-    fn compute(
-        &self,
-        machine: &truepose_kernel::Machine,
-        samples: &Samples<'_>,
-        out: &mut [f64],
-        status: &mut [Status],
-    ) {
-        fn run(
-            quantity: &impl FirstOrder,
-            machine: &truepose_kernel::Machine,
-            samples: &Samples<'_>,
-            out: &mut [f64],
-            status: &mut [Status],
-        ) {
-            batch::first_order(machine, samples, quantity, out, status);
-        }
-        match self {
-            Quantity::Sensitivity(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::JointJacobian(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Forces(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Loads(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Compliance(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::Stiffness(quantity) => run(quantity, machine, samples, out, status),
-            Quantity::InternalForces(quantity) => run(quantity, machine, samples, out, status),
-        }
-    }
-}
-pub fn write_coordinates(row: &mut [f64], freedoms: &[usize], pose: &Pose<f64>, found: bool) {
-    if !found {
-        row.fill(f64::NAN);
-        return;
-    }
-    let coordinates = pose.to_coordinates();
-    for (value, &freedom) in row.iter_mut().zip(freedoms) {
-        *value = coordinates[freedom];
     }
 }

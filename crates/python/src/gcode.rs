@@ -1,4 +1,4 @@
-//! Programs of machine tools: their moves as arrays, and their writing anew.
+//! Programs of machine tools: their moves as arrays, and programs rewritten.
 
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions};
@@ -261,7 +261,7 @@ impl GcodeReader {
     }
 }
 
-/// Writes a program anew with corrected moves.
+/// Rewrites a program with corrected moves.
 #[pyclass(module = "truepose._kernel")]
 pub struct GcodeCorrector {
     corrector: Option<Corrector<File, File>>,
@@ -317,9 +317,9 @@ impl GcodeCorrector {
         shares: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<()> {
         if points.shape()[1] != AXES {
-            let found = points.shape()[1];
+            let columns = points.shape()[1];
             let message =
-                format!("points: found {found} columns, expected one for each of {AXES} axes");
+                format!("points: columns {columns} columns, expected one for each of {AXES} axes");
             return Err(PyValueError::new_err(message));
         }
         let counts = counts.as_array().iter().map(|count| usize::try_from(*count)).collect();
@@ -351,7 +351,7 @@ impl GcodeCorrector {
     }
 }
 
-/// Puts what is of programs into the module.
+/// Adds the classes and functions of programs to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("GcodeError", module.py().get_type::<GcodeError>())?;
     module.add("GCODE_AXES", String::from_utf8_lossy(&AXIS_LETTERS))?;

@@ -1,8 +1,8 @@
 //! Calibration as a Python class: a design of measurements, what it predicts, and the fit to readings.
 
-use crate::arrays::{Array, Input, output};
-use crate::evaluate::codes;
+use crate::arrays::{Input, filled, output, required};
 use crate::machine::Machine;
+use crate::samples::with_codes;
 use numpy::PyArrayMethods;
 use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
@@ -15,19 +15,9 @@ use truepose_kernel::identification::{
 };
 use truepose_kernel::spatial::Pose;
 
-fn required<'py, T>(entry: &Bound<'py, PyDict>, key: &str) -> PyResult<T>
-where
-    T: FromPyObjectOwned<'py>,
-{
-    match entry.get_item(key)? {
-        Some(value) => value.extract().map_err(Into::into),
-        None => Err(PyValueError::new_err(format!("a design has no {key:?}"))),
-    }
-}
-
 /// A table with a row for each pose, or one for all.
 fn table(entry: &Bound<'_, PyDict>, key: &str, width: usize, poses: usize) -> PyResult<Table> {
-    let values: Vec<f64> = required(entry, key)?;
+    let values: Vec<f64> = required(entry, "a design", key)?;
     if values.len() == width * poses {
         Ok(Table { values, width, shared: false })
     } else if values.len() == width {
@@ -40,35 +30,35 @@ fn table(entry: &Bound<'_, PyDict>, key: &str, width: usize, poses: usize) -> Py
 }
 
 fn instrument(entry: &Bound<'_, PyDict>, unknowns: usize) -> PyResult<Instrument> {
-    let own: Vec<Option<usize>> = required(entry, "unknowns")?;
+    let own: Vec<Option<usize>> = required(entry, "a design", "unknowns")?;
     let own: [Option<usize>; OWN] = own.try_into().map_err(|_| {
         PyValueError::new_err(format!("an instrument has {OWN} numbers of its own"))
     })?;
     if own.iter().flatten().any(|&index| index >= unknowns) {
         return Err(PyValueError::new_err("an instrument has an unknown that is not there"));
     }
-    let frame: [f64; 7] = required(entry, "frame")?;
+    let frame: [f64; 7] = required(entry, "a design", "frame")?;
     Ok(Instrument {
         frame: Pose::from_row(&frame),
-        target: required(entry, "target")?,
-        axis: required(entry, "axis")?,
-        zero: required(entry, "zero")?,
-        on_platform: required(entry, "on_platform")?,
+        target: required(entry, "a design", "target")?,
+        axis: required(entry, "a design", "axis")?,
+        zero: required(entry, "a design", "zero")?,
+        on_platform: required(entry, "a design", "on_platform")?,
         unknowns: own,
     })
 }
 
 fn design(machine: &Machine, entry: &Bound<'_, PyDict>) -> PyResult<Design> {
     let machine = &machine.inner;
-    let unknowns: usize = required(entry, "unknowns")?;
-    let joints: Vec<f64> = required(entry, "joints")?;
-    let starts: Vec<f64> = required(entry, "starts")?;
+    let unknowns: usize = required(entry, "a design", "unknowns")?;
+    let joints: Vec<f64> = required(entry, "a design", "joints")?;
+    let starts: Vec<f64> = required(entry, "a design", "starts")?;
     let poses = starts.len() / 7;
     if starts.len() != 7 * poses || joints.len() != poses * machine.drives.len() {
         return Err(PyValueError::new_err("joints and starts have different numbers of rows"));
     }
-    let shifted: Vec<usize> = required(entry, "shifted")?;
-    let terms: Vec<(usize, usize)> = required(entry, "terms")?;
+    let shifted: Vec<usize> = required(entry, "a design", "shifted")?;
+    let terms: Vec<(usize, usize)> = required(entry, "a design", "terms")?;
     let parameters = machine.nominal.len();
     let bad_term =
         |&(unknown, parameter): &(usize, usize)| unknown >= unknowns || parameter >= parameters;
@@ -77,13 +67,13 @@ fn design(machine: &Machine, entry: &Bound<'_, PyDict>) -> PyResult<Design> {
     }
     let shifts = table(entry, "shifts", shifted.len(), poses)?;
     let coefficients = table(entry, "coefficients", terms.len(), poses)?;
-    let instruments: Vec<Bound<'_, PyDict>> = required(entry, "instruments")?;
+    let instruments: Vec<Bound<'_, PyDict>> = required(entry, "a design", "instruments")?;
     let instruments = instruments
         .iter()
         .map(|entry| instrument(entry, unknowns))
         .collect::<PyResult<Vec<Instrument>>>()?;
     type Row = (usize, usize, usize, usize, Option<usize>);
-    let rows: Vec<Row> = required(entry, "observations")?;
+    let rows: Vec<Row> = required(entry, "a design", "observations")?;
     let mut observations = Vec::with_capacity(rows.len());
     let mut last = 0;
     for (pose, by, observable, strut, bias) in rows {
@@ -115,7 +105,7 @@ fn design(machine: &Machine, entry: &Bound<'_, PyDict>) -> PyResult<Design> {
     })
 }
 
-/// What is measured where, and what is to be found.
+/// The measurements of a calibration and its unknowns.
 #[pyclass(frozen, module = "truepose._kernel")]
 pub struct Identification {
     inner: Prepared,
@@ -139,11 +129,10 @@ impl Identification {
         let mut evaluation = Evaluation::new(&self.inner);
         evaluation.place(values.data());
         evaluation.predict(values.data(), out.readwrite().as_slice_mut()?);
-        let status = codes(py, &[evaluation.status.len()], &evaluation.status)?;
-        (out, status).into_bound_py_any(py)
+        with_codes(py, out, &evaluation.status)
     }
 
-    /// (derivatives (n_observation, n), status (n_pose,)) of what is read to the unknowns.
+    /// (derivatives (n_observation, n), status (n_pose,)) of the readings to the unknowns.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -159,8 +148,7 @@ impl Identification {
             data.fill(f64::NAN);
         }
         drop(array);
-        let status = codes(py, &[evaluation.status.len()], &evaluation.status)?;
-        (out, status).into_bound_py_any(py)
+        with_codes(py, out, &evaluation.status)
     }
 
     /// (values (n_set, n), cost (n_set,), endings, evaluations) of fits to `measured`
@@ -193,22 +181,16 @@ impl Identification {
             ..Options::default()
         };
         let (read, weighted, from) = (measured.data(), weights.data(), start.data());
-        let found = py.detach(|| {
+        let fits = py.detach(|| {
             identification::fit_many(&self.inner, read, weighted, &prior, from, &options)
         });
-        let values: Array<'py> = output(py, &[found.len()], &[unknowns])?;
-        let costs: Array<'py> = output(py, &[found.len()], &[])?;
-        {
-            let (mut values, mut costs) = (values.readwrite(), costs.readwrite());
-            let (values, costs) = (values.as_slice_mut()?, costs.as_slice_mut()?);
-            for (set, one) in found.iter().enumerate() {
-                values[set * unknowns..(set + 1) * unknowns].copy_from_slice(&one.values);
-                costs[set] = one.cost;
-            }
-        }
+        let numbers: Vec<f64> = fits.iter().flat_map(|fit| &fit.values).copied().collect();
+        let values = filled(py, &[fits.len()], &[unknowns], &numbers)?;
+        let costs: Vec<f64> = fits.iter().map(|fit| fit.cost).collect();
+        let costs = filled(py, &[fits.len()], &[], &costs)?;
         let endings: Vec<&str> =
-            found.iter().map(|one| one.ended.map_or("unreachable", |ended| ended.name())).collect();
-        let evaluations: Vec<usize> = found.iter().map(|one| one.evaluations).collect();
+            fits.iter().map(|fit| fit.ended.map_or("unreachable", |ended| ended.name())).collect();
+        let evaluations: Vec<usize> = fits.iter().map(|fit| fit.evaluations).collect();
         (values, costs, endings, evaluations).into_bound_py_any(py)
     }
 }

@@ -1,7 +1,6 @@
 //! Largest lengths of sets of errors, as a function of the module.
 
-use crate::arrays::{Array, Input, output};
-use numpy::PyArrayMethods;
+use crate::arrays::{Array, Input, filled};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use truepose_kernel::largest::{Domain, Largest, NUMBERS, largest_of};
@@ -46,9 +45,7 @@ pub fn largest<'py>(
         domain: &domain,
         quantities: &quantities,
     };
-    let found = output(py, &[count], &[quantities.len(), NUMBERS])?;
     let mut numbers = vec![0.0; count * quantities.len() * NUMBERS];
     py.detach(|| largest_of(count, &of, &mut numbers));
-    found.readwrite().as_slice_mut()?.copy_from_slice(&numbers);
-    Ok(found)
+    filled(py, &[count], &[quantities.len(), NUMBERS], &numbers)
 }

@@ -1,6 +1,6 @@
 //! The kernel's least squares on Python's own residual and Jacobian.
 
-use crate::arrays::{Array, output};
+use crate::arrays::{Array, filled};
 use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -10,7 +10,7 @@ use truepose_kernel::identification::trust_region::{
 };
 
 /// Values, residual and Jacobian there, cost, status, evaluations, iterations.
-type Found<'py> = (Array<'py>, Array<'py>, Array<'py>, f64, &'static str, usize, usize);
+type Minimum<'py> = (Array<'py>, Array<'py>, Array<'py>, f64, &'static str, usize, usize);
 
 /// Callbacks, weighted and checked for their shapes; the first error ends the iteration.
 struct Callbacks<'py> {
@@ -28,14 +28,14 @@ struct Callbacks<'py> {
 fn asked<'py>(callback: &Bound<'py, PyAny>, values: &[f64]) -> PyResult<Array<'py>> {
     static CONVERT: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let py = callback.py();
-    let found = callback.call1((PyArray1::from_slice(py, values),))?;
-    if let Ok(array) = found.cast::<PyArrayDyn<f64>>()
+    let returned = callback.call1((PyArray1::from_slice(py, values),))?;
+    if let Ok(array) = returned.cast::<PyArrayDyn<f64>>()
         && array.is_c_contiguous()
     {
         return Ok(array.clone());
     }
     let convert = CONVERT.import(py, "numpy", "asarray")?;
-    Ok(convert.call1((found, "float64", "C"))?.cast_into::<PyArrayDyn<f64>>()?)
+    Ok(convert.call1((returned, "float64", "C"))?.cast_into::<PyArrayDyn<f64>>()?)
 }
 
 impl<'py> Callbacks<'py> {
@@ -46,16 +46,16 @@ impl<'py> Callbacks<'py> {
             let message = format!("the residual has shape {shape}, expected (m,)");
             return Err(PyValueError::new_err(message));
         }
-        let mut found = array.readonly().as_slice()?.to_vec();
+        let mut residuals = array.readonly().as_slice()?.to_vec();
         if let Some(weights) = &self.weights {
-            if weights.len() != found.len() {
-                let (weights, rows) = (weights.len(), found.len());
+            if weights.len() != residuals.len() {
+                let (weights, rows) = (weights.len(), residuals.len());
                 let message = format!("weights of shape ({weights},) for a residual of {rows}");
                 return Err(PyValueError::new_err(message));
             }
-            found.iter_mut().zip(weights).for_each(|(value, weight)| *value *= weight);
+            residuals.iter_mut().zip(weights).for_each(|(value, weight)| *value *= weight);
         }
-        Ok(found)
+        Ok(residuals)
     }
 
     fn rows_of_jacobian(&self, values: &[f64]) -> PyResult<Vec<f64>> {
@@ -66,13 +66,13 @@ impl<'py> Callbacks<'py> {
             let message = format!("the Jacobian has shape {shape}, expected ({rows}, {size})");
             return Err(PyValueError::new_err(message));
         }
-        let mut found = array.readonly().as_slice()?.to_vec();
+        let mut jacobian = array.readonly().as_slice()?.to_vec();
         if let Some(weights) = &self.weights {
-            for (row, weight) in found.chunks_exact_mut(size.max(1)).zip(weights) {
+            for (row, weight) in jacobian.chunks_exact_mut(size.max(1)).zip(weights) {
                 row.iter_mut().for_each(|value| *value *= weight);
             }
         }
-        Ok(found)
+        Ok(jacobian)
     }
 }
 
@@ -129,7 +129,7 @@ pub fn least_squares<'py>(
     gradient: f64,
     most_evaluations: usize,
     first_radius: f64,
-) -> PyResult<Found<'py>> {
+) -> PyResult<Minimum<'py>> {
     let options = Options {
         tolerances: Tolerances { cost, step, gradient },
         most_evaluations,
@@ -145,22 +145,17 @@ pub fn least_squares<'py>(
         tried: Vec::new(),
         here: (Vec::new(), Vec::new()),
     };
-    let found = minimise(&mut problem, &start, scale.as_deref(), &options);
+    let solution = minimise(&mut problem, &start, scale.as_deref(), &options);
     if let Some(error) = problem.failed {
         return Err(error);
     }
     let Solution { values, cost, status, evaluations, iterations } =
-        found.map_err(|refusal| PyValueError::new_err(refusal.to_string()))?;
+        solution.map_err(|refusal| PyValueError::new_err(refusal.to_string()))?;
     let (residual, rows) = problem.here;
-    let array = |numbers: &[f64], shape: &[usize]| -> PyResult<Array<'py>> {
-        let out = output(py, shape, &[])?;
-        out.readwrite().as_slice_mut()?.copy_from_slice(numbers);
-        Ok(out)
-    };
     Ok((
-        array(&values, &[values.len()])?,
-        array(&residual, &[residual.len()])?,
-        array(&rows, &[residual.len(), values.len()])?,
+        filled(py, &[values.len()], &[], &values)?,
+        filled(py, &[residual.len()], &[], &residual)?,
+        filled(py, &[residual.len(), values.len()], &[], &rows)?,
         cost,
         status.name(),
         evaluations,

@@ -13,6 +13,8 @@ mod largest;
 mod least_squares;
 mod machine;
 mod proof;
+mod quantity;
+mod samples;
 mod sampling;
 mod toml_lines;
 

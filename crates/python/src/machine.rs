@@ -1,9 +1,10 @@
 //! The machine as a Python class.
 
-use crate::arrays::{Array, Input, output};
+use crate::arrays::{Array, Input, filled, output};
 use crate::description::description;
-use crate::evaluate::{BLOCK, Quantity, codes, in_blocks, part, write_coordinates};
 use crate::failure::{KernelError, kernel_error};
+use crate::quantity::Quantity;
+use crate::samples::{BLOCK, in_blocks_into, with_codes, write_coordinates};
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -12,7 +13,7 @@ use std::collections::BTreeMap;
 use truepose_kernel::Status;
 use truepose_kernel::batch::{self, Deviations, Rows, Samples};
 use truepose_kernel::kinematics::{self, Sample};
-use truepose_kernel::machine::{COMPONENTS, FREEDOMS, chosen};
+use truepose_kernel::machine::{COMPONENTS, FREEDOMS, indices_of};
 use truepose_kernel::spatial::Pose;
 
 /// A parallel kinematic machine: immutable, picklable. SI units and radians throughout.
@@ -24,7 +25,7 @@ pub struct Machine {
 }
 
 fn names(flags: &[bool; 6], all: [&'static str; 6]) -> Vec<&'static str> {
-    chosen(flags).into_iter().map(|k| all[k]).collect()
+    indices_of(flags).into_iter().map(|k| all[k]).collect()
 }
 impl Machine {
     fn build(table: &Bound<'_, PyDict>, replaced: BTreeMap<usize, f64>) -> PyResult<Self> {
@@ -112,7 +113,7 @@ impl Machine {
     #[getter]
     fn home<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
         let coordinates = self.inner.home.to_coordinates();
-        PyArray1::from_iter(py, chosen(&self.inner.dof).into_iter().map(|k| coordinates[k]))
+        PyArray1::from_iter(py, indices_of(&self.inner.dof).into_iter().map(|k| coordinates[k]))
     }
     #[getter]
     fn length_parameters<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
@@ -127,9 +128,9 @@ impl Machine {
     fn replace(&self, py: Python<'_>, values: BTreeMap<String, f64>) -> PyResult<Self> {
         let mut replaced = self.replaced.clone();
         for (name, value) in values {
-            let found = self.inner.parameters.iter().position(|parameter| parameter.name == name);
+            let index = self.inner.parameters.iter().position(|parameter| parameter.name == name);
             let refused = |code, message| Err(KernelError::new_err((code, message, name.clone())));
-            match found {
+            match index {
                 None => {
                     return refused("unknown-parameter", format!("there is no parameter {name:?}"));
                 }
@@ -153,9 +154,9 @@ impl Machine {
         status: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
         let commands = self.commands(poses)?;
-        let placed = self.placed(py, &commands, None)?;
-        let out = output(py, &commands.leading, &[self.inner.drives.len()])?;
-        out.readwrite().as_slice_mut()?.copy_from_slice(&placed.joints);
+        let placed = self.placed(py, &commands, &Deviations::NONE)?;
+        let width = self.inner.drives.len();
+        let out = filled(py, &commands.leading, &[width], &placed.joints)?;
         self.answer(py, out, &commands.leading, &placed.status, status, Some(&commands))
     }
 
@@ -174,47 +175,40 @@ impl Machine {
         let (starts, shared) = match start {
             None => (machine.home.to_row().to_vec(), true),
             Some(start) => {
-                let start =
-                    Input::new(start, &[self.components(), machine.commanded_count()], "start")?;
-                let shared = start.serves(count, "start")?;
+                let start = self.poses(start, "start")?;
+                let shared = start.rows(count)?.is_shared();
                 (self.rows_of_poses(&start), shared)
             }
         };
-        let freedoms = chosen(&machine.dof);
-        let out = output(py, &joints.leading, &[freedoms.len()])?;
+        let starts = if shared { Rows::shared(&starts) } else { Rows::each(&starts, 7) };
+        let freedoms = indices_of(&machine.dof);
         let mut codes = vec![Status::Ok; count];
-        {
-            let mut writable = out.readwrite();
-            let data = writable.as_slice_mut()?;
-            if count == 1 {
-                // One pose: no lanes to fill and nothing to share out.
-                let limbs = kinematics::limbs(machine, &machine.nominal, joints.data());
-                let sample = Sample { machine, p: &machine.nominal, limbs: &limbs };
-                let start = Pose::from_row(&starts);
-                let (pose, code) = kinematics::forward(&sample, joints.data(), &start);
-                codes[0] = code;
-                write_coordinates(data, &freedoms, &pose, code == Status::Ok);
-            } else {
-                let mut poses = vec![0.0; BLOCK.min(count) * 7];
-                let (input, width) = (joints.data(), joints.width);
-                in_blocks(py, count, |first, size| {
-                    let samples = Samples {
-                        count: size,
-                        joints: Rows::each(&input[first * width..], width),
-                        poses: part(&starts, 7, first, shared),
-                        deviations: Deviations::NONE,
-                    };
-                    let codes = &mut codes[first..first + size];
-                    batch::forward_poses(machine, &samples, &mut poses[..size * 7], codes);
-                    for (i, code) in codes.iter().enumerate() {
-                        let pose = Pose::from_row(&poses[7 * i..7 * i + 7]);
-                        let at = (first + i) * freedoms.len();
-                        let row = &mut data[at..at + freedoms.len()];
-                        write_coordinates(row, &freedoms, &pose, *code == Status::Ok);
-                    }
-                })?;
-            }
-        }
+        let out = if count == 1 {
+            // One pose: no lanes to fill and nothing to share out.
+            let limbs = kinematics::limbs(machine, &machine.nominal, joints.data());
+            let sample = Sample { machine, p: &machine.nominal, limbs: &limbs };
+            let start = Pose::from_row(starts.row(0));
+            let (pose, code) = kinematics::forward(&sample, joints.data(), &start);
+            codes[0] = code;
+            let out = output(py, &joints.leading, &[freedoms.len()])?;
+            let solved = code == Status::Ok;
+            write_coordinates(out.readwrite().as_slice_mut()?, &freedoms, &pose, solved);
+            out
+        } else {
+            let mut poses = vec![0.0; BLOCK.min(count) * 7];
+            let rows = Rows::each(joints.data(), joints.width);
+            let samples =
+                Samples { count, joints: rows, poses: starts, deviations: Deviations::NONE };
+            in_blocks_into(py, &joints.leading, &[freedoms.len()], |first, size, out| {
+                let (poses, codes) = (&mut poses[..size * 7], &mut codes[first..first + size]);
+                batch::forward_poses(machine, &samples.part(first, size), poses, codes);
+                let rows = out.chunks_exact_mut(freedoms.len()).zip(poses.chunks_exact(7));
+                for ((row, pose), &code) in rows.zip(codes.iter()) {
+                    let solved = code == Status::Ok;
+                    write_coordinates(row, &freedoms, &Pose::from_row(pose), solved);
+                }
+            })?
+        };
         self.answer(py, out, &joints.leading, &codes, status, None)
     }
 
@@ -228,9 +222,9 @@ impl Machine {
     ) -> PyResult<Bound<'py, PyAny>> {
         let count = self.inner.nominal.len();
         let columns: Vec<usize> = (0..count).collect();
-        let further = [self.components(), count];
+        let (machine, further) = (&self.inner, [self.components(), count]);
         self.at_commands(py, &self.commands(poses)?, status, &further, |_| {
-            Quantity::Sensitivity(batch::Sensitivity::new(&self.inner, &columns))
+            Quantity::Sensitivity(batch::Sensitivity::new(machine, &columns))
         })
     }
 
@@ -242,9 +236,9 @@ impl Machine {
         poses: &Bound<'py, PyAny>,
         status: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let further = [self.components(), self.inner.drives.len()];
+        let (machine, further) = (&self.inner, [self.components(), self.inner.drives.len()]);
         self.at_commands(py, &self.commands(poses)?, status, &further, |_| {
-            Quantity::JointJacobian(batch::JointJacobian::new(&self.inner))
+            Quantity::JointJacobian(batch::JointJacobian::new(machine))
         })
     }
 
@@ -257,24 +251,19 @@ impl Machine {
         status: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
         let commands = self.commands(poses)?;
-        let placed = self.placed(py, &commands, None)?;
-        let out = output(py, &commands.leading, &[])?;
-        {
-            let mut writable = out.readwrite();
-            let data = writable.as_slice_mut()?;
-            let (machine, width) = (&self.inner, self.inner.drives.len());
-            in_blocks(py, commands.count, |first, size| {
-                for i in first..first + size {
-                    let joints = &placed.joints[i * width..(i + 1) * width];
-                    let pose = Pose::from_row(&placed.poses[7 * i..7 * i + 7]);
-                    data[i] = if placed.status[i].is_solved() {
-                        kinematics::condition(machine, &machine.nominal, joints, &pose)
-                    } else {
-                        f64::NAN
-                    };
-                }
-            })?;
-        }
+        let placed = self.placed(py, &commands, &Deviations::NONE)?;
+        let (machine, width) = (&self.inner, self.inner.drives.len());
+        let out = in_blocks_into(py, &commands.leading, &[], |first, _, out| {
+            for (i, index) in (first..).zip(out) {
+                let joints = &placed.joints[i * width..(i + 1) * width];
+                let pose = Pose::from_row(&placed.poses[7 * i..7 * i + 7]);
+                *index = if placed.status[i].is_solved() {
+                    kinematics::condition(machine, &machine.nominal, joints, &pose)
+                } else {
+                    f64::NAN
+                };
+            }
+        })?;
         self.answer(py, out, &commands.leading, &placed.status, status, Some(&commands))
     }
 
@@ -289,10 +278,10 @@ impl Machine {
     ) -> PyResult<Bound<'py, PyAny>> {
         let commands = self.commands(poses)?;
         let wrench = Input::new(wrench, &[6], "wrench")?;
-        let shared = wrench.serves(commands.count, "wrench")?;
-        let further = [self.inner.closure_count()];
+        let wrenches = wrench.rows(commands.count)?;
+        let (machine, further) = (&self.inner, [self.inner.closure_count()]);
         self.at_commands(py, &commands, status, &further, |first| {
-            Quantity::Forces(batch::Forces::new(&self.inner, wrench.rows(first, shared)))
+            Quantity::Forces(batch::Forces::new(machine, wrenches.starting_at(first)))
         })
     }
 
@@ -305,7 +294,7 @@ impl Machine {
         poses: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let commands = self.commands(poses)?;
-        let placed = self.placed(py, &commands, None)?;
+        let placed = self.placed(py, &commands, &Deviations::NONE)?;
         self.placed_arrays(py, &placed)
     }
 
@@ -320,7 +309,8 @@ impl Machine {
         let commands = self.commands(poses)?;
         let columns = self.columns(columns)?;
         let values = Input::new(values, &[columns.len()], "values")?;
-        let placed = self.placed(py, &commands, Some((&columns, &values)))?;
+        let values = values.rows(commands.count)?;
+        let placed = self.placed(py, &commands, &Deviations { columns: &columns, values })?;
         self.placed_arrays(py, &placed)
     }
 
@@ -333,35 +323,19 @@ impl Machine {
         columns: &Bound<'py, PyAny>,
         values: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let machine = &self.inner;
-        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
+        let posed = self.posed(joints, placements)?;
         let columns = self.columns(columns)?;
         let values = Input::new(values, &[columns.len()], "values")?;
-        let count = joints.count.max(placements.count).max(values.count);
-        let shared_joints = joints.serves(count, "joints")?;
-        let shared_poses = placements.serves(count, "placements")?;
-        let shared_values = values.serves(count, "values")?;
-        let width = self.components();
-        let out = output(py, &[count], &[width])?;
+        let count = posed.count(values.count);
+        let mut samples = posed.samples(count)?;
+        samples.deviations = Deviations { columns: &columns, values: values.rows(count)? };
+        let machine = &self.inner;
         let mut status = vec![Status::Ok; count];
-        {
-            let mut writable = out.readwrite();
-            let data = writable.as_slice_mut()?;
-            let (q, x, v) = (joints.data(), placements.data(), values.data());
-            in_blocks(py, count, |first, size| {
-                let values = part(v, columns.len(), first, shared_values);
-                let samples = Samples {
-                    count: size,
-                    joints: part(q, machine.drives.len(), first, shared_joints),
-                    poses: part(x, 7, first, shared_poses),
-                    deviations: Deviations { columns: &columns, values },
-                };
-                let out = &mut data[first * width..(first + size) * width];
-                batch::displacements(machine, &samples, out, &mut status[first..first + size]);
-            })?;
-        }
-        (out, codes(py, &[count], &status)?).into_bound_py_any(py)
+        let out = in_blocks_into(py, &[count], &[self.components()], |first, size, out| {
+            let status = &mut status[first..first + size];
+            batch::displacements(machine, &samples.part(first, size), out, status);
+        })?;
+        with_codes(py, out, &status)
     }
 
     /// (sensitivity (n, n_component, k), status).
@@ -373,9 +347,9 @@ impl Machine {
         columns: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let columns = self.columns(columns)?;
-        let further = [self.components(), columns.len()];
-        self.at_placements(py, joints, placements, None, &further, |_, _| {
-            Quantity::Sensitivity(batch::Sensitivity::new(&self.inner, &columns))
+        let (machine, further) = (&self.inner, [self.components(), columns.len()]);
+        self.at_placements(py, joints, placements, None, &further, |_| {
+            Quantity::Sensitivity(batch::Sensitivity::new(machine, &columns))
         })
     }
 
@@ -390,18 +364,10 @@ impl Machine {
     ) -> PyResult<Bound<'py, PyAny>> {
         let columns = self.columns(columns)?;
         let wrenches = Input::new(wrenches, &[6], "wrenches")?;
-        let further = [columns.len()];
-        self.at_placements(
-            py,
-            joints,
-            placements,
-            Some((&wrenches, "wrenches")),
-            &further,
-            |first, shared| {
-                let rows = wrenches.rows(first, shared);
-                Quantity::Loads(batch::Loads::new(&self.inner, &columns, rows))
-            },
-        )
+        let (machine, further) = (&self.inner, [columns.len()]);
+        self.at_placements(py, joints, placements, Some(&wrenches), &further, |rows| {
+            Quantity::Loads(batch::Loads::new(machine, &columns, rows))
+        })
     }
 
     /// (compliance (n, n_component, n_component), status) from parameter compliances (n or 1, k).
@@ -442,22 +408,17 @@ impl Machine {
         placements: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
         let machine = &self.inner;
-        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
-        let shared = joints.serves(placements.count, "joints")?;
+        let posed = self.posed(joints, placements)?;
+        let samples = posed.of_placements()?;
         let width = machine.struts.len();
-        let out = output(py, &[placements.count], &[width])?;
-        {
-            let mut writable = out.readwrite();
-            for (i, row) in writable.as_slice_mut()?.chunks_exact_mut(width).enumerate() {
-                let limbs =
-                    kinematics::limbs(machine, &machine.nominal, joints.rows(0, shared).row(i));
+        in_blocks_into(py, &[samples.count], &[width], |first, _, out| {
+            for (i, row) in (first..).zip(out.chunks_exact_mut(width)) {
+                let limbs = kinematics::limbs(machine, &machine.nominal, samples.joints.row(i));
                 for (value, limb) in row.iter_mut().zip(&limbs) {
                     *value = limb.length;
                 }
             }
-        }
-        Ok(out)
+        })
     }
 
     /// Poses (n, n_dof), Euler angles R = Rz(c) Ry(b) Rx(a), of placements (n, 7).
@@ -467,16 +428,13 @@ impl Machine {
         placements: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
         let placements = Input::new(placements, &[7], "placements")?;
-        let freedoms = chosen(&self.inner.dof);
-        let out = output(py, &placements.leading, &[freedoms.len()])?;
-        {
-            let mut writable = out.readwrite();
-            let rows = writable.as_slice_mut()?.chunks_exact_mut(freedoms.len());
-            for (row, placement) in rows.zip(placements.data().chunks_exact(7)) {
-                write_coordinates(row, &freedoms, &Pose::from_row(placement), true);
+        let freedoms = indices_of(&self.inner.dof);
+        let rows = Rows::each(placements.data(), 7);
+        in_blocks_into(py, &placements.leading, &[freedoms.len()], |first, _, out| {
+            for (i, row) in (first..).zip(out.chunks_exact_mut(freedoms.len())) {
+                write_coordinates(row, &freedoms, &Pose::from_row(rows.row(i)), true);
             }
-        }
-        Ok(out)
+        })
     }
 
     /// Placements (n, 7) of poses (n, n_dof) or (n, n_commanded).
@@ -485,10 +443,7 @@ impl Machine {
         py: Python<'py>,
         poses: &Bound<'py, PyAny>,
     ) -> PyResult<Array<'py>> {
-        let widths = [self.components(), self.inner.commanded_count()];
-        let poses = Input::new(poses, &widths, "poses")?;
-        let out = output(py, &poses.leading, &[7])?;
-        out.readwrite().as_slice_mut()?.copy_from_slice(&self.rows_of_poses(&poses));
-        Ok(out)
+        let poses = self.poses(poses, "poses")?;
+        filled(py, &poses.leading, &[7], &self.rows_of_poses(&poses))
     }
 }

@@ -7,7 +7,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truepose_kernel::batch::share_out;
-use truepose_kernel::machine::{chosen, parts};
+use truepose_kernel::machine::{indices_of, parts};
 use truepose_kernel::proof::{
     self, Affine, Deviating, Effort, Extent, PoseBound, Region, RegionBound, Unproven,
 };
@@ -60,18 +60,15 @@ impl Machine {
         let shifted = self.columns(shifted)?;
         let parameters = self.columns(parameters)?;
         let machine = &self.inner;
-        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
+        let posed = self.posed(joints, placements)?;
         let shift = Input::new(shift, &[shifted.len()], "shift")?;
         let swing = Input::new(swing, &[parameters.len()], "swing")?;
-        let count = placements.count;
         if variables.len() != parameters.len() {
             return Err(PyValueError::new_err("as many variables as parameters are needed"));
         }
-        let commands = joints.rows(0, joints.serves(count, "joints")?);
-        let shifts = shift.rows(0, shift.count != count || count == 1);
-        let swings = swing.rows(0, swing.count != count || count == 1);
-        let places = placements.data();
+        let samples = posed.of_placements()?;
+        let count = samples.count;
+        let (shifts, swings) = (shift.rows_if_any(count)?, swing.rows_if_any(count)?);
         let number = variables.iter().map(|&variable| variable + 1).max().unwrap_or(0);
         if directions.iter().flatten().any(|&member| member >= number) {
             return Err(PyValueError::new_err("a direction of variables that are not there"));
@@ -79,15 +76,12 @@ impl Machine {
         let quantities = parts(&machine.dof);
         let targets =
             targets.map(|given| Input::new(given, &[quantities.len()], "targets")).transpose()?;
-        let asked = targets
-            .as_ref()
-            .map(|given| Ok::<_, PyErr>(given.rows(0, given.serves(count, "targets")?)))
-            .transpose()?;
-        let mut found: Vec<(Result<PoseBound, Unproven>, usize)> =
+        let asked = targets.as_ref().map(|given| given.rows(count)).transpose()?;
+        let mut bounds: Vec<(Result<PoseBound, Unproven>, usize)> =
             vec![(Err(Unproven::TooWide), 0); count];
         py.detach(|| {
-            share_out(&mut found, count, 1, |poses, found| {
-                for (i, found) in poses.zip(found) {
+            share_out(&mut bounds, count, 1, |poses, bounds| {
+                for (i, bounds) in poses.zip(bounds) {
                     let deviating = Deviating {
                         parameters: parameters.clone(),
                         variables: variables.clone(),
@@ -97,8 +91,8 @@ impl Machine {
                     };
                     let extent = Extent::new(
                         machine,
-                        commands.row(i),
-                        Pose::from_row(&places[7 * i..7 * i + 7]),
+                        samples.joints.row(i),
+                        Pose::from_row(samples.poses.row(i)),
                         shifted.iter().copied().zip(shifts.row(i).iter().copied()),
                         &deviating,
                     );
@@ -108,25 +102,25 @@ impl Machine {
                             effort.targets[part] = target;
                         }
                     }
-                    *found = proof::bound_in_boxes(&extent, &effort);
+                    *bounds = proof::bound_in_boxes(&extent, &effort);
                 }
             });
         });
-        let components = chosen(&machine.dof);
+        let components = indices_of(&machine.dof);
         let none =
             PoseBound { lower: [f64::NAN; 6], upper: [f64::NAN; 6], magnitudes: [f64::NAN; 2] };
-        let all: Vec<PoseBound> = found.iter().map(|found| found.0.unwrap_or(none)).collect();
+        let all: Vec<PoseBound> = bounds.iter().map(|bounds| bounds.0.unwrap_or(none)).collect();
         let rows =
             |of: &dyn Fn(&PoseBound) -> Vec<f64>| -> Vec<Vec<f64>> { all.iter().map(of).collect() };
         let lower = rows(&|bound| components.iter().map(|&k| bound.lower[k]).collect());
         let upper = rows(&|bound| components.iter().map(|&k| bound.upper[k]).collect());
         let magnitudes =
             rows(&|bound| quantities.iter().map(|&part| bound.magnitudes[part]).collect());
-        let status: Vec<&str> = found
+        let status: Vec<&str> = bounds
             .iter()
-            .map(|found| found.0.as_ref().map_or_else(|&why| word(why), |_| "proven"))
+            .map(|bounds| bounds.0.as_ref().map_or_else(|&why| word(why), |_| "proven"))
             .collect();
-        let boxes: Vec<usize> = found.iter().map(|found| found.1).collect();
+        let boxes: Vec<usize> = bounds.iter().map(|bounds| bounds.1).collect();
         (lower, upper, magnitudes, status, boxes).into_bound_py_any(py)
     }
 
@@ -214,7 +208,7 @@ impl Machine {
         py: Python<'py>,
         bound: &RegionBound,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let components = chosen(&self.inner.dof);
+        let components = indices_of(&self.inner.dof);
         let parts = parts(&self.inner.dof);
         let upper = components.clone();
         let lower: Vec<usize> = components.iter().map(|k| 6 + k).collect();
@@ -225,23 +219,23 @@ impl Machine {
         let at = |targets: &[usize]| -> Vec<Vec<f64>> {
             targets.iter().map(|&target| bound.at[target].clone()).collect()
         };
-        let found = PyDict::new(py);
+        let table = PyDict::new(py);
         for (name, targets, sign) in
             [("lower", &lower, -1.0), ("upper", &upper, 1.0), ("magnitude", &magnitudes, 1.0)]
         {
-            found.set_item(name, of(&bound.bound, targets, sign))?;
-            found.set_item(format!("reached_{name}"), of(&bound.reached, targets, sign))?;
-            found.set_item(format!("{name}_at"), at(targets))?;
+            table.set_item(name, of(&bound.bound, targets, sign))?;
+            table.set_item(format!("reached_{name}"), of(&bound.reached, targets, sign))?;
+            table.set_item(format!("{name}_at"), at(targets))?;
         }
-        found.set_item("boxes", bound.boxes)?;
-        found.set_item("gap", bound.gap)?;
+        table.set_item("boxes", bound.boxes)?;
+        table.set_item("gap", bound.gap)?;
         let (status, place) = match (&bound.out_of_reach, &bound.unproven) {
             (Some((status, place)), _) => (status.name(), Some(place.clone())),
             (None, Some((why, place))) => (word(*why), Some(place.clone())),
             (None, None) => ("proven", None),
         };
-        found.set_item("status", status)?;
-        found.set_item("where", place)?;
-        Ok(found)
+        table.set_item("status", status)?;
+        table.set_item("where", place)?;
+        Ok(table)
     }
 }

@@ -1,32 +1,22 @@
 //! Monte Carlo as Python classes: variables, a study of a machine at poses, and the tallies of its samples.
 
-use crate::arrays::{Array, Input, output};
-use crate::evaluate::codes;
+use crate::arrays::{Array, Input, filled, output, required};
 use crate::machine::Machine;
+use crate::samples::codes;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truepose_kernel::Status;
-use truepose_kernel::machine::{chosen, parts};
+use truepose_kernel::machine::{indices_of, parts};
 use truepose_kernel::sampling::{
     self, Columns, Copula, Shape, StudyPose, Tally, Variable, Whitening,
 };
 use truepose_kernel::spatial::Pose;
 
-fn required<'py, T>(entry: &Bound<'py, PyDict>, key: &str) -> PyResult<T>
-where
-    T: FromPyObjectOwned<'py>,
-{
-    match entry.get_item(key)? {
-        Some(value) => value.extract().map_err(Into::into),
-        None => Err(PyValueError::new_err(format!("a variable has no {key:?}"))),
-    }
-}
-
 fn variable(entry: &Bound<'_, PyDict>) -> PyResult<Variable> {
-    let kind: String = required(entry, "kind")?;
-    let sigmas: f64 = required(entry, "sigmas")?;
+    let kind: String = required(entry, "a variable", "kind")?;
+    let sigmas: f64 = required(entry, "a variable", "sigmas")?;
     let shape = match kind.as_str() {
         "uniform" => Shape::Uniform,
         "triangular" => Shape::Triangular,
@@ -34,21 +24,25 @@ fn variable(entry: &Bound<'_, PyDict>) -> PyResult<Variable> {
         "two-point" => Shape::TwoPoint,
         "normal" => Shape::Normal(1.0 / sigmas),
         "student-t" => {
-            let dof: f64 = required(entry, "dof")?;
+            let dof: f64 = required(entry, "a variable", "dof")?;
             Shape::StudentT { dof, scale: ((dof - 2.0) / dof).sqrt() / sigmas }
         }
         "discrete" => {
             let mut sum = 0.0;
-            let mut cumulative: Vec<f64> = required(entry, "probabilities")?;
+            let mut cumulative: Vec<f64> = required(entry, "a variable", "probabilities")?;
             for value in &mut cumulative {
                 sum += *value;
                 *value = sum;
             }
-            Shape::Discrete { values: required(entry, "values")?, cumulative }
+            Shape::Discrete { values: required(entry, "a variable", "values")?, cumulative }
         }
         _ => return Err(PyValueError::new_err(format!("{kind:?} is no distribution"))),
     };
-    Ok(Variable { shape, stream: required(entry, "stream")?, number: required(entry, "number")? })
+    Ok(Variable {
+        shape,
+        stream: required(entry, "a variable", "stream")?,
+        number: required(entry, "a variable", "number")?,
+    })
 }
 
 /// Independent or correlated variables, each of a distribution, and components of directions.
@@ -106,10 +100,8 @@ impl Tallies {
         further: &[usize],
         row: impl Fn(&Tally) -> Vec<f64>,
     ) -> PyResult<Array<'py>> {
-        let out = output(py, &[self.inner.len()], further)?;
         let rows: Vec<f64> = self.inner.iter().flat_map(row).collect();
-        out.readwrite().as_slice_mut()?.copy_from_slice(&rows);
-        Ok(out)
+        filled(py, &[self.inner.len()], further, &rows)
     }
 
     fn columns(&self) -> usize {
@@ -256,35 +248,26 @@ impl Study {
     ) -> PyResult<Self> {
         let shifted = machine.columns(shifted)?;
         let parameters = machine.columns(parameters)?;
+        let posed = machine.posed(joints, placements)?;
         let machine = &machine.inner;
-        let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
-        let placements = Input::new(placements, &[7], "placements")?;
         let shift = Input::new(shift, &[shifted.len()], "shift")?;
         let swing = Input::new(swing, &[parameters.len()], "swing")?;
         let whitening = whitening.map(|rows| Input::new(rows, &[12], "whitening")).transpose()?;
-        let count = placements.count;
         if variables.len() != parameters.len() {
             return Err(PyValueError::new_err("as many variables as parameters are needed"));
         }
-        let commands = joints.rows(0, joints.serves(count, "joints")?);
-        let shifts = (!shifted.is_empty())
-            .then(|| Ok::<_, PyErr>(shift.rows(0, shift.serves(count, "shift")?)))
-            .transpose()?;
-        let swings = (!parameters.is_empty())
-            .then(|| Ok::<_, PyErr>(swing.rows(0, swing.serves(count, "swing")?)))
-            .transpose()?;
+        let samples = posed.of_placements()?;
+        let count = samples.count;
+        let (shifts, swings) = (shift.rows_if_any(count)?, swing.rows_if_any(count)?);
         let given = whitening.as_ref().map(Input::data);
-        let places = placements.data();
         let poses = py.detach(|| {
             let pose = |i: usize| {
                 let mut centre = machine.nominal.clone();
-                if let Some(shifts) = &shifts {
-                    for (&parameter, value) in shifted.iter().zip(shifts.row(i)) {
-                        centre[parameter] += value;
-                    }
+                for (&parameter, value) in shifted.iter().zip(shifts.row(i)) {
+                    centre[parameter] += value;
                 }
-                let swing = swings.as_ref().map_or(Vec::new(), |swings| swings.row(i).to_vec());
-                let nominal = Pose::from_row(&places[7 * i..7 * i + 7]);
+                let swing = swings.row(i).to_vec();
+                let nominal = Pose::from_row(samples.poses.row(i));
                 let whitening = given.map(|rows| {
                     let row = &rows[12 * i..12 * i + 12];
                     Whitening {
@@ -292,7 +275,7 @@ impl Study {
                         matrix: [0, 1, 2].map(|k| [0, 1, 2].map(|j| row[3 + 3 * k + j])),
                     }
                 });
-                StudyPose::new(machine, commands.row(i), &nominal, centre, swing, whitening)
+                StudyPose::new(machine, samples.joints.row(i), &nominal, centre, swing, whitening)
             };
             (0..count).map(pose).collect()
         });
@@ -310,15 +293,13 @@ impl Study {
     /// (n, n_component) error at the shifts.
     #[getter]
     fn shift_error<'py>(&self, py: Python<'py>) -> PyResult<Array<'py>> {
-        let components = chosen(&self.machine.dof);
-        let out = output(py, &[self.poses.len()], &[components.len()])?;
+        let components = indices_of(&self.machine.dof);
         let rows: Vec<f64> = self
             .poses
             .iter()
             .flat_map(|pose| components.iter().map(|&k| pose.shift_error[k]))
             .collect();
-        out.readwrite().as_slice_mut()?.copy_from_slice(&rows);
-        Ok(out)
+        filled(py, &[self.poses.len()], &[components.len()], &rows)
     }
 
     /// Evaluates samples at every pose into `tallies`, one a pose.
@@ -366,7 +347,7 @@ impl Study {
     }
 
     fn check(&self, tallies: &Tallies, variables: usize) -> PyResult<()> {
-        let components = chosen(&self.machine.dof);
+        let components = indices_of(&self.machine.dof);
         let whitened = self.poses.iter().all(|pose| pose.is_whitened());
         let columns = components.len() + parts(&self.machine.dof).len() + usize::from(whitened);
         if tallies.inner.len() != self.poses.len()

@@ -17,14 +17,14 @@ enum Step {
 struct Finder {
     /// Where each line ends.
     ends: Vec<usize>,
-    found: Vec<(Vec<Step>, usize)>,
+    lines: Vec<(Vec<Step>, usize)>,
 }
 
 impl Finder {
     fn note(&mut self, path: &[Step], span: Option<Range<usize>>) {
         if let Some(span) = span {
             let line = 1 + self.ends.partition_point(|&end| end < span.start);
-            self.found.push((path.to_vec(), line));
+            self.lines.push((path.to_vec(), line));
         }
     }
 
@@ -78,10 +78,10 @@ pub fn toml_lines<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyLis
     let document =
         Document::parse(text).map_err(|error| PyValueError::new_err(error.to_string()))?;
     let ends = text.match_indices('\n').map(|(end, _)| end).collect();
-    let mut finder = Finder { ends, found: Vec::new() };
+    let mut finder = Finder { ends, lines: Vec::new() };
     finder.table(&mut Vec::new(), document.as_table());
     let list = PyList::empty(py);
-    for (path, line) in finder.found {
+    for (path, line) in finder.lines {
         let steps: Vec<Bound<'py, PyAny>> = path
             .into_iter()
             .map(|step| match step {

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, assess
+from truepose.calibration.acceptance.tool_uncertainty import tool_components
 from truepose.calibration.data_checks import Suspicion, suspicions
 from truepose.calibration.identification.consider_covariance import (
     consider_covariance,
@@ -35,15 +36,13 @@ from truepose.machine import Machine
 if TYPE_CHECKING:
     import xarray as xr
 
-_ANGLES = {"rx": "a", "ry": "b", "rz": "c"}
-
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """What measurements say of a machine, and whether it may be used.
 
-    `gate.accepted` is the answer, `gate.words` says why. `suspicions` are blunders that the data
-    look like; `outliers` readings that do not fit; `validation` None where there was too little to
+    `gate.accepted` is the answer, `gate.words` says why. `suspicions`: mistakes that the data look
+    like; `outliers` readings that do not fit; `validation` None where there was too little to
     hold anything back. `poses` (n, n_commanded): where the tool was looked at, those that are
     `usable` (n,): the calibrated machine reaches them too. `seed`: of the folds.
     """
@@ -62,7 +61,7 @@ class Calibration:
     @property
     def accepted(self) -> bool:
         """Whether the calibrated machine may be used."""
-        return self.gate.accepted and not any(each.refuses for each in self.suspicions)
+        return self.gate.accepted and not any(suspicion.refuses for suspicion in self.suspicions)
 
     def calibrated(self) -> Machine:
         """The machine with the values found for its parameters; its bands are the file's still."""
@@ -106,7 +105,7 @@ def calibrate(
     seed: int = 0,
     margin: float = MARGIN,
 ) -> Calibration:
-    """Find the machine's parameters from measurements, and judge what was found.
+    """Find the machine's parameters from measurements, and decide whether they may be used.
 
     `data`: measurements, or the file of them. `identify`: what is to be found, patterns over
     parameters, groups of tolerances, `strut.*.expansion`, `strut.*.compliance`, each with a half
@@ -134,7 +133,7 @@ def calibrate(
         raise _with_suspicions(failure, suspected) from failure
     checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
-    gate = _judged(machine, fitted, checked, effects, placements[usable, :3], margin)
+    gate = _assessed(machine, fitted, checked, effects, placements[usable, :3], margin)
     rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
     gate = with_considered(gate, rest, (machine.accuracy.target, machine.accuracy.angle_target))
     return Calibration(
@@ -154,18 +153,22 @@ def calibrate(
 def _suspected(machine: Machine, whole: Measurements, unknowns: Unknowns) -> tuple[Suspicion, ...]:
     """What is suspected, with unknown frames first set where they fit best.
 
-    A blunder may lead them astray: what then stays unexplained is looked at with the frames as
-    declared too.
+    A mistake in the data may put the frames in a wrong place: what then stays unexplained is
+    checked with the frames as declared too.
     """
     try:
         standing = place_instruments(machine, whole, unknowns)[0].measurements
     except RequestError:
         return suspicions(machine, whole)
-    found = suspicions(machine, standing)
-    if standing.instruments == whole.instruments or all(each.code != "far-off" for each in found):
-        return found
-    declared = suspicions(machine, whole)
-    return found if any(each.code == "far-off" for each in declared) else declared
+    as_placed = suspicions(machine, standing)
+    if standing.instruments == whole.instruments or all(
+        suspicion.code != "far-off" for suspicion in as_placed
+    ):
+        return as_placed
+    as_declared = suspicions(machine, whole)
+    return (
+        as_placed if any(suspicion.code == "far-off" for suspicion in as_declared) else as_declared
+    )
 
 
 def _nothing_to_fit(whole: Measurements) -> RequestError:
@@ -181,14 +184,14 @@ def _nothing_to_fit(whole: Measurements) -> RequestError:
 
 
 def _with_suspicions(failure: RequestError, suspected: Sequence[Suspicion]) -> RequestError:
-    """What stopped the fit, with what the measurements look like in the place of the hint."""
-    said = "; ".join(each.sentence for each in suspected if each.refuses)
-    if not said or any(each.code != "no-fit" for each in failure.problems):
+    """What stopped the fit, its hint being the suspicions that refuse the measurements."""
+    sentences = "; ".join(suspicion.sentence for suspicion in suspected if suspicion.refuses)
+    if not sentences or any(problem.code != "no-fit" for problem in failure.problems):
         return failure
-    return RequestError(*(replace(each, hint=said) for each in failure.problems))
+    return RequestError(*(replace(problem, hint=sentences) for problem in failure.problems))
 
 
-def _judged(
+def _assessed(
     machine: Machine,
     fitted: Fit,
     checked: Validation | None,
@@ -206,11 +209,11 @@ def _judged(
         before=fitted.before,
         use_prior=fitted.use_prior,
         tool=effects,
-        components=[_ANGLES.get(name, name) for name in machine.components],
+        components=tool_components(machine),
         positions=positions,
         weights=fitted.weights,
         by=phrases(machine, fitted.measurements),
-        nominal=_nominal(machine, fitted),
+        nominal=unknowns.nominal_sizes(machine),
         held_out=_held_out(fitted, checked),
         target=(accuracy.target, accuracy.angle_target),
         candidates=candidates(machine, fitted),
@@ -231,7 +234,7 @@ def _held_out(fitted: Fit, checked: Validation | None) -> tuple[HeldOut, ...]:
 
 def phrases(machine: Machine, measurements: Measurements) -> list[str]:
     """How each instrument says where the machine is: "by heights alone"."""
-    found = []
+    texts = []
     for number, instrument in enumerate(measurements.instruments):
         read = measurements.observables(number)
         if not read:
@@ -241,23 +244,8 @@ def phrases(machine: Machine, measurements: Measurements) -> list[str]:
         heights = measurements.placements[rows, 2]
         if read == ("z",) and np.ptp(heights) < 1e-3 * machine.characteristic_length:
             phrase = "by a flat bed"
-        found.append(phrase)
-    return list(dict.fromkeys(found))
-
-
-def _nominal(machine: Machine, fitted: Fit) -> Floats:
-    """(n_machine,) the parameter that an unknown moves alone; NaN for groups and properties."""
-    unknowns = fitted.unknowns
-    found = np.full(unknowns.n_machine, np.nan)
-    for number in range(unknowns.n_machine):
-        moved = np.flatnonzero(unknowns.effects[:, number])
-        values = machine.nominal[unknowns.columns[moved]]
-        # Rods that are equal are one number for people, coordinates that move apart are not.
-        same = np.ptp(values) <= 1e-9 * np.abs(values).max() if moved.size else False
-        equal = moved.size and (unknowns.effects[moved, number] == 1.0).all()
-        if same and equal:
-            found[number] = values[0]
-    return found
+        texts.append(phrase)
+    return list(dict.fromkeys(texts))
 
 
 __all__ = ["Calibration", "calibrate", "phrases"]

@@ -16,7 +16,7 @@ from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import sentences
 from truepose.calibration.identification.fit import Equations
 from truepose.calibration.identification.problem import Prior
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.calibration.observables import UNITS, column_name
 from truepose.machine import Machine
 from truepose.runs.dataset import (
     Schema,
@@ -121,9 +121,9 @@ def dataset_of(calibration: Calibration) -> xr.Dataset:
     """Everything that a calibration found, SI; `docs/results.md` has the schema."""
     machine = calibration.machine
     values = {
-        **_of_unknowns(calibration),
-        **_of_observations(calibration),
-        **_of_tool(calibration),
+        **_unknown_values(calibration),
+        **_observation_values(calibration),
+        **_tool_values(calibration),
     }
     coords = {
         **_unknown_coords(calibration),
@@ -147,39 +147,43 @@ def dataset_of(calibration: Calibration) -> xr.Dataset:
 
 
 def verdict_of(calibration: Calibration) -> str:
-    """Yes or no with its reasons: suspicions that refuse go first, then what the gate says."""
+    """Yes or no with its reasons: first the suspicions that refuse, then the gate's reasons."""
     gate = calibration.gate
-    refusing = [each.sentence for each in calibration.suspicions if each.refuses]
+    refusing = [suspicion.sentence for suspicion in calibration.suspicions if suspicion.refuses]
     if not refusing:
         return gate.words
     # They begin with the instrument's name, which stays as it is written.
-    said = f"No: the measurements look wrong. {'. '.join(refusing)}."
+    verdict = f"No: the measurements look wrong. {'. '.join(refusing)}."
     if gate.accepted:
-        return said
-    reasons = "; ".join(each.sentence for each in gate.reasons)
-    return f"{said} As they are: {reasons}."
+        return verdict
+    reasons = "; ".join(reason.sentence for reason in gate.reasons)
+    return f"{verdict} As they are: {reasons}."
 
 
 def answer_of(calibration: Calibration) -> str:
-    """The verdict without what to heed and what to measure next, which are said elsewhere."""
-    gate, said = calibration.gate, verdict_of(calibration)
-    if said != gate.words:
-        return said
-    for each in reversed(gate.warnings):
-        said = said.removesuffix(f" {sentences.sentence(each.sentence)}.")
+    """The verdict without its warnings and the remedy, which are shown elsewhere."""
+    gate, answer = calibration.gate, verdict_of(calibration)
+    if answer != gate.words:
+        return answer
+    for warning in reversed(gate.warnings):
+        answer = answer.removesuffix(f" {sentences.sentence(warning.sentence)}.")
     if gate.remedy is not None:
-        said = said.removesuffix(f" {sentences.sentence(gate.remedy.sentence)}.")
-    return said
+        answer = answer.removesuffix(f" {sentences.sentence(gate.remedy.sentence)}.")
+    return answer
 
 
 # --- values --------------------------------------------------------------------------------------
 
 
-def _of_unknowns(calibration: Calibration) -> dict[str, Floats]:
+def _unknown_values(calibration: Calibration) -> dict[str, Floats]:
     fit, gate = calibration.fit, calibration.gate
     unknowns = fit.unknowns
     n = unknowns.n_machine
-    nominal = _nominal(calibration)
+    machine = calibration.machine
+    nominal = unknowns.nominal_sizes(machine)
+    for number, identified in unknowns.properties.items():
+        if identified.kind == "expansion":
+            nominal[number] = machine.struts[identified.strut].expansion or 0.0
     covariance = covariance_of(calibration)
     open_ = ~np.isfinite(np.diagonal(covariance))
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)
@@ -190,7 +194,7 @@ def _of_unknowns(calibration: Calibration) -> dict[str, Floats]:
     correlation[open_, :] = correlation[:, open_] = np.nan
     np.fill_diagonal(correlation, 1.0)
     columns = unknowns.columns
-    before = calibration.machine.nominal[columns]
+    before = machine.nominal[columns]
     effects = unknowns.effects[:, :n]
     parameter = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", effects, covariance, effects), 0.0))
     parameter[(effects[:, open_] != 0.0).any(axis=1)] = np.inf
@@ -237,35 +241,15 @@ def determined_covariance(calibration: Calibration) -> Floats:
     return covariance
 
 
-def _nominal(calibration: Calibration) -> Floats:
-    """(n_machine,) the size that an unknown changes: one parameter, equal ones, or a property.
-
-    NaN for what moves several that differ, such as the coordinates of a radius.
-    """
-    machine, unknowns = calibration.machine, calibration.fit.unknowns
-    found = np.full(unknowns.n_machine, np.nan)
-    for number in range(unknowns.n_machine):
-        effects = unknowns.effects[:, number]
-        moved = np.flatnonzero(effects)
-        sizes = machine.nominal[unknowns.columns[moved]]
-        alike = moved.size and (effects[moved] == 1.0).all()
-        if alike and np.ptp(sizes) <= 1e-9 * np.abs(sizes).max():
-            found[number] = sizes[0]
-        of = unknowns.properties.get(number)
-        if of is not None and of.kind == "expansion":
-            found[number] = machine.struts[of.strut].expansion or 0.0
-    return found
-
-
-def _of_observations(calibration: Calibration) -> dict[str, Floats]:
+def _observation_values(calibration: Calibration) -> dict[str, Floats]:
     fit, data = calibration.fit, calibration.measurements
     fitted = _fitted(data)
     sigma = data.uncertainty
 
     def over_all(values: Floats) -> Floats:
-        found = np.full(data.n_observation, np.nan)
-        found[fitted] = values
-        return found
+        everywhere = np.full(data.n_observation, np.nan)
+        everywhere[fitted] = values
+        return everywhere
 
     before, after = over_all(fit.before), over_all(fit.residual)
     checked = calibration.validation
@@ -290,18 +274,18 @@ def _fitted(data: Measurements) -> Flags:
     return flags
 
 
-def _of_tool(calibration: Calibration) -> dict[str, Floats]:
+def _tool_values(calibration: Calibration) -> dict[str, Floats]:
     gate = calibration.gate
     usable = calibration.usable
-    found: dict[str, Floats] = {}
+    values: dict[str, Floats] = {}
     for when, tool in (("before", gate.before), ("after", gate.after)):
         components = np.full((len(usable), len(calibration.machine.components)), np.nan)
         sizes = np.full((len(usable), len(quantities(calibration.machine.components))), np.nan)
         if tool is not None:
             components[usable] = tool.standard
             sizes[usable] = _sizes(tool, calibration.machine)
-        found[f"tool_{when}"], found[f"tool_size_{when}"] = components, sizes
-    return found
+        values[f"tool_{when}"], values[f"tool_size_{when}"] = components, sizes
+    return values
 
 
 def _sizes(tool: ToolUncertainty, machine: Machine) -> Floats:
@@ -317,7 +301,7 @@ def _unknown_coords(calibration: Calibration) -> dict[str, xr.Variable]:
     machine, unknowns = calibration.machine, calibration.fit.unknowns
     n = unknowns.n_machine
     names, units, labels = unknowns.names, unknowns.units, unknowns.labels
-    own, others, moved = "unknown", "instrument_unknown", unknowns.columns.tolist()
+    own, others, columns = "unknown", "instrument_unknown", unknowns.columns.tolist()
     return {
         own: label(own, list(names[:n]), "unknown of the machine"),
         "unknown_label": label(own, list(labels[:n]), "the unknown in words"),
@@ -328,11 +312,11 @@ def _unknown_coords(calibration: Calibration) -> dict[str, xr.Variable]:
         "instrument_unknown_units": label(others, _texts(units[n:]), "unit of the unknown"),
         "parameter": label(
             "parameter",
-            _texts([machine.parameters[column] for column in moved]),
+            _texts([machine.parameters[column] for column in columns]),
             "parameter of the machine that unknowns move",
         ),
         "parameter_units": label(
-            "parameter", _texts([machine.units[column] for column in moved]), "unit of it"
+            "parameter", _texts([machine.units[column] for column in columns]), "unit of it"
         ),
     }
 
@@ -343,7 +327,7 @@ def _texts(values: Any) -> np.ndarray:
 
 
 def _row_coords(machine: Machine, data: Measurements) -> dict[str, xr.Variable]:
-    names = [each.name for each in data.instruments]
+    names = [instrument.name for instrument in data.instruments]
     poses = machine.kernel.pose_of(data.placements)
     coords = {
         "row": label("row", np.arange(data.n_row), "number of the row, from 0"),
@@ -359,26 +343,19 @@ def _row_coords(machine: Machine, data: Measurements) -> dict[str, xr.Variable]:
             "row", poses[:, at], f"pose {freedom} of the nominal machine at the row", unit
         )
     observation = "observation"
+    read = zip(data.observable.tolist(), data.strut.tolist(), strict=True)
+    columns = (column_name(machine, code, strut) for code, strut in read)
     return {
         **coords,
         observation: label(
             observation, np.arange(data.n_observation), "number of the reading, from 0"
         ),
         "observation_row": label(observation, data.row, "number of the row that it stands in"),
-        "observation_what": label(observation, _texts(_what(machine, data)), "what was read"),
+        "observation_what": label(observation, _texts(columns), "what was read"),
         "observation_units": label(
             observation, _texts(UNITS[code] for code in data.observable.tolist()), "unit of it"
         ),
     }
-
-
-def _what(machine: Machine, data: Measurements) -> list[str]:
-    """The measured column of each reading: "x", "strut.a1.length"."""
-    found = []
-    for code, strut in zip(data.observable.tolist(), data.strut.tolist(), strict=True):
-        name = OBSERVABLES[code]
-        found.append(f"strut.{machine.struts[strut].name}.{name}" if name in OF_STRUTS else name)
-    return found
 
 
 def _tool_coords(calibration: Calibration) -> dict[str, xr.Variable]:
@@ -413,12 +390,12 @@ def _attrs(calibration: Calibration) -> dict[str, str | int | float]:
         "verdict": verdict_of(calibration),
         "answer": answer_of(calibration),
         "accepted": int(calibration.accepted),
-        "reasons": _json([asdict(each) for each in gate.reasons]),
-        "warnings": _json([asdict(each) for each in gate.warnings]),
+        "reasons": _json([asdict(reason) for reason in gate.reasons]),
+        "warnings": _json([asdict(warning) for warning in gate.warnings]),
         "undetermined": _json(list(gate.sentences)),
-        "suspicions": _json([_finite(asdict(each)) for each in calibration.suspicions]),
+        "suspicions": _json([_finite(asdict(suspicion)) for suspicion in calibration.suspicions]),
         "outliers": _json(
-            [{**asdict(each), "sentence": each.sentence} for each in calibration.outliers]
+            [{**asdict(outlier), "sentence": outlier.sentence} for outlier in calibration.outliers]
         ),
         "remedy": "" if gate.remedy is None else _json(_finite(asdict(gate.remedy))),
         "rank": gate.rank,

@@ -97,7 +97,7 @@ def least_squares(
         raise ValueError(f"the first radius is {first_radius}, expected a number above zero")
     values = np.array(start, np.float64).reshape(-1)
     with np.errstate(all="ignore"):  # a value out of reach is looked at, not warned of
-        found = solve_least_squares(
+        solution = solve_least_squares(
             residual,
             jacobian,
             values,
@@ -109,7 +109,7 @@ def least_squares(
             most_evaluations=most_evaluations,
             first_radius=first_radius,
         )
-    return Solution(*found)
+    return Solution(*solution)
 
 
 def covariance(
@@ -130,36 +130,66 @@ def covariance(
         raise ValueError("the Jacobian is not finite")
     if not (math.isfinite(variance) and variance >= 0.0):
         raise ValueError(f"the variance is {variance}, expected zero or more")
-    columns = _column_norms(slope)
+    columns = column_norms(slope)
     columns[columns == 0.0] = 1.0
-    factor = np.linalg.qr(slope / columns, mode="r")
-    _, found, right = np.linalg.svd(factor, full_matrices=True)
-    singular = np.zeros(slope.shape[1])
-    singular[: found.size] = found
+    singular, right = singular_decomposition(np.asarray(np.linalg.qr(slope / columns, mode="r")))
     seen = singular > rank_tolerance * max(float(singular.max(initial=0.0)), EPSILON)
     rows = right[seen] / singular[seen, np.newaxis] / columns
     return variance * (rows.T @ rows), right[~seen]
 
 
 def _weights(weights: ArrayLike) -> Floats:
-    given = np.asarray(weights, np.float64)
-    if not (np.isfinite(given) & (given >= 0.0)).all():
+    array = np.asarray(weights, np.float64)
+    if not (np.isfinite(array) & (array >= 0.0)).all():
         raise ValueError("the weights are not all finite and zero or more")
-    if given.ndim != 1:
-        raise ValueError(f"weights of shape {given.shape}, expected (m,)")
-    return given
+    if array.ndim != 1:
+        raise ValueError(f"weights of shape {array.shape}, expected (m,)")
+    return array
 
 
 def _scale(scale: ArrayLike, size: int) -> Floats:
-    given = np.asarray(scale, np.float64)
-    if given.shape != (size,) or not (np.isfinite(given) & (given > 0.0)).all():
+    array = np.asarray(scale, np.float64)
+    if array.shape != (size,) or not (np.isfinite(array) & (array > 0.0)).all():
         raise ValueError("a finite scale above zero is wanted for every value")
-    return given
+    return array
 
 
-def _column_norms(matrix: Floats) -> Floats:
+def column_norms(matrix: Floats) -> Floats:
+    """(n,) lengths of the columns of a matrix (m, n)."""
     norms: Floats = np.sqrt(np.einsum("ij,ij->j", matrix, matrix))
     return norms
 
 
-__all__ = ["CONVERGED", "Solution", "Tolerances", "covariance", "least_squares"]
+def column_basis(matrix: Floats, tolerance: float) -> Floats:
+    """(m, r) orthonormal: what the columns of a matrix (m, n) span.
+
+    Singular values below `tolerance` of the largest count as none.
+    """
+    left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
+    basis: Floats = left[:, singular > tolerance * singular.max(initial=0.0)]
+    return basis
+
+
+def singular_decomposition(matrix: Floats) -> tuple[Floats, Floats]:
+    """Singular values (n,), zeros added where there are fewer rows, and right vectors (n, n)."""
+    n = matrix.shape[1]
+    if matrix.shape[0] > n:
+        matrix = np.asarray(np.linalg.qr(matrix, mode="r"), np.float64)
+    if matrix.shape[0] == 0 or n == 0:
+        return np.zeros(n), np.eye(n)
+    _, values, right = np.linalg.svd(matrix, full_matrices=True)
+    singular = np.zeros(n)
+    singular[: values.size] = values
+    return singular, right
+
+
+__all__ = [
+    "CONVERGED",
+    "Solution",
+    "Tolerances",
+    "column_basis",
+    "column_norms",
+    "covariance",
+    "least_squares",
+    "singular_decomposition",
+]

@@ -10,6 +10,11 @@ angle           by which a strut's direction is turned about an axis from a zero
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from truepose.machine import Machine
+
 OBSERVABLES = (
     "x",
     "y",
@@ -31,3 +36,14 @@ UNITS = ("m",) * 3 + ("rad",) * 3 + ("m",) * 2 + ("1",) * 3 + ("rad",)
 
 OF_STRUTS = frozenset(OBSERVABLES[7:])
 """Those that are of one strut."""
+
+
+def column_name(machine: Machine, observable: int, strut: int) -> str:
+    """What a reading's column is called: "x", "strut.a1.length"."""
+    name = OBSERVABLES[observable]
+    return f"strut.{machine.struts[strut].name}.{name}" if name in OF_STRUTS else name
+
+
+def si_unit(observable: str) -> str:
+    """SI unit of an observable, by its name."""
+    return UNITS[OBSERVABLES.index(observable)]

@@ -295,7 +295,7 @@ def _sigmas(table: Mapping[str, Any], distribution: str) -> float:
             found=f"sigmas and a distribution that is {distribution}",
             expected='distribution = "normal", or no sigmas',
         )
-    sigmas = _plain(table["sigmas"], "sigmas", such_as="2")
+    sigmas = _unitless(table["sigmas"], "sigmas", such_as="2")
     if sigmas <= 0.0:
         raise QuantityError(
             "not-positive",
@@ -317,7 +317,7 @@ def _dof(table: Mapping[str, Any], distribution: str) -> float | None:
         )
     if not student:
         return None
-    dof = _plain(table["dof"], "dof", such_as="4")
+    dof = _unitless(table["dof"], "dof", such_as="4")
     if dof <= LEAST_DOF:
         raise QuantityError(
             "too-few-degrees-of-freedom",
@@ -328,7 +328,7 @@ def _dof(table: Mapping[str, Any], distribution: str) -> float | None:
     return dof
 
 
-def _plain(value: object, key: str, *, such_as: str) -> float:
+def _unitless(value: object, key: str, *, such_as: str) -> float:
     """A finite number without a unit."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise QuantityError(
@@ -373,7 +373,7 @@ def _probabilities(table: Mapping[str, Any], distribution: str) -> tuple[float, 
     listed = _read_key(
         "probabilities", lambda: _filled_list(table["probabilities"], "plain numbers")
     )
-    return tuple(_plain(text, "probabilities", such_as="0.5") for text in listed)
+    return tuple(_unitless(text, "probabilities", such_as="0.5") for text in listed)
 
 
 def _filled_list(value: object, phrase: str) -> list[Any]:

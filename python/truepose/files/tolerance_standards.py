@@ -76,7 +76,7 @@ def designations(dimension: str = "length") -> tuple[str, ...]:
     )
 
 
-def _plain(designation: str) -> str:
+def _normalised(designation: str) -> str:
     """ISO 2768-mK, iso 2768 m, "it 7": the same class however it is spaced and capitalised."""
     text = re.sub(r"[\s_-]+", "", designation).upper()
     return re.sub(r"^ISO2768(1(?=[A-Z]))?", "ISO2768", text)
@@ -84,8 +84,8 @@ def _plain(designation: str) -> str:
 
 def canonical(designation: str, dimension: str = "length") -> str:
     """The class as the tables name it. Raises `ToleranceClassError` for one that they lack."""
-    known = {_plain(name): name for name in designations(dimension)}
-    plain = _plain(designation)
+    known = {_normalised(name): name for name in designations(dimension)}
+    plain = _normalised(designation)
     if plain in known:
         return known[plain]
     near = get_close_matches(plain, known, n=1)

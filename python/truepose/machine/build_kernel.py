@@ -92,22 +92,22 @@ def _description(described: Described) -> dict[str, Any]:
                 "kind": drive.kind,
                 "travel": list(drive.travel),
                 "working_mode": drive.working_mode,
-                **_plain(drive.fields),
+                **_as_lists(drive.fields),
             }
             for drive in described.drives
         ],
         "struts": [
-            {"name": strut.name, "drive": strut.drive, **_plain(dict(own)), **_limits(strut)}
+            {"name": strut.name, "drive": strut.drive, **_as_lists(dict(own)), **_limits(strut)}
             for strut, own in zip(described.struts, geometry, strict=True)
         ],
         "guides": [
-            {"name": guide.name, "kind": guide.kind, **_plain(guide.fields)}
+            {"name": guide.name, "kind": guide.kind, **_as_lists(guide.fields)}
             for guide in described.guides
         ],
     }
 
 
-def _plain(fields: Mapping[str, Any]) -> dict[str, Any]:
+def _as_lists(fields: Mapping[str, Any]) -> dict[str, Any]:
     return {
         name: list(value) if isinstance(value, tuple) else value for name, value in fields.items()
     }

@@ -287,7 +287,7 @@ def residuals(result: xr.Dataset, shown_in: ShownUnits) -> Table:
         mine = (instrument == name) & (units == unit)
         scale = Shown("", 1.0) if unit == "1" else shown_in.small(unit)
         factor, shown = scale.per_si, scale.label
-        what = listed(list(dict.fromkeys(_plain(name) for name in names[mine].tolist())))
+        what = listed(list(dict.fromkeys(_without_strut(name) for name in names[mine].tolist())))
         mine &= ~named
         sizes = [
             rms(result[key].values[mine] * (sigma[mine] if normalised else 1.0)) * factor
@@ -338,7 +338,7 @@ def _odd(result: xr.Dataset) -> np.ndarray:
     return flags if flags.sum() <= FEW * np.isfinite(sizes).sum() else np.zeros_like(flags)
 
 
-def _plain(what: str) -> str:
+def _without_strut(what: str) -> str:
     """A reading without its strut: "strut.a1.length" is a length."""
     return what.split(".", 2)[2] if what.startswith("strut.") else what
 

@@ -26,6 +26,7 @@ from truepose.files.file_table import FileTable
 from truepose.files.quantity import Direction, Length, PositiveLength, refuse
 from truepose.files.ratio import SlopeWithin, one_or_limits
 from truepose.files.tolerance import Band
+from truepose.machine.elements import drive_kinds
 from truepose.machine.parts import Vector
 from truepose.sources._columns import Columns
 from truepose.sources._coverage import uncovered
@@ -46,7 +47,6 @@ SHAPES: Mapping[str, Callable[[Floats], Floats]] = {
 """Deviation over amplitude at the fraction of the travel, or, of a sine, of its period."""
 
 _POSITION = "position"
-_SLIDER = "slider"
 
 
 class StraightnessTable(FileTable):
@@ -252,13 +252,14 @@ class Guideway:
         ):
             if row.guideway is None:
                 continue
-            if drive.kind != _SLIDER:
+            if drive.carriage is None:
+                runs = [f'kind = "{k.kind}"' for k in drive_kinds().values() if k.has_carriage]
                 parts.refuse(
                     Fault(
                         "unwanted-guideway",
                         "only a carriage runs on a guideway",
                         found=f'kind = "{drive.kind}"',
-                        expected=f'kind = "{_SLIDER}", or no guideway',
+                        expected=f"{' or '.join(runs)}, or no guideway",
                         hint="what else a drive's axis and position may be off, [tolerance] says",
                     ),
                     f"{drive.part}.guideway",

@@ -16,7 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from oracle_cases import case
 from truepose.calibration.acceptance import Candidate, Gate, HeldOut, assess
-from truepose.calibration.acceptance.observability import observability, of_machine, row_covariance
+from truepose.calibration.acceptance.observability import (
+    observability,
+    project_out_instruments,
+    row_covariance,
+)
 from truepose.calibration.identification.unknowns import Unknowns
 
 Floats = NDArray[np.float64]
@@ -142,11 +146,13 @@ def warned(gate: Gate) -> set[str]:
 def test_figures_of_the_case(kind: str, key: str) -> None:
     expected = P02["outputs"][key]
     in_file_units = rows_of(kind) * 1e3 / TO_FILE
-    rows = of_machine(in_file_units, 9)
+    rows = project_out_instruments(in_file_units, 9)
     found = observability(rows, len(rows.matrix), np.ones(9))
     assert found.singular == pytest.approx(expected["singular_values"], abs=6e-7)
     assert found.condition == pytest.approx(expected["condition_number"], abs=0.06)
-    standard = row_covariance(of_machine(in_file_units / P02["inputs"]["noise_mm"], 9)).standard()
+    standard = row_covariance(
+        project_out_instruments(in_file_units / P02["inputs"]["noise_mm"], 9)
+    ).standard()
     assert standard == pytest.approx(list(expected["standard_uncertainty"].values()), abs=6e-6)
     # And in SI, from the gate.
     gate = verdict(kind)
@@ -159,9 +165,9 @@ def test_heights_alone_are_refused() -> None:
     assert codes(gate) == {"not-told-apart", "less-than-tolerance", "no-gain"}
     assert gate.words.startswith(
         "No: rod length, endstop and delta radius cannot be told apart by heights alone within "
-        "their tolerances, nor can rod length, endstop and tower angle; the data leave rod length "
-        "a uncertain by 3.7 mm, its tolerance is 0.5 mm (8 more are less certain than the "
-        "tolerance, too); at the worst pose of the workspace the tool's position would be "
+        "their tolerances, nor can rod length, endstop and tower angle; the measurements "
+        "determine rod length a only to 3.7 mm, its tolerance is 0.5 mm (8 more are less certain "
+        "than the tolerance, too); at the worst pose of the workspace the tool's position would be "
         "uncertain by 1.1 mm, against 0.85 mm of the machine as filed. "
     )
     assert gate.words.endswith("Measure every rod length (to 0.02 mm), or probe in x and y too.")
@@ -216,7 +222,7 @@ def test_with_tolerances_as_priors_heights_help_and_it_is_said_on_what_they_rest
     gate = verdict(HEIGHTS, use_prior=True)
     assert gate.accepted
     assert "rests-on-tolerances" in warned(gate)
-    assert "what is found of these rests on their tolerances" in gate.words
+    assert "what is stated for these rests on their tolerances" in gate.words
     assert (gate.standard < gate.standard_prior).all()
     assert gate.standard_data * TO_FILE == pytest.approx(
         list(P02["outputs"]["height_only"]["standard_uncertainty"].values()), abs=6e-6
@@ -235,7 +241,7 @@ def test_with_tolerances_as_priors_heights_help_and_it_is_said_on_what_they_rest
 
 def test_less_certain_than_the_tolerance_within_its_band() -> None:
     gate = verdict(HEIGHTS, noise=NOISE / 12.0)
-    assert "uncertain by 0.31 mm, its tolerance alone by 0.25 mm" in gate.words
+    assert "only to 0.31 mm, its tolerance already to 0.25 mm" in gate.words
 
 
 def test_priors_alone_are_no_gain() -> None:
@@ -263,7 +269,7 @@ def test_an_absurd_rod_is_refused() -> None:
     assert codes(gate) == {"absurd-value"}
     assert (
         "rod length a would be 269.6 mm, 18.5 mm off its drawing, 37 times its tolerance; rod "
-        "length b and c would be off likewise" in gate.words
+        "length b and c would be off too" in gate.words
     )
     assert gate.remedy is None
 
@@ -274,7 +280,7 @@ def test_rods_of_swapped_inputs_are_refused() -> None:
     gate = verdict(POSITIONS, values=values)
     assert (
         "rod length b would be 391.0 mm, 103 mm off its drawing, 210 times its tolerance; rod "
-        "length a and c would be off likewise" in gate.words
+        "length a and c would be off too" in gate.words
     )
     # Its half band is not told: then by standard deviations.
     open_band = replace(unknowns(), half=np.full(9, np.inf))
@@ -405,7 +411,7 @@ def test_an_unknown_that_is_not_seen_is_refused_and_named() -> None:
 def test_what_is_kept_already_needs_no_calibration() -> None:
     gate = verdict(HEIGHTS, noise=0.1, use_prior=True, target=(2e-3, None))
     assert codes(gate) == {"no-gain"}
-    assert "what is asked of the tool is kept without calibration" in gate.words
+    assert "the machine as filed already keeps the accuracy that is asked" in gate.words
     assert gate.remedy is None
     found = verdict(POSITIONS, target=(2e-3, None))
     assert found.accepted

@@ -92,7 +92,7 @@ def test_no_change_says_why_the_tool_may_be_elsewhere(tmp_path: Path) -> None:
     assert attrs["changed"] == 0
     said = attrs["verdict"]
     assert "the two files differ at the tool by up to" in said
-    assert "what both files say of their uncertainty allows it" in said
+    assert "which is within their uncertainties" in said
     assert "moves" not in said
 
 

@@ -24,7 +24,7 @@ def with_singular(values: list[float], m: int) -> Floats:
 
 def test_indices_by_their_definitions() -> None:
     values = [8.0, 4.0, 2.0, 1.0]
-    rows = seen.of_machine(with_singular(values, 20), 4)
+    rows = seen.project_out_instruments(with_singular(values, 20), 4)
     found = seen.observability(rows, 20, np.ones(4))
     assert found.scaling == "prior"
     assert found.singular == pytest.approx(values)
@@ -38,7 +38,7 @@ def test_indices_by_their_definitions() -> None:
 
 
 def test_indices_are_of_what_is_seen() -> None:
-    rows = seen.of_machine(with_singular([8.0, 4.0, 0.0], 20), 3)
+    rows = seen.project_out_instruments(with_singular([8.0, 4.0, 0.0], 20), 3)
     found = seen.observability(rows, 20, np.ones(3))
     assert (found.rank, found.n_null) == (2, 1)
     assert found.o1 == pytest.approx(np.sqrt(32.0) / np.sqrt(20))
@@ -47,14 +47,14 @@ def test_indices_are_of_what_is_seen() -> None:
 
 
 def test_nothing_seen_at_all() -> None:
-    found = seen.observability(seen.of_machine(np.zeros((3, 2)), 2), 3)
+    found = seen.observability(seen.project_out_instruments(np.zeros((3, 2)), 2), 3)
     assert (found.rank, found.n_null) == (0, 2)
     assert (found.o1, found.o2, found.o3, found.o4, found.o5) == (0.0,) * 5
 
 
 def test_without_a_prior_columns_are_scaled() -> None:
     jacobian = drawn(4, 12, 3) * np.array([1.0, 1e6, 1e-5])
-    found = seen.observability(seen.of_machine(jacobian, 3), 12, [1.0, np.inf, 1.0])
+    found = seen.observability(seen.project_out_instruments(jacobian, 3), 12, [1.0, np.inf, 1.0])
     assert found.scaling == "column"
     expected = np.linalg.svd(jacobian / np.linalg.norm(jacobian, axis=0))[1]
     assert found.singular == pytest.approx(expected)
@@ -65,18 +65,18 @@ def test_rank_does_not_depend_on_units(scale: float) -> None:
     jacobian = drawn(5, 12, 4)
     jacobian[:, 3] = jacobian[:, 0] - jacobian[:, 1]
     jacobian[:, 3] *= scale
-    assert seen.row_covariance(seen.of_machine(jacobian, 4)).rank == 3
+    assert seen.row_covariance(seen.project_out_instruments(jacobian, 4)).rank == 3
     # Both sides of the threshold.
     near = jacobian.copy()
     near[:, 3] += 1e-7 * scale * drawn(6, 12, 1)[:, 0]
-    assert seen.row_covariance(seen.of_machine(near, 4)).rank == 4
+    assert seen.row_covariance(seen.project_out_instruments(near, 4)).rank == 4
     near[:, 3] = jacobian[:, 3] + 1e-11 * scale * drawn(6, 12, 1)[:, 0]
-    assert seen.row_covariance(seen.of_machine(near, 4)).rank == 3
+    assert seen.row_covariance(seen.project_out_instruments(near, 4)).rank == 3
 
 
 def test_instruments_are_projected_out() -> None:
     jacobian = drawn(7, 30, 9)
-    left = seen.row_covariance(seen.of_machine(jacobian, 6))
+    left = seen.row_covariance(seen.project_out_instruments(jacobian, 6))
     whole = np.linalg.inv(jacobian.T @ jacobian)
     assert left.root @ left.root.T == pytest.approx(whole[:6, :6], rel=1e-10)
     assert left.standard() == pytest.approx(np.sqrt(np.diagonal(whole)[:6]))
@@ -85,7 +85,7 @@ def test_instruments_are_projected_out() -> None:
 def test_what_an_instrument_can_imitate_is_not_seen() -> None:
     jacobian = drawn(8, 30, 7)
     jacobian[:, 6] = jacobian[:, 0] + 2.0 * jacobian[:, 1]  # a frame that moves as 0 and 1 do
-    left = seen.row_covariance(seen.of_machine(jacobian, 6))
+    left = seen.row_covariance(seen.project_out_instruments(jacobian, 6))
     assert left.rank == 5
     direction = left.null[0] / left.null[0][0]
     assert direction == pytest.approx([1.0, 2.0, 0.0, 0.0, 0.0, 0.0], abs=1e-9)
@@ -97,14 +97,18 @@ def test_what_an_instrument_can_imitate_is_not_seen() -> None:
 def test_an_unknown_without_effect_is_not_seen() -> None:
     jacobian = drawn(9, 20, 3)
     jacobian[:, 1] *= 1e-16
-    assert np.isinf(seen.row_covariance(seen.of_machine(jacobian, 3)).standard()[1])
+    assert np.isinf(seen.row_covariance(seen.project_out_instruments(jacobian, 3)).standard()[1])
     # Not even with the scale of a prior, where it moves nothing by a millionth of the noise ...
     jacobian[:, 1] *= 1e6
     unit = np.array([1.0, 1e3, 1.0])
-    assert np.isinf(seen.row_covariance(seen.of_machine(jacobian, 3, unit)).standard()[1])
+    assert np.isinf(
+        seen.row_covariance(seen.project_out_instruments(jacobian, 3, unit)).standard()[1]
+    )
     # ... but a larger one is seen, however badly.
     unit[1] = 1e8
-    assert np.isfinite(seen.row_covariance(seen.of_machine(jacobian, 3, unit)).standard()[1])
+    assert np.isfinite(
+        seen.row_covariance(seen.project_out_instruments(jacobian, 3, unit)).standard()[1]
+    )
 
 
 def test_covariance_with_a_correlated_prior() -> None:
@@ -113,12 +117,12 @@ def test_covariance_with_a_correlated_prior() -> None:
     covariance = np.full((4, 4), 0.0)
     covariance[:3, :3] = root @ root.T
     covariance[3, 3] = np.inf
-    both = seen.stacked(seen.of_machine(jacobian, 4), seen.prior(covariance))
+    both = seen.stacked(seen.project_out_instruments(jacobian, 4), seen.prior(covariance))
     information = jacobian.T @ jacobian
     information[:3, :3] += np.linalg.inv(root @ root.T)
     found = seen.row_covariance(both)
     assert found.root @ found.root.T == pytest.approx(np.linalg.inv(information), rel=1e-9)
-    again = seen.prior_root(covariance)
+    again = seen.covariance_root(covariance)
     assert (again @ again.T)[:3, :3] == pytest.approx(root @ root.T)
     assert not (again @ again.T)[3].any()
 
@@ -154,6 +158,6 @@ def test_what_instruments_imitate_altogether_is_not_seen() -> None:
     # Every column of the machine is one of the instrument's, but for rounding.
     jacobian = drawn(14, 40, 3)
     jacobian = np.hstack([jacobian @ drawn(15, 3, 3), jacobian])
-    left = seen.row_covariance(seen.of_machine(jacobian, 3))
+    left = seen.row_covariance(seen.project_out_instruments(jacobian, 3))
     assert left.rank == 0
     assert np.isinf(left.standard()).all()

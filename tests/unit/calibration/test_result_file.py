@@ -17,7 +17,7 @@ from sweeps import thinned
 from truepose.arrays import Floats
 from truepose.calibration.identification.properties import properties_of
 from truepose.calibration.result.bands import bands_of, tolerance_covariance
-from truepose.calibration.result.directions import directions, tilted
+from truepose.calibration.result.directions import direction_at, directions
 from truepose.calibration.result.file import write_calibrated
 from truepose.errors import MachineFileError, RequestError
 from truepose.machine import Machine, load
@@ -122,7 +122,7 @@ def _assert_values(machine: Machine, written: Machine, deviation: Floats) -> Non
     rest = np.ones(len(deviation), np.bool_)
     for each in directions(machine):
         at = list(each.columns)
-        assert np.allclose(axes[each.columns], tilted(each.axis, deviation[at]), atol=4e-16)
+        assert np.allclose(axes[each.columns], direction_at(each.axis, deviation[at]), atol=4e-16)
         assert not written.nominal[at].any()
         rest[at] = False
     wanted = (machine.nominal + deviation)[rest]
@@ -363,7 +363,9 @@ def test_settings_and_replaced_values_are_written(tmp_path: Path) -> None:
     assert written.condition == machine.condition
     assert found["tolerance"]["tool.x"] == 0.1
     axis = next(iter(directions(machine))).axis
-    assert np.allclose(written.drives[0].fields["axis"], tilted(axis, [0.0, 1e-3]), atol=1e-16)
+    assert np.allclose(
+        written.drives[0].fields["axis"], direction_at(axis, [0.0, 1e-3]), atol=1e-16
+    )
 
 
 def test_the_condition_is_the_file_s(tmp_path: Path) -> None:
@@ -444,7 +446,8 @@ def test_directions_turn_what_is_known_of_them(tmp_path: Path, tilt: tuple[float
     def in_space(each: object, at: tuple[float, float], spread: Floats) -> Floats:
         step = 1e-6
         moved = [
-            (tilted(each.axis, np.add(at, e)) - tilted(each.axis, np.subtract(at, e))) / (2 * step)  # type: ignore[attr-defined]
+            (direction_at(each.axis, np.add(at, e)) - direction_at(each.axis, np.subtract(at, e)))
+            / (2 * step)  # type: ignore[attr-defined]
             for e in step * np.eye(2)
         ]
         return np.transpose(moved) @ spread @ np.array(moved)

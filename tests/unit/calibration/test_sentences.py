@@ -159,22 +159,22 @@ def test_worse_seen_directions_are_not_mixed_with_better_seen_ones() -> None:
 def test_what_cannot_be_told_apart() -> None:
     rows = np.zeros((1, 9))
     rows[0, [0, 1, 2, 3, 6, 7, 8]] = 0.3, -0.8, -0.8, -0.8, 1.0, 1.0, 1.0
-    assert sentences.cannot_tell(rows, DELTA, "by a flat bed") == [
+    assert sentences.undetermined(rows, DELTA, "by a flat bed") == [
         "rod length, endstop and delta radius cannot be told apart by a flat bed"
     ]
-    assert sentences.cannot_tell(rows, DELTA, "by a flat bed", within_tolerances=True) == [
+    assert sentences.undetermined(rows, DELTA, "by a flat bed", within_tolerances=True) == [
         "rod length, endstop and delta radius cannot be told apart by a flat bed "
         "within their tolerances"
     ]
-    assert sentences.cannot_tell(np.zeros((0, 9)), DELTA, "by a flat bed") == []
+    assert sentences.undetermined(np.zeros((0, 9)), DELTA, "by a flat bed") == []
 
 
 def test_one_unknown_alone_is_not_found() -> None:
     rows = np.eye(9)[[4]]
-    assert sentences.cannot_tell(rows, DELTA, "by heights alone") == [
+    assert sentences.undetermined(rows, DELTA, "by heights alone") == [
         "tower angle a cannot be found by heights alone"
     ]
-    assert sentences.cannot_tell(rows, DELTA, "by heights alone", within_tolerances=True) == [
+    assert sentences.undetermined(rows, DELTA, "by heights alone", within_tolerances=True) == [
         "tower angle a cannot be found by heights alone better than its tolerance says"
     ]
 
@@ -182,13 +182,13 @@ def test_one_unknown_alone_is_not_found() -> None:
 def test_all_of_one_family() -> None:
     # Only their sum is seen: each against the others.
     rows = sentences.sparse(np.linalg.svd(np.ones((1, 6)))[2][1:])
-    assert sentences.cannot_tell(rows, STRUTS, "by heights alone") == [
+    assert sentences.undetermined(rows, STRUTS, "by heights alone") == [
         "the strut lengths cannot be told apart by heights alone"
     ]
     rows = np.zeros((2, 9))
     rows[0, [6, 7]] = 1.0, -1.0
     rows[1, [6, 8]] = 1.0, -1.0
-    assert sentences.cannot_tell(rows, DELTA, "by heights alone") == [
+    assert sentences.undetermined(rows, DELTA, "by heights alone") == [
         "rod length a, b and c cannot be told apart by heights alone"
     ]
 
@@ -196,10 +196,10 @@ def test_all_of_one_family() -> None:
 def test_numbered_points_that_cannot_be_told_apart() -> None:
     points = tuple(f"joint {n}, {axis}" for n in (1, 2, 3) for axis in "xyz")
     rows = np.ones((1, 9))
-    assert sentences.cannot_tell(rows, points, "by heights alone") == [
+    assert sentences.undetermined(rows, points, "by heights alone") == [
         "joints 1, 2 and 3 cannot be told apart by heights alone"
     ]
-    assert sentences.cannot_tell(np.eye(9)[:1] + np.eye(9)[1], points, "by heights alone") == [
+    assert sentences.undetermined(np.eye(9)[:1] + np.eye(9)[1], points, "by heights alone") == [
         "joint 1 x and y cannot be told apart by heights alone"
     ]
 
@@ -210,7 +210,7 @@ def test_many_directions_make_few_sentences() -> None:
     rows = np.zeros((4, 8))
     for index in range(4):
         rows[index, [2 * index, 2 * index + 1]] = 1.0, -1.0
-    assert sentences.cannot_tell(rows, labels, "by heights alone") == [
+    assert sentences.undetermined(rows, labels, "by heights alone") == [
         "alder size and beech size cannot be told apart by heights alone, nor can cedar size and "
         "dogwood size, nor can elm size and fir size, nor can one more such combination"
     ]

@@ -4,7 +4,7 @@
 use super::samples::{Group, Rows, Samples};
 use super::threads::for_chunks;
 use crate::dispatch::{Work, dispatch};
-use crate::element::{DRIVE_END, PLACES};
+use crate::element::{ParameterGradient, Slots};
 use crate::machine::Machine;
 use crate::scalar::Real;
 
@@ -44,7 +44,7 @@ impl Work for Chunk<'_> {
         let count = machine.struts.len();
         let mut group = Group::<S>::new(machine);
         let mut force = vec![S::default(); 3 * count];
-        let mut works = vec![[S::default(); PLACES]; count];
+        let mut works = vec![ParameterGradient::<S>::default(); count];
         let mut cells = vec![S::default(); width];
         for (number, out) in out.chunks_mut((width * S::WIDTH).max(1)).enumerate() {
             let sample = first + number * S::WIDTH;
@@ -55,30 +55,22 @@ impl Work for Chunk<'_> {
                 let own = &group.p[strut.first..];
                 let base = [own[0], own[1], own[2]];
                 let acting = [force[3 * i], force[3 * i + 1], force[3 * i + 2]];
+                let work = &mut works[i];
                 match strut.drive {
-                    None => works[i][..3].copy_from_slice(&acting),
+                    None => work.set_base(&acting),
                     Some(index) => {
                         let drive = &machine.drives[index];
-                        let (parameters, joint) = (&group.p[drive.first..], group.q[index]);
-                        let works = &mut works[i];
-                        drive.kind.base_load(
-                            &drive.nominal,
-                            parameters,
-                            joint,
-                            base,
-                            acting,
-                            works,
-                        );
+                        let (nominal, joint) = (&drive.nominal, group.q[index]);
+                        let parameters = &group.p[drive.first..];
+                        drive.kind.base_load(nominal, parameters, joint, base, acting, work);
                     }
                 }
             }
             for (cell, &column) in cells.iter_mut().zip(columns) {
                 let mut sum = S::default();
-                for &(closure, place) in &machine.readers[column] {
-                    // The places of the base side: the strut's base, and the drive's parameters.
-                    let of_base = place < 3 || (6..DRIVE_END).contains(&place);
-                    if closure < count && of_base {
-                        sum = sum + works[closure][place];
+                for &(closure, slot) in &machine.dependents[column] {
+                    if closure < count && Slots::is_base_side(slot) {
+                        sum = sum + works[closure][slot];
                     }
                 }
                 *cell = sum;

@@ -1,6 +1,6 @@
 //! First-order quantities of many samples: sensitivities, forces, loads, compliances.
 //!
-//! Each quantity says how many numbers it is and how they follow from the linearised closures; lanes,
+//! Each quantity defines how many numbers it is and how they follow from the linearised closures; lanes,
 //! fall-back and threads are the same for all.
 
 use super::samples::{Group, Rows, Samples};
@@ -10,10 +10,11 @@ use crate::kinematics::{
     Limbs, Linearisation, SINGULAR, Sample, condition, internal_forces, limbs, place_limbs,
 };
 use crate::linear::{CLOSURES, Order, SIX, factor_pivoting};
-use crate::machine::{Machine, chosen};
+use crate::machine::{Machine, indices_of};
 use crate::scalar::Real;
 use crate::statics::{
-    closure_compliance, closure_forces, parameter_load, pose_compliance, pose_stiffness,
+    ClosureMatrix, closure_compliance, closure_forces, parameter_load, pose_compliance,
+    pose_stiffness,
 };
 use crate::status::Status;
 
@@ -122,7 +123,7 @@ fn single_order<S: Real>(machine: &Machine, group: &Group<S>, size: usize) -> Or
     factor_pivoting(&square).order
 }
 
-/// One sample on the single road.
+/// One sample on the scalar path.
 #[inline(never)]
 fn alone<S: Real, Q: FirstOrder>(
     machine: &Machine,
@@ -135,7 +136,7 @@ fn alone<S: Real, Q: FirstOrder>(
     let (p, q, pose) = group.single(lane);
     let mut linear = Linearisation::default();
     let at = limbs(machine, &p, &q);
-    linear.fill_alone(&Sample { machine, p: &p, limbs: &at }, &q, &pose);
+    linear.fill_scalar(&Sample { machine, p: &p, limbs: &at }, &q, &pose);
     let regular = condition(machine, &p, &q, &pose) >= SINGULAR;
     if regular || quantity.survives_singular() {
         let width = out.len() / quantity.parts();
@@ -154,24 +155,24 @@ fn alone<S: Real, Q: FirstOrder>(
     }
 }
 
-/// For each of the given parameters the (closure, place) pairs that read it.
-fn readers<'a>(machine: &'a Machine, columns: &[usize]) -> Vec<&'a [(usize, usize)]> {
-    columns.iter().map(|&column| machine.readers[column].as_slice()).collect()
+/// For each of the given parameters the (closure, slot) pairs that read it.
+fn dependents<'a>(machine: &'a Machine, columns: &[usize]) -> Vec<&'a [(usize, usize)]> {
+    columns.iter().map(|&column| machine.dependents[column].as_slice()).collect()
 }
 
 /// `-W^-1 dg/dp` for some parameters: (component, parameter) per sample.
 pub struct Sensitivity<'a> {
     components: Vec<usize>,
     runs: Vec<Run>,
-    /// The columns that several closures read, or none, with their readers.
+    /// The columns that several closures read, or none, with their dependents.
     common: Vec<(usize, &'a [(usize, usize)])>,
     count: usize,
 }
 
-/// Neighbouring columns that one closure alone reads at neighbouring places.
+/// Neighbouring columns that one closure alone reads at neighbouring slots.
 struct Run {
     closure: usize,
-    place: usize,
+    slot: usize,
     column: usize,
     length: usize,
 }
@@ -181,23 +182,23 @@ impl<'a> Sensitivity<'a> {
     pub fn new(machine: &'a Machine, columns: &[usize]) -> Self {
         let mut runs: Vec<Run> = Vec::new();
         let mut common = Vec::new();
-        for (column, readers) in readers(machine, columns).into_iter().enumerate() {
-            let &[(closure, place)] = readers else {
-                common.push((column, readers));
+        for (column, dependents) in dependents(machine, columns).into_iter().enumerate() {
+            let &[(closure, slot)] = dependents else {
+                common.push((column, dependents));
                 continue;
             };
             match runs.last_mut() {
                 Some(run)
                     if run.closure == closure
-                        && run.place + run.length == place
+                        && run.slot + run.length == slot
                         && run.column + run.length == column =>
                 {
                     run.length += 1;
                 }
-                _ => runs.push(Run { closure, place, column, length: 1 }),
+                _ => runs.push(Run { closure, slot, column, length: 1 }),
             }
         }
-        Sensitivity { components: chosen(&machine.dof), runs, common, count: columns.len() }
+        Sensitivity { components: indices_of(&machine.dof), runs, common, count: columns.len() }
     }
 }
 
@@ -219,16 +220,16 @@ impl FirstOrder for Sensitivity<'_> {
         let inverse = &linear.inverse[self.components[part]];
         for run in &self.runs {
             let twist = -inverse[run.closure];
-            let gradient = &linear.to_parameters[run.closure][run.place..run.place + run.length];
+            let gradient = &linear.to_parameters[run.closure][run.slot..run.slot + run.length];
             let cells = &mut columns[run.column..run.column + run.length];
             for (cell, &derivative) in cells.iter_mut().zip(gradient) {
                 *cell = twist * derivative;
             }
         }
-        for (column, readers) in &self.common {
+        for (column, dependents) in &self.common {
             let mut sum = S::default();
-            for &(closure, place) in *readers {
-                sum = (-inverse[closure]).mul_add(linear.to_parameters[closure][place], sum);
+            for &(closure, slot) in *dependents {
+                sum = (-inverse[closure]).mul_add(linear.to_parameters[closure][slot], sum);
             }
             columns[*column] = sum;
         }
@@ -245,7 +246,7 @@ impl JointJacobian {
     /// For all joints.
     pub fn new(machine: &Machine) -> Self {
         let struts = machine.drives.iter().map(|drive| drive.struts.clone()).collect();
-        JointJacobian { components: chosen(&machine.dof), struts }
+        JointJacobian { components: indices_of(&machine.dof), struts }
     }
 }
 
@@ -296,7 +297,7 @@ fn multipliers<S: Real>(
 ) -> [S; CLOSURES] {
     let mut wrench = [S::default(); SIX];
     wrenches.load(place.first, place.size, &mut wrench);
-    closure_forces(linear, &wrench)
+    closure_forces(&linear.inverse, &wrench)
 }
 
 impl FirstOrder for Forces<'_> {
@@ -320,20 +321,20 @@ impl FirstOrder for Forces<'_> {
 
 /// Loads on some parameters under a wrench on the tool.
 pub struct Loads<'a> {
-    readers: Vec<&'a [(usize, usize)]>,
+    dependents: Vec<&'a [(usize, usize)]>,
     wrenches: Rows<'a>,
 }
 
 impl<'a> Loads<'a> {
     /// For the parameters of the given indices.
     pub fn new(machine: &'a Machine, columns: &[usize], wrenches: Rows<'a>) -> Self {
-        Loads { readers: readers(machine, columns), wrenches }
+        Loads { dependents: dependents(machine, columns), wrenches }
     }
 }
 
 impl FirstOrder for Loads<'_> {
     fn width(&self) -> usize {
-        self.readers.len()
+        self.dependents.len()
     }
     #[inline(always)]
     fn write<S: Real>(
@@ -344,8 +345,8 @@ impl FirstOrder for Loads<'_> {
         columns: &mut [S],
     ) {
         let forces = multipliers(linear, &self.wrenches, place);
-        for (column, readers) in columns.iter_mut().zip(&self.readers) {
-            *column = parameter_load(&forces, &linear.to_parameters, readers);
+        for (column, dependents) in columns.iter_mut().zip(&self.dependents) {
+            *column = parameter_load(&forces, &linear.to_parameters, dependents);
         }
     }
 }
@@ -353,15 +354,23 @@ impl FirstOrder for Loads<'_> {
 /// Twist per unit wrench, (component, component) per sample.
 pub struct Compliance<'a> {
     components: Vec<usize>,
-    readers: Vec<&'a [(usize, usize)]>,
+    dependents: Vec<&'a [(usize, usize)]>,
     compliances: Rows<'a>,
 }
 
 impl<'a> Compliance<'a> {
     /// From the compliances (m/N, rad/(N m)) of the parameters of the given indices.
     pub fn new(machine: &'a Machine, columns: &[usize], compliances: Rows<'a>) -> Self {
-        let readers = readers(machine, columns);
-        Compliance { components: chosen(&machine.dof), readers, compliances }
+        let dependents = dependents(machine, columns);
+        Compliance { components: indices_of(&machine.dof), dependents, compliances }
+    }
+
+    /// How far closures open per unit force in closures.
+    #[inline(always)]
+    fn of_closures<S: Real>(&self, linear: &Linearisation<S>, place: Place) -> ClosureMatrix<S> {
+        let mut compliances = vec![S::default(); self.dependents.len()];
+        self.compliances.load(place.first, place.size, &mut compliances);
+        closure_compliance(&linear.to_parameters, &self.dependents, &compliances)
     }
 }
 
@@ -377,10 +386,8 @@ impl FirstOrder for Compliance<'_> {
         _part: usize,
         columns: &mut [S],
     ) {
-        let mut compliances = vec![S::default(); self.readers.len()];
-        self.compliances.load(place.first, place.size, &mut compliances);
-        let closures = closure_compliance(linear, &self.readers, &compliances);
-        let matrix = pose_compliance(linear, &closures);
+        let closures = self.of_closures(linear, place);
+        let matrix = pose_compliance(&linear.inverse, &closures);
         let mut cells = columns.iter_mut();
         for &i in &self.components {
             for (&k, cell) in self.components.iter().zip(&mut cells) {
@@ -419,9 +426,7 @@ impl FirstOrder for Stiffness<'_> {
         _part: usize,
         columns: &mut [S],
     ) {
-        let mut compliances = vec![S::default(); self.from.readers.len()];
-        self.from.compliances.load(place.first, place.size, &mut compliances);
-        let closures = closure_compliance(linear, &self.from.readers, &compliances);
+        let closures = self.from.of_closures(linear, place);
         // Pivoting is per sample: the closures' compliance may be as ill-scaled as the file.
         for lane in 0..S::WIDTH {
             let single = closures.map(|row| row.map(|value| value.lane(lane)));
@@ -441,19 +446,19 @@ impl FirstOrder for Stiffness<'_> {
 /// strains in a machine with more closures than freedoms, N/m or N/rad.
 pub struct InternalForces<'a> {
     machine: &'a Machine,
-    readers: Vec<&'a [(usize, usize)]>,
+    dependents: Vec<&'a [(usize, usize)]>,
 }
 
 impl<'a> InternalForces<'a> {
     /// For the parameters of the given indices.
     pub fn new(machine: &'a Machine, columns: &[usize]) -> Self {
-        InternalForces { machine, readers: readers(machine, columns) }
+        InternalForces { machine, dependents: dependents(machine, columns) }
     }
 }
 
 impl FirstOrder for InternalForces<'_> {
     fn width(&self) -> usize {
-        self.machine.closure_count() * self.readers.len()
+        self.machine.closure_count() * self.dependents.len()
     }
     #[inline(always)]
     fn write<S: Real>(
@@ -468,11 +473,11 @@ impl FirstOrder for InternalForces<'_> {
             let forces = internal_forces(self.machine, &linear.lane(lane));
             let mut cells = columns.iter_mut();
             for row in &forces[..self.machine.closure_count()] {
-                for (readers, cell) in self.readers.iter().zip(&mut cells) {
-                    let force = |&(closure, place): &(usize, usize)| {
-                        row[closure] * linear.to_parameters[closure][place].lane(lane)
+                for (dependents, cell) in self.dependents.iter().zip(&mut cells) {
+                    let force = |&(closure, slot): &(usize, usize)| {
+                        row[closure] * linear.to_parameters[closure][slot].lane(lane)
                     };
-                    cell.set_lane(lane, readers.iter().map(force).sum());
+                    cell.set_lane(lane, dependents.iter().map(force).sum());
                 }
             }
         }

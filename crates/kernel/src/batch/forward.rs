@@ -4,7 +4,7 @@ use super::samples::{Group, Samples};
 use super::threads::for_chunks;
 use crate::dispatch::{Work, dispatch};
 use crate::kinematics::{Limbs, Sample, descend, forward, place_limbs, start_order};
-use crate::machine::{Machine, chosen};
+use crate::machine::{Machine, indices_of};
 use crate::scalar::Real;
 use crate::spatial::{Pose, relative_rotation};
 use crate::status::Status;
@@ -36,7 +36,7 @@ pub fn displacements(
     errors: &mut [f64],
     status: &mut [Status],
 ) {
-    let components = chosen(&machine.dof);
+    let components = indices_of(&machine.dof);
     run(machine, samples, Kept::Displacement(&components), components.len(), errors, status);
 }
 
@@ -85,16 +85,16 @@ impl Work for Chunk<'_> {
                 let lane = group.first_finite(size);
                 order = start_order(machine, &single_limbs(&at, lane), &group.pose.lane(lane));
             }
-            let found = descend(machine, &at, &group.pose, &order);
+            let descent = descend(machine, &at, &group.pose, &order);
             match kept {
                 Kept::Pose => {
                     for lane in 0..size {
                         out[7 * lane..7 * lane + 7]
-                            .copy_from_slice(&found.pose.lane(lane).to_row());
+                            .copy_from_slice(&descent.pose.lane(lane).to_row());
                     }
                 }
                 Kept::Displacement(components) => {
-                    let error = displacement(&group.pose, &found.pose);
+                    let error = displacement(&group.pose, &descent.pose);
                     let mut columns = [S::default(); 6];
                     for (column, &component) in columns.iter_mut().zip(components) {
                         *column = error[component];
@@ -105,7 +105,7 @@ impl Work for Chunk<'_> {
             for lane in 0..size {
                 status[lane] = Status::Ok;
                 // Also true where it is NaN.
-                if !(found.proof.lane(lane) > 0.0) {
+                if !(descent.proof.lane(lane) > 0.0) {
                     let out = &mut out[width * lane..width * (lane + 1)];
                     alone(machine, &group, &at, lane, kept, out, &mut status[lane]);
                 }
@@ -136,7 +136,7 @@ fn single_limbs<S: Real>(limbs: &Limbs<S>, lane: usize) -> Limbs<f64> {
     single
 }
 
-/// One sample on the single road; NaN where there is no pose to tell.
+/// One sample on the scalar path; NaN where there is no pose.
 #[inline(never)]
 fn alone<S: Real>(
     machine: &Machine,

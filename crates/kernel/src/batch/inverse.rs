@@ -5,13 +5,13 @@ use super::threads::for_chunks;
 use crate::dispatch::{Work, dispatch};
 use crate::kinematics::{commanded_pose, inverse, lane_inverse, permitted};
 use crate::linear::SIX;
-use crate::machine::{Machine, chosen};
+use crate::machine::{Machine, indices_of};
 use crate::scalar::Real;
 use crate::spatial::{Pose, quaternion_from_euler};
 use crate::status::Status;
 
 /// The joints and the full pose (seven numbers) of every command, for the nominal parameters plus
-/// deviations. Poses are finite also where the status says that there are no joints.
+/// deviations. Poses are finite also where the status is that there are no joints.
 pub fn inverses(
     machine: &Machine,
     commands: &Rows<'_>,
@@ -52,12 +52,12 @@ impl Work for Chunk<'_> {
     fn run<S: Real>(self) {
         let Chunk { machine, commands, deviations, first, joints, poses, status } = self;
         let width = machine.drives.len();
-        let freedoms = chosen(&machine.commanded);
+        let freedoms = indices_of(&machine.commanded);
         let home = machine.home.to_coordinates();
         let turns = freedoms.iter().any(|&freedom| freedom >= 3);
         let mut group = Group::<S>::new(machine);
         let mut command = vec![S::default(); freedoms.len()];
-        let mut found = vec![S::default(); width];
+        let mut lane_joints = vec![S::default(); width];
         let groups = joints
             .chunks_mut(width * S::WIDTH)
             .zip(poses.chunks_mut(7 * S::WIDTH))
@@ -90,8 +90,8 @@ impl Work for Chunk<'_> {
             if turns {
                 pose.rotation = quaternion_from_euler([a, b, c]);
             }
-            let margin = lane_inverse(machine, &group.p, &pose, &mut found);
-            S::store_rows(&found, joints, width, size);
+            let margin = lane_inverse(machine, &group.p, &pose, &mut lane_joints);
+            S::store_rows(&lane_joints, joints, width, size);
             for lane in 0..size {
                 poses[7 * lane..7 * lane + 7].copy_from_slice(&pose.lane(lane).to_row());
                 let joints = &mut joints[width * lane..width * (lane + 1)];

@@ -1,7 +1,7 @@
 //! The same numbers as one by one, for many samples: lanes, instruction sets, threads.
 //!
 //! A batch is cut into chunks for the threads, a chunk into groups of lanes. What a group cannot
-//! prove good is done again sample by sample on the single road, and each sample has its status.
+//! prove good is done again sample by sample on the scalar path, and each sample has its status.
 
 mod base_loads;
 mod first_order;

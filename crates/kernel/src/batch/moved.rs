@@ -5,7 +5,7 @@ use super::samples::Samples;
 use super::threads::share_out;
 use crate::kinematics::{Linearisation, Sample, forward, limbs};
 use crate::linear::SIX;
-use crate::machine::{Machine, chosen};
+use crate::machine::{Machine, indices_of};
 use crate::spatial::{Pose, Vector, add, cross, dot, scale};
 use crate::status::Status;
 
@@ -18,7 +18,7 @@ pub fn moved_sensitivities(
     columns: &[usize],
     out: &mut [f64],
 ) -> Vec<Status> {
-    let components = chosen(&machine.dof);
+    let components = indices_of(&machine.dof);
     let width = components.len() * columns.len();
     let parts = share_out(out, samples.count, width, |numbers, out| {
         let mut status = Vec::with_capacity(numbers.len());
@@ -48,20 +48,20 @@ fn one(
     let start = Pose::from_row(samples.poses.row(number));
     let struts = limbs(machine, &p, q);
     let sample = Sample { machine, p: &p, limbs: &struts };
-    let (found, status) = forward(&sample, q, &start);
+    let (pose, status) = forward(&sample, q, &start);
     if status != Status::Ok {
         out.fill(f64::NAN);
         return status;
     }
     let mut linear = Linearisation::default();
-    linear.fill_alone(&sample, q, &found);
-    let error = displacement(&start, &found);
+    linear.fill_scalar(&sample, q, &pose);
+    let error = displacement(&start, &pose);
     let turned = [error[3], error[4], error[5]];
     for (at, &column) in columns.iter().enumerate() {
         let mut twist = [0.0; SIX];
-        for &(closure, place) in &machine.readers[column] {
+        for &(closure, slot) in &machine.dependents[column] {
             for (value, row) in twist.iter_mut().zip(&linear.inverse) {
-                *value -= row[closure] * linear.to_parameters[closure][place];
+                *value -= row[closure] * linear.to_parameters[closure][slot];
             }
         }
         let rate = rotation_vector_rate(turned, [twist[3], twist[4], twist[5]]);

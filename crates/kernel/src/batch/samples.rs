@@ -24,6 +24,11 @@ impl<'a> Rows<'a> {
         Rows { data, width: data.len(), shared: true }
     }
 
+    /// The rows of the samples from `first` on.
+    pub fn starting_at(&self, first: usize) -> Self {
+        if self.shared { *self } else { Rows::each(&self.data[first * self.width..], self.width) }
+    }
+
     /// Whether one row serves all samples.
     pub fn is_shared(&self) -> bool {
         self.shared
@@ -76,6 +81,25 @@ pub struct Samples<'a> {
     pub poses: Rows<'a>,
     /// Deviations of the parameters.
     pub deviations: Deviations<'a>,
+}
+
+impl<'a> Deviations<'a> {
+    /// Those of the samples from `first` on.
+    pub fn starting_at(&self, first: usize) -> Self {
+        Deviations { columns: self.columns, values: self.values.starting_at(first) }
+    }
+}
+
+impl<'a> Samples<'a> {
+    /// The `count` samples from `first` on.
+    pub fn part(&self, first: usize, count: usize) -> Self {
+        Samples {
+            count,
+            joints: self.joints.starting_at(first),
+            poses: self.poses.starting_at(first),
+            deviations: self.deviations.starting_at(first),
+        }
+    }
 }
 
 /// The lanes of one group, reused from group to group: only what differs is loaded again.

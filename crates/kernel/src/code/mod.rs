@@ -2,7 +2,7 @@
 //!
 //! Every function here runs the library's own generic code on [`Trace`] and prints what was recorded:
 //! straight-line C99 without branches, loops or calls but those of `math.h`. What is no formula (Newton's
-//! loop, pivoting, status) is the business of whoever puts a program together from these.
+//! loop, pivoting, status) belongs to the program that is built from these.
 //!
 //! In C, `p` is the flat vector of parameters, `q` the joints, `at` the tool point, `r` the platform's axes
 //! row by row, `u` a quaternion; outputs come last. All SI, rad.
@@ -30,7 +30,7 @@ pub struct Function {
     pub values: usize,
 }
 
-/// A function being recorded: its tape, and what it gives.
+/// A function being recorded: its tape, and its outputs.
 struct Recording<'t> {
     tape: &'t Tape,
     outputs: Vec<(String, Trace<'t>)>,
@@ -161,13 +161,13 @@ pub struct Shifts {
 impl Shifts {
     /// The parameters that give way, in the order of `load`.
     fn loaded(&self) -> Vec<usize> {
-        let mut found = Vec::new();
+        let mut parameters = Vec::new();
         for term in &self.compliance {
-            if !found.contains(&term.parameter) {
-                found.push(term.parameter);
+            if !parameters.contains(&term.parameter) {
+                parameters.push(term.parameter);
             }
         }
-        found
+        parameters
     }
 
     /// Parameters `p` shifted; `load` as [`Shifts::loaded`].
@@ -244,7 +244,7 @@ pub fn functions(machine: &Machine, shifts: &Shifts) -> Vec<Function> {
          double row[6][6], double residual[6]",
         |f| {
             let p = f.many("p", parameters);
-            let mut limbs = [no_limb(p[0]); CLOSURES];
+            let mut limbs = [Limb::zero(p[0]); CLOSURES];
             for (i, limb) in limbs[..machine.struts.len()].iter_mut().enumerate() {
                 let at = |k: usize| f.tape.input(format!("limb[{}]", 7 * i + k));
                 let vector = |from: usize| [0, 1, 2].map(|k| at(from + k));
@@ -262,10 +262,11 @@ pub fn functions(machine: &Machine, shifts: &Shifts) -> Vec<Function> {
          double row[][6], double *residual, double *to_joint",
         |f| {
             let (p, q) = (f.many("p", parameters), f.many("q", joints));
-            let found = gradients::<_, CLOSURES>(machine, &p, &q, f.inputs("at"), &f.matrix("r"));
-            f.give_rows(&found.to_twist[..count]);
-            f.give("residual", found.residuals[..count].iter().copied());
-            f.give("to_joint", found.to_joint[..count].iter().copied());
+            let gradients =
+                gradients::<_, CLOSURES>(machine, &p, &q, f.inputs("at"), &f.matrix("r"));
+            f.give_rows(&gradients.to_twist[..count]);
+            f.give("residual", gradients.residuals[..count].iter().copied());
+            f.give("to_joint", gradients.to_joint[..count].iter().copied());
         },
     ));
     all.push(function(
@@ -274,9 +275,10 @@ pub fn functions(machine: &Machine, shifts: &Shifts) -> Vec<Function> {
          const double *multiplier, double *load",
         |f| {
             let (p, q) = (f.many("p", parameters), f.many("q", joints));
-            let found = gradients::<_, CLOSURES>(machine, &p, &q, f.inputs("at"), &f.matrix("r"));
+            let gradients =
+                gradients::<_, CLOSURES>(machine, &p, &q, f.inputs("at"), &f.matrix("r"));
             let multipliers = f.many("multiplier", count);
-            f.give("load", loads(machine, &loaded, &found, &multipliers));
+            f.give("load", loads(machine, &loaded, &gradients, &multipliers));
         },
     ));
     all.push(function(
@@ -295,8 +297,8 @@ pub fn functions(machine: &Machine, shifts: &Shifts) -> Vec<Function> {
             "const double *p, const double *q, const double at[3], const double r[9], double *beyond",
             |f| {
                 let (p, q) = (f.many("p", parameters), f.many("q", joints));
-                let found = leanings(machine, &p, &q, &f.matrix("r"), f.inputs("at"));
-                f.give("beyond", found.into_iter().map(|(_, _, beyond)| beyond));
+                let leanings = leanings(machine, &p, &q, &f.matrix("r"), f.inputs("at"));
+                f.give("beyond", leanings.into_iter().map(|(_, _, beyond)| beyond));
             },
         ));
     }
@@ -319,11 +321,12 @@ fn compliance(machine: &Machine) -> Function {
          double *compliance",
         |f| {
             let (p, q) = (f.many("p", parameters), f.many("q", joints));
-            let found = gradients::<_, CLOSURES>(machine, &p, &q, f.inputs("at"), &f.matrix("r"));
+            let gradients =
+                gradients::<_, CLOSURES>(machine, &p, &q, f.inputs("at"), &f.matrix("r"));
             let zero = f.tape.constant(0.0);
             let mut sums = [[zero; CLOSURES]; CLOSURES];
             for &(parameter, compliance) in &machine.parameter_compliance {
-                let column = found.to_parameter(machine, parameter);
+                let column = gradients.to_parameter(machine, parameter);
                 for &i in &carrying {
                     let scaled = column[i] * zero.lift(compliance);
                     for &k in &carrying {
@@ -364,8 +367,8 @@ fn compensated(machine: &Machine, shifts: &Shifts) -> Function {
             let rise = f.many("rise", shifts.per_kelvin.len());
             let wrench: [Trace<'_>; SIX] = f.inputs("wrench");
             let nominal = f.give_reach(machine, &p, at, &r, ["nominal", "margin"]);
-            let found = gradients::<_, CLOSURES>(machine, &p, &nominal, at, &r);
-            let rows = square(machine, &found, p[0]);
+            let gradients = gradients::<_, CLOSURES>(machine, &p, &nominal, at, &r);
+            let rows = square(machine, &gradients, p[0]);
             let mut factors = order.map(|row| rows[row]);
             factor(&mut factors);
             let placed_multipliers = solve_transposed(&factors, &wrench.map(|value| -value));
@@ -373,7 +376,7 @@ fn compensated(machine: &Machine, shifts: &Shifts) -> Function {
             for (k, row) in order.into_iter().enumerate() {
                 multipliers[row] = placed_multipliers[k];
             }
-            let load = loads(machine, &shifts.loaded(), &found, &multipliers);
+            let load = loads(machine, &shifts.loaded(), &gradients, &multipliers);
             let shifted = shifts.apply(&placed(machine, &p, &nominal), &p, &rise, &load);
             f.give_reach(machine, &shifted, at, &r, ["q", "left"]);
             let mut growth = f.tape.constant(0.0);
@@ -388,10 +391,10 @@ fn compensated(machine: &Machine, shifts: &Shifts) -> Function {
 }
 
 /// The rows of as many closures as freedoms, with identity rows for what the frame holds.
-fn square<S: Scalar>(machine: &Machine, found: &Gradients<S, CLOSURES>, of: S) -> Matrix6<S> {
+fn square<S: Scalar>(machine: &Machine, gradients: &Gradients<S, CLOSURES>, of: S) -> Matrix6<S> {
     let mut rows = [[of.lift(0.0); SIX]; SIX];
     let count = machine.closure_count();
-    rows[..count].copy_from_slice(&found.to_twist[..count]);
+    rows[..count].copy_from_slice(&gradients.to_twist[..count]);
     for (number, &freedom) in machine.held.iter().enumerate() {
         rows[count + number][freedom] = of.lift(1.0);
     }
@@ -402,11 +405,11 @@ fn square<S: Scalar>(machine: &Machine, found: &Gradients<S, CLOSURES>, of: S) -
 fn loads<'t>(
     machine: &Machine,
     parameters: &[usize],
-    found: &Gradients<Trace<'t>, CLOSURES>,
+    gradients: &Gradients<Trace<'t>, CLOSURES>,
     multipliers: &[Trace<'t>],
 ) -> Vec<Trace<'t>> {
     let load = |&parameter: &usize| {
-        let column = found.to_parameter(machine, parameter);
+        let column = gradients.to_parameter(machine, parameter);
         let mut load = multipliers[0].lift(0.0);
         for (&multiplier, &derivative) in multipliers.iter().zip(&column) {
             load = load + multiplier * derivative;
@@ -416,13 +419,8 @@ fn loads<'t>(
     parameters.iter().map(load).collect()
 }
 
-fn no_limb<S: Scalar>(of: S) -> Limb<S> {
-    let zero = of.lift(0.0);
-    Limb { base: [zero; 3], arm: [zero; 3], length: zero }
-}
-
 fn placed<S: Scalar>(machine: &Machine, p: &[S], q: &[S]) -> Limbs<S> {
-    let mut limbs = [no_limb(p[0]); CLOSURES];
+    let mut limbs = [Limb::zero(p[0]); CLOSURES];
     place_limbs(machine, p, q, &mut limbs);
     limbs
 }

@@ -1,45 +1,13 @@
 //! An arm that turns about a fixed axis.
 
-use super::{Dimension, Direction, Drawing, Drive, ElementTable, Field, ParameterField, Reach};
-use super::{axis_parameter_fields, axis_parameters};
+use super::direction::Direction;
+use super::drive::{Drive, InverseRoot, axis_parameter_fields, axis_parameters};
+use super::table::{Dimension, Drawing, ElementTable, Field};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, add, cross, dot, scale as scaled, subtract};
 
 /// The joint centre stands at `origin + Rot(axis, scale q + offset) base`.
 pub struct Crank;
-
-const FIELDS: &[Field] = &[
-    Field {
-        name: "origin",
-        shape: 3,
-        dimension: Dimension::Length,
-        default: Some(0.0),
-        doc: "a point on the axis of rotation; strut bases are measured from it",
-    },
-    Field {
-        name: "axis",
-        shape: 3,
-        dimension: Dimension::Direction,
-        default: None,
-        doc: "axis of rotation; positive angles by the right-hand rule",
-    },
-    Field {
-        name: "offset",
-        shape: 0,
-        dimension: Dimension::Angle,
-        default: Some(0.0),
-        doc: "added to the joint coordinate (encoder zero)",
-    },
-    Field {
-        name: "scale",
-        shape: 0,
-        dimension: Dimension::Scale,
-        default: Some(1.0),
-        doc: "true rotation per commanded rotation (gear ratio)",
-    },
-];
-
-const PARAMETERS: &[ParameterField] = &axis_parameter_fields(Dimension::Angle);
 
 impl Drive for Crank {
     const TABLE: ElementTable = ElementTable {
@@ -47,11 +15,30 @@ impl Drive for Crank {
         doc: "An arm that turns about a fixed axis; struts of fixed length hang on its end. \
               Strut bases are vectors from the origin at angle 0. \
               Working mode +: the elbow ahead of the platform joint in the sense of rotation.",
-        sets_length: false,
         drawing: Drawing::Circle,
-        fields: FIELDS,
-        parameters: PARAMETERS,
+        fields: &[
+            Field::point(
+                "origin",
+                "a point on the axis of rotation; strut bases are measured from it",
+            )
+            .or(0.0),
+            Field::direction("axis", "axis of rotation; positive angles by the right-hand rule"),
+            Field::number(
+                "offset",
+                Dimension::Angle,
+                "added to the joint coordinate (encoder zero)",
+            )
+            .or(0.0),
+            Field::number(
+                "scale",
+                Dimension::Scale,
+                "true rotation per commanded rotation (gear ratio)",
+            )
+            .or(1.0),
+        ],
+        parameters: &axis_parameter_fields(Dimension::Angle),
         coordinate: Dimension::Angle,
+        ..ElementTable::COMMON
     };
 
     #[inline(always)]
@@ -79,7 +66,7 @@ impl Drive for Crank {
         base: Vector<S>,
         length: S,
         platform: Vector<S>,
-    ) -> Reach<S> {
+    ) -> InverseRoot<S> {
         let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
         let arm = Arm::new(nominal.tilted(u, v), base);
         let w = subtract(platform, [x, y, z]);
@@ -89,7 +76,7 @@ impl Drive for Crank {
         let margin = p.square() + q.square() - c.square();
         let side = margin.select(margin, margin.lift(0.0)).sqrt() * margin.lift(mode);
         let angle = (q * c + p * side).atan2(p * c - q * side);
-        Reach { joint: (angle - offset) / scale, margin }
+        InverseRoot { joint: (angle - offset) / scale, margin }
     }
 
     fn span(

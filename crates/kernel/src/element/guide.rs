@@ -4,20 +4,21 @@
 //! they move with the pose and with their own deviations is added here, once for all guides, as dual
 //! numbers through the guide's closures.
 
-use super::{DRIVE_END, Dimension, Direction, ElementTable, PLACES};
+use super::direction::Direction;
+use super::table::{Dimension, ElementTable};
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{RotationMatrix, Vector, add, cross, rotate};
 
-/// The four things that a guide may read, in the order of their parameters' places in a gradient.
+/// The four things that a guide may read, in the order of their parameters' slots in a gradient.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
-    /// A point of the frame: places 0 to 2.
+    /// A point of the frame: slots 0 to 2.
     FramePoint,
-    /// A point of the platform: places 3 to 5.
+    /// A point of the platform: slots 3 to 5.
     PlatformPoint,
-    /// A direction of the frame, with two tilts: places 6 and 7.
+    /// A direction of the frame, with two tilts: slots 6 and 7.
     FrameDirection,
-    /// A direction of the platform, with two tilts: places 8 and 9.
+    /// A direction of the platform, with two tilts: slots 8 and 9.
     PlatformDirection,
 }
 
@@ -31,7 +32,7 @@ impl Anchor {
     ];
 
     /// Where its first parameter stands in a gradient.
-    pub fn place(self) -> usize {
+    pub fn slot(self) -> usize {
         match self {
             Anchor::FramePoint => 0,
             Anchor::PlatformPoint => 3,
@@ -42,7 +43,7 @@ impl Anchor {
 }
 
 /// Parameters of the four anchors together.
-const OWN_PARAMETERS: usize = 10;
+pub const ANCHOR_PARAMETERS: usize = 10;
 
 /// What a guide's closures read at one pose, all in base axes. Directions come as a unit vector and two
 /// tangents; what the guide does not declare is zero.
@@ -125,7 +126,7 @@ impl<S: Scalar> GuideLimb<S> {
 
 /// Residual of a closure and its row: derivatives to the platform's twist about the tool point.
 #[inline(always)]
-fn row_of<S: Scalar, G: Guide>(
+pub fn row_of<S: Scalar, G: Guide>(
     which: usize,
     frames: &GuideFrames,
     limb: &GuideLimb<S>,
@@ -167,7 +168,7 @@ fn row_of<S: Scalar, G: Guide>(
 
 /// Residual of a closure on any scalar.
 #[inline(always)]
-fn residual_of<S: Scalar, G: Guide>(
+pub fn residual_of<S: Scalar, G: Guide>(
     which: usize,
     frames: &GuideFrames,
     limb: &GuideLimb<S>,
@@ -177,112 +178,31 @@ fn residual_of<S: Scalar, G: Guide>(
     G::closure(which, &limb.points(frames, rotation, position), length)
 }
 
-/// The derivatives of a closure to its own parameters and to the tool point's, at their places.
+/// The derivatives of a closure to the parameters of its anchors, at their slots.
 #[inline(always)]
-fn gradient_of<S: Scalar, G: Guide>(
+pub fn gradient_of<S: Scalar, G: Guide>(
     which: usize,
     frames: &GuideFrames,
     limb: &GuideLimb<S>,
     (rotation, position): Placement<'_, S>,
     length: f64,
-    places: &mut [S; PLACES],
-) {
+) -> [S; ANCHOR_PARAMETERS] {
     let one = position[0].lift(1.0);
-    let mut own = limb.map(Dual::<S, OWN_PARAMETERS>::constant);
+    let mut own = limb.map(Dual::<S, ANCHOR_PARAMETERS>::constant);
     for k in 0..3 {
-        own.frame_point[k].parts[Anchor::FramePoint.place() + k] = one;
-        own.arm[k].parts[Anchor::PlatformPoint.place() + k] = one;
+        own.frame_point[k].parts[Anchor::FramePoint.slot() + k] = one;
+        own.arm[k].parts[Anchor::PlatformPoint.slot() + k] = one;
     }
     for k in 0..2 {
-        own.tilts[0][k].parts[Anchor::FrameDirection.place() + k] = one;
-        own.tilts[1][k].parts[Anchor::PlatformDirection.place() + k] = one;
+        own.tilts[0][k].parts[Anchor::FrameDirection.slot() + k] = one;
+        own.tilts[1][k].parts[Anchor::PlatformDirection.slot() + k] = one;
     }
     let pose = (&rotation.map(|row| row.map(Dual::constant)), position.map(Dual::constant));
-    let closure = residual_of::<_, G>(which, frames, &own, pose, length);
-    places[..OWN_PARAMETERS].copy_from_slice(&closure.parts);
-    for k in 0..3 {
-        places[DRIVE_END + k] = -closure.parts[Anchor::PlatformPoint.place() + k];
-    }
+    residual_of::<_, G>(which, frames, &own, pose, length).parts
 }
 
 /// Where a platform is: its rotation and its tool point.
 pub type Placement<'a, S> = (&'a RotationMatrix<S>, Vector<S>);
-
-/// Makes the closed set of guides from its list, with static dispatch.
-macro_rules! guides {
-    ($($name:ident => $type:path),+ $(,)?) => {
-        /// The kinds of guide.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[allow(missing_docs)] // each is described by its table
-        pub enum GuideKind { $($name),+ }
-
-        impl GuideKind {
-            /// Every kind, in the order of the list.
-            pub const ALL: &[GuideKind] = &[$(GuideKind::$name),+];
-
-            /// Kind, fields and parameters.
-            pub fn table(self) -> &'static ElementTable {
-                match self { $(GuideKind::$name => const { &<$type as Guide>::TABLE }),+ }
-            }
-
-            /// The field that each anchor is given by.
-            pub fn fields(self) -> &'static [(Anchor, &'static str)] {
-                match self { $(GuideKind::$name => <$type as Guide>::FIELDS),+ }
-            }
-
-            /// How many closures it has.
-            pub fn closures(self) -> usize {
-                match self { $(GuideKind::$name => <$type as Guide>::CLOSURES),+ }
-            }
-
-            /// Residual (m) of one closure and its row: derivatives to the platform's twist.
-            pub fn row<S: Scalar>(
-                self,
-                which: usize,
-                frames: &GuideFrames,
-                limb: &GuideLimb<S>,
-                at: Placement<'_, S>,
-                length: f64,
-            ) -> (S, [S; 6]) {
-                match self { $(GuideKind::$name => row_of::<S, $type>(which, frames, limb, at, length)),+ }
-            }
-
-            /// Residual (m) of one closure, on any scalar.
-            pub fn residual<S: Scalar>(
-                self,
-                which: usize,
-                frames: &GuideFrames,
-                limb: &GuideLimb<S>,
-                at: Placement<'_, S>,
-                length: f64,
-            ) -> S {
-                match self { $(GuideKind::$name => residual_of::<S, $type>(which, frames, limb, at, length)),+ }
-            }
-
-            /// The derivatives of one closure to its parameters and to the tool's, at their places.
-            pub fn gradient<S: Scalar>(
-                self,
-                which: usize,
-                frames: &GuideFrames,
-                limb: &GuideLimb<S>,
-                at: Placement<'_, S>,
-                length: f64,
-                places: &mut [S; PLACES],
-            ) {
-                match self {
-                    $(GuideKind::$name => gradient_of::<S, $type>(which, frames, limb, at, length, places)),+
-                }
-            }
-        }
-    };
-}
-
-// The list: a new guide is its file, its `mod` line in `element/mod.rs` and one line here.
-guides! {
-    Plane => super::plane::Plane,
-    Line => super::line::Line,
-    Universal => super::universal::Universal,
-}
 
 /// The names and dimensions of the parameters of one anchor.
 pub fn anchor_parameters(anchor: Anchor) -> &'static [(&'static str, Dimension)] {

@@ -1,342 +1,143 @@
-//! What a machine is made of. One element = one file, and one line in the list at the end.
+//! What a machine is made of. One element = one file, and one line in a list at the end.
 //!
 //! An element is written as functions of joint-centre points, lengths and joint coordinates, on any
 //! scalar. It knows nothing of poses and nobody derives a Jacobian: how points move with the platform
 //! and with the drives is the library's business ([`crate::kinematics`]).
 
 mod crank;
+mod direction;
+mod drive;
 pub mod guide;
 mod line;
 mod plane;
 mod slider;
 pub mod strut;
+mod table;
 mod telescopic;
 mod universal;
 
-use crate::scalar::{Dual, Scalar};
-use crate::spatial::{Vector, dot, norm, scale, subtract, tangents};
+pub use direction::Direction;
+pub use drive::{ClosureGradient, Drive, InverseRoot};
+pub use table::{Dimension, Drawing, ElementTable, Field, ParameterField};
 
-/// What a number measures; the machine file's units follow from it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Dimension {
-    /// m.
-    Length,
-    /// rad.
-    Angle,
-    /// A vector of which only the direction counts.
-    Direction,
-    /// The drive's own joint coordinate: m or rad.
-    Coordinate,
-    /// No unit.
-    Scale,
-}
+use crate::scalar::{Real, Scalar};
+use crate::spatial::Vector;
+use drive::{DRIVE_INPUTS, driven_base_load, driven_gradient};
+use guide::{
+    ANCHOR_PARAMETERS, Anchor, Guide, GuideFrames, GuideLimb, Placement, gradient_of, residual_of,
+    row_of,
+};
+use std::ops::Deref;
+use strut::strut_gradient;
 
-impl Dimension {
-    /// The word that the machine file's model uses.
-    pub fn name(self) -> &'static str {
-        match self {
-            Dimension::Length => "length",
-            Dimension::Angle => "angle",
-            Dimension::Direction => "direction",
-            Dimension::Coordinate => "coordinate",
-            Dimension::Scale => "scale",
-        }
-    }
+/// Where the gradient of one closure has its derivatives to the parameters that the closure reads: a
+/// strut's `base`, `platform`, `length`, the drive's parameters, `tool`, `ring_radius`; a guide's anchors
+/// ([`Anchor::slot`]), then `tool`.
+pub struct Slots;
 
-    /// The SI unit of a parameter.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Dimension::Length | Dimension::Coordinate => "m",
-            Dimension::Angle => "rad",
-            Dimension::Direction | Dimension::Scale => "1",
-        }
-    }
-}
+impl Slots {
+    /// `base.x`; y and z follow.
+    pub const BASE: usize = 0;
+    /// `platform.x`; y and z follow.
+    pub const PLATFORM: usize = Self::BASE + 3;
+    /// `length`.
+    pub const LENGTH: usize = Self::PLATFORM + 3;
+    /// The drive's first parameter; the others follow.
+    pub const DRIVE: usize = Self::LENGTH + 1;
+    /// `tool.x`; y and z follow.
+    pub const TOOL: usize = Self::DRIVE + MAX_DRIVE_PARAMETERS;
+    /// `ring_radius`.
+    pub const RING_RADIUS: usize = Self::TOOL + 3;
+    /// How many.
+    pub const COUNT: usize = Self::RING_RADIUS + 1;
 
-/// One key of an element's table in the machine file.
-#[derive(Clone, Copy, Debug)]
-pub struct Field {
-    /// The key.
-    pub name: &'static str,
-    /// 0: one number; 3: a vector.
-    pub shape: usize,
-    /// What it measures.
-    pub dimension: Dimension,
-    /// The value of every component where the key is missing; `None`: the key is required.
-    pub default: Option<f64>,
-    /// One line for the reader of the machine file.
-    pub doc: &'static str,
-}
-
-/// A number that the closure reads and that a deviation may move.
-#[derive(Clone, Copy, Debug)]
-pub struct ParameterField {
-    /// The last part of the parameter's name, as in `origin.x`.
-    pub name: &'static str,
-    /// What it measures.
-    pub dimension: Dimension,
-}
-
-const fn parameter(name: &'static str, dimension: Dimension) -> ParameterField {
-    ParameterField { name, dimension }
-}
-
-/// How an element is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Drawing {
-    /// A straight guideway along the travel.
-    Line,
-    /// The circle on which the joint centre turns.
-    Circle,
-    /// Nothing beyond the strut itself.
-    None,
-}
-
-impl Drawing {
-    /// The word in the element table.
-    pub fn name(self) -> &'static str {
-        match self {
-            Drawing::Line => "line",
-            Drawing::Circle => "circle",
-            Drawing::None => "none",
-        }
+    /// Whether a strut's slot is of its base side: the base, the length and the drive.
+    #[inline(always)]
+    pub fn is_base_side(slot: usize) -> bool {
+        slot < Self::PLATFORM || (Self::LENGTH..Self::TOOL).contains(&slot)
     }
 }
 
-/// Everything the rest of the software needs to know of an element's kind.
-#[derive(Clone, Copy, Debug)]
-pub struct ElementTable {
-    /// The word in the machine file.
-    pub kind: &'static str,
-    /// One sentence.
-    pub doc: &'static str,
-    /// Whether it is the length of the strut that it carries, which then has none of its own.
-    pub sets_length: bool,
-    /// How it is drawn.
-    pub drawing: Drawing,
-    /// The keys it reads.
-    pub fields: &'static [Field],
-    /// The parameters it contributes.
-    pub parameters: &'static [ParameterField],
-    /// What its joint coordinate measures ([`Dimension::Length`] or [`Dimension::Angle`]).
-    pub coordinate: Dimension,
-}
-
-/// A nominal direction and the two directions in which its deviations `u`, `v` tilt it.
+/// The derivatives of one closure to the parameters that it reads, by their [`Slots`]. The platform's, the
+/// tool's and the ring's are the library's to fill, since they depend on the attitude.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Direction {
-    /// Unit vector.
-    pub axis: Vector<f64>,
-    /// Unit vectors; with the axis a right-handed frame.
-    pub tangents: [Vector<f64>; 2],
-}
+pub struct ParameterGradient<S>([S; Slots::COUNT]);
 
-impl Direction {
-    /// From any non-zero vector.
-    pub fn new(direction: Vector<f64>) -> Self {
-        let axis = scale(direction, 1.0 / norm(direction));
-        Direction { axis, tangents: tangents(axis) }
+impl<S: Scalar> ParameterGradient<S> {
+    /// Zero everywhere, of the same kind as `like`.
+    pub fn zero(like: S) -> Self {
+        ParameterGradient([like.lift(0.0); Slots::COUNT])
     }
 
-    /// The unit axis tilted by `u` and `v` (tangents of the tilt angles).
+    /// To the strut's base.
     #[inline(always)]
-    pub fn tilted<S: Scalar>(&self, u: S, v: S) -> Vector<S> {
-        let mut axis = [u; 3];
+    pub fn set_base(&mut self, to_base: &[S]) {
+        self.0[Slots::BASE..Slots::PLATFORM].copy_from_slice(to_base);
+    }
+
+    /// To the drive's parameters and the strut's base, of the inputs of [`Drive::place`]; returns those to
+    /// the joint coordinate and to the length.
+    #[inline(always)]
+    fn set_driven<const N: usize>(&mut self, inputs: &[S; N]) -> (S, S) {
+        let count = N - DRIVE_INPUTS;
+        self.set_base(&inputs[count + 1..count + 4]);
+        self.0[Slots::DRIVE..Slots::DRIVE + count].copy_from_slice(&inputs[..count]);
+        (inputs[count], inputs[count + 4])
+    }
+
+    /// To the platform-side joint, platform axes. That to the tool point is its opposite.
+    #[inline(always)]
+    pub fn set_platform(&mut self, to_platform: Vector<S>) {
         for k in 0..3 {
-            let first = u.mul_add(u.lift(self.tangents[0][k]), u.lift(self.axis[k]));
-            axis[k] = v.mul_add(v.lift(self.tangents[1][k]), first);
+            self.0[Slots::PLATFORM + k] = to_platform[k];
+            self.0[Slots::TOOL + k] = -to_platform[k];
         }
-        scale(axis, u.lift(1.0) / norm(axis))
     }
 
-    /// The tilted unit axis and two vectors across it.
+    /// To the radius of the strut's ring.
     #[inline(always)]
-    pub fn tilted_triad<S: Scalar>(&self, u: S, v: S) -> [Vector<S>; 3] {
-        if self.axis == [0.0; 3] {
-            return [[u.lift(0.0); 3]; 3];
+    pub fn set_ring_radius(&mut self, to_radius: S) {
+        self.0[Slots::RING_RADIUS] = to_radius;
+    }
+
+    /// To a guide's anchors and the tool point.
+    fn set_anchors(&mut self, to_anchors: [S; ANCHOR_PARAMETERS]) {
+        self.0[..ANCHOR_PARAMETERS].copy_from_slice(&to_anchors);
+        let platform = Anchor::PlatformPoint.slot();
+        for k in 0..3 {
+            self.0[Slots::TOOL + k] = -to_anchors[platform + k];
         }
-        let axis = self.tilted(u, v);
-        let across = self.tangents.map(|tangent| {
-            let tangent = tangent.map(|value| u.lift(value));
-            subtract(tangent, scale(axis, dot(tangent, axis)))
-        });
-        [axis, across[0], across[1]]
     }
 }
 
-/// The closed-form inverse of a drive at one platform-side joint centre.
-#[derive(Clone, Copy, Debug)]
-pub struct Reach<S> {
-    /// The joint coordinate; where `margin < 0` that of the nearest reachable point.
-    pub joint: S,
-    /// Not negative exactly where the strut reaches.
-    pub margin: S,
+impl<S: Real> ParameterGradient<S> {
+    /// That of one sample of a group.
+    pub fn lane(&self, lane: usize) -> ParameterGradient<f64> {
+        ParameterGradient(self.0.map(|value| value.lane(lane)))
+    }
 }
 
-/// An actuated joint.
-pub trait Drive {
-    /// Kind, fields and parameters.
-    const TABLE: ElementTable;
-    /// Directions of a dual number that differentiates [`Drive::place`]: its parameters, the joint
-    /// coordinate, the strut's base point and length.
-    const WIDTH: usize = Self::TABLE.parameters.len() + 5;
+impl<S> Deref for ParameterGradient<S> {
+    type Target = [S; Slots::COUNT];
 
-    /// The base-side joint centre (base frame) and the length of a strut that this drive carries.
-    ///
-    /// `base` is the joint centre as the machine file gives it; `length` the strut's own length
-    /// (unused where the drive is the length).
-    fn place<S: Scalar>(
-        nominal: &Direction,
-        parameters: &[S],
-        joint: S,
-        base: Vector<S>,
-        length: S,
-    ) -> (Vector<S>, S);
-
-    /// The joint coordinate for a platform-side joint centre; `mode` (+1 or -1) picks the branch.
-    fn inverse<S: Scalar>(
-        nominal: &Direction,
-        parameters: &[S],
-        mode: f64,
-        base: Vector<S>,
-        length: S,
-        platform: Vector<S>,
-    ) -> Reach<S>;
-
-    /// The shortest and the longest strut that reaches `platform` from some joint coordinate.
-    fn span(
-        nominal: &Direction,
-        parameters: &[f64],
-        base: Vector<f64>,
-        platform: Vector<f64>,
-    ) -> [f64; 2];
+    #[inline(always)]
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
 }
 
-/// Where a closure's gradient keeps the derivatives to the strut's own parameters, in their order.
-pub const OWN: usize = 7;
-/// Where the drive's parameters end.
-pub const DRIVE_END: usize = OWN + MAX_DRIVE_PARAMETERS;
-/// Where the derivative to the radius of a strut's ring stands.
-pub const RING: usize = DRIVE_END + 3;
-/// Places of one closure's gradient: a strut's `base`, `platform`, `length`, the drive's parameters,
-/// `tool`, `ring_radius`; a guide's anchors, then `tool`. The platform's, the tool's and the ring's are
-/// the library's to fill, since they depend on the attitude.
-pub const PLACES: usize = RING + 1;
-
-/// The derivatives of one closure that need no knowledge of poses, beside those in its places.
-#[derive(Clone, Copy, Debug)]
-pub struct ClosureGradient<S> {
-    /// To the platform-side joint centre, base frame.
-    pub centre: Vector<S>,
-    /// To the joint coordinate.
-    pub joint: S,
-}
-
-/// The gradient of the closure of a strut that hangs on the frame; `points` are its base-side and its
+/// The gradient of the closure of a strut on the frame; `points` are its base-side and its
 /// platform-side joint centre.
 #[inline(always)]
 pub fn fixed_gradient<S: Scalar>(
     points: [Vector<S>; 2],
     length: S,
-    places: &mut [S; PLACES],
+    to_parameters: &mut ParameterGradient<S>,
 ) -> ClosureGradient<S> {
     let (to_centre, to_length) = strut_gradient(points, length);
-    for k in 0..3 {
-        places[k] = -to_centre[k];
-    }
-    places[6] = to_length;
+    to_parameters.set_base(&[-to_centre[0], -to_centre[1], -to_centre[2]]);
+    to_parameters.0[Slots::LENGTH] = to_length;
     ClosureGradient { centre: to_centre, joint: length.lift(0.0) }
-}
-
-/// The derivatives of the strut closure to the platform-side centre and to the length. That to the
-/// base-side centre is the former's opposite: moving both points alike changes no distance.
-#[inline(always)]
-fn strut_gradient<S: Scalar>([base, platform]: [Vector<S>; 2], length: S) -> (Vector<S>, S) {
-    let closure = strut::closure(
-        [Dual::constant(base[0]), Dual::constant(base[1]), Dual::constant(base[2])],
-        [
-            Dual::<S, 4>::variable(platform[0], 0),
-            Dual::variable(platform[1], 1),
-            Dual::variable(platform[2], 2),
-        ],
-        Dual::variable(length, 3),
-    );
-    ([closure.parts[0], closure.parts[1], closure.parts[2]], closure.parts[3])
-}
-
-/// A strut's base-side joint centre and length through the drive `D`, as dual numbers in the drive's
-/// parameters, the joint coordinate, the strut's base point and its length; `N` is [`Drive::WIDTH`].
-#[inline(always)]
-fn driven_place<S: Scalar, D: Drive, const N: usize>(
-    nominal: &Direction,
-    parameters: &[S],
-    joint: S,
-    base: Vector<S>,
-    length: S,
-) -> (Vector<Dual<S, N>>, Dual<S, N>) {
-    let count = D::TABLE.parameters.len();
-    let mut inputs = [Dual::<S, N>::constant(joint); MAX_DRIVE_PARAMETERS];
-    for k in 0..count {
-        inputs[k] = Dual::variable(parameters[k], k);
-    }
-    D::place(
-        nominal,
-        &inputs[..count],
-        Dual::variable(joint, count),
-        [
-            Dual::variable(base[0], count + 1),
-            Dual::variable(base[1], count + 2),
-            Dual::variable(base[2], count + 3),
-        ],
-        Dual::variable(length, count + 4),
-    )
-}
-
-/// The gradient of the strut closure through the drive `D`; `N` is its [`Drive::WIDTH`]. `points` are
-/// the strut's base as the machine file gives it and its platform-side joint centre.
-#[inline(always)]
-fn driven_gradient<S: Scalar, D: Drive, const N: usize>(
-    nominal: &Direction,
-    parameters: &[S],
-    joint: S,
-    [base, platform]: [Vector<S>; 2],
-    length: S,
-    places: &mut [S; PLACES],
-) -> ClosureGradient<S> {
-    let count = D::TABLE.parameters.len();
-    let (centre, own) = driven_place::<S, D, N>(nominal, parameters, joint, base, length);
-    let at = [centre[0].value, centre[1].value, centre[2].value];
-    let (to_centre, to_length) = strut_gradient([at, platform], own.value);
-    let mut chained = [joint; N];
-    for j in 0..N {
-        let along = [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]];
-        chained[j] = to_length.mul_add(own.parts[j], -dot(to_centre, along));
-    }
-    places[..3].copy_from_slice(&chained[count + 1..count + 4]);
-    places[6] = chained[count + 4];
-    places[OWN..OWN + count].copy_from_slice(&chained[..count]);
-    ClosureGradient { centre: to_centre, joint: chained[count] }
-}
-
-/// The work of a force on the base-side joint centre per unit of each parameter, through the drive `D`,
-/// at the places of a gradient.
-#[inline(always)]
-fn driven_base_load<S: Scalar, D: Drive, const N: usize>(
-    nominal: &Direction,
-    parameters: &[S],
-    joint: S,
-    base: Vector<S>,
-    force: Vector<S>,
-    places: &mut [S; PLACES],
-) {
-    let count = D::TABLE.parameters.len();
-    let (centre, _) = driven_place::<S, D, N>(nominal, parameters, joint, base, joint.lift(1.0));
-    let mut work = [joint; N];
-    for j in 0..N {
-        work[j] = dot(force, [centre[0].parts[j], centre[1].parts[j], centre[2].parts[j]]);
-    }
-    places[..3].copy_from_slice(&work[count + 1..count + 4]);
-    places[OWN..OWN + count].copy_from_slice(&work[..count]);
 }
 
 const fn most(counts: &[usize]) -> usize {
@@ -397,7 +198,7 @@ macro_rules! drives {
                 base: Vector<S>,
                 length: S,
                 platform: Vector<S>,
-            ) -> Reach<S> {
+            ) -> InverseRoot<S> {
                 match self {
                     $(DriveKind::$name => <$type as Drive>::inverse(nominal, parameters, mode, base, length, platform)),+
                 }
@@ -425,12 +226,15 @@ macro_rules! drives {
                 joint: S,
                 base: Vector<S>,
                 force: Vector<S>,
-                places: &mut [S; PLACES],
+                loads: &mut ParameterGradient<S>,
             ) {
                 match self {
-                    $(DriveKind::$name => driven_base_load::<S, $type, { <$type as Drive>::WIDTH }>(
-                        nominal, parameters, joint, base, force, places,
-                    )),+
+                    $(DriveKind::$name => {
+                        let inputs = driven_base_load::<S, $type, { <$type as Drive>::WIDTH }>(
+                            nominal, parameters, joint, base, force,
+                        );
+                        loads.set_driven(&inputs);
+                    }),+
                 }
             }
 
@@ -443,13 +247,88 @@ macro_rules! drives {
                 joint: S,
                 points: [Vector<S>; 2],
                 length: S,
-                places: &mut [S; PLACES],
+                to_parameters: &mut ParameterGradient<S>,
             ) -> ClosureGradient<S> {
                 match self {
-                    $(DriveKind::$name => driven_gradient::<S, $type, { <$type as Drive>::WIDTH }>(
-                        nominal, parameters, joint, points, length, places,
-                    )),+
+                    $(DriveKind::$name => {
+                        let (centre, inputs) =
+                            driven_gradient::<S, $type, { <$type as Drive>::WIDTH }>(
+                                nominal, parameters, joint, points, length,
+                            );
+                        let (joint, to_length) = to_parameters.set_driven(&inputs);
+                        to_parameters.0[Slots::LENGTH] = to_length;
+                        ClosureGradient { centre, joint }
+                    }),+
                 }
+            }
+        }
+    };
+}
+
+/// Makes the closed set of guides from its list, with static dispatch.
+macro_rules! guides {
+    ($($name:ident => $type:path),+ $(,)?) => {
+        /// The kinds of guide.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[allow(missing_docs)] // each is described by its table
+        pub enum GuideKind { $($name),+ }
+
+        impl GuideKind {
+            /// Every kind, in the order of the list.
+            pub const ALL: &[GuideKind] = &[$(GuideKind::$name),+];
+
+            /// Kind, fields and parameters.
+            pub fn table(self) -> &'static ElementTable {
+                match self { $(GuideKind::$name => const { &<$type as Guide>::TABLE }),+ }
+            }
+
+            /// The field that each anchor is given by.
+            pub fn fields(self) -> &'static [(Anchor, &'static str)] {
+                match self { $(GuideKind::$name => <$type as Guide>::FIELDS),+ }
+            }
+
+            /// How many closures it has.
+            pub fn closures(self) -> usize {
+                match self { $(GuideKind::$name => <$type as Guide>::CLOSURES),+ }
+            }
+
+            /// Residual (m) of one closure and its row: derivatives to the platform's twist.
+            pub fn row<S: Scalar>(
+                self,
+                which: usize,
+                frames: &GuideFrames,
+                limb: &GuideLimb<S>,
+                at: Placement<'_, S>,
+                length: f64,
+            ) -> (S, [S; 6]) {
+                match self { $(GuideKind::$name => row_of::<S, $type>(which, frames, limb, at, length)),+ }
+            }
+
+            /// Residual (m) of one closure, on any scalar.
+            pub fn residual<S: Scalar>(
+                self,
+                which: usize,
+                frames: &GuideFrames,
+                limb: &GuideLimb<S>,
+                at: Placement<'_, S>,
+                length: f64,
+            ) -> S {
+                match self { $(GuideKind::$name => residual_of::<S, $type>(which, frames, limb, at, length)),+ }
+            }
+
+            /// The derivatives of one closure to its parameters and to the tool's.
+            pub fn gradient<S: Scalar>(
+                self,
+                which: usize,
+                frames: &GuideFrames,
+                limb: &GuideLimb<S>,
+                at: Placement<'_, S>,
+                length: f64,
+                to_parameters: &mut ParameterGradient<S>,
+            ) {
+                to_parameters.set_anchors(match self {
+                    $(GuideKind::$name => gradient_of::<S, $type>(which, frames, limb, at, length)),+
+                });
             }
         }
     };
@@ -462,23 +341,9 @@ drives! {
     Telescopic => telescopic::Telescopic,
 }
 
-/// The parameters of every drive with an axis; the offset is of the joint coordinate's dimension.
-const fn axis_parameter_fields(offset: Dimension) -> [ParameterField; 7] {
-    [
-        parameter("origin.x", Dimension::Length),
-        parameter("origin.y", Dimension::Length),
-        parameter("origin.z", Dimension::Length),
-        parameter("axis.u", Dimension::Angle),
-        parameter("axis.v", Dimension::Angle),
-        parameter("offset", offset),
-        parameter("scale", Dimension::Scale),
-    ]
-}
-
-/// The values of [`axis_parameter_fields`].
-#[inline(always)]
-fn axis_parameters<S: Scalar>(parameters: &[S]) -> [S; 7] {
-    let mut values = [parameters[0]; 7];
-    values.copy_from_slice(&parameters[..7]);
-    values
+// The list: a new guide is its file, its `mod` line above and one line here.
+guides! {
+    Plane => plane::Plane,
+    Line => line::Line,
+    Universal => universal::Universal,
 }

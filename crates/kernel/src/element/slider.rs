@@ -1,56 +1,37 @@
 //! A carriage on a straight guideway.
 
-use super::{Dimension, Direction, Drawing, Drive, ElementTable, Field, ParameterField, Reach};
-use super::{axis_parameter_fields, axis_parameters};
+use super::direction::Direction;
+use super::drive::{Drive, InverseRoot, TRAVEL_SCALE, axis_parameter_fields, axis_parameters};
+use super::table::{Dimension, Drawing, ElementTable, Field};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, add, dot, norm, scale as scaled, subtract};
 
 /// The carriage stands at `origin + (scale q + offset) axis`.
 pub struct Slider;
 
-const FIELDS: &[Field] = &[
-    Field {
-        name: "origin",
-        shape: 3,
-        dimension: Dimension::Length,
-        default: Some(0.0),
-        doc: "the carriage's reference point where the joint coordinate is 0",
-    },
-    Field {
-        name: "axis",
-        shape: 3,
-        dimension: Dimension::Direction,
-        default: None,
-        doc: "direction of the guideway",
-    },
-    Field {
-        name: "offset",
-        shape: 0,
-        dimension: Dimension::Coordinate,
-        default: Some(0.0),
-        doc: "added to the joint coordinate (home switch, encoder zero)",
-    },
-    Field {
-        name: "scale",
-        shape: 0,
-        dimension: Dimension::Scale,
-        default: Some(1.0),
-        doc: "true travel per commanded travel (lead, scale factor)",
-    },
-];
-
-const PARAMETERS: &[ParameterField] = &axis_parameter_fields(Dimension::Length);
-
 impl Drive for Slider {
     const TABLE: ElementTable = ElementTable {
         kind: "slider",
         doc: "A carriage on a straight guideway; struts of fixed length hang on it. \
               Working mode +: the carriage on the +axis side of the platform joint.",
-        sets_length: false,
         drawing: Drawing::Line,
-        fields: FIELDS,
-        parameters: PARAMETERS,
-        coordinate: Dimension::Length,
+        fields: &[
+            Field::point(
+                "origin",
+                "the carriage's reference point where the joint coordinate is 0",
+            )
+            .or(0.0),
+            Field::direction("axis", "direction of the guideway"),
+            Field::number(
+                "offset",
+                Dimension::Coordinate,
+                "added to the joint coordinate (home switch, encoder zero)",
+            )
+            .or(0.0),
+            TRAVEL_SCALE,
+        ],
+        parameters: &axis_parameter_fields(Dimension::Length),
+        ..ElementTable::COMMON
     };
 
     #[inline(always)]
@@ -74,7 +55,7 @@ impl Drive for Slider {
         base: Vector<S>,
         length: S,
         platform: Vector<S>,
-    ) -> Reach<S> {
+    ) -> InverseRoot<S> {
         let [x, y, z, u, v, offset, scale] = axis_parameters(parameters);
         let axis = nominal.tilted(u, v);
         let from_origin = subtract(platform, add([x, y, z], base));
@@ -84,7 +65,7 @@ impl Drive for Slider {
         let margin = length.square() - dot(perpendicular, perpendicular);
         let half_chord = margin.select(margin, margin.lift(0.0)).sqrt();
         let travelled = half_chord.mul_add(half_chord.lift(mode), foot);
-        Reach { joint: (travelled - offset) / scale, margin }
+        InverseRoot { joint: (travelled - offset) / scale, margin }
     }
 
     fn span(

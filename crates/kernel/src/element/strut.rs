@@ -1,59 +1,34 @@
 //! A strut: two joint centres at a fixed distance.
 
-use super::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
-use crate::scalar::Scalar;
+use super::table::{
+    Dimension, Drawing, ElementTable, Field, ParameterField, parameter, parameters,
+};
+use crate::scalar::{Dual, Scalar};
 use crate::spatial::{Vector, add, dot, norm, scale, subtract};
 
 /// Keys and parameters of a strut. Its length is a parameter only where no telescopic drive is it.
 pub const TABLE: ElementTable = ElementTable {
     kind: "strut",
     doc: "Two joint centres, one on the base side and one on the platform, at a distance.",
-    sets_length: false,
     drawing: Drawing::Line,
     fields: &[
-        Field {
-            name: "base",
-            shape: 3,
-            dimension: Dimension::Length,
-            default: None,
-            doc: "base-side joint centre: on the frame, or on the drive's carriage or crank",
-        },
-        Field {
-            name: "platform",
-            shape: 3,
-            dimension: Dimension::Length,
-            default: None,
-            doc: "platform-side joint centre in the platform's axes",
-        },
-        Field {
-            name: "ring_radius",
-            shape: 0,
-            dimension: Dimension::Length,
-            default: Some(0.0),
-            doc: "radius of a ring about `platform` on which the platform-side joint slides \
-                  (pentapods); 0: the joint stands at `platform`",
-        },
-        Field {
-            name: "ring_axis",
-            shape: 3,
-            dimension: Dimension::Direction,
-            default: Some(0.0),
-            doc: "axis of the ring, platform axes",
-        },
+        Field::point(
+            "base",
+            "base-side joint centre: on the frame, or on the drive's carriage or crank",
+        ),
+        Field::point("platform", "platform-side joint centre in the platform's axes"),
+        Field::number(
+            "ring_radius",
+            Dimension::Length,
+            "radius of a ring about `platform` on which the platform-side joint slides \
+             (pentapods); 0: the joint stands at `platform`",
+        )
+        .or(0.0),
+        Field::direction("ring_axis", "axis of the ring, platform axes").or(0.0),
     ],
-    parameters: PARAMETERS,
-    coordinate: Dimension::Length,
+    parameters: &parameters![point "base" point "platform" (Dimension::Length) "length"],
+    ..ElementTable::COMMON
 };
-
-const PARAMETERS: &[ParameterField] = &[
-    parameter("base.x", Dimension::Length),
-    parameter("base.y", Dimension::Length),
-    parameter("base.z", Dimension::Length),
-    parameter("platform.x", Dimension::Length),
-    parameter("platform.y", Dimension::Length),
-    parameter("platform.z", Dimension::Length),
-    parameter("length", Dimension::Length),
-];
 
 /// The parameter of a strut whose platform-side joint slides on a ring, beside [`TABLE`]'s.
 pub const RING_RADIUS: ParameterField = parameter("ring_radius", Dimension::Length);
@@ -87,4 +62,20 @@ pub fn nearest_on_ring<S: Scalar>(
     let across = subtract(away, scale(axis, dot(away, axis)));
     let radial = scale(across, radius.lift(1.0) / norm(across));
     (add(centre, scale(radial, radius)), radial)
+}
+
+/// The derivatives of the strut closure to the platform-side centre and to the length. That to the
+/// base-side centre is the former's opposite: moving both points alike changes no distance.
+#[inline(always)]
+pub fn strut_gradient<S: Scalar>([base, platform]: [Vector<S>; 2], length: S) -> (Vector<S>, S) {
+    let gradient = closure(
+        [Dual::constant(base[0]), Dual::constant(base[1]), Dual::constant(base[2])],
+        [
+            Dual::<S, 4>::variable(platform[0], 0),
+            Dual::variable(platform[1], 1),
+            Dual::variable(platform[2], 2),
+        ],
+        Dual::variable(length, 3),
+    );
+    ([gradient.parts[0], gradient.parts[1], gradient.parts[2]], gradient.parts[3])
 }

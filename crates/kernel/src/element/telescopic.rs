@@ -1,42 +1,30 @@
 //! A strut whose own length is driven.
 
-use super::parameter;
-use super::{Dimension, Direction, Drawing, Drive, ElementTable, Field, ParameterField, Reach};
+use super::direction::Direction;
+use super::drive::{Drive, InverseRoot, TRAVEL_SCALE};
+use super::table::{Dimension, ElementTable, Field, parameters};
 use crate::scalar::Scalar;
 use crate::spatial::{Vector, norm, subtract};
 
-/// The strut hangs on the frame and is `scale q + offset` long.
+/// The strut stands on the frame and is `scale q + offset` long.
 pub struct Telescopic;
-
-const FIELDS: &[Field] = &[
-    Field {
-        name: "offset",
-        shape: 0,
-        dimension: Dimension::Coordinate,
-        default: Some(0.0),
-        doc: "strut length where the joint coordinate is 0",
-    },
-    Field {
-        name: "scale",
-        shape: 0,
-        dimension: Dimension::Scale,
-        default: Some(1.0),
-        doc: "true travel per commanded travel (lead, scale factor)",
-    },
-];
-
-const PARAMETERS: &[ParameterField] =
-    &[parameter("offset", Dimension::Length), parameter("scale", Dimension::Scale)];
 
 impl Drive for Telescopic {
     const TABLE: ElementTable = ElementTable {
         kind: "telescopic",
         doc: "The strut itself grows and shrinks; its length is the joint coordinate plus an offset.",
         sets_length: true,
-        drawing: Drawing::None,
-        fields: FIELDS,
-        parameters: PARAMETERS,
-        coordinate: Dimension::Length,
+        fields: &[
+            Field::number(
+                "offset",
+                Dimension::Coordinate,
+                "strut length where the joint coordinate is 0",
+            )
+            .or(0.0),
+            TRAVEL_SCALE,
+        ],
+        parameters: &parameters![(Dimension::Length) "offset" (Dimension::Scale) "scale"],
+        ..ElementTable::COMMON
     };
 
     #[inline(always)]
@@ -58,9 +46,9 @@ impl Drive for Telescopic {
         base: Vector<S>,
         length: S,
         platform: Vector<S>,
-    ) -> Reach<S> {
+    ) -> InverseRoot<S> {
         let distance = norm(subtract(platform, base));
-        Reach { joint: (distance - parameters[0]) / parameters[1], margin: length.lift(1.0) }
+        InverseRoot { joint: (distance - parameters[0]) / parameters[1], margin: length.lift(1.0) }
     }
 
     fn span(

@@ -1,36 +1,12 @@
 //! A universal joint: the platform does not twist.
 
 use super::guide::{Anchor, Guide, GuidePoints};
-use super::{Dimension, Drawing, ElementTable, Field, ParameterField, parameter};
+use super::table::{ElementTable, Field, parameters};
 use crate::scalar::Scalar;
 use crate::spatial::dot;
 
 /// `length (base_axis . platform_axis) = 0`.
 pub struct Universal;
-
-const FIELDS: &[Field] = &[
-    Field {
-        name: "base_axis",
-        shape: 3,
-        dimension: Dimension::Direction,
-        default: None,
-        doc: "the joint's axis on the frame, base frame",
-    },
-    Field {
-        name: "platform_axis",
-        shape: 3,
-        dimension: Dimension::Direction,
-        default: None,
-        doc: "the joint's axis on the platform, platform axes",
-    },
-];
-
-const PARAMETERS: &[ParameterField] = &[
-    parameter("base_axis.u", Dimension::Angle),
-    parameter("base_axis.v", Dimension::Angle),
-    parameter("platform_axis.u", Dimension::Angle),
-    parameter("platform_axis.v", Dimension::Angle),
-];
 
 impl Guide for Universal {
     const TABLE: ElementTable = ElementTable {
@@ -38,11 +14,12 @@ impl Guide for Universal {
         doc: "An axis of the frame and one of the platform stay at a right angle, as the cross of a \
               universal joint keeps them: no twist. One closure, in m: the cosine of their angle \
               times the characteristic length.",
-        sets_length: false,
-        drawing: Drawing::None,
-        fields: FIELDS,
-        parameters: PARAMETERS,
-        coordinate: Dimension::Length,
+        fields: &[
+            Field::direction("base_axis", "the joint's axis on the frame, base frame"),
+            Field::direction("platform_axis", "the joint's axis on the platform, platform axes"),
+        ],
+        parameters: &parameters![tilt "base_axis" tilt "platform_axis"],
+        ..ElementTable::COMMON
     };
     const FIELDS: &'static [(Anchor, &'static str)] =
         &[(Anchor::FrameDirection, "base_axis"), (Anchor::PlatformDirection, "platform_axis")];

@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 const SOUND: f64 = 1e8;
 /// The same where the triangle is that of the normal equations, whose digits go with the square of it.
 const SOUND_NORMAL: f64 = 1e5;
-/// The least pivot of the normal equations with unit diagonal, and what is left then of 16 digits.
+/// The least pivot of the normal equations with unit diagonal, which sets how many of 16 digits remain.
 const LEAST_PIVOT: f64 = 1e-8;
 /// Sweeps of Jacobi's rotations; six to ten do, the rest is safety.
 const SWEEPS: usize = 60;
@@ -383,7 +383,7 @@ pub fn square_sum(values: &[f64]) -> f64 {
     dot(values, values)
 }
 
-/// Euclidean length, also of what is too small or large to be squared.
+/// Euclidean length, also of numbers too small or too large to be squared.
 pub(super) fn norm(values: &[f64]) -> f64 {
     let sum = square_sum(values);
     if sum > 1e-280 && sum < 1e280 {
@@ -493,14 +493,14 @@ mod tests {
             let axes: Vec<f64> = linear.columns.iter().map(|c| 0.3 * c).collect();
             let singular = Singular::new(&linear, &axes);
             let scaled = DMatrix::from_fn(rows, size, |i, j| slope[(i, j)] / axes[j]);
-            let mut found: Vec<f64> = singular.values.clone();
-            found.sort_by(|a, b| b.total_cmp(a));
+            let mut descending: Vec<f64> = singular.values.clone();
+            descending.sort_by(|a, b| b.total_cmp(a));
             let expected = if size > 0 { scaled.singular_values() } else { DVector::zeros(0) };
             let rank = rows.min(size - twins);
             for k in 0..rank {
-                assert!(close(found[k], expected[k], 10.0 * expected[0]));
+                assert!(close(descending[k], expected[k], 10.0 * expected[0]));
             }
-            assert!(found[rank..].iter().all(|value| *value == 0.0));
+            assert!(descending[rank..].iter().all(|value| *value == 0.0));
             // The step leaves a residual at right angles to every column, and is in the row space.
             let parts = singular.values.iter().zip(&singular.turned);
             let whole = parts.map(|(s, c)| if *s > 0.0 { -c / s } else { 0.0 });

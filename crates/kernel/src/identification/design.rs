@@ -1,4 +1,4 @@
-//! What is measured where, and what is to be found: everything but the numbers that were read.
+//! The measurements of a calibration and its unknowns: everything but the readings.
 
 use super::observation::{Instrument, Observable};
 use crate::machine::Machine;
@@ -92,9 +92,9 @@ pub struct Prepared {
     pub one_to_one: bool,
     /// The observations of pose i are `of_pose[i]..of_pose[i + 1]`.
     pub of_pose: Vec<usize>,
-    /// Which sight each observation is of, `None` where it is of a strut; neighbours share theirs.
-    pub sights: Vec<Option<usize>>,
-    /// Pose and instrument of each sight, and whether angles are read in it.
+    /// Which view each observation is of, `None` where it is of a strut; neighbours share theirs.
+    pub views: Vec<Option<usize>>,
+    /// Pose and instrument of each view, and whether angles are read in it.
     pub sighted: Vec<(usize, usize, bool)>,
     /// For each parameter of the machine the terms that move it.
     pub movers: Vec<Vec<usize>>,
@@ -119,10 +119,10 @@ impl Prepared {
             of_pose[pose + 1] += of_pose[pose];
         }
         let mut sighted: Vec<(usize, usize, bool)> = Vec::new();
-        let mut sights = Vec::with_capacity(design.observations.len());
+        let mut views = Vec::with_capacity(design.observations.len());
         for observation in &design.observations {
             if observation.observable.of_strut() {
-                sights.push(None);
+                views.push(None);
                 continue;
             }
             let here = (observation.pose, observation.instrument);
@@ -132,7 +132,7 @@ impl Prepared {
             if let Some(last) = sighted.last_mut() {
                 last.2 |= observation.observable.is_angle();
             }
-            sights.push(Some(sighted.len() - 1));
+            views.push(Some(sighted.len() - 1));
         }
         let mut movers = vec![Vec::new(); design.machine.nominal.len()];
         for (number, term) in design.terms.iter().enumerate() {
@@ -140,12 +140,12 @@ impl Prepared {
         }
         let shared = (design.shifted.is_empty() || design.shifts.shared)
             && (design.terms.is_empty() || design.coefficients.shared);
-        let each = |(at, (term, &column)): (usize, (&Term, &usize))| {
+        let same = |(at, (term, &column)): (usize, (&Term, &usize))| {
             term.unknown == at && column == at && design.coefficients.row(0)[at] == 1.0
         };
         let one_to_one = shared
             && term_columns.len() == columns.len()
-            && design.terms.iter().zip(&term_columns).enumerate().all(each);
+            && design.terms.iter().zip(&term_columns).enumerate().all(same);
         Prepared {
             columns,
             shift_columns,
@@ -153,7 +153,7 @@ impl Prepared {
             shared,
             one_to_one,
             of_pose,
-            sights,
+            views,
             sighted,
             movers,
             design,

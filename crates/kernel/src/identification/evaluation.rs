@@ -1,11 +1,11 @@
 //! What the instruments read for given unknowns, and its derivatives; normal equations in one pass.
 
 use super::design::{Design, Prepared};
-use super::observation::{Placed, Reading, Sight, StrutSight, of_strut};
+use super::observation::{InstrumentView, Placed, Reading, StrutView, of_strut};
 use crate::batch::{Deviations, Rows, Samples, Sensitivity, first_order, forward_poses};
 use crate::dispatch::{Work, dispatch};
 use crate::linear::SIX;
-use crate::machine::chosen;
+use crate::machine::indices_of;
 use crate::scalar::Real;
 use crate::spatial::Pose;
 use crate::status::Status;
@@ -30,7 +30,7 @@ pub struct Evaluation<'a> {
     /// What became of them.
     pub status: Vec<Status>,
     placed: Vec<Placed>,
-    sights: Vec<Sight>,
+    views: Vec<InstrumentView>,
     sensitivities: Vec<f64>,
 }
 
@@ -64,7 +64,7 @@ impl<'a> Evaluation<'a> {
             poses: vec![0.0; 7 * poses],
             status: vec![Status::Ok; *poses],
             placed: Vec::new(),
-            sights: Vec::new(),
+            views: Vec::new(),
             sensitivities: vec![0.0; poses * width],
         }
     }
@@ -99,10 +99,10 @@ impl<'a> Evaluation<'a> {
         self.placed.clear();
         let instruments = &self.prepared.design.instruments;
         self.placed.extend(instruments.iter().map(|instrument| instrument.placed(values)));
-        self.sights.clear();
+        self.views.clear();
         for &(pose, instrument, with_angles) in &self.prepared.sighted {
             let at = self.pose(pose);
-            self.sights.push(Sight::new(&self.placed[instrument], &at, with_angles));
+            self.views.push(InstrumentView::new(&self.placed[instrument], &at, with_angles));
         }
         self.status.iter().all(|status| *status == Status::Ok)
     }
@@ -137,15 +137,15 @@ impl<'a> Evaluation<'a> {
         let mut parameters = Vec::new();
         let mut last = usize::MAX;
         let mut joints: &[f64] = &[];
-        let sights = &self.prepared.sights;
-        for ((observation, sight), out) in design.observations.iter().zip(sights).zip(out) {
+        let views = &self.prepared.views;
+        for ((observation, view), out) in design.observations.iter().zip(views).zip(out) {
             if self.status[observation.pose] != Status::Ok {
                 *out = f64::NAN;
                 continue;
             }
             let placed = &self.placed[observation.instrument];
-            let reading = if let Some(sight) = *sight {
-                self.sights[sight].value(observation.observable, placed)
+            let reading = if let Some(view) = *view {
+                self.views[view].value(observation.observable, placed)
             } else {
                 if last != observation.pose {
                     joints = self.inputs(observation.pose, &mut parameters);
@@ -261,10 +261,10 @@ impl Receiver for Summed<'_> {
         }
         for part in rows.chunks_exact(TOGETHER * stride) {
             let row = |k: usize| &part[k * stride..(k + 1) * stride];
-            let each = [row(0), row(1), row(2), row(3), row(4), row(5)];
+            let six_rows = [row(0), row(1), row(2), row(3), row(4), row(5)];
             for column in (0..stride).step_by(S::WIDTH) {
-                let right = each.map(|row| S::load(&row[column..column + S::WIDTH]));
-                let [a, b, c, d, e, f] = each.map(|row| row.iter());
+                let right = six_rows.map(|row| S::load(&row[column..column + S::WIDTH]));
+                let [a, b, c, d, e, f] = six_rows.map(|row| row.iter());
                 let left = a.zip(b).zip(c).zip(d).zip(e).zip(f);
                 let sums = matrix.chunks_exact_mut(stride).zip(left);
                 for (sums, (((((a, b), c), d), e), f)) in sums.take((*count).min(column + S::WIDTH))
@@ -293,7 +293,7 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
     fn run<S: Real>(mut self) {
         let evaluation = self.evaluation;
         let (prepared, design) = (evaluation.prepared, &evaluation.prepared.design);
-        let components = chosen(&design.machine.dof);
+        let components = indices_of(&design.machine.dof);
         let columns = prepared.columns.len();
         let stride = padded(design.unknowns);
         let mut twists = vec![0.0; SIX * stride];
@@ -328,19 +328,19 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
             rows.resize(observed.len().next_multiple_of(TOGETHER) * stride, 0.0);
             let at = evaluation.pose(pose);
             let mut joints: Option<&[f64]> = None;
-            let mut strut: Option<(usize, StrutSight)> = None;
+            let mut strut: Option<(usize, StrutView)> = None;
             for (number, row) in observed.clone().zip(rows.chunks_exact_mut(stride)) {
                 let observation = &design.observations[number];
                 let instrument = &design.instruments[observation.instrument];
                 let placed = &evaluation.placed[observation.instrument];
                 let weight = self.receiver.weight(number);
-                let reading = if let Some(sight) = prepared.sights[number] {
-                    evaluation.sights[sight].reading(observation.observable, placed)
+                let reading = if let Some(view) = prepared.views[number] {
+                    evaluation.views[view].reading(observation.observable, placed)
                 } else {
                     let q = *joints.get_or_insert_with(|| evaluation.inputs(pose, &mut parameters));
                     if strut.as_ref().is_none_or(|(index, _)| *index != observation.strut) {
                         let inputs = (parameters.as_slice(), q);
-                        let seen = StrutSight::new(&design.machine, observation.strut, inputs, &at);
+                        let seen = StrutView::new(&design.machine, observation.strut, inputs, &at);
                         strut = Some((observation.strut, seen));
                     }
                     let Some((_, seen)) = &strut else { continue };

@@ -59,7 +59,7 @@ impl Observable {
 /// Numbers of an instrument's own that may be unknown: origin and rotation of its frame, its target.
 pub const OWN: usize = 9;
 
-/// An instrument: where it stands, what it looks at.
+/// An instrument: its frame and its target.
 #[derive(Clone, Debug)]
 pub struct Instrument {
     /// Its frame in the base frame.
@@ -134,7 +134,7 @@ impl Reading {
 
 /// What an instrument sees of the platform at one pose: all that its readings there have in common.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sight {
+pub struct InstrumentView {
     body: RotationMatrix<f64>,
     arm: Vector<f64>,
     away: Vector<f64>,
@@ -143,21 +143,21 @@ pub struct Sight {
     rates: [Vector<f64>; 3],
 }
 
-impl Sight {
-    /// From an instrument to the platform at a pose; angles only where they are asked for.
+impl InstrumentView {
+    /// From an instrument to the platform at a pose; angles only where they are needed.
     pub fn new(placed: &Placed, pose: &Pose<f64>, with_angles: bool) -> Self {
         let body = rotation_matrix(pose.rotation);
         let arm = rotate(&body, placed.target);
         let away = subtract(add(pose.position, arm), placed.origin);
-        let mut sight = Sight { body, arm, away, ..Sight::default() };
+        let mut view = InstrumentView { body, arm, away, ..InstrumentView::default() };
         if with_angles {
-            sight.angles = euler_angles(&product(&transposed(&placed.rotation), &body));
+            view.angles = euler_angles(&product(&transposed(&placed.rotation), &body));
             // Rates for velocities along the frame's axes, one a column; then along the base's.
             let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-                .map(|velocity| angle_rates(sight.angles, velocity));
-            sight.rates = [0, 1, 2].map(|k| rotate(&placed.rotation, [x[k], y[k], z[k]]));
+                .map(|velocity| angle_rates(view.angles, velocity));
+            view.rates = [0, 1, 2].map(|k| rotate(&placed.rotation, [x[k], y[k], z[k]]));
         }
-        sight
+        view
     }
 
     /// What is read.
@@ -285,14 +285,14 @@ fn observed<S: Scalar>(
 
 /// What an instrument sees of one strut at one pose, with its derivatives: all that its readings there
 /// have in common.
-pub struct StrutSight {
+pub struct StrutView {
     along: Vector<Dual<f64, STRUT_WIDTH>>,
     rotation: RotationMatrix<Dual<f64, STRUT_WIDTH>>,
     read: [usize; STRUT_PARAMETERS],
     count: usize,
 }
 
-impl StrutSight {
+impl StrutView {
     /// For parameters `p` and joints `q`.
     pub fn new(machine: &Machine, strut: usize, (p, q): (&[f64], &[f64]), at: &Pose<f64>) -> Self {
         type D = Dual<f64, STRUT_WIDTH>;
@@ -313,7 +313,7 @@ impl StrutSight {
         body.step(twist);
         let rotation = rotation_matrix(body.rotation);
         let place = (&rotation, body.position);
-        StrutSight {
+        StrutView {
             along: along(machine, strut, &values[..count], q, place),
             rotation,
             read,

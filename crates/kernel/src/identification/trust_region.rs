@@ -43,7 +43,7 @@ pub trait Problem {
     fn size(&self) -> usize;
     /// Sum of squares at the values (n,); none where the model does not reach so far.
     fn cost(&mut self, values: &[f64]) -> Option<f64>;
-    /// Linearises at the values, where the cost was asked just before; false where that is not finite, and whatever
+    /// Linearises at the values, where the cost was evaluated just before; false where that is not finite, and whatever
     /// `linear` then holds is not looked at.
     fn linearise(&mut self, values: &[f64], linear: &mut Linear) -> bool;
     /// Whether to give up at once, as after an error outside.
@@ -138,7 +138,7 @@ pub struct Solution {
     pub cost: f64,
     /// Which test ended it.
     pub status: Status,
-    /// How often the cost was asked.
+    /// How often the cost was evaluated.
     pub evaluations: usize,
     /// How many steps were taken.
     pub iterations: usize,
@@ -362,8 +362,8 @@ impl Promise {
             return (self.whole.clone(), 0.0);
         }
         let singular = self.singular.get_or_insert_with(|| Singular::new(linear, axes));
-        let found = multiplier(singular, radius);
-        (singular.step(coordinates(singular, found), axes), found)
+        let damping = multiplier(singular, radius);
+        (singular.step(coordinates(singular, damping), axes), damping)
     }
 }
 
@@ -392,24 +392,24 @@ fn multiplier(singular: &Singular, radius: f64) -> f64 {
     let slope = (0..s.len()).map(|k| (c[k] / (s[k] * s[k])).powi(2)).sum::<f64>() / whole;
     let below = if slope.is_finite() && slope > 0.0 { (whole - radius) / slope } else { 0.0 };
     let mut lower = below.max(0.0);
-    let mut found = lower.max(1e-3 * upper).min(upper);
+    let mut damping = lower.max(1e-3 * upper).min(upper);
     for _ in 0..MULTIPLIER_STEPS {
-        let length = length_at(&|k| s[k] * c[k] / (s[k] * s[k] + found));
+        let length = length_at(&|k| s[k] * c[k] / (s[k] * s[k] + damping));
         if (length - radius).abs() <= HELD * radius {
             break;
         }
         if length < radius {
-            upper = found;
+            upper = damping;
         } else {
-            lower = lower.max(found);
+            lower = lower.max(damping);
         }
-        let parts = (0..s.len()).map(|k| (s[k] * c[k]).powi(2) / (s[k] * s[k] + found).powi(3));
-        found += (length - radius) / radius * length / (parts.sum::<f64>() / length);
-        if !(lower < found && found < upper) {
-            found = (1e-3 * upper).max((lower * upper).sqrt());
+        let parts = (0..s.len()).map(|k| (s[k] * c[k]).powi(2) / (s[k] * s[k] + damping).powi(3));
+        damping += (length - radius) / radius * length / (parts.sum::<f64>() / length);
+        if !(lower < damping && damping < upper) {
+            damping = (1e-3 * upper).max((lower * upper).sqrt());
         }
     }
-    found
+    damping
 }
 
 /// Share of the cost that the model promises to take away, and half its slope at 0.

@@ -3,10 +3,11 @@
 //! The elements give closures of points; how a platform joint moves with the platform's twist
 //! (translation of the tool point, then rotation) is added here, once for all elements.
 
-use crate::element::guide::{Anchor, GuideLimb};
+use crate::element::ParameterGradient;
+use crate::element::guide::{Anchor, GuideLimb, Placement};
 use crate::element::strut::{self, nearest_on_ring};
 use crate::linear::{CLOSURES, IN_ORDER, Matrix6, Order, SIX};
-use crate::machine::{Machine, MachineGuide, Ring};
+use crate::machine::{Machine, MachineGuide, Ring, Strut};
 use crate::scalar::{Dual, Real, Scalar};
 use crate::spatial::{Pose, RotationMatrix, Vector, add, cross, rotate, rotation_matrix, subtract};
 
@@ -28,25 +29,67 @@ pub type Rows<S> = [[S; SIX]; CLOSURES];
 /// Residuals of all closures of one sample.
 pub type Residuals<S> = [S; CLOSURES];
 
-/// Places every strut's joint centres for parameters `p` and joint coordinates `q`.
-#[inline(always)]
-pub fn place_limbs<S: Scalar>(machine: &Machine, p: &[S], q: &[S], limbs: &mut Limbs<S>) {
-    let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
-    for (limb, strut) in limbs.iter_mut().zip(&machine.struts) {
+impl<S: Scalar> Limb<S> {
+    /// All zero, of the same kind as `like`.
+    pub fn zero(like: S) -> Self {
+        let zero = like.lift(0.0);
+        Limb { base: [zero; 3], arm: [zero; 3], length: zero }
+    }
+
+    /// A strut as its own parameters give it, before its drive: `base` from the carriage or crank, and no
+    /// length where the drive is the length. `tool` is the tool point, platform axes.
+    #[inline(always)]
+    pub fn undriven(strut: &Strut, p: &[S], tool: Vector<S>) -> Self {
         let own = &p[strut.first..];
         let base = [own[0], own[1], own[2]];
         let length = match strut.own_length {
             Some(index) => p[index],
             None => base[0].lift(0.0),
         };
-        limb.arm = [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]];
-        (limb.base, limb.length) = match strut.drive {
-            None => (base, length),
-            Some(index) => {
-                let drive = &machine.drives[index];
-                drive.kind.place(&drive.nominal, &p[drive.first..], q[index], base, length)
-            }
-        };
+        Limb { base, arm: [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]], length }
+    }
+
+    /// A strut where its drive puts it.
+    #[inline(always)]
+    pub fn placed(machine: &Machine, strut: &Strut, p: &[S], q: &[S], tool: Vector<S>) -> Self {
+        let mut limb = Limb::undriven(strut, p, tool);
+        if let Some(index) = strut.drive {
+            let drive = &machine.drives[index];
+            let (nominal, parameters) = (&drive.nominal, &p[drive.first..]);
+            (limb.base, limb.length) =
+                drive.kind.place(nominal, parameters, q[index], limb.base, limb.length);
+        }
+        limb
+    }
+
+    /// The platform-side joint centre from the tool point, base axes.
+    #[inline(always)]
+    pub fn turned_arm(
+        &self,
+        strut: &Strut,
+        p: &[S],
+        rotation: &RotationMatrix<S>,
+        position: Vector<S>,
+    ) -> Vector<S> {
+        match &strut.ring {
+            None => rotate(rotation, self.arm),
+            Some(ring) => ring_arm(ring, p[ring.radius], self, rotation, position).0,
+        }
+    }
+}
+
+/// The tool point in platform axes.
+#[inline(always)]
+pub fn tool_point<S: Scalar>(machine: &Machine, p: &[S]) -> Vector<S> {
+    [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]]
+}
+
+/// Places every strut's joint centres for parameters `p` and joint coordinates `q`.
+#[inline(always)]
+pub fn place_limbs<S: Scalar>(machine: &Machine, p: &[S], q: &[S], limbs: &mut Limbs<S>) {
+    let tool = tool_point(machine, p);
+    for (limb, strut) in limbs.iter_mut().zip(&machine.struts) {
+        *limb = Limb::placed(machine, strut, p, q, tool);
     }
 }
 
@@ -63,10 +106,16 @@ pub fn limbs(machine: &Machine, p: &[f64], q: &[f64]) -> Limbs<f64> {
 pub fn row<S: Scalar>(machine: &Machine, to_centre: Vector<S>, arm: Vector<S>) -> [S; SIX] {
     let moment = cross(arm, to_centre);
     let mut row = [to_centre[0], to_centre[1], to_centre[2], moment[0], moment[1], moment[2]];
-    for &freedom in &machine.held {
-        row[freedom] = arm[0].lift(0.0);
-    }
+    hold(machine, &mut row);
     row
+}
+
+/// Takes the freedoms that the frame holds out of a row.
+#[inline(always)]
+fn hold<S: Scalar>(machine: &Machine, row: &mut [S; SIX]) {
+    for &freedom in &machine.held {
+        row[freedom] = row[0].lift(0.0);
+    }
 }
 
 /// A ring joint's arm from the tool point, base axes: the ring's point nearest to the strut's base, and
@@ -86,7 +135,7 @@ pub fn ring_arm<S: Scalar>(
 
 /// A guide's anchors for parameters `p`.
 #[inline(always)]
-pub fn guide_limb<S: Scalar>(guide: &MachineGuide, p: &[S], tool: Vector<S>) -> GuideLimb<S> {
+fn guide_limb<S: Scalar>(guide: &MachineGuide, p: &[S], tool: Vector<S>) -> GuideLimb<S> {
     let zero = tool[0].lift(0.0);
     let value =
         |anchor: Anchor, k: usize| guide.first[anchor as usize].map_or(zero, |at| p[at + k]);
@@ -96,6 +145,49 @@ pub fn guide_limb<S: Scalar>(guide: &MachineGuide, p: &[S], tool: Vector<S>) -> 
         frame_point: point(Anchor::FramePoint),
         arm: subtract(point(Anchor::PlatformPoint), tool),
         tilts: [tilt(Anchor::FrameDirection), tilt(Anchor::PlatformDirection)],
+    }
+}
+
+/// One closure of a guide for parameters `p`.
+pub struct GuideClosure<'a, S> {
+    guide: &'a MachineGuide,
+    which: usize,
+    limb: GuideLimb<S>,
+}
+
+/// The guides' closures, each with its number among all closures.
+pub fn guide_closures<'a, S: Scalar>(
+    machine: &'a Machine,
+    p: &[S],
+) -> impl Iterator<Item = (usize, GuideClosure<'a, S>)> {
+    let closures = machine.guide_closures.iter().enumerate();
+    closures.map(move |(number, &(guide, which))| {
+        let guide = &machine.guides[guide];
+        let limb = guide_limb(guide, p, tool_point(machine, p));
+        (machine.struts.len() + number, GuideClosure { guide, which, limb })
+    })
+}
+
+impl<S: Scalar> GuideClosure<'_, S> {
+    /// Residual and row; zero in the freedoms that the frame holds.
+    pub fn row(&self, machine: &Machine, at: Placement<'_, S>) -> (S, [S; SIX]) {
+        let GuideClosure { guide, which, limb } = self;
+        let length = machine.characteristic_length;
+        let (residual, mut row) = guide.kind.row(*which, &guide.frames, limb, at, length);
+        hold(machine, &mut row);
+        (residual, row)
+    }
+
+    /// Derivatives to the parameters.
+    pub fn gradient(
+        &self,
+        machine: &Machine,
+        at: Placement<'_, S>,
+        to_parameters: &mut ParameterGradient<S>,
+    ) {
+        let GuideClosure { guide, which, limb } = self;
+        let length = machine.characteristic_length;
+        guide.kind.gradient(*which, &guide.frames, limb, at, length, to_parameters);
     }
 }
 
@@ -188,31 +280,18 @@ pub fn system<S: Scalar, const SQUARED: bool>(
     let (mut rows, mut residuals) = ([[zero; SIX]; CLOSURES], [zero; CLOSURES]);
     for (i, strut) in machine.struts.iter().enumerate() {
         let limb = &limbs[i];
-        let arm = match &strut.ring {
-            None => rotate(rotation, limb.arm),
-            Some(ring) => ring_arm(ring, p[ring.radius], limb, rotation, position).0,
-        };
+        let arm = limb.turned_arm(strut, p, rotation, position);
         let closure = strut_closure::<S, SQUARED>(limb, add(arm, position));
         rows[i] = row(machine, closure.parts, arm);
         residuals[i] = closure.value;
     }
-    for (number, &(guide, which)) in machine.guide_closures.iter().enumerate() {
-        let guide = &machine.guides[guide];
-        let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
-        let limb = guide_limb(guide, p, tool);
-        let length = machine.characteristic_length;
-        let (residual, mut row) =
-            guide.kind.row(which, &guide.frames, &limb, (rotation, position), length);
-        for &freedom in &machine.held {
-            row[freedom] = zero;
-        }
-        rows[machine.struts.len() + number] = row;
-        residuals[machine.struts.len() + number] = residual;
+    for (i, closure) in guide_closures(machine, p) {
+        (residuals[i], rows[i]) = closure.row(machine, (rotation, position));
     }
     (rows, residuals)
 }
 
-/// One sample of any machine on the single road: parameters, and the struts placed.
+/// One sample of any machine on the scalar path: parameters, and the struts placed.
 #[derive(Clone, Copy)]
 pub struct Sample<'a> {
     /// The machine.

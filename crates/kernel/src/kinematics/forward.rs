@@ -1,17 +1,17 @@
 //! Forward kinematics: the pose that closes the struts, by Newton's iteration from a nearby pose.
 //!
-//! Two roads: [`descend`] runs many samples side by side with one row order and reports, lane by
-//! lane, whether its answer is proven good; [`forward`] takes one sample, pivots, and where the plain
+//! Two paths: [`descend`] runs many samples side by side with one row order and reports, lane by
+//! lane, whether its solution is proven; [`forward`] takes one sample, pivots, and where the plain
 //! iteration is not trustworthy follows the residual down in steps, so that a pose of another
 //! assembly is never returned as `ok`.
 
 use super::SINGULAR;
 use super::closures::{Limbs, Sample, squared_residuals, squared_rows, start_rows};
+use super::condition::condition_at;
 use super::linearisation::proven_regular;
-use super::overconstrained::{Surroundings, least_energy};
+use super::overconstrained::{Loads, least_energy};
 use crate::linear::{
-    IN_ORDER, Matrix6, Order, Pivoted, SIX, condition_index, factor, factor_pivoting, inverse_of,
-    solve,
+    IN_ORDER, Matrix6, Order, Pivoted, SIX, factor, factor_pivoting, inverse_of, solve,
 };
 use crate::machine::Machine;
 use crate::scalar::Real;
@@ -25,9 +25,9 @@ const CHORD: f64 = 2e-4;
 const CHORD_STEPS: usize = 3;
 /// A chord step c on factors of a full step s leaves about c s: settled below this.
 const SETTLED: f64 = 1e-15;
-/// Full steps before a group of lanes gives up to the single road.
+/// Full steps before a group of lanes gives up to the scalar path.
 const LANE_STEPS: usize = 12;
-/// Full steps of one plain iteration on the single road.
+/// Full steps of one plain iteration on the scalar path.
 const STEPS: usize = 40;
 /// Plain iteration: a longer relative step may leave the assembly.
 const LONG_STEP: f64 = 0.5;
@@ -102,7 +102,7 @@ const CHORD_LIMIT: usize = 10;
 const CONTRACTION: f64 = 0.1;
 /// Relative step that may be rounding alone.
 const ROUNDING: f64 = 1e-13;
-/// [`chord`] is settled where what is left is below this, relative.
+/// [`chord`] has converged where the remaining relative step is below this.
 const CHORD_SETTLED: f64 = 1e-15;
 
 /// The inverse of the squared rows of a plain machine at a pose, for [`chord`].
@@ -152,7 +152,7 @@ pub fn chord<S: Real>(
 /// How one plain iteration ended.
 enum Ending {
     /// At a root, the determinant's sign kept all the way; the last determinant.
-    Settled(f64),
+    Converged(f64),
     /// The determinant changed its sign.
     Crossed,
     /// A step too long, a singular matrix, or too many steps.
@@ -193,7 +193,7 @@ fn settle(
                 let twist = step(sample.squared_residuals(pose));
                 pose.step_back(&twist);
                 if relative_size(sample.machine, &twist) * size < SETTLED {
-                    return Ending::Settled(determinant);
+                    return Ending::Converged(determinant);
                 }
             }
         }
@@ -216,13 +216,13 @@ pub fn forward(sample: &Sample<'_>, q: &[f64], start: &Pose<f64>) -> (Pose<f64>,
         return (*start, Status::Unreachable);
     }
     if machine.is_overconstrained() {
-        let settled = least_energy(sample, q, start, &Surroundings::default());
-        return (settled.pose, settled.status);
+        let equilibrium = least_energy(sample, q, start, &Loads::default());
+        return (equilibrium.pose, equilibrium.status);
     }
     let mut sign = 0.0;
     let mut pose = *start;
     let plain = settle(sample, &mut pose, &[0.0; SIX], LONG_STEP, &mut sign);
-    if let Ending::Settled(determinant) = plain {
+    if let Ending::Converged(determinant) = plain {
         return judged(sample, pose, determinant);
     }
     if condition_at(sample, &pose) < SINGULAR {
@@ -245,7 +245,7 @@ fn follow(sample: &Sample<'_>, start: &Pose<f64>) -> (Pose<f64>, Status) {
         let target = whole.map(|residual| residual * next);
         let mut trial = pose;
         match settle(sample, &mut trial, &target, FOLLOWED_STEP, &mut sign) {
-            Ending::Settled(determinant) => {
+            Ending::Converged(determinant) => {
                 pose = trial;
                 last = determinant;
                 left = next;
@@ -277,15 +277,4 @@ fn judged(sample: &Sample<'_>, pose: Pose<f64>, determinant: f64) -> (Pose<f64>,
         sample.machine.plain && proven_regular(sample.machine, sample.limbs, determinant) > 0.0;
     let regular = proven || condition_at(sample, &pose) >= SINGULAR;
     (pose, if regular { Status::Ok } else { Status::Singular })
-}
-
-/// Smallest over largest singular value of the scaled rows.
-pub fn condition_at(sample: &Sample<'_>, pose: &Pose<f64>) -> f64 {
-    let (mut rows, _) = sample.closures(pose);
-    for row in &mut rows {
-        for value in &mut row[3..] {
-            *value /= sample.machine.characteristic_length;
-        }
-    }
-    condition_index(&rows, sample.machine.closure_count(), &sample.machine.dof)
 }

@@ -1,14 +1,46 @@
 //! All closures of any machine with their first derivatives, on any scalar: what proofs and printed code
 //! run on. [`super::Linearisation`] is the same on lanes, for speed.
 
-use super::closures::{Limb, guide_limb, ring_arm};
-use crate::element::{DRIVE_END, PLACES, RING, fixed_gradient};
+use super::closures::{Limb, guide_closures, ring_arm, row, tool_point};
+use crate::element::{ClosureGradient, ParameterGradient, fixed_gradient};
 use crate::linear::SIX;
-use crate::machine::Machine;
+use crate::machine::{Machine, Strut};
 use crate::scalar::Scalar;
-use crate::spatial::{
-    RotationMatrix, Vector, add, cross, dot, norm, rotate, rotate_back, subtract,
-};
+use crate::spatial::{RotationMatrix, Vector, add, dot, norm, rotate, rotate_back, subtract};
+
+/// The first derivatives of one strut's closure, by dual numbers through drive and strut at once: fills
+/// those to the parameters, and returns the platform-side joint's arm from the tool point (base axes) and
+/// the others. Without `RINGS` no ring is looked for.
+#[inline(always)]
+pub fn strut_gradient<S: Scalar, const RINGS: bool>(
+    machine: &Machine,
+    strut: &Strut,
+    (p, q, tool): (&[S], &[S], Vector<S>),
+    (rotation, position): (&RotationMatrix<S>, Vector<S>),
+    to_parameters: &mut ParameterGradient<S>,
+) -> (Vector<S>, ClosureGradient<S>) {
+    let limb = Limb::undriven(strut, p, tool);
+    let mut arm = rotate(rotation, limb.arm);
+    let mut radial = arm;
+    let ring = if RINGS { strut.ring.as_ref() } else { None };
+    if let Some(ring) = ring {
+        (arm, radial) = ring_arm(ring, p[ring.radius], &limb, rotation, position);
+    }
+    let (points, length) = ([limb.base, add(arm, position)], limb.length);
+    let gradient = match strut.drive {
+        None => fixed_gradient(points, length, to_parameters),
+        Some(index) => {
+            let drive = &machine.drives[index];
+            let (nominal, parameters) = (&drive.nominal, &p[drive.first..]);
+            drive.kind.gradient(nominal, parameters, q[index], points, length, to_parameters)
+        }
+    };
+    to_parameters.set_platform(rotate_back(rotation, gradient.centre));
+    if ring.is_some() {
+        to_parameters.set_ring_radius(dot(gradient.centre, radial));
+    }
+    (arm, gradient)
+}
 
 /// Residuals and derivatives of at most `N` closures; zero beyond the machine's.
 #[derive(Clone, Debug)]
@@ -19,16 +51,16 @@ pub struct Gradients<S, const N: usize> {
     pub to_twist: [[S; SIX]; N],
     /// To the joint coordinate of each closure's drive.
     pub to_joint: [S; N],
-    /// To the parameters, at the places that [`Machine::readers`] names.
-    to_parameters: [[S; PLACES]; N],
+    /// To the parameters, at the slots that [`Machine::dependents`] names.
+    to_parameters: [ParameterGradient<S>; N],
 }
 
 impl<S: Scalar, const N: usize> Gradients<S, N> {
     /// Derivatives of all closures to one parameter.
     pub fn to_parameter(&self, machine: &Machine, parameter: usize) -> [S; N] {
         let mut column = [self.residuals[0].lift(0.0); N];
-        for &(closure, place) in &machine.readers[parameter] {
-            column[closure] = self.to_parameters[closure][place];
+        for &(closure, slot) in &machine.dependents[parameter] {
+            column[closure] = self.to_parameters[closure][slot];
         }
         column
     }
@@ -47,64 +79,21 @@ pub fn gradients<S: Scalar, const N: usize>(
         residuals: [zero; N],
         to_twist: [[zero; SIX]; N],
         to_joint: [zero; N],
-        to_parameters: [[zero; PLACES]; N],
+        to_parameters: [ParameterGradient::zero(zero); N],
     };
-    let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
+    let (at, tool) = ((rotation, position), tool_point(machine, p));
     for (i, strut) in machine.struts.iter().enumerate() {
-        let own = &p[strut.first..];
-        let base = [own[0], own[1], own[2]];
-        let platform = subtract([own[3], own[4], own[5]], tool);
-        let mut arm = rotate(rotation, platform);
-        let mut radial = arm;
-        if let Some(ring) = &strut.ring {
-            let limb = Limb { base, arm: platform, length: zero };
-            (arm, radial) = ring_arm(ring, p[ring.radius], &limb, rotation, position);
-        }
-        let centre = add(arm, position);
-        let length = strut.own_length.map_or(zero, |index| p[index]);
-        let places = &mut result.to_parameters[i];
-        let (gradient, joint_centre, length) = match strut.drive {
-            None => (fixed_gradient([base, centre], length, places), base, length),
-            Some(index) => {
-                let drive = &machine.drives[index];
-                let parameters = &p[drive.first..];
-                let (nominal, joint) = (&drive.nominal, q[index]);
-                let points = [base, centre];
-                let gradient =
-                    drive.kind.gradient(nominal, parameters, joint, points, length, places);
-                let (at, length) = drive.kind.place(nominal, parameters, joint, base, length);
-                (gradient, at, length)
-            }
-        };
-        let to_platform = rotate_back(rotation, gradient.centre);
-        for k in 0..3 {
-            places[3 + k] = to_platform[k];
-            places[DRIVE_END + k] = -to_platform[k];
-        }
-        if strut.ring.is_some() {
-            places[RING] = dot(gradient.centre, radial);
-        }
+        let to_parameters = &mut result.to_parameters[i];
+        let (arm, gradient) =
+            strut_gradient::<S, true>(machine, strut, (p, q, tool), at, to_parameters);
+        let limb = Limb::placed(machine, strut, p, q, tool);
+        result.residuals[i] = norm(subtract(add(arm, position), limb.base)) - limb.length;
         result.to_joint[i] = gradient.joint;
-        result.residuals[i] = norm(subtract(centre, joint_centre)) - length;
-        let moment = cross(arm, gradient.centre);
-        result.to_twist[i][..3].copy_from_slice(&gradient.centre);
-        result.to_twist[i][3..].copy_from_slice(&moment);
+        result.to_twist[i] = row(machine, gradient.centre, arm);
     }
-    for (number, &(guide, which)) in machine.guide_closures.iter().enumerate() {
-        let i = machine.struts.len() + number;
-        let guide = &machine.guides[guide];
-        let limb = guide_limb(guide, p, tool);
-        let placed = (rotation, position);
-        let length = machine.characteristic_length;
-        let places = &mut result.to_parameters[i];
-        guide.kind.gradient(which, &guide.frames, &limb, placed, length, places);
-        (result.residuals[i], result.to_twist[i]) =
-            guide.kind.row(which, &guide.frames, &limb, placed, length);
-    }
-    for row in &mut result.to_twist[..machine.closure_count()] {
-        for &freedom in &machine.held {
-            row[freedom] = zero;
-        }
+    for (i, closure) in guide_closures(machine, p) {
+        closure.gradient(machine, at, &mut result.to_parameters[i]);
+        (result.residuals[i], result.to_twist[i]) = closure.row(machine, at);
     }
     result
 }

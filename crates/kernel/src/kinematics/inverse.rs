@@ -5,14 +5,13 @@
 //! solved for together by Newton's iteration, started from the closed forms at the home attitude.
 
 use super::SINGULAR;
-use super::closures::{Limb, Rows, Sample, limbs, place_limbs, ring_arm};
+use super::closures::{Limb, Sample, limbs, place_limbs, ring_arm};
+use super::condition::condition;
 use super::forward::forward;
 use super::linearisation::Linearisation;
-use crate::element::{Dimension, Reach};
-use crate::linear::{
-    CLOSURES, Matrix6, Pivoted, SIX, condition_index, factor_pivoting, null_space, solve,
-};
-use crate::machine::{Machine, MachineDrive, chosen};
+use crate::element::{Dimension, InverseRoot};
+use crate::linear::{CLOSURES, Matrix6, Pivoted, SIX, condition_index, factor_pivoting, solve};
+use crate::machine::{Machine, MachineDrive, indices_of};
 use crate::scalar::{Real, Scalar};
 use crate::spatial::{
     Pose, RotationMatrix, Vector, add, angle_rates, cross, dot, euler_axes, norm, rotate,
@@ -65,7 +64,7 @@ pub fn closed_form<S: Scalar>(
     p: &[S],
     position: Vector<S>,
     rotation: &RotationMatrix<S>,
-) -> Reach<S> {
+) -> InverseRoot<S> {
     let strut = &machine.struts[drive.struts[0]];
     let own = &p[strut.first..];
     let tool = &p[machine.tool..];
@@ -78,6 +77,7 @@ pub fn closed_form<S: Scalar>(
             ring_arm(ring, p[ring.radius], &limb, rotation, position).0
         }
     };
+    // Last, since it may be a constant of its own: printed code names its steps in this order.
     let length = match strut.own_length {
         Some(index) => p[index],
         None => base[0].lift(0.0),
@@ -150,15 +150,12 @@ pub fn leanings<S: Scalar>(
     position: Vector<S>,
 ) -> Vec<(usize, usize, S)> {
     let zero = position[0].lift(0.0);
-    let mut at = [Limb { base: [zero; 3], arm: [zero; 3], length: zero }; CLOSURES];
+    let mut at = [Limb::zero(zero); CLOSURES];
     place_limbs(machine, p, joints, &mut at);
-    let mut found = Vec::new();
+    let mut leanings = Vec::new();
     for (i, strut) in machine.struts.iter().enumerate() {
         let limb = &at[i];
-        let arm = match &strut.ring {
-            None => rotate(rotation, limb.arm),
-            Some(ring) => ring_arm(ring, p[ring.radius], limb, rotation, position).0,
-        };
+        let arm = limb.turned_arm(strut, p, rotation, position);
         let along = subtract(add(arm, position), limb.base);
         for (end, limit) in strut.limits.iter().enumerate() {
             let Some(limit) = limit else { continue };
@@ -169,10 +166,10 @@ pub fn leanings<S: Scalar>(
                 (_, Some(drive)) => carried(machine, p, joints, drive, given),
             };
             let angle = norm(cross(axis, along)).atan2(dot(axis, along));
-            found.push((i, end, angle - zero.lift(limit.angle)));
+            leanings.push((i, end, angle - zero.lift(limit.angle)));
         }
     }
-    found
+    leanings
 }
 
 /// The same of a pose, by how much beyond.
@@ -211,22 +208,22 @@ fn solve_strained(
 ) {
     let unreachable = if seed_margin < 0.0 { Status::Unreachable } else { Status::NotConverged };
     let wanted = pose.to_coordinates();
-    let commanded = chosen(&machine.commanded);
+    let commanded = indices_of(&machine.commanded);
     let l = machine.characteristic_length;
     let unit = |freedom: usize| if freedom < 3 { 1.0 } else { l };
     for _ in 0..STEPS {
         let at = limbs(machine, p, &solved.joints);
         let sample = Sample { machine, p, limbs: &at };
-        let (found, status) = forward(&sample, &solved.joints, &solved.pose);
+        let (reached_pose, status) = forward(&sample, &solved.joints, &solved.pose);
         if status != Status::Ok {
             solved.status = if status == Status::NotConverged { unreachable } else { status };
             return;
         }
-        solved.pose = found;
-        let reached = found.to_coordinates();
+        solved.pose = reached_pose;
+        let reached = reached_pose.to_coordinates();
         let angles = [reached[3], reached[4], reached[5]];
         let mut linear = Linearisation::default();
-        linear.fill_alone(&sample, &solved.joints, &found);
+        linear.fill_scalar(&sample, &solved.joints, &reached_pose);
         // Twist per joint, and twist per coordinate, in the commanded freedoms.
         let count = commanded.len();
         let mut system = [[0.0; SIX]; SIX];
@@ -393,7 +390,7 @@ pub enum Obstacle {
 
 /// What keeps a commanded pose from being used, with amounts.
 pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle> {
-    let mut found = Vec::new();
+    let mut obstacles = Vec::new();
     let rotation = rotation_matrix(pose.rotation);
     for (index, strut) in machine.struts.iter().enumerate() {
         let Some(length) = strut.own_length.map(|own| p[own]) else { continue };
@@ -409,9 +406,9 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
         };
         let fixed_in_closed_pose = strut.drive.is_none() && !machine.has_direct_inverse();
         if length < least && !fixed_in_closed_pose {
-            found.push(Obstacle::Strut(index, least - length));
+            obstacles.push(Obstacle::Strut(index, least - length));
         } else if length > most && !fixed_in_closed_pose {
-            found.push(Obstacle::Strut(index, most - length));
+            obstacles.push(Obstacle::Strut(index, most - length));
         }
     }
     let solved = inverse(machine, p, pose);
@@ -419,54 +416,23 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
         for (index, (&joint, drive)) in solved.joints.iter().zip(&machine.drives).enumerate() {
             let [low, high] = drive.travel;
             if joint > high {
-                found.push(Obstacle::Travel(index, joint - high));
+                obstacles.push(Obstacle::Travel(index, joint - high));
             } else if joint < low {
-                found.push(Obstacle::Travel(index, joint - low));
+                obstacles.push(Obstacle::Travel(index, joint - low));
             }
         }
         if machine.limited {
             let beyond = leaning_at(machine, p, &solved.joints, &solved.pose)
                 .filter(|&(_, _, beyond)| beyond > 0.0);
-            found.extend(beyond.map(|(strut, end, angle)| Obstacle::Leaning(strut, end, angle)));
+            obstacles
+                .extend(beyond.map(|(strut, end, angle)| Obstacle::Leaning(strut, end, angle)));
         }
         let index = condition(machine, p, &solved.joints, &solved.pose);
         if index < SINGULAR {
-            found.push(Obstacle::Singular(index));
+            obstacles.push(Obstacle::Singular(index));
         }
     }
-    found
-}
-
-/// The closures' rows with rotations in units of the characteristic length.
-fn scaled_rows(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Rows<f64> {
-    let mut linear = Linearisation::default();
-    linear.differentiate(machine, p, q, pose);
-    let mut rows = linear.rows;
-    for row in &mut rows {
-        for value in &mut row[3..] {
-            *value /= machine.characteristic_length;
-        }
-    }
-    rows
-}
-
-/// Smallest over largest singular value of the scaled closure Jacobian: 1 isotropic, 0 singular.
-pub fn condition(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> f64 {
-    let rows = scaled_rows(machine, p, q, pose);
-    condition_index(&rows, machine.closure_count(), &machine.dof)
-}
-
-/// The twists of the platform about its tool point that no closure holds: none at a good pose. Of unit
-/// length where rotations are measured by the characteristic length.
-pub fn free_motions(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Vec<[f64; SIX]> {
-    let rows = scaled_rows(machine, p, q, pose);
-    let mut free = null_space(&rows, machine.closure_count(), &machine.dof, SINGULAR);
-    for twist in &mut free {
-        for value in &mut twist[3..] {
-            *value /= machine.characteristic_length;
-        }
-    }
-    free
+    obstacles
 }
 
 /// The commanded pose that a row of values in the order of the commanded freedoms names; what is not
@@ -476,7 +442,7 @@ pub fn commanded_pose(machine: &Machine, values: &[f64]) -> Pose<f64> {
         return Pose::from_coordinates(std::array::from_fn(|k| values[k]));
     }
     let mut coordinates = machine.home.to_coordinates();
-    for (&freedom, &value) in chosen(&machine.commanded).iter().zip(values) {
+    for (&freedom, &value) in indices_of(&machine.commanded).iter().zip(values) {
         coordinates[freedom] = value;
     }
     Pose::from_coordinates(coordinates)

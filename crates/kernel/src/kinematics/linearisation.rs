@@ -2,13 +2,14 @@
 //! parameters and joints. By implicit differentiation, never through an iteration.
 
 use super::SINGULAR;
-use super::closures::{Limb, Limbs, Sample, guide_limb, held_row, ring_arm, row};
-use super::overconstrained::spread;
-use crate::element::{DRIVE_END, PLACES, RING, fixed_gradient};
+use super::closures::{Limbs, Sample, guide_closures, held_row, row, tool_point};
+use super::elastic::spread;
+use super::gradients::strut_gradient;
+use crate::element::ParameterGradient;
 use crate::linear::{CLOSURES, Order, SIX, factor, factor_pivoting, growth, invert};
 use crate::machine::Machine;
 use crate::scalar::Real;
-use crate::spatial::{Pose, add, dot, rotate, rotate_back, rotation_matrix};
+use crate::spatial::{Pose, rotation_matrix};
 
 /// A larger growth of rounding errors asks for an order of elimination of the sample's own.
 const GROWTH: f64 = 40.0;
@@ -25,17 +26,16 @@ pub struct Linearisation<S> {
     pub inverse: [[S; CLOSURES]; SIX],
     /// Closure i to its joint.
     pub to_joint: [S; CLOSURES],
-    /// Closure i to its parameters, at the places that [`Machine::readers`] names.
-    pub to_parameters: [[S; PLACES]; CLOSURES],
+    /// Closure i to its parameters, at the slots that [`Machine::dependents`] names.
+    pub to_parameters: [ParameterGradient<S>; CLOSURES],
     /// Positive where the rows are proven regular and their order of elimination served.
     pub regular: S,
 }
 
 impl<S: Real> Linearisation<S> {
-    /// Fills rows and gradients of the struts' closures, by dual numbers through drive and strut at once.
-    /// `PLAIN` machines have no rings, which need not be looked for.
+    /// Fills rows and gradients of the struts' closures.
     #[inline(always)]
-    fn differentiate_struts<const PLAIN: bool>(
+    fn differentiate_struts<const RINGS: bool>(
         &mut self,
         machine: &Machine,
         p: &[S],
@@ -43,43 +43,12 @@ impl<S: Real> Linearisation<S> {
         pose: &Pose<S>,
     ) {
         let rotation = rotation_matrix(pose.rotation);
-        let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
+        let (at, tool) = ((&rotation, pose.position), tool_point(machine, p));
         let count = machine.struts.len();
         for i in 0..count {
-            let strut = &machine.struts[i];
-            let own = &p[strut.first..];
-            let base = [own[0], own[1], own[2]];
-            let platform = [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]];
-            let mut arm = rotate(&rotation, platform);
-            let mut radial = arm;
-            let ring = if PLAIN { None } else { strut.ring.as_ref() };
-            if let Some(ring) = ring {
-                let limb = Limb { base, arm: platform, length: S::default() };
-                (arm, radial) = ring_arm(ring, p[ring.radius], &limb, &rotation, pose.position);
-            }
-            let centre = add(arm, pose.position);
-            let length = match strut.own_length {
-                Some(index) => p[index],
-                None => S::default(),
-            };
-            let places = &mut self.to_parameters[i];
-            let gradient = match strut.drive {
-                None => fixed_gradient([base, centre], length, places),
-                Some(index) => {
-                    let drive = &machine.drives[index];
-                    let parameters = &p[drive.first..];
-                    let (nominal, joint) = (&drive.nominal, q[index]);
-                    drive.kind.gradient(nominal, parameters, joint, [base, centre], length, places)
-                }
-            };
-            let platform = rotate_back(&rotation, gradient.centre);
-            for k in 0..3 {
-                places[3 + k] = platform[k];
-                places[DRIVE_END + k] = -platform[k];
-            }
-            if ring.is_some() {
-                places[RING] = dot(gradient.centre, radial);
-            }
+            let (strut, to_parameters) = (&machine.struts[i], &mut self.to_parameters[i]);
+            let (arm, gradient) =
+                strut_gradient::<S, RINGS>(machine, strut, (p, q, tool), at, to_parameters);
             self.to_joint[i] = gradient.joint;
             self.rows[i] = row(machine, gradient.centre, arm);
         }
@@ -104,7 +73,7 @@ impl<S: Real> Linearisation<S> {
         pose: &Pose<S>,
         order: &Order,
     ) {
-        self.differentiate_struts::<true>(machine, p, q, pose);
+        self.differentiate_struts::<false>(machine, p, q, pose);
         self.hold(machine);
         let mut determinant = self.eliminate(order);
         for limb in &limbs[..machine.struts.len()] {
@@ -134,7 +103,7 @@ impl<S: Real> Linearisation<S> {
             rows: self.rows.map(|row| row.map(|value| value.lane(lane))),
             inverse: self.inverse.map(|row| row.map(|value| value.lane(lane))),
             to_joint: self.to_joint.map(|value| value.lane(lane)),
-            to_parameters: self.to_parameters.map(|row| row.map(|value| value.lane(lane))),
+            to_parameters: self.to_parameters.map(|gradient| gradient.lane(lane)),
             regular: self.regular.lane(lane),
         }
     }
@@ -143,31 +112,23 @@ impl<S: Real> Linearisation<S> {
 impl Linearisation<f64> {
     /// Fills rows and gradients of all closures of one sample.
     pub fn differentiate(&mut self, machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) {
-        self.differentiate_struts::<false>(machine, p, q, pose);
+        self.differentiate_struts::<true>(machine, p, q, pose);
         let rotation = rotation_matrix(pose.rotation);
-        let tool = [p[machine.tool], p[machine.tool + 1], p[machine.tool + 2]];
-        for (number, &(guide, which)) in machine.guide_closures.iter().enumerate() {
-            let i = machine.struts.len() + number;
-            let guide = &machine.guides[guide];
-            let limb = guide_limb(guide, p, tool);
-            let (at, length) = ((&rotation, pose.position), machine.characteristic_length);
-            let places = &mut self.to_parameters[i];
-            guide.kind.gradient(which, &guide.frames, &limb, at, length, places);
-            self.rows[i] = guide.kind.row(which, &guide.frames, &limb, at, length).1;
-            for &freedom in &machine.held {
-                self.rows[i][freedom] = 0.0;
-            }
+        let at = (&rotation, pose.position);
+        for (i, closure) in guide_closures(machine, p) {
+            closure.gradient(machine, at, &mut self.to_parameters[i]);
+            self.rows[i] = closure.row(machine, at).1;
             self.to_joint[i] = 0.0;
         }
         self.hold(machine);
     }
 
     /// Fills everything of one sample of any machine; whether the rows are regular is not looked at.
-    pub fn fill_alone(&mut self, sample: &Sample<'_>, q: &[f64], pose: &Pose<f64>) {
+    pub fn fill_scalar(&mut self, sample: &Sample<'_>, q: &[f64], pose: &Pose<f64>) {
         let machine = sample.machine;
         self.differentiate(machine, sample.p, q, pose);
         if machine.is_overconstrained() {
-            self.inverse = spread(machine, self);
+            self.inverse = spread(machine, &self.rows, &self.to_parameters);
         } else {
             let mut square = [[0.0; SIX]; SIX];
             square.copy_from_slice(&self.rows[..SIX]);

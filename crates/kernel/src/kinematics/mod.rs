@@ -1,6 +1,8 @@
-//! How joints, pose and parameters hang together.
+//! How joints, pose and parameters depend on each other.
 
 mod closures;
+mod condition;
+mod elastic;
 mod forward;
 mod gradients;
 mod inverse;
@@ -8,16 +10,14 @@ mod linearisation;
 mod overconstrained;
 
 pub(crate) use closures::system;
-pub use closures::{Limb, Limbs, Sample, guide_limb, limbs, place_limbs, ring_arm};
+pub use closures::{Limb, Limbs, Sample, limbs, place_limbs, ring_arm, tool_point};
+pub use condition::{condition, free_motions};
 pub use forward::{Descent, chord, chord_inverse, descend, forward, start_order};
 pub(crate) use gradients::{Gradients, gradients};
-pub use inverse::{
-    Inverse, Obstacle, commanded_pose, condition, free_motions, inverse, lane_inverse, obstacles,
-    permitted,
-};
+pub use inverse::{Inverse, Obstacle, commanded_pose, inverse, lane_inverse, obstacles, permitted};
 pub(crate) use inverse::{closed_form, leanings};
 pub use linearisation::{Linearisation, proven_regular};
-pub use overconstrained::{Settled, Surroundings, internal_forces, least_energy};
+pub use overconstrained::{Equilibrium, Loads, internal_forces, least_energy};
 
 /// Singular: smallest scaled singular value below this share of the largest.
 pub const SINGULAR: f64 = 1e-6;

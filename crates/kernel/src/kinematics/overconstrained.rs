@@ -8,15 +8,17 @@
 //! clearances absorb and errors that strain the structure).
 //!
 //! The change of the rows with the pose is left out of the stiffness, so that where clearances are wide and
-//! loads large against the stiffness the iteration may not settle, which the status then says.
+//! loads large against the stiffness the iteration may not converge, which the status then reports.
 
+use super::SINGULAR;
 use super::closures::Sample;
+use super::condition::condition_at;
+use super::elastic::{Structure, scaled_rows, spread, unit};
 use super::linearisation::Linearisation;
-use super::{SINGULAR, forward::condition_at};
 use crate::linear::{CLOSURES, SIX};
-use crate::machine::{Machine, chosen};
+use crate::machine::{Machine, indices_of};
 use crate::spatial::Pose;
-use crate::statics::{ClosureMatrix, closure_compliance};
+use crate::statics::ClosureMatrix;
 use crate::status::Status;
 use nalgebra::{DMatrix, DVector};
 
@@ -33,7 +35,7 @@ const CENTRING: f64 = 1e-9;
 
 /// What acts on an over-constrained machine beside its parameters.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Surroundings {
+pub struct Loads {
     /// Half of each closure's clearance, m: its residual is free within plus and minus this.
     pub clearance: [f64; CLOSURES],
     /// Wrench on the tool at the tool point, base axes, N and N m.
@@ -42,7 +44,7 @@ pub struct Surroundings {
 
 /// A machine at rest.
 #[derive(Clone, Copy, Debug)]
-pub struct Settled {
+pub struct Equilibrium {
     /// The platform's pose.
     pub pose: Pose<f64>,
     /// Force in each closure, N: tension of a strut positive.
@@ -64,76 +66,13 @@ enum Contact {
     Floating,
 }
 
-/// Closures that carry at all, and the compliance between all closures.
-struct Structure {
-    carrying: Vec<usize>,
-    compliance: ClosureMatrix<f64>,
-}
-
-impl Structure {
-    fn new(machine: &Machine, linear: &Linearisation<f64>) -> Self {
-        let readers: Vec<&[(usize, usize)]> = machine
-            .parameter_compliance
-            .iter()
-            .map(|&(parameter, _)| machine.readers[parameter].as_slice())
-            .collect();
-        let values: Vec<f64> = machine.parameter_compliance.iter().map(|&(_, c)| c).collect();
-        let mut compliance = closure_compliance(linear, &readers, &values);
-        let own = &machine.closure_compliance;
-        let carrying: Vec<usize> = machine.carrying().collect();
-        for &i in &carrying {
-            compliance[i][i] += own[i];
-        }
-        Structure { carrying, compliance }
-    }
-
-    /// The stiffness between some of the closures; `None` where one of them is rigid.
-    fn stiffness(&self, closures: &[usize]) -> Option<DMatrix<f64>> {
-        let size = closures.len();
-        let matrix = DMatrix::from_fn(size, size, |i, k| self.compliance[closures[i]][closures[k]]);
-        matrix.cholesky().map(|factors| factors.inverse())
-    }
-}
-
-/// Rows of some closures in the platform's freedoms, rotations in units of the characteristic length.
-fn scaled_rows(machine: &Machine, rows: &[[f64; SIX]], closures: &[usize]) -> DMatrix<f64> {
-    let freedoms = chosen(&machine.dof);
-    DMatrix::from_fn(closures.len(), freedoms.len(), |i, k| {
-        rows[closures[i]][freedoms[k]] / unit(machine, freedoms[k])
-    })
-}
-
-/// What one unit of a scaled freedom is: 1 m, or the angle that moves the characteristic length by 1 m.
-fn unit(machine: &Machine, freedom: usize) -> f64 {
-    if freedom < 3 { 1.0 } else { machine.characteristic_length }
-}
-
-/// `(W^T K W)^-1 W^T K`: the twist per unit residual that leaves the least elastic energy. Not finite
-/// where the closures are rigid or do not hold the platform.
-pub fn spread(machine: &Machine, linear: &Linearisation<f64>) -> [[f64; CLOSURES]; SIX] {
-    let mut result = [[0.0; CLOSURES]; SIX];
-    let structure = Structure::new(machine, linear);
-    let rows = scaled_rows(machine, &linear.rows, &structure.carrying);
-    let solved = structure.stiffness(&structure.carrying).and_then(|stiffness| {
-        let weighted = rows.transpose() * stiffness;
-        (&weighted * &rows).cholesky().map(|normal| normal.solve(&weighted))
-    });
-    for (k, &freedom) in chosen(&machine.dof).iter().enumerate() {
-        for (i, &closure) in structure.carrying.iter().enumerate() {
-            result[freedom][closure] =
-                solved.as_ref().map_or(f64::NAN, |solved| solved[(k, i)] / unit(machine, freedom));
-        }
-    }
-    result
-}
-
 /// `K (I - W W^+)` with the spread W^+: the force in each closure per unit residual of each, after the
 /// platform gave way. Tension of a strut positive; not finite where a closure is rigid.
 pub fn internal_forces(machine: &Machine, linear: &Linearisation<f64>) -> ClosureMatrix<f64> {
     let mut result = [[0.0; CLOSURES]; CLOSURES];
-    let structure = Structure::new(machine, linear);
+    let structure = Structure::new(machine, &linear.to_parameters);
     let carrying = &structure.carrying;
-    let spread = spread(machine, linear);
+    let spread = spread(machine, &linear.rows, &linear.to_parameters);
     let Some(stiffness) = structure.stiffness(carrying) else {
         return [[f64::NAN; CLOSURES]; CLOSURES];
     };
@@ -156,67 +95,66 @@ pub fn least_energy(
     sample: &Sample<'_>,
     q: &[f64],
     start: &Pose<f64>,
-    surroundings: &Surroundings,
-) -> Settled {
+    loads: &Loads,
+) -> Equilibrium {
     let machine = sample.machine;
     let zero = [0.0; CLOSURES];
-    let mut settled = Settled {
+    let mut equilibrium = Equilibrium {
         pose: *start,
         forces: zero,
         absorbed: zero,
         strain: zero,
         status: Status::NotConverged,
     };
-    let mut contacts: Vec<Contact> = surroundings.clearance[..machine.closure_count()]
+    let mut contacts: Vec<Contact> = loads.clearance[..machine.closure_count()]
         .iter()
         .map(|&gap| if gap > 0.0 { Contact::Floating } else { Contact::Touching(0.0) })
         .collect();
     let mut linear = Linearisation::default();
     for _ in 0..STEPS {
-        linear.differentiate(machine, sample.p, q, &settled.pose);
-        let structure = Structure::new(machine, &linear);
-        let (_, residuals) = sample.closures(&settled.pose);
-        let found =
-            Rest { machine, surroundings, structure: &structure, linear: &linear, residuals }
-                .find(&mut contacts);
-        let Some(rest) = found else { return settled };
+        linear.differentiate(machine, sample.p, q, &equilibrium.pose);
+        let structure = Structure::new(machine, &linear.to_parameters);
+        let (_, residuals) = sample.closures(&equilibrium.pose);
+        let balance = Rest { machine, loads, structure: &structure, linear: &linear, residuals }
+            .find(&mut contacts);
+        let Some(rest) = balance else { return equilibrium };
         let size: f64 = rest.twist.iter().map(|value| value.abs()).sum();
         if !size.is_finite() {
-            return settled;
+            return equilibrium;
         }
         // A long step is taken in part, so that the platform moves as it would and keeps its assembly.
         let share = (LONG_STEP * machine.characteristic_length / size).min(1.0);
         let mut twist = [0.0; SIX];
-        for (k, &freedom) in chosen(&machine.dof).iter().enumerate() {
+        for (k, &freedom) in indices_of(&machine.dof).iter().enumerate() {
             twist[freedom] = share * rest.twist[k] / unit(machine, freedom);
         }
-        settled.pose.step(twist);
+        equilibrium.pose.step(twist);
         for i in 0..machine.closure_count() {
-            settled.forces[i] = rest.forces[i];
-            settled.absorbed[i] = rest.absorbed[i];
-            settled.strain[i] =
+            equilibrium.forces[i] = rest.forces[i];
+            equilibrium.absorbed[i] = rest.absorbed[i];
+            equilibrium.strain[i] =
                 (0..CLOSURES).map(|k| structure.compliance[i][k] * rest.forces[k]).sum();
         }
         if size / machine.characteristic_length < SETTLED {
-            let held = condition_at(sample, &settled.pose) >= SINGULAR;
-            settled.status = if held { Status::Ok } else { Status::Singular };
-            return settled;
+            let held = condition_at(sample, &equilibrium.pose) >= SINGULAR;
+            equilibrium.status = if held { Status::Ok } else { Status::Singular };
+            return equilibrium;
         }
     }
-    settled
+    equilibrium
 }
 
 /// The linearised problem at one pose.
 struct Rest<'a> {
     machine: &'a Machine,
-    surroundings: &'a Surroundings,
+    loads: &'a Loads,
     structure: &'a Structure,
     linear: &'a Linearisation<f64>,
     residuals: [f64; CLOSURES],
 }
 
 /// Its solution: scaled twist, forces and what clearances take.
-struct Found {
+struct Balance {
     twist: DVector<f64>,
     forces: [f64; CLOSURES],
     absorbed: [f64; CLOSURES],
@@ -224,22 +162,22 @@ struct Found {
 
 impl Rest<'_> {
     /// Exchanges contacts, the most contradicting first, until each is what its force and gap say.
-    fn find(&self, contacts: &mut [Contact]) -> Option<Found> {
+    fn find(&self, contacts: &mut [Contact]) -> Option<Balance> {
         for round in 0..EXCHANGES {
-            let found = self.solve(contacts)?;
+            let balance = self.solve(contacts)?;
             let mut worst: Option<(f64, usize, Contact)> = None;
             for &i in &self.structure.carrying {
-                let gap = self.surroundings.clearance[i];
+                let gap = self.loads.clearance[i];
                 if gap == 0.0 {
                     continue;
                 }
                 let (excess, becomes) = match contacts[i] {
                     Contact::Touching(side) => {
-                        let pressing = side * found.forces[i] * self.structure.compliance[i][i];
+                        let pressing = side * balance.forces[i] * self.structure.compliance[i][i];
                         (-pressing, Contact::Floating)
                     }
                     Contact::Floating => {
-                        let open = self.opening(i, &found.twist);
+                        let open = self.opening(i, &balance.twist);
                         (open.abs() - gap, Contact::Touching(open.signum()))
                     }
                 };
@@ -251,7 +189,7 @@ impl Rest<'_> {
                 }
             }
             match worst {
-                None => return Some(found),
+                None => return Some(balance),
                 Some((_, i, becomes)) => contacts[i] = becomes,
             }
         }
@@ -265,7 +203,7 @@ impl Rest<'_> {
     }
 
     /// Balance of forces with the contacts as they are assumed.
-    fn solve(&self, contacts: &[Contact]) -> Option<Found> {
+    fn solve(&self, contacts: &[Contact]) -> Option<Balance> {
         let carrying = &self.structure.carrying;
         let touching: Vec<usize> = carrying
             .iter()
@@ -273,7 +211,7 @@ impl Rest<'_> {
             .filter(|&i| matches!(contacts[i], Contact::Touching(_)))
             .collect();
         let taken = |i: usize| match contacts[i] {
-            Contact::Touching(side) => side * self.surroundings.clearance[i],
+            Contact::Touching(side) => side * self.loads.clearance[i],
             Contact::Floating => 0.0,
         };
         let rows = scaled_rows(self.machine, &self.linear.rows, &touching);
@@ -282,10 +220,10 @@ impl Rest<'_> {
             touching.len(),
             touching.iter().map(|&i| self.residuals[i] - taken(i)),
         );
-        let freedoms = chosen(&self.machine.dof);
+        let freedoms = indices_of(&self.machine.dof);
         let mut balance = DVector::from_iterator(
             freedoms.len(),
-            freedoms.iter().map(|&k| self.surroundings.wrench[k] / unit(self.machine, k)),
+            freedoms.iter().map(|&k| self.loads.wrench[k] / unit(self.machine, k)),
         );
         let weighted = rows.transpose() * &stiffness;
         let mut normal = &weighted * &rows;
@@ -300,16 +238,16 @@ impl Rest<'_> {
         }
         let twist = normal.cholesky()?.solve(&balance);
         let pulls = &stiffness * (&rows * &twist + open);
-        let mut found = Found { twist, forces: [0.0; CLOSURES], absorbed: [0.0; CLOSURES] };
+        let mut solution = Balance { twist, forces: [0.0; CLOSURES], absorbed: [0.0; CLOSURES] };
         for (&i, &force) in touching.iter().zip(&pulls) {
-            found.forces[i] = force;
+            solution.forces[i] = force;
         }
         for &i in carrying {
-            found.absorbed[i] = match contacts[i] {
+            solution.absorbed[i] = match contacts[i] {
                 Contact::Touching(_) => taken(i),
-                Contact::Floating => self.opening(i, &found.twist),
+                Contact::Floating => self.opening(i, &solution.twist),
             };
         }
-        Some(found)
+        Some(solution)
     }
 }

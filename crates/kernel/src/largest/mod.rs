@@ -1,6 +1,6 @@
 //! The largest length that a vector of a set can have: how far off one machine inside the bands can be.
 //!
-//! The set is a point, plus segments (what one variable in [-1, 1] does), plus ellipsoids (what a unit vector
+//! The set is a point, plus segments (the effect of one variable in [-1, 1]), plus ellipsoids (that of a unit vector
 //! does). Its support function, the most that e . u is over it,
 //!
 //! ```text
@@ -35,7 +35,7 @@ const NARROW: f64 = 1e-6;
 const MANY: usize = 1500;
 /// See `MANY`: what a length may be too large by.
 pub const STATED: f64 = 5e-4;
-/// Directions after which the gap is what it is.
+/// The most directions, whatever the gap is then.
 const MOST: usize = 60_000;
 /// Steps of a climb: a few to a vertex, more on an ellipsoid, which the cones finish.
 const STEPS: usize = 24;
@@ -125,7 +125,7 @@ impl Set {
 
     /// From a direction on to that of the point found, as long as the points become longer.
     #[inline(always)]
-    fn climb(&self, from: Vector<f64>, found: &mut Farthest) {
+    fn climb(&self, from: Vector<f64>, farthest: &mut Farthest) {
         let mut u = from;
         let mut reached = 0.0;
         for _ in 0..STEPS {
@@ -135,8 +135,8 @@ impl Set {
                 break;
             }
             reached = length;
-            if length > found.reached {
-                *found = Farthest { reached: length, direction: u, ..*found };
+            if length > farthest.reached {
+                *farthest = Farthest { reached: length, direction: u, ..*farthest };
             }
             u = scale(point, 1.0 / length);
         }
@@ -158,7 +158,7 @@ impl Search {
     /// The farthest point of a set; no number where the set has a part that is none.
     #[inline(always)]
     pub fn farthest<S: Real>(&mut self, set: &Set) -> Farthest {
-        let mut found = Farthest::default();
+        let mut farthest = Farthest::default();
         if set.segments.is_empty() && set.ellipsoids.is_empty() {
             let length = norm(set.centre);
             let direction =
@@ -171,14 +171,14 @@ impl Search {
                 return Farthest { length: f64::NAN, reached: f64::NAN, direction: [f64::NAN; 3] };
             }
         }
-        self.climb_from(0, set, &mut found);
-        self.cones_of_net::<S>(found.reached * (1.0 + ROUNDING));
+        self.climb_from(0, set, &mut farthest);
+        self.cones_of_net::<S>(farthest.reached * (1.0 + ROUNDING));
         while !self.cones.is_empty() {
             let mut largest: f64 = 0.0;
             for cone in &self.cones {
                 largest = largest.max(cone.bound);
             }
-            let (tried, gap) = (self.directions.len(), largest / found.reached - 1.0);
+            let (tried, gap) = (self.directions.len(), largest / farthest.reached - 1.0);
             if tried >= SOME && gap <= NARROW || tried >= MANY && gap <= STATED || tried >= MOST {
                 self.dropped = self.dropped.max(largest);
                 break;
@@ -188,11 +188,11 @@ impl Search {
                 self.directions.push(cone.apex);
             }
             self.evaluate::<S>(set, first);
-            self.climb_from(first, set, &mut found);
-            self.divide(first, found.reached * (1.0 + ROUNDING));
+            self.climb_from(first, set, &mut farthest);
+            self.divide(first, farthest.reached * (1.0 + ROUNDING));
         }
-        found.length = self.dropped.max(found.reached);
-        found
+        farthest.length = self.dropped.max(farthest.reached);
+        farthest
     }
 
     /// Evaluates the net.
@@ -222,7 +222,7 @@ impl Search {
 
     /// Climbs from the direction, of those from number `first` on, along which the set reaches farthest.
     #[inline(always)]
-    fn climb_from(&self, first: usize, set: &Set, found: &mut Farthest) {
+    fn climb_from(&self, first: usize, set: &Set, farthest: &mut Farthest) {
         let mut best = first;
         for k in first..self.reach.len() {
             if self.reach[k] > self.reach[best] {
@@ -230,8 +230,8 @@ impl Search {
             }
         }
         // No point is nearer than the set reaches along its direction.
-        if self.reach[best] > found.reached {
-            set.climb(self.directions[best], found);
+        if self.reach[best] > farthest.reached {
+            set.climb(self.directions[best], farthest);
         }
     }
 

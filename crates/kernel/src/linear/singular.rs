@@ -17,7 +17,7 @@ pub fn condition_index(matrix: &[[f64; SIX]], rows: usize, columns: &[bool; SIX]
 }
 
 /// The unit combinations of the columns that the first `rows` rows leave free: right singular vectors whose
-/// value is below `limit` times the largest, zero in columns that are not asked for.
+/// value is below `limit` times the largest, zero in the other columns.
 pub fn null_space(
     matrix: &[[f64; SIX]],
     rows: usize,

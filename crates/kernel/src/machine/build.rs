@@ -1,12 +1,12 @@
-//! From a description to a machine: elements, parameters and who reads which.
+//! From a description to a machine: elements, parameters and which closures depend on them.
 
 use super::description::error;
 use super::{
     Description, DriveDescription, FREEDOMS, GuideDescription, Machine, MachineDrive, MachineError,
-    MachineGuide, Parameter, Ring, Strut, StrutDescription, chosen,
+    MachineGuide, Parameter, Ring, Strut, StrutDescription, indices_of,
 };
 use crate::element::guide::{Anchor, GuideFrames, anchor_parameters};
-use crate::element::{DRIVE_END, Dimension, Direction, OWN, RING, strut};
+use crate::element::{Dimension, Direction, Slots, strut};
 use crate::linear::{CLOSURES, SIX};
 use crate::spatial::{Pose, Vector, norm, scale};
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ impl Machine {
             limited: false,
             characteristic_length: 0.0,
             home: Pose::from_coordinates(description.home),
-            readers: Vec::new(),
+            dependents: Vec::new(),
             regularity_scale: 0.0,
         };
         for strut in &description.struts {
@@ -62,7 +62,7 @@ impl Machine {
             }
         }
         machine.check_counts()?;
-        machine.find_readers();
+        machine.find_dependents();
         machine.plain = machine.guides.is_empty()
             && !machine.is_overconstrained()
             && machine.struts.iter().all(|strut| strut.ring.is_none());
@@ -102,13 +102,7 @@ impl Machine {
         drives: &[DriveDescription],
     ) -> Result<(), MachineError> {
         let place = format!("strut.{}", strut.name);
-        if self.struts.iter().any(|other| other.name == strut.name) {
-            return error(
-                "duplicate-name",
-                place,
-                format!("two struts are named {:?}", strut.name),
-            );
-        }
+        check_unique("strut", &strut.name, self.struts.iter().map(|other| &other.name))?;
         let drive = match &strut.drive {
             None => None,
             Some(name) => match drives.iter().position(|drive| &drive.name == name) {
@@ -172,13 +166,7 @@ impl Machine {
 
     fn add_guide(&mut self, guide: &GuideDescription) -> Result<(), MachineError> {
         let place = format!("guide.{}", guide.name);
-        if self.guides.iter().any(|other| other.name == guide.name) {
-            return error(
-                "duplicate-name",
-                place,
-                format!("two guides are named {:?}", guide.name),
-            );
-        }
+        check_unique("guide", &guide.name, self.guides.iter().map(|other| &other.name))?;
         let mut frames = GuideFrames::default();
         let mut first = [None; 4];
         for &(anchor, name) in guide.kind.fields() {
@@ -237,13 +225,7 @@ impl Machine {
 
     fn add_drive(&mut self, index: usize, drive: &DriveDescription) -> Result<(), MachineError> {
         let place = format!("drive.{}", drive.name);
-        if self.drives.iter().any(|other| other.name == drive.name) {
-            return error(
-                "duplicate-name",
-                place,
-                format!("two drives are named {:?}", drive.name),
-            );
-        }
+        check_unique("drive", &drive.name, self.drives.iter().map(|other| &other.name))?;
         let table = drive.kind.table();
         let mut nominal = Direction::default();
         let mut values = BTreeMap::new();
@@ -291,43 +273,39 @@ impl Machine {
         Ok(())
     }
 
-    /// Fills in who reads which parameter, at the places of [`crate::element::PLACES`].
-    fn find_readers(&mut self) {
-        let mut readers = vec![Vec::new(); self.nominal.len()];
-        for (i, strut) in self.struts.iter().enumerate() {
-            for place in 0..6 {
-                readers[strut.first + place].push((i, place));
+    /// Fills in which closures depend on which parameter, at [`Slots`].
+    fn find_dependents(&mut self) {
+        let mut dependents = vec![Vec::new(); self.nominal.len()];
+        // Neighbouring parameters have neighbouring slots.
+        let mut depend = |closure: usize, first: usize, slot: usize, count: usize| {
+            for k in 0..count {
+                dependents[first + k].push((closure, slot + k));
             }
+        };
+        for (i, strut) in self.struts.iter().enumerate() {
+            depend(i, strut.first, Slots::BASE, Slots::LENGTH);
             if let Some(index) = strut.own_length {
-                readers[index].push((i, 6));
+                depend(i, index, Slots::LENGTH, 1);
             }
             if let Some(drive) = strut.drive {
                 let drive = &self.drives[drive];
-                for place in 0..drive.kind.table().parameters.len() {
-                    readers[drive.first + place].push((i, OWN + place));
-                }
+                depend(i, drive.first, Slots::DRIVE, drive.kind.table().parameters.len());
             }
             if let Some(ring) = strut.ring {
-                readers[ring.radius].push((i, RING));
+                depend(i, ring.radius, Slots::RING_RADIUS, 1);
             }
-            for k in 0..3 {
-                readers[self.tool + k].push((i, DRIVE_END + k));
-            }
+            depend(i, self.tool, Slots::TOOL, 3);
         }
         for (number, &(guide, _)) in self.guide_closures.iter().enumerate() {
             let i = self.struts.len() + number;
             for anchor in Anchor::ALL {
                 if let Some(first) = self.guides[guide].first[anchor as usize] {
-                    for k in 0..anchor_parameters(anchor).len() {
-                        readers[first + k].push((i, anchor.place() + k));
-                    }
+                    depend(i, first, anchor.slot(), anchor_parameters(anchor).len());
                 }
             }
-            for k in 0..3 {
-                readers[self.tool + k].push((i, DRIVE_END + k));
-            }
+            depend(i, self.tool, Slots::TOOL, 3);
         }
-        self.readers = readers;
+        self.dependents = dependents;
     }
 
     fn check_counts(&self) -> Result<(), MachineError> {
@@ -386,9 +364,22 @@ fn unit(direction: Vector<f64>, place: impl Fn() -> String) -> Result<Vector<f64
     error("zero-direction", place(), "it points nowhere".into())
 }
 
+/// Refuses a second element of one name.
+fn check_unique<'a>(
+    family: &str,
+    name: &String,
+    mut others: impl Iterator<Item = &'a String>,
+) -> Result<(), MachineError> {
+    if others.any(|other| other == name) {
+        let message = format!("two {family}s are named {name:?}");
+        return error("duplicate-name", format!("{family}.{name}"), message);
+    }
+    Ok(())
+}
+
 fn check_freedoms(description: &Description) -> Result<(), MachineError> {
     let names = |flags: &[bool; SIX]| {
-        let names: Vec<&str> = chosen(flags).into_iter().map(|k| FREEDOMS[k]).collect();
+        let names: Vec<&str> = indices_of(flags).into_iter().map(|k| FREEDOMS[k]).collect();
         names.join(" ")
     };
     if !description.dof.contains(&true) {

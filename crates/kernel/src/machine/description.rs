@@ -1,7 +1,7 @@
 //! A machine as its file gives it, in SI units, and why it may be none.
 
 use crate::element::DriveKind;
-use crate::element::guide::GuideKind;
+use crate::element::GuideKind;
 use crate::linear::SIX;
 use crate::spatial::Vector;
 use std::collections::BTreeMap;
@@ -27,7 +27,7 @@ pub struct DriveDescription {
 pub struct StrutDescription {
     /// Unique among the struts.
     pub name: String,
-    /// The drive that carries it (or is its length); `None`: it hangs on the frame.
+    /// The drive that carries it (or is its length); `None`: it stands on the frame.
     pub drive: Option<String>,
     /// Base-side joint centre.
     pub base: Vector<f64>,

@@ -7,8 +7,8 @@ pub use description::{
     Description, DriveDescription, GuideDescription, JointLimit, MachineError, StrutDescription,
 };
 
-use crate::element::guide::{GuideFrames, GuideKind};
-use crate::element::{Dimension, Direction, DriveKind};
+use crate::element::guide::GuideFrames;
+use crate::element::{Dimension, Direction, DriveKind, GuideKind};
 use crate::linear::{CLOSURES, SIX};
 use crate::spatial::{Pose, Vector, norm, rotate, rotation_matrix, subtract};
 
@@ -116,7 +116,7 @@ pub struct Machine {
     /// Where `tool.x` stands among the parameters.
     pub tool: usize,
     /// Whether every closure is a strut's between two joints that stay, and there are as many as
-    /// freedoms: what runs on lanes. All others take the single road.
+    /// freedoms: what runs on lanes. All others take the scalar path.
     pub plain: bool,
     /// Whether a joint limits how far a strut may lean.
     pub limited: bool,
@@ -124,15 +124,15 @@ pub struct Machine {
     pub characteristic_length: f64,
     /// Start of the forward solution.
     pub home: Pose<f64>,
-    /// For each parameter the closures that read it: (closure, place in its gradient).
-    pub readers: Vec<Vec<(usize, usize)>>,
+    /// For each parameter the closures that depend on it: (closure, slot in its gradient).
+    pub dependents: Vec<Vec<(usize, usize)>>,
     /// What [`crate::kinematics::proven_regular`] multiplies by: `2^n l^r / (n-1)^((n-1)/2)` for n
     /// closures, r rotations and the characteristic length l.
     pub regularity_scale: f64,
 }
 
 /// The indices whose flag is set.
-pub fn chosen(flags: &[bool; SIX]) -> Vec<usize> {
+pub fn indices_of(flags: &[bool; SIX]) -> Vec<usize> {
     (0..SIX).filter(|&k| flags[k]).collect()
 }
 

@@ -1,7 +1,6 @@
 //! What a source knows of one parameter all over a region: a constant, and a multiple of a strut's length.
 
 use super::point;
-use super::pose_box::Tangent;
 use crate::scalar::{Dual, Interval, Scalar};
 
 /// A number for one parameter, known at every pose: `constant + per_length` times the present length of
@@ -30,7 +29,7 @@ impl FromInterval for Interval {
     }
 }
 
-impl FromInterval for Tangent {
+impl<const N: usize> FromInterval for Dual<Interval, N> {
     fn from_interval(value: Interval) -> Self {
         Dual::constant(value)
     }

@@ -24,7 +24,7 @@ pub const FINE: f64 = 1.0003;
 /// Times that the box is made smaller.
 const ROUNDS: usize = 6;
 
-/// Where the bounds are asked for.
+/// The pose, the deviations and the machine that bounds are for.
 #[derive(Clone, Debug)]
 pub struct Extent<'a> {
     /// The machine.
@@ -33,7 +33,7 @@ pub struct Extent<'a> {
     pub joints: &'a [f64],
     /// The commanded pose.
     pub pose: Pose<f64>,
-    /// Joints and pose as they are exactly: a number each, or what is known of it.
+    /// Enclosures of the exact joints and pose: points where they are known exactly.
     pub command: (Vec<Interval>, Placed),
     /// Known deviations of the parameters (index, value).
     pub shift: Vec<(usize, Interval)>,
@@ -72,7 +72,7 @@ pub struct Unenclosed {
     pub effects: Vec<f64>,
 }
 
-/// A part of the box that is proven, with what is found out about smaller ones in it.
+/// A part of the box that is proven, with the enclosures over smaller parts in it.
 pub struct Part<'a> {
     extent: &'a Extent<'a>,
     /// The variables' ends.
@@ -82,8 +82,8 @@ pub struct Part<'a> {
     narrowed: RefCell<HashMap<Vec<i8>, Option<Rc<Enclosed>>>>,
 }
 
-/// How far a part reaches along a direction, and what is left to find out.
-struct Reach {
+/// A bound on how far a part reaches along a direction, and what limits it.
+struct DirectionBound {
     bound: f64,
     /// The variable whose slope is least certain, if one is.
     loosest: Option<usize>,
@@ -169,12 +169,12 @@ impl<'a> Extent<'a> {
         let nearly: Vec<f64> = p_middle.iter().map(|one| one.midpoint()).collect();
         let struts = limbs(machine, &nearly, self.joints);
         let sample = Sample { machine, p: &nearly, limbs: &struts };
-        let (found, status) = forward(&sample, self.joints, start);
+        let (found_pose, status) = forward(&sample, self.joints, start);
         if status != Status::Ok {
             let why = Unproven::NearSingular;
             return Err(Box::new(Unenclosed { why, pose: None, effects: Vec::new() }));
         }
-        let middle = displacement_numbers(machine, &self.pose, &found);
+        let middle = displacement_numbers(machine, &self.pose, &found_pose);
         let (q, at) = (&self.command.0, &self.command.1);
         let exact = derivatives(machine, &p_middle, q, at, &middle.map(point));
         let spread = derivatives(machine, &p, q, at, &middle.map(point));
@@ -182,7 +182,7 @@ impl<'a> Extent<'a> {
         let varying: Vec<Varying> = self.columns(&spread).into_iter().zip(away).collect();
         let unproven = |why: Unproven| {
             let effects = effects(&spread.to_displacement, &varying);
-            Box::new(Unenclosed { why, pose: Some(found), effects })
+            Box::new(Unenclosed { why, pose: Some(found_pose), effects })
         };
         let residuals = &exact.closures.residuals;
         let root = prove(&middle, residuals, &varying, &spread.to_displacement, |tried| {
@@ -209,20 +209,12 @@ impl<'a> Extent<'a> {
             .map(|column| inverse.times(column).map(|value| -value))
             .collect();
         let Root { enclosure, unique_in } = root;
-        Ok(Enclosed { middle: at_middle, pose: found, whole: enclosure, unique_in, slopes })
+        Ok(Enclosed { middle: at_middle, pose: found_pose, whole: enclosure, unique_in, slopes })
     }
 
     /// Derivatives of the closures to the variables.
     fn columns(&self, at: &super::closures::Derivatives) -> Vec<Six> {
-        let mut columns = vec![[point(0.0); SIX]; self.deviating.count];
-        let Deviating { parameters, variables, swing, .. } = self.deviating;
-        for ((&parameter, &variable), &swing) in parameters.iter().zip(variables).zip(swing) {
-            let gradient = at.closures.to_parameter(self.machine, parameter);
-            for k in 0..SIX {
-                columns[variable][k] = columns[variable][k] + gradient[k] * point(swing);
-            }
-        }
-        columns
+        self.deviating.columns(|parameter| at.closures.to_parameter(self.machine, parameter))
     }
 
     /// The machine over every variable in [-1, 1].
@@ -259,11 +251,12 @@ impl Part<'_> {
         }
         let sides: Vec<Interval> =
             ends.iter().enumerate().map(|(variable, &end)| self.side(variable, end)).collect();
-        let found = self.extent.enclose(&sides, &self.first.pose).ok();
+        let enclosed = self.extent.enclose(&sides, &self.first.pose).ok();
         // The root over the smaller part is the one proved over the whole.
-        let found = found.filter(|one| lies_in(&one.middle, &self.first.unique_in)).map(Rc::new);
-        self.narrowed.borrow_mut().insert(ends.to_vec(), found.clone());
-        found
+        let enclosed =
+            enclosed.filter(|one| lies_in(&one.middle, &self.first.unique_in)).map(Rc::new);
+        self.narrowed.borrow_mut().insert(ends.to_vec(), enclosed.clone());
+        enclosed
     }
 
     /// The most that `direction . displacement` can be.
@@ -276,7 +269,7 @@ impl Part<'_> {
         self.reach(direction).loosest
     }
 
-    fn reach(&self, direction: &[f64; SIX]) -> Reach {
+    fn reach(&self, direction: &[f64; SIX]) -> DirectionBound {
         let Deviating { directions, count, .. } = self.extent.deviating;
         let mut in_direction = vec![false; *count];
         for &member in directions.iter().flatten() {
@@ -335,7 +328,7 @@ impl Part<'_> {
             }
             own = Some(next);
         }
-        Reach { bound: best, loosest }
+        DirectionBound { bound: best, loosest }
     }
 
     /// Bounds over the part.

@@ -1,5 +1,5 @@
 //! Bounds at a pose with the box of variables divided: where nothing is proven over the whole of it, or
-//! where a bound is not as low as asked for.
+//! where a bound is not as low as its target.
 //!
 //! **Existence.** A box over which nothing is proven is halved across the variable that moves the platform
 //! most, and so on until all leaves of this tree are proven. Over a leaf L every machine t has exactly one
@@ -16,7 +16,7 @@
 //! [`forward`](crate::kinematics::forward) finds at t = 0 from the commanded pose lies in the U of a leaf
 //! that holds t = 0. A continuation along any path from there is X, for regular roots cannot part.
 //!
-//! **Lower bounds.** A leaf whose magnitudes lie above what is asked for is halved across the variable with
+//! **Lower bounds.** A leaf whose magnitudes lie above their targets is halved across the variable with
 //! the least certain slope. Its halves are within it, so that their root is known to exist: a smaller
 //! enclosure is taken where it is of that root, its middle in U_L; elsewhere the leaf's own bound stays, and
 //! so do its bounds of what no target is given for.
@@ -130,8 +130,8 @@ impl<'a> Search<'a> {
     /// That the branch is the one found from the commanded pose at the shift.
     fn check_shift(&self, tree: &Node<'a>) -> Result<(), Unproven> {
         let middle = vec![0.0; self.extent.deviating.count];
-        let found = self.at(&middle, &self.extent.pose)?;
-        of(&found, &tree.leaf(&middle).first).then_some(()).ok_or(Unproven::TooWide)
+        let spot = self.at(&middle, &self.extent.pose)?;
+        of(&spot, &tree.leaf(&middle).first).then_some(()).ok_or(Unproven::TooWide)
     }
 
     /// That all leaves below a box are of one branch.
@@ -140,8 +140,8 @@ impl<'a> Search<'a> {
         let mut middle: Vec<f64> = sides.iter().map(|side| side.midpoint()).collect();
         middle[*variable] = halving(sides[*variable]);
         let [one, other] = halves.each_ref().map(|half| &half.leaf(&middle).first);
-        let found = self.at(&middle, &one.pose)?;
-        if !of(&found, one) || !of(&found, other) {
+        let spot = self.at(&middle, &one.pose)?;
+        if !of(&spot, one) || !of(&spot, other) {
             return Err(Unproven::TooWide);
         }
         halves.iter().try_for_each(|half| self.check_branch(half))
@@ -169,7 +169,7 @@ impl<'a> Search<'a> {
             raise(&mut floor, &bounds.values);
             open.push(Bounded { part, bounds });
         }
-        // What is done with: of no more use to divide.
+        // Finished leaves: dividing them further is of no use.
         let mut closed = AS_LOW_AS_CAN_BE;
         let mut wanted: Vec<usize> =
             (0..2).filter(|&part| targets[part] >= 0.0 && targets[part].is_finite()).collect();
@@ -246,8 +246,8 @@ impl<'a> Node<'a> {
 }
 
 /// Whether the root enclosed at the middle of a part is that of another, which holds the middle.
-fn of(found: &Enclosed, other: &Enclosed) -> bool {
-    lies_in(&found.middle, &other.unique_in)
+fn of(spot: &Enclosed, other: &Enclosed) -> bool {
+    lies_in(&spot.middle, &other.unique_in)
 }
 
 /// Where a side is halved.

@@ -16,7 +16,14 @@ pub type Six<S = Interval> = [S; SIX];
 /// Rows of derivatives.
 pub type Square<S = Interval> = [Six<S>; SIX];
 
-/// Where a platform is, on intervals or what is built of them.
+/// Adds a multiple of a column.
+pub fn add_multiple(sum: &mut Six, column: &Six, factor: Interval) {
+    for k in 0..SIX {
+        sum[k] = sum[k] + column[k] * factor;
+    }
+}
+
+/// The placement of a platform, on intervals or dual numbers of intervals.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed<S = Interval> {
     /// The tool point, m.

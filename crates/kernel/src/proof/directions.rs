@@ -14,7 +14,7 @@
 
 use crate::spatial::{Vector, cross, dot, norm, scale, subtract};
 
-/// Directions asked for at most.
+/// The most directions that are tried.
 const MOST: usize = 1000;
 /// What rounding in the few operations here may do, generously.
 const ROUNDING: f64 = 1.0 + 1e-12;
@@ -83,14 +83,14 @@ impl<R: FnMut(Vector<f64>) -> f64> Net<R> {
         let mut best = self.fallback(&corners);
         for some in 1..1_usize << corners.len() {
             let own: Vec<usize> = (0..corners.len()).filter(|k| some >> k & 1 == 1).collect();
-            let Some(found) = self.solved(&corners, &own) else { continue };
-            let p = self.sum(&corners, &found);
+            let Some(weights) = self.solved(&corners, &own) else { continue };
+            let p = self.sum(&corners, &weights);
             let length = norm(p);
             let serves = |&corner: &usize| {
                 dot(p, self.directions[corner]) >= self.reached[corner] - SHORT * length
             };
-            if length < best.0 && found.iter().all(|&w| w >= 0.0) && corners.iter().all(serves) {
-                best = (length, found);
+            if length < best.0 && weights.iter().all(|&w| w >= 0.0) && corners.iter().all(serves) {
+                best = (length, weights);
             }
         }
         let (length, weights) = best;
@@ -284,8 +284,11 @@ mod tests {
             asked += 1;
             u[0].abs() + u[1].abs() + u[2].abs()
         };
-        let found = longest(&[0, 1, 2], 1.0003, f64::NEG_INFINITY, cube);
-        assert!(found.bound >= 3f64.sqrt() && found.bound < 3f64.sqrt() * (1.0 + 1e-11));
+        let longest_length = longest(&[0, 1, 2], 1.0003, f64::NEG_INFINITY, cube);
+        assert!(
+            longest_length.bound >= 3f64.sqrt()
+                && longest_length.bound < 3f64.sqrt() * (1.0 + 1e-11)
+        );
         assert!(asked <= 14, "{asked}");
     }
 
@@ -302,13 +305,21 @@ mod tests {
             let middle = vector().map(|value| value * away);
             let free = if flat[2] == 0.0 { vec![0, 1] } else { vec![0, 1, 2] };
             let mut asked = 0;
-            let found = longest(&free, 1.0003, f64::NEG_INFINITY, |u| {
+            let longest_length = longest(&free, 1.0003, f64::NEG_INFINITY, |u| {
                 asked += 1;
                 support(middle, &segments, u)
             });
             let exact = of_all_signs(middle, &segments);
-            assert!(found.bound >= exact * (1.0 - 1e-14), "{seed}: {} {exact}", found.bound);
-            assert!(found.bound <= 1.0003 * exact, "{seed}: {} {exact}", found.bound);
+            assert!(
+                longest_length.bound >= exact * (1.0 - 1e-14),
+                "{seed}: {} {exact}",
+                longest_length.bound
+            );
+            assert!(
+                longest_length.bound <= 1.0003 * exact,
+                "{seed}: {} {exact}",
+                longest_length.bound
+            );
             asked_most = asked_most.max(asked);
         }
         assert!(asked_most < 120, "{asked_most}");
@@ -330,12 +341,16 @@ mod tests {
     #[test]
     fn a_ball_runs_into_the_limit_and_keeps_a_bound() {
         let mut asked = 0;
-        let found = longest(&[0, 1, 2], 1.000_001, f64::NEG_INFINITY, |_| {
+        let longest_length = longest(&[0, 1, 2], 1.000_001, f64::NEG_INFINITY, |_| {
             asked += 1;
             1.0
         });
         assert!(asked <= MOST + 1);
-        assert!(found.bound >= 1.0 && found.bound < 1.01, "{}", found.bound);
+        assert!(
+            longest_length.bound >= 1.0 && longest_length.bound < 1.01,
+            "{}",
+            longest_length.bound
+        );
     }
 
     #[test]
@@ -343,10 +358,10 @@ mod tests {
         let one_way = |u: Vector<f64>| if u[0] > 0.5 { f64::INFINITY } else { 1.0 };
         assert_eq!(longest(&[0, 1, 2], 1.01, 5.0, one_way).bound, f64::INFINITY);
         let mut asked = 0;
-        let found = longest(&[0, 1, 2], 1.0003, 2.0, |u| {
+        let longest_length = longest(&[0, 1, 2], 1.0003, 2.0, |u| {
             asked += 1;
             norm([u[0], u[1], 0.9 * u[2]])
         });
-        assert!(asked == 6 && found.bound <= 2.0 && found.bound >= 1.0);
+        assert!(asked == 6 && longest_length.bound <= 2.0 && longest_length.bound >= 1.0);
     }
 }

@@ -9,18 +9,24 @@ mod affine;
 mod at_pose;
 mod boxes;
 mod closures;
+mod command;
 mod directions;
 mod over_region;
 mod pose_box;
+mod rates;
+mod region;
 mod root;
 mod targets;
 
 pub use affine::Affine;
 pub use at_pose::{Extent, PoseBound};
 pub use boxes::{Effort, bound_in_boxes};
-pub use over_region::{Region, RegionBound, bound_over_region, can_be_enclosed};
+pub use over_region::{RegionBound, bound_over_region, can_be_enclosed};
+pub use region::Region;
 
+use crate::linear::SIX;
 use crate::scalar::Interval;
+use closures::{Six, add_multiple};
 
 /// What the variables of a box of deviations move: column c moves `parameters[c]` by `swing[c]` times
 /// variable `variables[c]`, which lies in [-1, 1]; the variables of one of `directions` lie on the unit
@@ -37,6 +43,18 @@ pub struct Deviating {
     pub count: usize,
     /// Variables that are together a unit vector.
     pub directions: Vec<Vec<usize>>,
+}
+
+impl Deviating {
+    /// Derivatives to the variables, from those to a parameter.
+    fn columns(&self, gradient: impl Fn(usize) -> Six) -> Vec<Six> {
+        let mut columns = vec![[point(0.0); SIX]; self.count];
+        let moved = self.parameters.iter().zip(&self.variables).zip(&self.swing);
+        for ((&parameter, &variable), &swing) in moved {
+            add_multiple(&mut columns[variable], &gradient(parameter), point(swing));
+        }
+        columns
+    }
 }
 
 /// Why nothing was proven.

@@ -2,17 +2,18 @@
 //!
 //! Over a box of poses the nominal command is enclosed first (the parasitic freedoms and the joints as
 //! the unknowns), then the actual platform relative to it. The box with the largest bound is halved until
-//! no bound lies above what is reached somewhere by more than the gap.
+//! no bound lies above an error reached somewhere by more than the gap.
 
-use super::affine::Affine;
 use super::at_pose::{Extent, along, displacement_numbers};
-use super::pose_box::{Over, reach, reach_more};
+use super::pose_box::Over;
+use super::rates::{reach, reach_more};
+use super::region::Region;
 use super::targets::{AS_LOW_AS_CAN_BE, Closeness, TARGETS, targets};
 use super::{Deviating, Unproven, point};
 use crate::batch::{displacement, share_out};
 use crate::kinematics::{Sample, commanded_pose, forward, inverse, limbs};
 use crate::linear::SIX;
-use crate::machine::{Machine, chosen};
+use crate::machine::{Machine, indices_of};
 use crate::scalar::Interval;
 use crate::spatial::Pose;
 use crate::status::Status;
@@ -26,27 +27,6 @@ const FINE: f64 = 1.01;
 /// A component below this share of its magnitude is closed to the gap of this share.
 const MINOR: f64 = 0.1;
 
-/// A region and what deviates in it.
-#[derive(Clone, Debug)]
-pub struct Region<'a> {
-    /// The machine.
-    pub machine: &'a Machine,
-    /// Lowest and highest value of each commanded freedom, m and rad.
-    pub sides: Vec<[f64; 2]>,
-    /// Known deviations of the parameters.
-    pub shift: Vec<Affine>,
-    /// Compliances, m/N or rad/(N m), of parameters that yield under the wrench.
-    pub yielding: Vec<Affine>,
-    /// Force (N) and moment (N m) on the tool, base axes.
-    pub wrench: [f64; SIX],
-    /// What the variables move.
-    pub deviating: &'a Deviating,
-    /// How far the bounds may lie above what is reached, relative.
-    pub gap: f64,
-    /// Boxes that may be looked at.
-    pub most_boxes: usize,
-}
-
 /// What is proven over a region; bounds are infinite where nothing is.
 #[derive(Clone, Debug)]
 pub struct RegionBound {
@@ -58,7 +38,7 @@ pub struct RegionBound {
     pub at: Vec<Vec<f64>>,
     /// Boxes looked at.
     pub boxes: usize,
-    /// By how much the bounds lie above what is reached, in the measure of [`Region::gap`].
+    /// By how much the bounds lie above the errors reached, in the measure of [`Region::gap`].
     pub gap: f64,
     /// Why a part of the region is not proven, and its middle.
     pub unproven: Option<(Unproven, Vec<f64>)>,
@@ -68,11 +48,11 @@ pub struct RegionBound {
 
 struct Cell {
     sides: Vec<[f64; 2]>,
-    found: Option<Found>,
+    bounds: Option<CellBounds>,
 }
 
 #[derive(Clone)]
-struct Found {
+struct CellBounds {
     bound: Result<[f64; TARGETS], Unproven>,
     reached: [f64; TARGETS],
     middle: Vec<f64>,
@@ -80,11 +60,11 @@ struct Found {
 }
 
 impl Region<'_> {
-    /// Bounds over a box of poses and what is reached in its middle.
+    /// Bounds over a box of poses and the errors reached in its middle.
     ///
     /// Slopes over all machines give a first bound; where it is above `allowed`, the exact extent at the
     /// middle takes their place.
-    fn look(&self, sides: &[[f64; 2]], allowed: &[f64; TARGETS]) -> Found {
+    fn look(&self, sides: &[[f64; 2]], allowed: &[f64; TARGETS]) -> CellBounds {
         let machine = self.machine;
         let middle: Vec<f64> = sides.iter().map(|[low, high]| 0.5 * (low + high)).collect();
         let start = commanded_pose(machine, &middle);
@@ -92,7 +72,7 @@ impl Region<'_> {
         let reached = [f64::NEG_INFINITY; TARGETS];
         if solved.status != Status::Ok {
             let status = solved.status;
-            return Found { bound: Err(Unproven::NearSingular), reached, middle, status };
+            return CellBounds { bound: Err(Unproven::NearSingular), reached, middle, status };
         }
         let spot: Vec<[f64; 2]> = middle.iter().map(|&value| [value, value]).collect();
         let bounded = || -> Result<([f64; TARGETS], [f64; TARGETS]), Unproven> {
@@ -137,8 +117,10 @@ impl Region<'_> {
             Ok((bound, reached))
         };
         match bounded() {
-            Ok((bound, reached)) => Found { bound: Ok(bound), reached, middle, status: Status::Ok },
-            Err(why) => Found { bound: Err(why), reached, middle, status: Status::Ok },
+            Ok((bound, reached)) => {
+                CellBounds { bound: Ok(bound), reached, middle, status: Status::Ok }
+            }
+            Err(why) => CellBounds { bound: Err(why), reached, middle, status: Status::Ok },
         }
     }
 
@@ -162,11 +144,11 @@ impl Region<'_> {
             }
             let struts = limbs(machine, &p, joints);
             let sample = Sample { machine, p: &p, limbs: &struts };
-            let (found, status) = forward(&sample, joints, pose);
+            let (reached_pose, status) = forward(&sample, joints, pose);
             if status != Status::Ok {
                 return None;
             }
-            let error = displacement(pose, &found);
+            let error = displacement(pose, &reached_pose);
             let length =
                 |part: usize| (0..3).map(|k| error[3 * part + k].powi(2)).sum::<f64>().sqrt();
             for k in 0..SIX {
@@ -176,9 +158,9 @@ impl Region<'_> {
             for part in 0..2 {
                 best[2 * SIX + part] = best[2 * SIX + part].max(length(part));
             }
-            Some(displacement_numbers(machine, pose, &found))
+            Some(displacement_numbers(machine, pose, &reached_pose))
         };
-        let free = chosen(&machine.dof);
+        let free = indices_of(&machine.dof);
         for part in 0..2 {
             let mut farthest: Option<[f64; SIX]> = None;
             let size = |one: &[f64; SIX]| (0..3).map(|k| one[3 * part + k].powi(2)).sum::<f64>();
@@ -186,18 +168,17 @@ impl Region<'_> {
                 for sign in [1.0, -1.0] {
                     let mut direction = [0.0; SIX];
                     direction[k] = sign;
-                    let found = try_vertex(&direction);
-                    if let Some(found) = found
-                        && farthest.is_none_or(|best| size(&found) > size(&best))
+                    if let Some(vertex) = try_vertex(&direction)
+                        && farthest.is_none_or(|best| size(&vertex) > size(&best))
                     {
-                        farthest = Some(found);
+                        farthest = Some(vertex);
                     }
                 }
             }
             for _ in 0..2 {
-                let Some(found) = farthest else { break };
+                let Some(vertex) = farthest else { break };
                 let mut direction = [0.0; SIX];
-                direction[3 * part..3 * part + 3].copy_from_slice(&found[3 * part..3 * part + 3]);
+                direction[3 * part..3 * part + 3].copy_from_slice(&vertex[3 * part..3 * part + 3]);
                 farthest = try_vertex(&direction);
             }
         }
@@ -214,7 +195,7 @@ pub fn can_be_enclosed(machine: &Machine) -> bool {
     !machine.is_overconstrained() && (parasitic.is_empty() || parasitic == [5] || !commanded)
 }
 
-/// Bounds over a region. `progress(boxes, gap)` is asked between batches whether to go on.
+/// Bounds over a region. `progress(boxes, gap)` is called between batches; false stops the search.
 pub fn bound_over_region(
     region: &Region<'_>,
     mut progress: impl FnMut(usize, f64) -> bool,
@@ -230,30 +211,30 @@ pub fn bound_over_region(
         out_of_reach: None,
     };
     let mut closed = [f64::NEG_INFINITY; TARGETS];
-    // Nothing is reached yet, so the first box is bounded as well as can be.
+    // Nothing is reached yet, so the first box is bounded as closely as possible.
     let mut allowed = [f64::NEG_INFINITY; TARGETS];
-    let mut open = vec![Cell { sides: region.sides.clone(), found: None }];
+    let mut open = vec![Cell { sides: region.sides.clone(), bounds: None }];
     loop {
         // The boxes not looked at yet, side by side.
         let mut fresh: Vec<&mut Cell> =
-            open.iter_mut().filter(|cell| cell.found.is_none()).collect();
+            open.iter_mut().filter(|cell| cell.bounds.is_none()).collect();
         let count = fresh.len();
         share_out(&mut fresh, count, 1, |_, cells| {
             for cell in cells {
-                cell.found = Some(region.look(&cell.sides, &allowed));
+                cell.bounds = Some(region.look(&cell.sides, &allowed));
             }
         });
         result.boxes += count;
         for cell in &open {
-            let Some(found) = &cell.found else { continue };
-            if found.status != Status::Ok {
-                result.out_of_reach = Some((found.status, found.middle.clone()));
+            let Some(bounds) = &cell.bounds else { continue };
+            if bounds.status != Status::Ok {
+                result.out_of_reach = Some((bounds.status, bounds.middle.clone()));
                 return result;
             }
             for target in 0..TARGETS {
-                if found.reached[target] > result.reached[target] {
-                    result.reached[target] = found.reached[target];
-                    result.at[target] = found.middle.clone();
+                if bounds.reached[target] > result.reached[target] {
+                    result.reached[target] = bounds.reached[target];
+                    result.at[target] = bounds.middle.clone();
                 }
             }
         }
@@ -263,10 +244,10 @@ pub fn bound_over_region(
                 .map(|target| bound[target] - allowed[target])
                 .fold(f64::NEG_INFINITY, f64::max)
         };
-        // What cannot rise above the allowed bounds is done with.
+        // Boxes that cannot rise above the allowed bounds are finished.
         let mut kept: Vec<(f64, Cell)> = Vec::new();
         for cell in open {
-            match cell.found.as_ref().map(|found| found.bound) {
+            match cell.bounds.as_ref().map(|bounds| bounds.bound) {
                 Some(Ok(bound)) if excess(&bound) <= 0.0 => {
                     for target in 0..TARGETS {
                         closed[target] = closed[target].max(bound[target]);
@@ -283,11 +264,11 @@ pub fn bound_over_region(
             || result.boxes >= region.most_boxes
             || !progress(result.boxes, region.gap + widest);
         let given_up = kept.iter().find(|(_, cell)| {
-            cell.found.as_ref().is_none_or(|found| found.bound.is_err())
+            cell.bounds.as_ref().is_none_or(|bounds| bounds.bound.is_err())
                 && (stop || share_of(region, &cell.sides) < SMALLEST)
         });
         if let Some((_, cell)) = given_up {
-            let why = match cell.found.as_ref().map(|found| found.bound) {
+            let why = match cell.bounds.as_ref().map(|bounds| bounds.bound) {
                 Some(Err(why)) => why,
                 _ => Unproven::TooWide,
             };
@@ -297,7 +278,7 @@ pub fn bound_over_region(
         }
         if stop {
             for (_, cell) in &kept {
-                if let Some(Ok(bound)) = cell.found.as_ref().map(|found| found.bound) {
+                if let Some(Ok(bound)) = cell.bounds.as_ref().map(|bounds| bounds.bound) {
                     for target in 0..TARGETS {
                         closed[target] = closed[target].max(bound[target]);
                     }
@@ -369,5 +350,5 @@ fn halves(region: &Region<'_>, sides: &[[f64; 2]]) -> [Cell; 2] {
     let (mut low, mut high) = (sides.to_vec(), sides.to_vec());
     low[widest][1] = middle;
     high[widest][0] = middle;
-    [low, high].map(|sides| Cell { sides, found: None })
+    [low, high].map(|sides| Cell { sides, bounds: None })
 }

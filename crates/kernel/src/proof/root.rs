@@ -210,13 +210,13 @@ pub fn prove(
             between[i] = between[i].hull(at_middle[i]);
         }
         let spread = distance(&approximate, &jacobian(&between));
-        let mut found = *tried;
+        let mut image = *tried;
         for i in 0..SIX {
             let more =
                 sum_above((0..SIX).map(|k| (spread[i][k], (tried[k] - at_middle[k]).magnitude())));
-            found[i] = at_middle[i] + shift[i] + Interval::symmetric(more);
+            image[i] = at_middle[i] + shift[i] + Interval::symmetric(more);
         }
-        found
+        image
     };
     let widened = |one: Interval| one + Interval::symmetric(INFLATION * one.radius() + FINEST);
     let mut tried = [point(0.0); SIX];
@@ -227,9 +227,9 @@ pub fn prove(
         if !tried.iter().all(|one| one.is_finite()) {
             return Err(Unproven::TooWide);
         }
-        let found = krawczyk(&tried);
-        if found.iter().zip(&tried).all(|(found, tried)| found.is_inside(*tried)) {
-            let mut enclosure = found;
+        let image = krawczyk(&tried);
+        if image.iter().zip(&tried).all(|(image, tried)| image.is_inside(*tried)) {
+            let mut enclosure = image;
             for _ in 0..REFINEMENTS {
                 let tighter = krawczyk(&enclosure);
                 let before = enclosure;
@@ -243,8 +243,8 @@ pub fn prove(
             }
             return Ok(Root { enclosure, unique_in: tried });
         }
-        // Not the hull of both: what is wide enough already must not drive the others on.
-        tried = found.map(widened);
+        // Not the hull of both: a side that is wide enough must not widen the others.
+        tried = image.map(widened);
     }
     Err(Unproven::TooWide)
 }

@@ -1,10 +1,10 @@
-//! What bounds are asked of: both ends of every component of an error, and the sizes of its two parts.
+//! The quantities that are bounded: both ends of every component of an error, and the sizes of its two parts.
 
 use super::closures::Six;
 use super::directions::{Longest, longest};
 use super::point;
 use crate::linear::SIX;
-use crate::machine::{Machine, chosen, parts};
+use crate::machine::{Machine, indices_of, parts};
 use crate::scalar::Scalar;
 use crate::spatial::Vector;
 
@@ -14,7 +14,7 @@ pub const TARGETS: usize = 2 * SIX + 2;
 /// Nothing is enough.
 pub const AS_LOW_AS_CAN_BE: [f64; TARGETS] = [f64::NEG_INFINITY; TARGETS];
 
-/// How closely bounds are asked for.
+/// How close the bounds must be.
 #[derive(Clone, Copy, Debug)]
 pub struct Closeness {
     /// Magnitudes: at most this times the farthest reach.
@@ -40,7 +40,7 @@ pub fn targets(
     most: impl Fn(&[f64; SIX]) -> f64,
 ) -> Bounds {
     let length = point(machine.characteristic_length);
-    let free = chosen(&machine.dof);
+    let free = indices_of(&machine.dof);
     let squared =
         (3..SIX).map(|k| (whole[k] / length).square()).fold(point(0.0), |sum, one| sum + one).upper;
     let mut values = [0.0; TARGETS];

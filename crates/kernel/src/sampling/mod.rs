@@ -1,4 +1,4 @@
-//! Monte Carlo: machines drawn at random, their exact poses, and what is kept of them.
+//! Monte Carlo: machines drawn at random, their exact poses, and the statistics that are kept.
 //!
 //! Random numbers are counter-based: the value of a variable in a sample follows from the seed and the
 //! variable's identity alone, whatever threads, lanes or calls the samples are shared out to.

@@ -8,7 +8,7 @@ use crate::kinematics::{
     Descent, Limbs, Sample, chord, chord_inverse, forward, limbs, place_limbs,
 };
 use crate::linear::{Matrix6, SIX};
-use crate::machine::{Machine, chosen};
+use crate::machine::{Machine, indices_of};
 use crate::scalar::{LANES, Real};
 use crate::spatial::Pose;
 use crate::status::Status;
@@ -142,7 +142,7 @@ pub fn sample(study: &Study<'_>, first: u64, count: usize, tallies: &mut [Tally]
             tally.merge(more);
         }
     }
-    // Floating-point sums in the order of the samples, whoever made them.
+    // Floating-point sums in the order of the samples, whichever thread made them.
     for sums in sums.chunks(width) {
         for (tally, sums) in tallies.iter_mut().zip(sums) {
             tally.add_sums(sums);
@@ -177,7 +177,7 @@ impl Work for Segment<'_> {
                 }
             }
         }
-        let components = chosen(&machine.dof);
+        let components = indices_of(&machine.dof);
         let mut p: Vec<S> = vec![S::default(); machine.nominal.len()];
         let mut q: Vec<S> = vec![S::default(); machine.drives.len()];
         let mut placed: Limbs<S> = Default::default();
@@ -203,7 +203,7 @@ impl Work for Segment<'_> {
                     *parameter = S::splat(swing).mul_add(value, from);
                 }
                 place_limbs(machine, &p, &q, &mut placed);
-                let mut found = if machine.plain {
+                let mut descent = if machine.plain {
                     chord(machine, &placed, &start, &pose.inverse)
                 } else {
                     Descent { pose: start, proof: S::splat(-1.0) }
@@ -212,13 +212,13 @@ impl Work for Segment<'_> {
                 let mut status = [Status::Ok; LANES];
                 for lane in 0..lanes {
                     // Also true where it is NaN.
-                    if !(found.proof.lane(lane) > 0.0) {
+                    if !(descent.proof.lane(lane) > 0.0) {
                         let (one, outcome) = alone(machine, &p, pose, lane);
                         status[lane] = outcome;
-                        found.pose.set_lane(lane, &one.to_row());
+                        descent.pose.set_lane(lane, &one.to_row());
                     }
                 }
-                let error = displacement(&nominal, &found.pose);
+                let error = displacement(&nominal, &descent.pose);
                 moments.add(&error, &components, pose.whitening.as_ref(), &status[..lanes], tally);
             }
             moments.finish(sums, tally);
@@ -226,7 +226,7 @@ impl Work for Segment<'_> {
     }
 }
 
-/// One sample on the single road.
+/// One sample on the scalar path.
 #[inline(never)]
 fn alone<S: Real>(
     machine: &Machine,
@@ -237,8 +237,8 @@ fn alone<S: Real>(
     let p: Vec<f64> = p.iter().map(|value| value.lane(lane)).collect();
     let placed = limbs(machine, &p, &pose.joints);
     let sample = Sample { machine, p: &p, limbs: &placed };
-    let (found, status) = forward(&sample, &pose.joints, &pose.start);
-    if status == Status::Ok { (found, status) } else { (pose.start, status) }
+    let (reached, status) = forward(&sample, &pose.joints, &pose.start);
+    if status == Status::Ok { (reached, status) } else { (pose.start, status) }
 }
 
 /// Sums of the lanes, and which columns there are.

@@ -376,8 +376,8 @@ mod tests {
         }
         // Standard deviations of the four means: 1, sqrt 2, sqrt 15, sqrt 96, over sqrt(count).
         let sigmas = [1.0, 2f64.sqrt(), 15f64.sqrt(), 96f64.sqrt()].map(|s| 4.0 * s / 1e3);
-        for ((found, expected), sigma) in sums.iter().zip([0.0, 1.0, 0.0, 3.0]).zip(sigmas) {
-            assert!((found - expected).abs() < sigma, "{sums:?}");
+        for ((moment, expected), sigma) in sums.iter().zip([0.0, 1.0, 0.0, 3.0]).zip(sigmas) {
+            assert!((moment - expected).abs() < sigma, "{sums:?}");
         }
         for product in cross {
             assert!(product.abs() < 4.0 / (count as f64 / 4.0).sqrt(), "{cross:?}");

@@ -84,7 +84,7 @@ fn value_at(values: &[f64], cumulative: &[f64], u: f64) -> f64 {
     values[cumulative.partition_point(|&sum| sum <= u).min(values.len() - 1)]
 }
 
-/// A variable and its identity: whoever else varies, its values are the same.
+/// A variable and its identity: its values do not depend on the other variables.
 #[derive(Clone, Debug)]
 pub struct Variable {
     /// How it is distributed.

@@ -2,7 +2,7 @@
 //!
 //! **Rounding.** IEEE 754 arithmetic and square root err by at most half a step of the result, so a
 //! bound that is computed to nearest and then moved outward by at least one step encloses. Each
-//! operation has two roads:
+//! operation has two ways:
 //!
 //! - the short one moves a bound `b` by `|b| STEP`, one to two steps of any normal number, without a
 //!   branch. It is left whenever a result is not finite or may have underflowed, where that is too
@@ -181,7 +181,7 @@ impl Interval {
         Interval { lower: lower.next_down(), upper: upper.next_up() }.known()
     }
 
-    /// The short road's bounds, if both are finite numbers that no more than two steps of the largest
+    /// The short way's bounds, if both are finite numbers that no more than two steps of the largest
     /// number could move away.
     #[inline(always)]
     fn if_finite(lower: f64, upper: f64) -> Option<Self> {
@@ -196,7 +196,7 @@ impl Interval {
         Self::if_finite(lower - lower.abs() * STEP, upper + upper.abs() * STEP)
     }
 
-    /// Bounds of products or quotients, rounded to nearest: outward if that is the short road's case.
+    /// Bounds of products or quotients, rounded to nearest: outward if that is the short way's case.
     #[inline(always)]
     fn product(lower: f64, upper: f64) -> Option<Self> {
         let (below, above) = (lower.abs(), upper.abs());
@@ -300,7 +300,7 @@ impl Interval {
     }
 
     /// Bounds of a product plus bounds of a term, outward by one rounding for both operations, if that
-    /// is the short road's case.
+    /// is the short way's case.
     #[inline(always)]
     fn product_sum(product: (f64, f64), term: Self) -> Option<Self> {
         let (lower, upper) = (product.0 + term.lower, product.1 + term.upper);
@@ -397,7 +397,7 @@ impl Scalar for Interval {
             lower: most(lower - (lower * STEP + f64::from_bits(1)), 0.0),
             upper: upper + upper * STEP,
         };
-        // The last says that neither bound is NaN.
+        // The last condition means that neither bound is NaN.
         if upper >= f64::MIN_POSITIVE && result.upper < f64::INFINITY && self.lower <= self.upper {
             result
         } else if self.is_zero() {
@@ -520,7 +520,7 @@ impl Scalar for Interval {
 mod tests {
     use super::*;
 
-    /// The short roads hold what the rare ones do: `tests/interval.rs` proves both.
+    /// The short ways hold what the rare ones do: `tests/interval.rs` proves both.
     #[test]
     fn both_roads_agree() {
         let bounds = [-1e300, -3.7, -1e-200, 0.0, 1e-160, 0.1, 2.0 / 3.0, 7.0, 1e155];

@@ -15,17 +15,24 @@ pub const LANES: usize = 8;
 #[repr(C, align(64))]
 pub struct Lanes<const LEVEL: u8>(pub [f64; LANES]);
 
+/// The lanes whose number `k` is an expression of `k`, as a plain loop.
+macro_rules! lanes {
+    ($k:ident => $value:expr) => {{
+        let mut result = [0.0; LANES];
+        for $k in 0..LANES {
+            result[$k] = $value;
+        }
+        Lanes(result)
+    }};
+}
+
 macro_rules! lane_wise {
     ($trait:ident, $method:ident, $operator:tt) => {
         impl<const LEVEL: u8> $trait for Lanes<LEVEL> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                let mut result = [0.0; LANES];
-                for k in 0..LANES {
-                    result[k] = self.0[k] $operator other.0[k];
-                }
-                Lanes(result)
+                lanes!(k => self.0[k] $operator other.0[k])
             }
         }
     };
@@ -39,11 +46,7 @@ impl<const LEVEL: u8> Neg for Lanes<LEVEL> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        let mut result = self.0;
-        for k in 0..LANES {
-            result[k] = -result[k];
-        }
-        Lanes(result)
+        lanes!(k => -self.0[k])
     }
 }
 
@@ -54,15 +57,11 @@ impl<const LEVEL: u8> Scalar for Lanes<LEVEL> {
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, term: Self) -> Self {
-        let mut result = [0.0; LANES];
-        for k in 0..LANES {
-            result[k] = if LEVEL > PORTABLE {
-                self.0[k].mul_add(factor.0[k], term.0[k])
-            } else {
-                self.0[k] * factor.0[k] + term.0[k]
-            };
-        }
-        Lanes(result)
+        lanes!(k => if LEVEL > PORTABLE {
+            self.0[k].mul_add(factor.0[k], term.0[k])
+        } else {
+            self.0[k] * factor.0[k] + term.0[k]
+        })
     }
     #[inline(always)]
     fn square(self) -> Self {
@@ -74,11 +73,7 @@ impl<const LEVEL: u8> Scalar for Lanes<LEVEL> {
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
-        let mut result = self.0;
-        for k in 0..LANES {
-            result[k] = result[k].sqrt();
-        }
-        Lanes(result)
+        lanes!(k => self.0[k].sqrt())
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
@@ -87,19 +82,11 @@ impl<const LEVEL: u8> Scalar for Lanes<LEVEL> {
     // Only a crank's inverse asks for it, once a pose; the library's is good enough there.
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
-        let mut result = self.0;
-        for k in 0..LANES {
-            result[k] = result[k].atan2(x.0[k]);
-        }
-        Lanes(result)
+        lanes!(k => self.0[k].atan2(x.0[k]))
     }
     #[inline(always)]
     fn select(self, then: Self, otherwise: Self) -> Self {
-        let mut result = [0.0; LANES];
-        for k in 0..LANES {
-            result[k] = if self.0[k] >= 0.0 { then.0[k] } else { otherwise.0[k] };
-        }
-        Lanes(result)
+        lanes!(k => if self.0[k] >= 0.0 { then.0[k] } else { otherwise.0[k] })
     }
 }
 
@@ -129,11 +116,7 @@ impl<const LEVEL: u8> Real for Lanes<LEVEL> {
     }
     #[inline(always)]
     fn abs(self) -> Self {
-        let mut result = self.0;
-        for k in 0..LANES {
-            result[k] = result[k].abs();
-        }
-        Lanes(result)
+        lanes!(k => self.0[k].abs())
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {

@@ -100,7 +100,7 @@ impl Tape {
         Trace { tape: self, place }
     }
 
-    /// The body of a C99 function, one statement a line: `outputs` are what is assigned, as `y[0]`, and
+    /// The body of a C99 function, one statement a line: `outputs` are the left-hand sides, as `y[0]`, and
     /// its value. What they do not need is left out. Also how many values it keeps.
     pub fn print_c(&self, outputs: &[(String, Trace<'_>)]) -> (String, usize) {
         let recorded = self.recorded.borrow();

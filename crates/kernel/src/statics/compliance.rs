@@ -3,7 +3,7 @@
 //! A parameter of compliance c under load Q moves by c Q; the closures move by
 //! `C_g = G diag(c) G^T` per unit force, and the platform by `W^-1 C_g W^-T`.
 
-use crate::kinematics::Linearisation;
+use crate::element::ParameterGradient;
 use crate::linear::{CLOSURES, Matrix6, SIX};
 use crate::scalar::Real;
 use nalgebra::DMatrix;
@@ -11,36 +11,37 @@ use nalgebra::DMatrix;
 /// Closures by closures.
 pub type ClosureMatrix<S> = [[S; CLOSURES]; CLOSURES];
 
-/// How many closures a machine may have on a road: lanes run machines of at most six.
+/// How many closures a machine may have on a path: lanes run machines of at most six.
 #[inline(always)]
 pub const fn most_closures<S: Real>() -> usize {
     if S::WIDTH > 1 { SIX } else { CLOSURES }
 }
 
-/// `G diag(c) G^T`: how far closures open per unit force in closures. `readers[j]` lists the
-/// (closure, place) pairs that read the parameter of compliance `compliances[j]`.
+/// `G diag(c) G^T`: how far closures open per unit force in closures. `dependents[j]` lists the
+/// (closure, slot) pairs that read the parameter of compliance `compliances[j]`.
 #[inline(always)]
 pub fn closure_compliance<S: Real>(
-    linear: &Linearisation<S>,
-    readers: &[&[(usize, usize)]],
+    to_parameters: &[ParameterGradient<S>; CLOSURES],
+    dependents: &[&[(usize, usize)]],
     compliances: &[S],
 ) -> ClosureMatrix<S> {
     let mut matrix = [[S::default(); CLOSURES]; CLOSURES];
-    for (readers, &compliance) in readers.iter().zip(compliances) {
-        for &(i, place) in *readers {
-            let scaled = linear.to_parameters[i][place] * compliance;
-            for &(k, other) in *readers {
-                matrix[i][k] = scaled.mul_add(linear.to_parameters[k][other], matrix[i][k]);
+    for (dependents, &compliance) in dependents.iter().zip(compliances) {
+        for &(i, slot) in *dependents {
+            let scaled = to_parameters[i][slot] * compliance;
+            for &(k, other) in *dependents {
+                matrix[i][k] = scaled.mul_add(to_parameters[k][other], matrix[i][k]);
             }
         }
     }
     matrix
 }
 
-/// `W^-1 C_g W^-T`: twist of the platform per unit wrench on the tool.
+/// `W^-1 C_g W^-T`: twist of the platform per unit wrench on the tool, with the
+/// twist per unit residual, `W^-1`.
 #[inline(always)]
 pub fn pose_compliance<S: Real>(
-    linear: &Linearisation<S>,
+    inverse: &[[S; CLOSURES]; SIX],
     closures: &ClosureMatrix<S>,
 ) -> Matrix6<S> {
     let mut half = [[S::default(); CLOSURES]; SIX];
@@ -48,14 +49,14 @@ pub fn pose_compliance<S: Real>(
     for i in 0..SIX {
         for j in 0..most_closures::<S>() {
             for k in 0..most_closures::<S>() {
-                half[i][j] = linear.inverse[i][k].mul_add(closures[k][j], half[i][j]);
+                half[i][j] = inverse[i][k].mul_add(closures[k][j], half[i][j]);
             }
         }
     }
     for i in 0..SIX {
         for j in 0..SIX {
             for k in 0..most_closures::<S>() {
-                whole[i][j] = half[i][k].mul_add(linear.inverse[j][k], whole[i][j]);
+                whole[i][j] = half[i][k].mul_add(inverse[j][k], whole[i][j]);
             }
         }
     }

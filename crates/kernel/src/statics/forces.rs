@@ -1,20 +1,19 @@
 //! Closure forces under a wrench on the tool.
 
-use crate::element::PLACES;
-use crate::kinematics::Linearisation;
+use crate::element::ParameterGradient;
 use crate::linear::{CLOSURES, SIX};
 use crate::scalar::Real;
 use crate::statics::most_closures;
 
 /// The multipliers of `W^T lambda + F = 0` for a wrench `F` on the tool at the tool point, base axes
-/// (N, N m). A strut's tension is minus its multiplier.
+/// (N, N m), with the twist per unit residual, `W^-1`. A strut's tension is minus its multiplier.
 #[inline(always)]
-pub fn closure_forces<S: Real>(linear: &Linearisation<S>, wrench: &[S; SIX]) -> [S; CLOSURES] {
+pub fn closure_forces<S: Real>(inverse: &[[S; CLOSURES]; SIX], wrench: &[S; SIX]) -> [S; CLOSURES] {
     let mut multipliers = [S::default(); CLOSURES];
     for i in 0..most_closures::<S>() {
         let mut sum = S::default();
         for k in 0..SIX {
-            sum = linear.inverse[k][i].mul_add(wrench[k], sum);
+            sum = inverse[k][i].mul_add(wrench[k], sum);
         }
         multipliers[i] = -sum;
     }
@@ -22,16 +21,16 @@ pub fn closure_forces<S: Real>(linear: &Linearisation<S>, wrench: &[S; SIX]) -> 
 }
 
 /// The load on a parameter by virtual work, `lambda . dg/dp`, over the closures that read it at the
-/// given (closure, place): positive drives the parameter up. For a strut's length it is the tension.
+/// given (closure, slot): positive drives the parameter up. For a strut's length it is the tension.
 #[inline(always)]
 pub fn parameter_load<S: Real>(
     multipliers: &[S; CLOSURES],
-    to_parameters: &[[S; PLACES]; CLOSURES],
-    readers: &[(usize, usize)],
+    to_parameters: &[ParameterGradient<S>; CLOSURES],
+    dependents: &[(usize, usize)],
 ) -> S {
     let mut load = S::default();
-    for &(closure, place) in readers {
-        load = multipliers[closure].mul_add(to_parameters[closure][place], load);
+    for &(closure, slot) in dependents {
+        load = multipliers[closure].mul_add(to_parameters[closure][slot], load);
     }
     load
 }

@@ -1,4 +1,4 @@
-"""What measurements are worth: the part of the gate's verdict that changes when some are added."""
+"""What measurements determine: the part of the verdict that changes when some are added."""
 
 from __future__ import annotations
 
@@ -14,37 +14,36 @@ from truepose.calibration.acceptance.observability import (
     Observability,
     RowCovariance,
     WhitenedRows,
-    decomposed,
     fitted,
     normalised_rms,
     observability,
-    of_machine,
     prior,
-    prior_root,
     prior_rows,
+    project_out_instruments,
     row_covariance,
     stacked,
     weighted,
 )
 from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
+from truepose.calibration.least_squares import singular_decomposition
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
 
 
 POOR = 1e-3
-"""Of the largest singular value: what is weak where nothing is there to compare with."""
+"""Of the largest singular value: below it a direction is weak, where there is no tolerance."""
 NOTHING = 100.0
-"""Half bands of a tolerance: an uncertainty beyond is not worth its number."""
+"""Half bands of a tolerance: a larger uncertainty is said in words, not as a number."""
 ROUNDING = 1e-6
-"""Relatively so much worse is not worse."""
+"""Relative: an uncertainty that is larger by no more than this is not larger."""
 
 Kind = Literal["unseen", "weak", "gauge", "harmless"]
 
 
 @dataclass(frozen=True)
 class Reason:
-    """Why not, or what to heed: a code word and a sentence without its full stop."""
+    """A reason against the calibration, or a warning: code, and sentence without its full stop."""
 
     code: str
     sentence: str
@@ -66,7 +65,7 @@ class Direction:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What some rows lead to: (a), (b) and (e) of the verdict."""
+    """What the measured rows lead to: (a), (b) and (e) of the verdict."""
 
     data: RowCovariance
     used: RowCovariance
@@ -124,9 +123,9 @@ class Case:
             "the weights": (weights.shape, residual.shape),
             "the tool's sensitivity": (tool.effects.shape[2:], (n_machine,)),
         }
-        for name, (found, expected) in shapes.items():
-            if found != expected:
-                raise ValueError(f"{name}: shape {found}, expected {expected}")
+        for name, (shape, expected) in shapes.items():
+            if shape != expected:
+                raise ValueError(f"{name}: shape {shape}, expected {expected}")
         for name, array in (("the Jacobian", jacobian), ("the residuals", residual)):
             if not np.isfinite(array).all():
                 raise ValueError(f"{name}: not finite")
@@ -172,7 +171,7 @@ class Case:
     @cached_property
     def observability(self) -> Observability:
         """Of the data as their uncertainties are stated."""
-        rows = of_machine(self.rows, self.n, self.sigma)
+        rows = project_out_instruments(self.rows, self.n, self.sigma)
         return observability(rows, int(np.count_nonzero(self.weights > 0.0)), self.sigma)
 
     @cached_property
@@ -185,10 +184,10 @@ class Case:
         """What the data say of the machine's unknowns, their uncertainties times `birge`."""
         parts = [self.factor] if extra is None else [self.factor, extra]
         if self.use_prior:
-            other = self.prior_rows.copy()  # what is known of the instruments beforehand
-            other = other[np.any(other[:, self.n :] != 0.0, axis=1)]
-            parts.append(other)
-        return of_machine(np.vstack(parts), self.n, self.sigma)
+            of_instruments = self.prior_rows.copy()  # what is known of the instruments beforehand
+            of_instruments = of_instruments[np.any(of_instruments[:, self.n :] != 0.0, axis=1)]
+            parts.append(of_instruments)
+        return project_out_instruments(np.vstack(parts), self.n, self.sigma)
 
     def outcome(self, extra: Floats | None = None) -> Outcome:
         """With `extra` (k, n) whitened rows, or as it is."""
@@ -200,9 +199,7 @@ class Case:
         of_data = self.tool.sort(data, with_gauge=free)
         tool = self.tool.relative(of_data.gauge)
         moving = self.tool.sort(used, with_gauge=free).moving
-        before = None
-        if np.isfinite(self.sigma[tool.moved]).all():
-            before = tool.uncertainty(prior_root(self.prior), np.zeros((0, self.n)))
+        before = tool.beforehand(self.prior)
         after = tool.uncertainty(used.root, moving)
         weak, still = self._weak(seen, rows, tool, before)
         unit = seen.unit
@@ -215,17 +212,19 @@ class Case:
         )
         directions = tuple(
             Direction(
-                kind, each * unit, tuple(self.unknowns.names[i] for i in sentences.members(each))
+                kind,
+                direction * unit,
+                tuple(self.unknowns.names[i] for i in sentences.members(direction)),
             )
             for kind, group in groups
-            for each in group
+            for direction in group
         )
-        not_seen = sentences.cannot_tell(unseen, self.labels, self.by)
+        not_seen = sentences.undetermined(unseen, self.labels, self.by)
         within = seen.scaling == "prior"
-        hardly = sentences.cannot_tell(weak, self.labels, self.by, within_tolerances=within)
+        hardly = sentences.undetermined(weak, self.labels, self.by, within_tolerances=within)
         reasons = []
         if len(moving):
-            text = "; ".join(sentences.cannot_tell(_sparse(moving / unit), self.labels, self.by))
+            text = "; ".join(sentences.undetermined(_sparse(moving / unit), self.labels, self.by))
             reasons.append(Reason("not-determined", text))
         if hardly and not self.use_prior:
             reasons.append(Reason("not-told-apart", "; ".join(hardly)))
@@ -245,7 +244,7 @@ class Case:
 
         Those that move the tool, scaled and sparse; and standard uncertainties along the others.
         """
-        with_noise, right = decomposed(rows.matrix * seen.unit)
+        with_noise, right = singular_decomposition(rows.matrix * seen.unit)
         lengths = 1.0 / seen.unit
         kept = range(seen.rank)
         if seen.scaling == "prior":
@@ -284,13 +283,14 @@ class Case:
         if np.isfinite(half) and own[at] > half:
             known = f"its tolerance is {sentences.stated(half, unit, units)}"
         else:
-            known = f"its tolerance alone by {sentences.quantity(sigma, unit, units=units)}"
-        found = sentences.quantity(own[at], unit, units=units)
-        text = f"the data leave {self.labels[at]} uncertain by {found}, {known}"
+            known = f"its tolerance already to {sentences.quantity(sigma, unit, units=units)}"
+        uncertainty = sentences.quantity(own[at], unit, units=units)
+        text = f"the measurements determine {self.labels[at]} only to {uncertainty}, {known}"
         if np.isfinite(half) and own[at] > NOTHING * half:
             tolerance = sentences.stated(half, unit, units)
             text = (
-                f"the data say next to nothing of {self.labels[at]}, its tolerance is {tolerance}"
+                f"the measurements say almost nothing about {self.labels[at]}, "
+                f"its tolerance is {tolerance}"
             )
         if len(loose) > 1:
             others = "one more unknown is" if len(loose) == 2 else f"{len(loose) - 1} more are"
@@ -299,24 +299,22 @@ class Case:
 
     def reference(self, before: ToolUncertainty | None) -> tuple[float | None, float | None]:
         """What the tool is known to before, position and rotation, at the worst pose."""
-        if before is None:
-            return self.measured
-        return before.position_max, before.rotation_max
+        return self.measured if before is None else before.worst
 
     def _no_gain(self, before: ToolUncertainty | None, after: ToolUncertainty) -> list[Reason]:
         """(b): the tool is not known better than before."""
-        found = [
+        compared = [
             (name, unit, size, was)
             for (name, unit, size, _), was in zip(
-                both(after, None), self.reference(before), strict=True
+                at_worst_pose(after, None), self.reference(before), strict=True
             )
             if was is not None and (was > 0.0 or size > 0.0)
         ]
-        worse = [each for each in found if each[2] > (1.0 + ROUNDING) * each[3]]
-        gained = any(size <= self.margin * was for _, _, size, was in found)
-        if not found or (gained and not worse):
+        worse = [row for row in compared if row[2] > (1.0 + ROUNDING) * row[3]]
+        gained = any(size <= self.margin * was for _, _, size, was in compared)
+        if not compared or (gained and not worse):
             return []
-        shown, units = worse or found, self.unknowns.shown
+        shown, units = worse or compared, self.unknowns.shown
         whose = "of the machine as filed" if before is not None else "measured before"
         texts = [
             f"{name} by {sentences.quantity(size, unit, units=units)}, against "
@@ -325,34 +323,37 @@ class Case:
         ]
         texts[0] = texts[0].replace(" by ", " would be uncertain by ", 1)
         text = f"at the worst pose of the workspace {', and '.join(texts)}"
-        if self.is_within(before):
-            text += "; but what is asked of the tool is kept without calibration"
+        if self.keeps_target(before):
+            text += "; but the machine as filed already keeps the accuracy that is asked"
         return [Reason("no-gain", text)]
 
-    def is_within(self, before: ToolUncertainty | None) -> bool:
-        """Whether the machine as filed keeps what is asked."""
-        pairs = [
-            (asked, was)
-            for asked, was in zip(self.target, self.reference(before), strict=True)
-            if asked is not None
-        ]
-        return bool(pairs) and all(was is not None and was <= asked for asked, was in pairs)
+    def keeps_target(self, before: ToolUncertainty | None) -> bool:
+        """Whether the machine as filed keeps the accuracy that is asked of it."""
+        return is_kept(self.target, self.reference(before))
 
-    def is_enough(self, found: Outcome) -> bool:
-        """Whether the only thing missing is a gain that nobody asked for."""
-        only = {reason.code for reason in found.reasons} == {"no-gain"}
-        return only and self.is_within(found.before)
+    def lacks_only_gain(self, outcome: Outcome) -> bool:
+        """Whether the only reason is a missing gain that nobody asked for."""
+        only = {reason.code for reason in outcome.reasons} == {"no-gain"}
+        return only and self.keeps_target(outcome.before)
 
 
 def _sparse(directions: Floats) -> Floats:
     return sentences.sparse(directions) if len(directions) else directions
 
 
-def both(
+def is_kept(
+    target: tuple[float | None, float | None], sizes: tuple[float | None, float | None]
+) -> bool:
+    """Whether something is asked of position or rotation, and the sizes are known to keep it."""
+    pairs = [(asked, size) for asked, size in zip(target, sizes, strict=True) if asked is not None]
+    return bool(pairs) and all(size is not None and size <= asked for asked, size in pairs)
+
+
+def at_worst_pose(
     after: ToolUncertainty, before: ToolUncertainty | None
 ) -> list[tuple[str, str, float, float | None]]:
     """(name, unit, after, before) of position and rotation at the worst pose."""
-    was = (None, None) if before is None else (before.position_max, before.rotation_max)
+    was = (None, None) if before is None else before.worst
     return [
         ("the tool's position", "m", after.position_max, was[0]),
         ("the tool's rotation", "rad", after.rotation_max, was[1]),

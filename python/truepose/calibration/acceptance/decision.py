@@ -1,8 +1,9 @@
 """The gate: whether a calibration may be used, why not, and what to measure so that it may.
 
-Least squares finds a best machine for any measurements, also for those that cannot tell it from a
-hundred others. The gate looks at what the measurements determine, at what that is worth at the
-tool over the whole workspace, and at what the found values claim, and says yes or no with reasons.
+Least squares finds a best machine for any measurements, also for those that hundreds of machines
+explain equally well. The gate looks at what the measurements determine, at how well the tool is
+then known over the whole workspace, and at whether the values found are plausible; its answer is
+yes or no, with reasons.
 Arrays only; `docs/calibration_gate.md` has formulas, thresholds and references.
 """
 
@@ -17,9 +18,21 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.assessment import Case, Direction, Outcome, Reason, both
+from truepose.calibration.acceptance.assessment import (
+    Case,
+    Direction,
+    Outcome,
+    Reason,
+    at_worst_pose,
+)
 from truepose.calibration.acceptance.observability import Observability, share
-from truepose.calibration.acceptance.remedy import CALIPER, Candidate, Remedy, directly, remedy_of
+from truepose.calibration.acceptance.remedy import (
+    CALIPER,
+    Candidate,
+    Remedy,
+    cheapest_remedy,
+    direct_candidates,
+)
 from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
 from truepose.files.shown_units import METRIC, ShownUnits
 
@@ -113,12 +126,12 @@ class Gate:
         parts = [f"{'Yes' if self.accepted else 'No'}: {'; '.join(clauses)}."]
         if self.remedy is not None:
             parts.append(f"{sentences.sentence(self.remedy.sentence)}.")
-        parts += [f"{sentences.sentence(each.sentence)}." for each in self.warnings]
+        parts += [f"{sentences.sentence(warning.sentence)}." for warning in self.warnings]
         return " ".join(parts)
 
     def _gain(self) -> str:
         texts = []
-        for name, unit, after, before in both(self.after, self.before):
+        for name, unit, after, before in at_worst_pose(self.after, self.before):
             if after == 0.0 and not before:
                 continue
             known = sentences.quantity(after, unit, units=self.shown)
@@ -127,13 +140,13 @@ class Gate:
                 f"{name} becomes known to {known} at the worst pose"
                 + (f", against {was} before" if was else "")
             )
-        held = [
+        falling = [
             "on poses that were not fitted the error falls from "
-            f"{_shown(each, each.before, self.shown)} to {_shown(each, each.after, self.shown)}"
-            for each in self.held_out
-            if each.before > ABOVE_NOISE * each.noise and each.after < each.before
+            f"{_shown(check, check.before, self.shown)} to {_shown(check, check.after, self.shown)}"
+            for check in self.held_out
+            if check.before > ABOVE_NOISE * check.noise and check.after < check.before
         ]
-        return "; ".join([*(texts or ["the unknowns are determined"]), *held[:1]])
+        return "; ".join([*(texts or ["the unknowns are determined"]), *falling[:1]])
 
 
 def assess(
@@ -191,15 +204,15 @@ def assess(
         margin=margin,
         noise=noise,
     )
-    found = case.outcome()
+    outcome = case.outcome()
     held = tuple(held_out)
-    reasons = [*found.reasons, *_of_held_out(held, margin, unknowns.shown)]
-    reasons += _of_values(case, found)
-    reasons += _of_noise(case)
-    warnings = _warnings(case, found)
+    reasons = [*outcome.reasons, *_not_confirmed(held, margin, unknowns.shown)]
+    reasons += _absurd_values(case, outcome)
+    reasons += _contradicts_noise(case)
+    warnings = _warnings(case, outcome)
     remedy = None
-    if found.reasons and not case.is_enough(found):
-        remedy = remedy_of(case, [*candidates, *directly(unknowns, direct)])
+    if outcome.reasons and not case.lacks_only_gain(outcome):
+        remedy = cheapest_remedy(case, [*candidates, *direct_candidates(unknowns, direct)])
     first = np.asarray(before, np.float64)
     return Gate(
         accepted=not reasons,
@@ -211,16 +224,16 @@ def assess(
         labels=case.labels,
         units=unknowns.units[: case.n],
         values=case.values[: case.n],
-        standard_data=found.data.standard(),
-        standard=found.used.standard(),
+        standard_data=outcome.data.standard(),
+        standard=outcome.used.standard(),
         standard_prior=case.sigma,
-        share=share(found.used.standard(), case.sigma, use_prior=use_prior),
+        share=share(outcome.used.standard(), case.sigma, use_prior=use_prior),
         observability=case.observability,
-        directions=found.directions,
-        sentences=found.sentences,
-        before=found.before,
-        after=found.after,
-        relative=found.relative,
+        directions=outcome.directions,
+        sentences=outcome.sentences,
+        before=outcome.before,
+        after=outcome.after,
+        relative=outcome.relative,
         rms_before=float(np.sqrt(np.mean(first**2))) if first.size else float("nan"),
         rms=case.rms,
         birge=case.birge,
@@ -230,35 +243,35 @@ def assess(
     )
 
 
-def _of_held_out(held: Iterable[HeldOut], margin: float, units: ShownUnits) -> list[Reason]:
-    """(c): poses that were not fitted do not confirm what the fit claims."""
-    found = []
-    for each in held:
-        above = each.before > ABOVE_NOISE * each.noise and each.after > margin * each.before
-        if above and not each.consistent:
-            was, now = (_shown(each, size, units) for size in (each.before, each.after))
+def _not_confirmed(held: Iterable[HeldOut], margin: float, units: ShownUnits) -> list[Reason]:
+    """(c): poses that were not fitted do not confirm the fit."""
+    reasons = []
+    for check in held:
+        above = check.before > ABOVE_NOISE * check.noise and check.after > margin * check.before
+        if above and not check.consistent:
+            was, now = (_shown(check, size, units) for size in (check.before, check.after))
             change = f"falls from {was} to {now} only"
-            if each.after >= each.before:
+            if check.after >= check.before:
                 change = f"does not fall: {was} before, {now} after"
-            found.append(
+            reasons.append(
                 Reason(
                     "not-confirmed",
                     f"on poses that were not fitted the error {change}, though "
                     + (
                         "that is above the noise"
-                        if each.unit == "1"
-                        else f"the noise is {_shown(each, each.noise, units)}"
+                        if check.unit == "1"
+                        else f"the noise is {_shown(check, check.noise, units)}"
                     ),
                 )
             )
-    return found
+    return reasons
 
 
-def _of_values(case: Case, found: Outcome) -> list[Reason]:
-    """(d): values far outside of what was made."""
+def _absurd_values(case: Case, outcome: Outcome) -> list[Reason]:
+    """(d): values far outside of the tolerances."""
     n = case.n
     off = case.values[:n] - np.asarray(case.unknowns.prior_mean, np.float64)[:n]
-    own = found.used.standard()
+    own = outcome.used.standard()
     off = np.where(np.isfinite(off), off, 0.0)
     band = np.where(np.isfinite(case.half), case.half, 0.0)
     size = np.abs(off)
@@ -267,14 +280,14 @@ def _of_values(case: Case, found: Outcome) -> list[Reason]:
     at = [int(i) for i in np.argsort(-ratio, kind="stable") if beyond[i]]
     if not at:
         return []
-    text = _absurd(case, at[0], float(off[at[0]]))
+    text = _absurd_sentence(case, at[0], float(off[at[0]]))
     more = sentences.collapsed([case.labels[i] for i in sorted(at[1:])], case.labels)
     if more:
-        text += f"; {sentences.listed(more)} would be off likewise"
+        text += f"; {sentences.listed(more)} would be off too"
     return [Reason("absurd-value", text)]
 
 
-def _absurd(case: Case, at: int, off: float) -> str:
+def _absurd_sentence(case: Case, at: int, off: float) -> str:
     unit, units = case.unknowns.units[at], case.unknowns.shown
     nominal, half = float(case.nominal[at]), float(case.half[at])
     would = ""
@@ -288,7 +301,7 @@ def _absurd(case: Case, at: int, off: float) -> str:
     )
 
 
-def _of_noise(case: Case) -> list[Reason]:
+def _contradicts_noise(case: Case) -> list[Reason]:
     if not case.rms > CONTRADICTED:
         return []
     return [
@@ -301,44 +314,53 @@ def _of_noise(case: Case) -> list[Reason]:
     ]
 
 
-def _warnings(case: Case, found: Outcome) -> list[Reason]:
+def _warnings(case: Case, outcome: Outcome) -> list[Reason]:
     warnings = []
     if case.degrees < 0.5:
-        text = "there are no more measurements than unknowns, so the stated noise is not checked"
+        text = (
+            "there are no more readings than unknowns, so the stated uncertainties cannot be "
+            "checked"
+        )
         warnings.append(Reason("noise-unchecked", text))
     elif case.rms <= CONTRADICTED and _unlikely(case) > UNLIKELY:
         text = (
             f"the residuals are {sentences.times(case.rms)} times as large as the stated "
-            "uncertainties, which are multiplied by that here"
+            "uncertainties, which have been multiplied by this factor"
         )
         warnings.append(Reason("noise-too-small", text))
     elif _unlikely(case) < -UNLIKELY:
         text = (
-            f"the residuals are only {sentences.times(case.rms)} of the stated uncertainties, "
+            f"the residuals are only {sentences.times(case.rms)} times the stated uncertainties, "
             "which seem too large"
         )
         warnings.append(Reason("noise-too-large", text))
-    if case.use_prior and found.sentences and not found.reasons:
-        text = f"{'; '.join(found.sentences)}: what is found of these rests on their tolerances"
+    if case.use_prior and outcome.sentences and not outcome.reasons:
+        text = (
+            f"{'; '.join(outcome.sentences)}: what is stated for these rests on their tolerances, "
+            "not on the measurements"
+        )
         warnings.append(Reason("rests-on-tolerances", text))
-    gauge = [each for each in found.directions if each.kind == "gauge"]
+    gauge = [direction for direction in outcome.directions if direction.kind == "gauge"]
     if gauge:
         text = (
-            "where the machine as a whole stands in the instrument's frame is unknown, without "
-            "effect on what it does: uncertainties at the tool are without it"
+            "where the machine as a whole stands in the instrument's frame is not determined, "
+            "which does not affect its accuracy: the uncertainties at the tool leave it out"
         )
         warnings.append(Reason("gauge", text))
-    if found.before is None and case.measured[0] is None and case.measured[1] is None:
+    if outcome.before is None and case.measured[0] is None and case.measured[1] is None:
         text = (
             "not every unknown has a tolerance, and no error was measured before: "
             "nothing shows that the machine becomes better"
         )
         warnings.append(Reason("nothing-to-compare", text))
-    if case.is_within(found.before) and not case.is_enough(found):
-        text = "what is asked of the tool is kept without calibration: it is not needed"
+    if case.keeps_target(outcome.before) and not case.lacks_only_gain(outcome):
+        text = (
+            "the machine as filed already keeps the accuracy that is asked: "
+            "calibration is not needed"
+        )
         warnings.append(Reason("not-needed", text))
-    if not found.reasons:
-        pairs = zip(both(found.after, None), case.reference(found.before), strict=True)
+    if not outcome.reasons:
+        pairs = zip(at_worst_pose(outcome.after, None), case.reference(outcome.before), strict=True)
         units = case.unknowns.shown
         for (name, unit, size, _), was in pairs:
             if was is not None and was > 0.0 and size > case.margin * was:
@@ -365,10 +387,10 @@ def _shown(held: HeldOut, value: float, units: ShownUnits) -> str:
 def _or_nan(values: ArrayLike | None, n: int) -> Floats:
     if values is None:
         return np.full(n, np.nan)
-    found = np.asarray(values, np.float64)
-    if found.shape != (n,):
-        raise ValueError(f"the nominal values have shape {found.shape}, expected ({n},)")
-    return found
+    array = np.asarray(values, np.float64)
+    if array.shape != (n,):
+        raise ValueError(f"the nominal values have shape {array.shape}, expected ({n},)")
+    return array
 
 
 __all__ = ["Candidate", "Gate", "HeldOut", "Reason", "Remedy", "assess"]

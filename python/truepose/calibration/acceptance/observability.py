@@ -14,7 +14,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose.arrays import Flags, Floats
+from truepose.arrays import Flags, Floats, Indices
+from truepose.calibration.least_squares import (
+    column_basis,
+    column_norms,
+    singular_decomposition,
+)
 
 RANK_TOLERANCE = 1e-9
 """Of the largest singular value of the columns scaled to length one, or of one if that is larger:
@@ -61,9 +66,9 @@ class RowCovariance:
 
     def standard(self) -> Floats:
         """Standard uncertainty (n,), inf where a null direction has a part in the unknown."""
-        found: Floats = np.sqrt(np.einsum("ij,ij->i", self.root, self.root))
+        deviations: Floats = np.sqrt(np.einsum("ij,ij->i", self.root, self.root))
         touched = (np.abs(self.null * self.lengths) > TOUCHED).any(axis=0)
-        return np.where(touched, np.inf, found)
+        return np.where(touched, np.inf, deviations)
 
 
 @dataclass(frozen=True)
@@ -107,22 +112,22 @@ def weighted(jacobian: ArrayLike, weights: ArrayLike | None = None) -> Floats:
     return np.sqrt(np.asarray(weights, np.float64))[:, np.newaxis] * rows
 
 
-def of_machine(rows: ArrayLike, n_machine: int, unit: Floats | None = None) -> WhitenedRows:
+def project_out_instruments(
+    rows: ArrayLike, n_machine: int, unit: Floats | None = None
+) -> WhitenedRows:
     """Rows (m, n) of all unknowns with those after the first `n_machine` projected out.
 
     What is left of the machine's columns is what no change of the instruments' unknowns can
     imitate: the Schur complement of the normal equations. `unit` (n_machine,): prior standard
     deviations, inf where there is none.
     """
-    both = np.asarray(rows, np.float64)
-    machine, other = both[:, :n_machine].copy(), both[:, n_machine:]
-    lengths = _lengths(machine)
+    whole = np.asarray(rows, np.float64)
+    machine, of_instruments = whole[:, :n_machine].copy(), whole[:, n_machine:]
+    lengths = column_norms(machine)
     lengths[_unseen(lengths, unit)] = 0.0
     machine[:, lengths == 0.0] = 0.0
-    if other.shape[1]:
-        sizes = _lengths(other)
-        u, found, _ = np.linalg.svd(other / np.where(sizes > 0.0, sizes, 1.0), full_matrices=False)
-        basis = u[:, found > RANK_TOLERANCE * found.max(initial=0.0)]
+    if of_instruments.shape[1]:
+        basis = column_basis(_of_length_one(of_instruments), RANK_TOLERANCE)
         for _ in range(2):  # the second takes away what rounding left of the first
             machine -= basis @ (basis.T @ machine)
     return WhitenedRows(machine, lengths)
@@ -142,29 +147,33 @@ def prior_rows(covariance: ArrayLike) -> Floats:
     known to 1e-6 of its own standard deviation.
     """
     whole = np.asarray(covariance, np.float64)
-    known = np.flatnonzero(np.isfinite(np.diagonal(whole)))
-    rows = np.zeros((known.size, whole.shape[0]))
-    if known.size == 0:
-        return rows
-    part = whole[np.ix_(known, known)]
-    sigma = np.sqrt(np.diagonal(part))
-    values, vectors = np.linalg.eigh(part / np.outer(sigma, sigma))
-    values = np.maximum(values, 1e-12)
-    rows[:, known] = (vectors / np.sqrt(values)).T / sigma
+    known, sigma, values, vectors = _principal(whole)
+    rows = np.zeros((known.size, len(whole)))
+    rows[:, known] = (vectors / np.sqrt(np.maximum(values, 1e-12))).T / sigma
     return rows
 
 
-def prior_root(covariance: ArrayLike) -> Floats:
-    """(n, k) with covariance = root root^T over the unknowns that have a prior, 0 elsewhere."""
+def covariance_root(covariance: ArrayLike) -> Floats:
+    """(n, k) with covariance = root root^T over the finite variances, 0 elsewhere."""
     whole = np.asarray(covariance, np.float64)
-    known = np.flatnonzero(np.isfinite(np.diagonal(whole)))
-    root = np.zeros((whole.shape[0], known.size))
-    if known.size:
-        part = whole[np.ix_(known, known)]
-        sigma = np.sqrt(np.diagonal(part))
-        values, vectors = np.linalg.eigh(part / np.outer(sigma, sigma))
-        root[known] = sigma[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, 0.0))
+    known, sigma, values, vectors = _principal(whole)
+    root = np.zeros((len(whole), known.size))
+    root[known] = sigma[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, 0.0))
     return root
+
+
+def _principal(covariance: Floats) -> tuple[Indices, Floats, Floats, Floats]:
+    """Which of n have a finite variance, their k deviations; eigenvalues and vectors.
+
+    The eigenvalues (k,) and vectors (k, k) are those of the correlation matrix, so that no unit
+    matters. What is exact has the deviation 1 and the eigenvalue 0.
+    """
+    known = np.flatnonzero(np.isfinite(np.diagonal(covariance)))
+    part = covariance[np.ix_(known, known)]
+    sigma = np.sqrt(np.diagonal(part))
+    sigma = np.where(sigma > 0.0, sigma, 1.0)
+    values, vectors = np.linalg.eigh(part / np.outer(sigma, sigma))
+    return known, sigma, values, vectors
 
 
 def stacked(*parts: WhitenedRows) -> WhitenedRows:
@@ -176,7 +185,7 @@ def stacked(*parts: WhitenedRows) -> WhitenedRows:
 def prior(covariance: ArrayLike) -> WhitenedRows:
     """A prior covariance (n, n) as rows."""
     matrix = prior_rows(covariance)
-    return WhitenedRows(matrix, _lengths(matrix))
+    return WhitenedRows(matrix, column_norms(matrix))
 
 
 def row_covariance(rows: WhitenedRows) -> RowCovariance:
@@ -185,10 +194,10 @@ def row_covariance(rows: WhitenedRows) -> RowCovariance:
     of_seen = rows.lengths[rows.lengths > 0.0]
     usual = float(np.median(of_seen)) if of_seen.size else 1.0
     lengths = np.where(rows.lengths > 0.0, rows.lengths, usual)
-    found, right = decomposed(rows.matrix / lengths)
+    singular, right = singular_decomposition(rows.matrix / lengths)
     # Where instruments imitate everything, what is left is rounding of columns of length one.
-    seen = found > RANK_TOLERANCE * found.max(initial=1.0)
-    root: Floats = (right[seen] / found[seen, np.newaxis] / lengths).T
+    seen = singular > RANK_TOLERANCE * singular.max(initial=1.0)
+    root: Floats = (right[seen] / singular[seen, np.newaxis] / lengths).T
     return RowCovariance(root, right[~seen] / lengths, lengths)
 
 
@@ -212,7 +221,7 @@ def observability(
     inverse = 1.0 / np.where(rows.lengths > 0.0, rows.lengths, 1.0)
     rank = row_covariance(rows).rank
     unit = standard if by_prior else inverse
-    singular, right = decomposed(rows.matrix * unit)
+    singular, right = singular_decomposition(rows.matrix * unit)
     singular[rank:] = 0.0
     seen = singular[:rank]
     o1 = o2 = o3 = o4 = o5 = 0.0
@@ -233,24 +242,11 @@ def share(after: ArrayLike, prior_standard: ArrayLike, *, use_prior: bool) -> Fl
     posterior = np.asarray(after, np.float64)
     before = np.asarray(prior_standard, np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = 1.0 - (posterior / before) ** 2
+        shares = 1.0 - (posterior / before) ** 2
     determined = np.isfinite(posterior).astype(np.float64)
     if not use_prior:
         return determined
-    return np.where(np.isfinite(before), np.clip(found, 0.0, 1.0), determined)
-
-
-def decomposed(matrix: Floats) -> tuple[Floats, Floats]:
-    """Singular values (n,), zeros added where there are fewer rows, and right vectors (n, n)."""
-    n = matrix.shape[1]
-    if matrix.shape[0] > n:
-        matrix = np.asarray(np.linalg.qr(matrix, mode="r"), np.float64)
-    if matrix.shape[0] == 0 or n == 0:
-        return np.zeros(n), np.eye(n)
-    _, found, right = np.linalg.svd(matrix, full_matrices=True)
-    singular = np.zeros(n)
-    singular[: found.size] = found
-    return singular, right
+    return np.where(np.isfinite(before), np.clip(shares, 0.0, 1.0), determined)
 
 
 def fitted(rows: Floats, held: Floats) -> float:
@@ -259,11 +255,14 @@ def fitted(rows: Floats, held: Floats) -> float:
     `held` (k, n): rows of the prior. Without it the rank; with it the trace of the matrix that
     turns measurements into fitted ones.
     """
-    both = np.vstack([rows, held])
-    lengths = _lengths(both)
-    u, found, _ = np.linalg.svd(both / np.where(lengths > 0.0, lengths, 1.0), full_matrices=False)
-    seen = u[: len(rows), found > RANK_TOLERANCE * found.max(initial=0.0)]
-    return float(np.sum(seen**2))
+    basis = column_basis(_of_length_one(np.vstack([rows, held])), RANK_TOLERANCE)
+    return float(np.sum(basis[: len(rows)] ** 2))
+
+
+def _of_length_one(matrix: Floats) -> Floats:
+    """The matrix with its columns divided by their lengths; a column of zeros stays."""
+    lengths = column_norms(matrix)
+    return np.asarray(matrix / np.where(lengths > 0.0, lengths, 1.0))
 
 
 def normalised_rms(residual: Floats, weights: Floats, degrees: float) -> float:
@@ -271,8 +270,3 @@ def normalised_rms(residual: Floats, weights: Floats, degrees: float) -> float:
     if degrees < 0.5:
         return float("nan")
     return float(np.sqrt(np.sum((weights * residual) ** 2) / degrees))
-
-
-def _lengths(matrix: Floats) -> Floats:
-    lengths: Floats = np.sqrt(np.einsum("ij,ij->j", matrix, matrix))
-    return lengths

@@ -60,7 +60,7 @@ class Remedy:
         return bool(self.names)
 
 
-def directly(unknowns: Unknowns, uncertainty: Mapping[str, float]) -> list[Candidate]:
+def direct_candidates(unknowns: Unknowns, uncertainty: Mapping[str, float]) -> list[Candidate]:
     """Measuring each unknown of the machine by itself, and each family as a whole.
 
     `uncertainty`: standard, by unit; unknowns in other units cannot be measured by themselves.
@@ -79,14 +79,14 @@ def directly(unknowns: Unknowns, uncertainty: Mapping[str, float]) -> list[Candi
         cost = EASY if "length" in re.split(r"[ _-]", label) else HARD
         single[label] = Candidate(label, cost, f"measure {label} {to}", row, direct=True)
         families.setdefault(sentences.family(label, labels)[0], []).append(label)
-    found = list(single.values())
+    candidates = list(single.values())
     for members in families.values():
         if len(members) > 1:
             parts = [single[label] for label in members]
             to = parts[0].sentence[parts[0].sentence.rindex("(") :]
             what = sentences.some(members[0], labels, "every")
             rows = np.vstack([part.rows for part in parts])
-            found.append(
+            candidates.append(
                 Candidate(
                     what,
                     sum(part.cost for part in parts),
@@ -95,25 +95,25 @@ def directly(unknowns: Unknowns, uncertainty: Mapping[str, float]) -> list[Candi
                     direct=True,
                 )
             )
-    return found
+    return candidates
 
 
-def remedy_of(case: Case, candidates: Sequence[Candidate]) -> Remedy:
+def cheapest_remedy(case: Case, candidates: Sequence[Candidate]) -> Remedy:
     """The cheapest candidate with which nothing is left open, else the cheapest pair.
 
     Among equally cheap ones it is the one that leaves the tool least uncertain.
     """
     if not candidates:
         return Remedy((), 0.0, "no further measurement was tried")
-    outcomes = [case.outcome(each.rows) for each in candidates]
-    whole = [i for i, found in enumerate(outcomes) if not found.reasons]
-    if whole:
-        whole.sort(key=lambda i: (candidates[i].cost, outcomes[i].after.position_max, i))
-        best = whole[0]
-        sentence = _named(case, candidates, whole, best)
-        other = [i for i in whole if candidates[i].direct != candidates[best].direct]
-        if other:
-            sentence += f", or {_named(case, candidates, whole, other[0])}"
+    outcomes = [case.outcome(candidate.rows) for candidate in candidates]
+    sufficient = [i for i, outcome in enumerate(outcomes) if not outcome.reasons]
+    if sufficient:
+        sufficient.sort(key=lambda i: (candidates[i].cost, outcomes[i].after.position_max, i))
+        best = sufficient[0]
+        sentence = _named(case, candidates, sufficient, best)
+        of_other_sort = [i for i in sufficient if candidates[i].direct != candidates[best].direct]
+        if of_other_sort:
+            sentence += f", or {_named(case, candidates, sufficient, of_other_sort[0])}"
         return _remedy((candidates[best],), outcomes[best], sentence)
     helpful = sorted(range(len(candidates)), key=lambda i: (*_open(outcomes[i]), i))[:MOST_PAIRED]
     pairs = sorted(
@@ -121,34 +121,34 @@ def remedy_of(case: Case, candidates: Sequence[Candidate]) -> Remedy:
     )
     for pair in pairs:
         parts = tuple(candidates[i] for i in pair)
-        found = case.outcome(np.vstack([part.rows for part in parts]))
-        if not found.reasons:
-            return _remedy(parts, found, f"{parts[0].sentence} and {parts[1].sentence}")
+        outcome = case.outcome(np.vstack([part.rows for part in parts]))
+        if not outcome.reasons:
+            return _remedy(parts, outcome, f"{parts[0].sentence} and {parts[1].sentence}")
     return Remedy((), 0.0, "none of the further measurements that were tried helps")
 
 
-def _remedy(parts: tuple[Candidate, ...], found: Outcome, sentence: str) -> Remedy:
+def _remedy(parts: tuple[Candidate, ...], outcome: Outcome, sentence: str) -> Remedy:
     return Remedy(
         tuple(part.name for part in parts),
         sum(part.cost for part in parts),
         sentence,
-        found.after.position_max,
-        found.after.rotation_max,
+        outcome.after.position_max,
+        outcome.after.rotation_max,
     )
 
 
-def _named(case: Case, candidates: Sequence[Candidate], whole: Sequence[int], at: int) -> str:
+def _named(case: Case, candidates: Sequence[Candidate], sufficient: Sequence[int], at: int) -> str:
     """The candidate's sentence; "one rod length" where any of the family would do."""
     best = candidates[at]
     if not best.direct or best.name not in case.labels:
         return best.sentence
     _, relatives = sentences.family(best.name, case.labels)
-    helping = {candidates[i].name for i in whole}
+    helping = {candidates[i].name for i in sufficient}
     if len(relatives) > 1 and helping.issuperset(relatives):
         return best.sentence.replace(best.name, sentences.some(best.name, case.labels, "one"), 1)
     return best.sentence
 
 
-def _open(found: Outcome) -> tuple[int, float]:
+def _open(outcome: Outcome) -> tuple[int, float]:
     """How much is still open: the reasons against it, and the uncertainty at the tool."""
-    return len(found.reasons), found.after.position_max + found.after.rotation_max
+    return len(outcome.reasons), outcome.after.position_max + outcome.after.rotation_max

@@ -153,41 +153,40 @@ def _collapsed(labels: Sequence[str], every: Sequence[str], fewest: int) -> list
 
 def family(label: str, every: Sequence[str]) -> tuple[str, list[str]]:
     """The head that `label` shares with others of `every`, and all who share it."""
-    found = _MEMBER.match(label)
-    if found is None:
+    head = _head(label)
+    if head is None:
         return label, [label]
-    head = found[1]
-    return head, [each for each in every if _head(each) == head]
+    return head, [other for other in every if _head(other) == head]
 
 
 @cache
 def _head(label: str) -> str | None:
-    found = _MEMBER.match(label)
-    return None if found is None else found[1]
+    match = _MEMBER.match(label)
+    return None if match is None else match[1]
 
 
 def _families(
     labels: Sequence[str], every: Sequence[str]
 ) -> list[tuple[str | None, list[str], int]]:
     """(head, members among `labels`, how many there are in all), in the order of `labels`."""
-    found: dict[str, tuple[str | None, list[str], int]] = {}
+    families: dict[str, tuple[str | None, list[str], int]] = {}
     for label in labels:
         head, all_members = family(label, every)
         if len(all_members) < 2:
-            found[label] = (None, [label], 1)
+            families[label] = (None, [label], 1)
             continue
-        entry = found.setdefault(f"{head}\0", (head, [], len(all_members)))
+        entry = families.setdefault(f"{head}\0", (head, [], len(all_members)))
         entry[1].append(label)
     return [
         (None, members, count) if len(members) == 1 else (head, members, count)
-        for head, members, count in found.values()
+        for head, members, count in families.values()
     ]
 
 
 def _suffixes(members: Sequence[str]) -> list[str]:
     """Sorted, numbers by their size."""
-    found = [_MEMBER.sub(r"\2", label) for label in members]
-    return sorted(found, key=lambda each: (len(each) if each.isdigit() else 0, each))
+    suffixes = [_MEMBER.sub(r"\2", label) for label in members]
+    return sorted(suffixes, key=lambda word: (len(word) if word.isdigit() else 0, word))
 
 
 def _are_parts(members: Sequence[str]) -> bool:
@@ -197,13 +196,13 @@ def _are_parts(members: Sequence[str]) -> bool:
 
 def _plural(head: str, *, of_parts: bool) -> tuple[str, str]:
     """Plural and axis: ("the strut base joints", "x") of "base joint x of strut" 1, 2, ..."""
-    found = _OF_PART.match(head)
-    if not of_parts or found is None:
+    match = _OF_PART.match(head)
+    if not of_parts or match is None:
         return head, ""
-    what, axis = found[1], ""
+    what, axis = match[1], ""
     if re.fullmatch(r".+ [a-z]", what):
         what, axis = what[:-2], what[-1]
-    return f"the {found[2]} {what}{'' if what.endswith('s') else 's'}", axis
+    return f"the {match[2]} {what}{'' if what.endswith('s') else 's'}", axis
 
 
 def some(label: str, every: Sequence[str], which: str) -> str:
@@ -214,8 +213,8 @@ def some(label: str, every: Sequence[str], which: str) -> str:
     head, relatives = family(label, every)
     if len(relatives) < 2:
         return label
-    found = _OF_PART.match(head)
-    return f"{which} {head}" if found is None else f"the {found[1]} of {which} {found[2]}"
+    match = _OF_PART.match(head)
+    return f"{which} {head}" if match is None else f"the {match[1]} of {which} {match[2]}"
 
 
 # --- directions ----------------------------------------------------------------------------------
@@ -237,7 +236,7 @@ def sparse(directions: ArrayLike) -> Floats:
     comparable units.
     """
     rows = np.array(directions, np.float64, ndmin=2)
-    taken: list[tuple[int, int]] = []
+    pivots: list[tuple[int, int]] = []
     free = np.ones(rows.shape, np.bool_)
     for _ in range(rows.shape[0]):
         at = int(np.argmax(np.where(free, np.abs(rows), -1.0)))
@@ -249,7 +248,7 @@ def sparse(directions: ArrayLike) -> Floats:
         factor[row] = 0.0
         rows -= np.outer(factor, rows[row])
         free[row], free[:, column] = False, False
-        taken.append((row, column))
+        pivots.append((row, column))
     scale = np.abs(rows).max(axis=1, initial=0.0, keepdims=True)
     return rows / np.where(scale > 0.0, scale, 1.0)
 
@@ -266,22 +265,22 @@ def grouped(directions: ArrayLike, labels: Sequence[str]) -> list[Group]:
 
     In the order of the directions.
     """
-    found: list[tuple[set[str], dict[int, None], int]] = []
+    groups: list[tuple[set[str], dict[int, None], int]] = []
     for row in np.array(directions, np.float64, ndmin=2):
         part = members(row)
         heads = {_family_name(labels[i], labels) for i in part}
-        for at, (names, indices, count) in enumerate(found):
+        for at, (names, indices, count) in enumerate(groups):
             if heads <= names or names <= heads:
                 merged = (
                     indices | dict.fromkeys(part)
                     if heads <= names
                     else (dict.fromkeys(part) | indices)
                 )
-                found[at] = (names | heads, merged, count + 1)
+                groups[at] = (names | heads, merged, count + 1)
                 break
         else:
-            found.append((heads, dict.fromkeys(part), 1))
-    return [Group(tuple(indices), count) for _, indices, count in found]
+            groups.append((heads, dict.fromkeys(part), 1))
+    return [Group(tuple(indices), count) for _, indices, count in groups]
 
 
 def clustered(directions: ArrayLike, sizes: ArrayLike) -> Floats:
@@ -308,7 +307,7 @@ def _family_name(label: str, every: Sequence[str]) -> str:
     return head if len(all_members) > 1 else label
 
 
-def cannot_tell(
+def undetermined(
     directions: ArrayLike,
     labels: Sequence[str],
     by: str,
@@ -322,20 +321,20 @@ def cannot_tell(
     """
     if np.size(directions) == 0:
         return []
-    found: dict[str, list[str]] = {}
+    by_ending: dict[str, list[str]] = {}
     for group in grouped(directions, labels):
         own = [labels[i] for i in group.members]
         names = collapsed(own, labels)
         if group.n_direction >= len(own):
-            one = "its tolerance says" if len(own) == 1 else "their tolerances say"
-            end = f"found {by}{f' better than {one}' if within_tolerances else ''}"
+            tolerances = "its tolerance says" if len(own) == 1 else "their tolerances say"
+            end = f"found {by}{f' better than {tolerances}' if within_tolerances else ''}"
         else:
             if names == [_head(own[0])]:  # one name for several, which are told apart here
                 names = [f"{names[0]} {listed(_suffixes(own))}"]
             end = f"told apart {by}{' within their tolerances' if within_tolerances else ''}"
-        found.setdefault(end, []).append(listed(names))
+        by_ending.setdefault(end, []).append(listed(names))
     clauses = []
-    for end, groups in found.items():
+    for end, groups in by_ending.items():
         shown = list(dict.fromkeys(groups))
         rest = len(shown) - MOST_SENTENCES
         if rest > 0:

@@ -10,12 +10,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.acceptance.observability import RowCovariance, decomposed
+from truepose.calibration.acceptance.observability import RowCovariance, covariance_root
+from truepose.calibration.least_squares import (
+    column_basis,
+    column_norms,
+    singular_decomposition,
+)
+from truepose.machine import Machine
 
 POSITION = "xyz"
 ROTATION = "abc"
 SLIGHT = 1e-3
-"""Of the largest effect at the tool of any unknown, by columns of length one: smaller is none."""
+"""Of the largest effect of any unknown at the tool, by columns of length one: less is none."""
+
+
+def tool_components(machine: Machine) -> list[str]:
+    """The machine's components as they are called here: x y z, and a b c for rotations."""
+    return [_ROTATIONS.get(name, name) for name in machine.components]
+
+
+_ROTATIONS = {"rx": "a", "ry": "b", "rz": "c"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,13 +56,18 @@ class ToolUncertainty:
         return float(self.rotation.max(initial=0.0))
 
     @property
+    def worst(self) -> tuple[float, float]:
+        """`position_max` and `rotation_max`."""
+        return self.position_max, self.rotation_max
+
+    @property
     def position_rms(self) -> float:
         """Root mean square over the poses, m."""
         return _rms(self.position)
 
 
 @dataclass(frozen=True, eq=False)
-class Sorted:
+class SortedDirections:
     """Directions (k, n) that rows do not see, by what they do at the tool.
 
     `moving`: the tool moves. `gauge`: it moves as a rigid body over the whole workspace, together
@@ -77,34 +96,34 @@ class Tool:
     @classmethod
     def of(cls, effects: ArrayLike, components: Sequence[str], positions: ArrayLike | None) -> Tool:
         """Raises `ValueError` for shapes that do not fit."""
-        found = np.asarray(effects, np.float64)
-        if found.ndim != 3 or found.shape[1] != len(components):
+        array = np.asarray(effects, np.float64)
+        if array.ndim != 3 or array.shape[1] != len(components):
             raise ValueError(
-                f"the tool's sensitivity has shape {found.shape}, "
+                f"the tool's sensitivity has shape {array.shape}, "
                 f"expected (n_pose, {len(components)}, n_machine)"
             )
-        where = None if positions is None else np.asarray(positions, np.float64)
-        if where is not None and where.shape != (found.shape[0], 3):
+        points = None if positions is None else np.asarray(positions, np.float64)
+        if points is not None and points.shape != (array.shape[0], 3):
             raise ValueError(
-                f"the positions have shape {where.shape}, expected ({found.shape[0]}, 3)"
+                f"the positions have shape {points.shape}, expected ({array.shape[0]}, 3)"
             )
         length = 1.0
-        if where is not None and where.size:
-            length = _rms(np.linalg.norm(where - where.mean(axis=0), axis=1)) or 1.0
-        return cls(tuple(components), found, where, length)
+        if points is not None and points.size:
+            length = _rms(np.linalg.norm(points - points.mean(axis=0), axis=1)) or 1.0
+        return cls(tuple(components), array, points, length)
 
     @cached_property
     def moved(self) -> Flags:
         """(n,): unknowns that move the tool at all."""
-        found: Flags = np.any(self.effects != 0.0, axis=(0, 1))
-        return found
+        flags: Flags = np.any(self.effects != 0.0, axis=(0, 1))
+        return flags
 
     def uncertainty(self, root: Floats, open_directions: Floats) -> ToolUncertainty:
         """Of a covariance root root^T, `root` (n, r), without limit in `open_directions` (k, n)."""
         # As one product of matrices, which is many times faster than one for each pose.
         n_pose, n_component, n = self.effects.shape
-        moved = self.effects.reshape(-1, n) @ root
-        standard: Floats = np.sqrt(np.einsum("ij,ij->i", moved, moved))
+        of_root = self.effects.reshape(-1, n) @ root
+        standard: Floats = np.sqrt(np.einsum("ij,ij->i", of_root, of_root))
         standard = standard.reshape(n_pose, n_component)
         if len(open_directions):
             effect = np.abs(self.effects @ open_directions.T)
@@ -116,6 +135,12 @@ class Tool:
             self._size(standard, POSITION),
             self._size(standard, ROTATION),
         )
+
+    def beforehand(self, prior: Floats) -> ToolUncertainty | None:
+        """Of a prior covariance (n, n); None where an unknown that moves the tool has none."""
+        if not np.isfinite(np.diagonal(prior)[self.moved]).all():
+            return None
+        return self.uncertainty(covariance_root(prior), np.zeros((0, len(prior))))
 
     def size_of(self, direction: Floats) -> float:
         """Largest displacement (m) over the workspace that a direction (n,) makes."""
@@ -129,35 +154,34 @@ class Tool:
         effect = float(np.linalg.norm(self._flat @ direction))
         return effect > SLIGHT * self._largest(lengths) * float(np.linalg.norm(direction * lengths))
 
-    def sort(self, open_directions: RowCovariance, *, with_gauge: bool) -> Sorted:
+    def sort(self, open_directions: RowCovariance, *, with_gauge: bool) -> SortedDirections:
         """The null directions by what they do; `with_gauge`: there are unknowns of instruments."""
         null = open_directions.null
         flat = self._flat
         none = np.zeros((0, flat.shape[1]))
         if len(null) == 0:
-            return Sorted(none, none, none)
+            return SortedDirections(none, none, none)
         slight = SLIGHT * self._largest(open_directions.lengths)
         harmless, rest = _split(flat @ null.T, null, slight)
         if not with_gauge or self.positions is None or len(rest) == 0:
-            return Sorted(rest, none, harmless)
+            return SortedDirections(rest, none, harmless)
         fields = self._rigid_fields()
         effect = flat @ rest.T
         gauge, moving = _split(effect - fields @ (fields.T @ effect), rest, slight)
-        return Sorted(moving, gauge, harmless)
+        return SortedDirections(moving, gauge, harmless)
 
     def relative(self, gauge: Floats) -> Tool:
         """The same without what the `gauge` directions (k, n) do."""
         if len(gauge) == 0:
             return self
         flat = self._flat
-        basis, found, _ = np.linalg.svd(flat @ gauge.T, full_matrices=False)
-        basis = basis[:, found > SLIGHT * found.max(initial=0.0)]
+        basis = column_basis(flat @ gauge.T, SLIGHT)
         left = flat - basis @ (basis.T @ flat)
         effects = left.reshape(self.effects.shape) / self._weights()[:, np.newaxis]
         return Tool(self.components, effects, self.positions, self.length)
 
     def _weights(self) -> Floats:
-        return np.array([1.0 if each in POSITION else self.length for each in self.components])
+        return np.array([1.0 if name in POSITION else self.length for name in self.components])
 
     @cached_property
     def _flat(self) -> Floats:
@@ -167,8 +191,7 @@ class Tool:
 
     @cached_property
     def _sizes(self) -> Floats:
-        sizes: Floats = np.sqrt(np.einsum("ij,ij->j", self._flat, self._flat))
-        return sizes
+        return column_norms(self._flat)
 
     def _largest(self, lengths: Floats) -> float:
         return float((self._sizes / lengths).max(initial=0.0))
@@ -187,18 +210,17 @@ class Tool:
                 fields[:, index, 3:] = turns[:, :, axis]
             else:
                 fields[:, index, 3 + ROTATION.index(component)] = self.length
-        basis, found, _ = np.linalg.svd(fields.reshape(-1, 6), full_matrices=False)
-        return np.asarray(basis[:, found > SLIGHT * found.max(initial=0.0)], np.float64)
+        return column_basis(fields.reshape(-1, 6), SLIGHT)
 
     def _size(self, values: Floats, components: str) -> Floats:
-        chosen = [index for index, each in enumerate(self.components) if each in components]
+        chosen = [index for index, name in enumerate(self.components) if name in components]
         size: Floats = np.sqrt((values[:, chosen] ** 2).sum(axis=1))
         return size
 
 
 def _split(effect: Floats, directions: Floats, slight: float) -> tuple[Floats, Floats]:
     """`directions` (k, n) as those whose `effect` (N, k) is slight, and the others."""
-    sizes, right = decomposed(effect)
+    sizes, right = singular_decomposition(effect)
     turned = right @ directions
     return turned[sizes <= slight], turned[sizes > slight]
 

@@ -1,14 +1,14 @@
 """The form of a suspicion, and of the two ways in which one arises.
 
-A *mend* is a supposition: "if x and y were exchanged". It is made on a copy, judged, and never
-kept. A *look* reads a suspicion off the data without a supposition: "row 7 is there twice".
+A *hypothesis* says what may be wrong: "if x and y were exchanged". It is tried on a copy, assessed,
+and never kept. An *inspection* reads a suspicion off the data themselves: "row 7 is there twice".
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -32,14 +32,14 @@ Root mean square over an instrument. Tolerances at their ends are 1.7 standard d
 uniform band, so this is about five of them."""
 
 LESS = 5.0
-"""How many times smaller a mend must make the residual."""
+"""How many times smaller a hypothesis must make the residual."""
 
 TRIMMED = 0.1
 """Share of the largest residuals that does not count, before and after: outliers are not blunders
 of the whole set, and a few must not hide one."""
 
 REDUNDANT = 3
-"""Observations beyond the fitted unknowns below which no supposition is made. With fewer, data are
+"""Observations beyond the fitted unknowns below which no hypothesis is tried. With fewer, data are
 called far off where they are twice as far off as others may be."""
 
 
@@ -50,8 +50,8 @@ class Suspicion:
     `code`: its kind; `sentence`: for people; `instrument`: its name, "" for all; `where`: columns;
     `rows`: indices of the measurements' rows, and their `lines` in the file, where not all are
     meant. `before`, `after`: rms of what was read less what the nominal machine would show, SI
-    `unit`, as the data are and as they would be with the supposition; `factor` = before / after
-    (nan, where there is no supposition). `refuses`: whether a calibration from these data must not
+    `unit`, as the data are and as they would be under the hypothesis; `factor` = before / after
+    (nan, where there is no hypothesis). `refuses`: whether a calibration from these data must not
     be offered before someone has looked.
     """
 
@@ -73,26 +73,27 @@ class Misfit:
     """How far readings are from a machine.
 
     `residual` (k,) SI; `quotients` (k,) residual over what is allowed; `column` (k,) number of the
-    column of each; `reach`: how far the machine moves what is read, in what is allowed.
+    column of each; `reach`: by how much the readings vary as the machine moves, in what is allowed.
     """
 
     residual: Floats
     quotients: Floats
     column: Indices
     reach: float
-    setup: Placement
+    placement: Placement
     redundancy: int
 
     def size(self, trimmed: bool = True) -> float:
         """Root mean square of the quotients of the worst column, corrected for what was fitted.
 
-        NaN where nothing is redundant. One column alone tells: a wrong sign of one angle must not
-        drown in five good columns.
+        NaN where nothing is redundant. The worst column counts, so that five good columns do not
+        hide a wrong sign of one angle.
         """
         if self.redundancy < 1:
             return float("nan")
         worst = max(
-            _rms(self.quotients[self.column == each], trimmed) for each in np.unique(self.column)
+            _rms(self.quotients[self.column == column], trimmed)
+            for column in np.unique(self.column)
         )
         return worst * math.sqrt(self.quotients.size / self.redundancy)
 
@@ -104,16 +105,16 @@ def _rms(values: Floats, trimmed: bool) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """A supposition and how far the data are off under it.
+    """What may be wrong, and how far the data are off if it is.
 
-    `words`: what is supposed, "the readings x and y are exchanged"; `where`: the columns;
+    `words`: what is assumed, "the readings x and y are exchanged"; `where`: the columns;
     `kept`: the observations that take part, None: all; `trimmed`: whether outliers are left out;
     `of_command`: whether it is what was commanded that would be wrong.
     """
 
     words: str
     where: tuple[str, ...]
-    judged: Misfit
+    misfit: Misfit
     kept: Indices | None = None
     trimmed: bool = True
     rows: tuple[int, ...] = ()
@@ -122,12 +123,12 @@ class Hypothesis:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredColumn:
-    """One measured column of an instrument: `at` (m,) its places among the observations."""
+    """One measured column of an instrument; `observations` (m,): numbers among the instrument's."""
 
     name: str
     observable: int
     strut: int
-    at: Indices
+    observations: Indices
 
     @property
     def unit(self) -> str:
@@ -139,33 +140,34 @@ class MeasuredColumn:
 class View:
     """One instrument's part of the measurements, against the nominal machine.
 
-    `at` (k,): its observations among the measurements'; `geometry`: of all rows; `readings`: what
+    `observations` (k,): its own among the measurements'; `geometry`: of all rows; `readings`: what
     it read, with `scale` (k,) what tolerances and noise allow.
     """
 
     machine: Machine
     measurements: Measurements
     instrument: Instrument
-    at: Indices
+    observations: Indices
     geometry: Geometry
     readings: Readings
 
     @cached_property
     def as_given(self) -> Misfit:
-        """How far the data are off as they are."""
-        return self.judge()
+        """The misfit of the data as they are."""
+        return self.assess()
 
     @cached_property
     def columns(self) -> tuple[MeasuredColumn, ...]:
         """The measured columns, in the order of the observables."""
         key = self.readings.observable * 100_000 + self.readings.strut
-        found = []
-        for each in np.unique(key):
-            at = np.flatnonzero(key == each)
-            observable = int(self.readings.observable[at[0]])
-            strut = int(self.readings.strut[at[0]])
-            found.append(MeasuredColumn(self._name(observable, strut), observable, strut, at))
-        return tuple(found)
+        columns = []
+        for number in np.unique(key):
+            observations = np.flatnonzero(key == number)
+            observable = int(self.readings.observable[observations[0]])
+            strut = int(self.readings.strut[observations[0]])
+            name = self._name(observable, strut)
+            columns.append(MeasuredColumn(name, observable, strut, observations))
+        return tuple(columns)
 
     def _name(self, observable: int, strut: int) -> str:
         name = OBSERVABLES[observable]
@@ -173,7 +175,12 @@ class View:
 
     def column(self, observable: str) -> MeasuredColumn | None:
         """The column of an observable that is of no strut."""
-        return next((each for each in self.columns if each.name == observable), None)
+        return next((column for column in self.columns if column.name == observable), None)
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """Names of the measured columns."""
+        return tuple(column.name for column in self.columns)
 
     @cached_property
     def rows(self) -> Indices:
@@ -183,74 +190,89 @@ class View:
     @cached_property
     def table(self) -> Indices | None:
         """(m, n_column) places among the observations; None where rows differ in columns."""
-        counts = [column.at.size for column in self.columns]
+        counts = [column.observations.size for column in self.columns]
         if set(counts) != {self.rows.size}:
             return None
-        by_row = [column.at[np.argsort(self.readings.row[column.at])] for column in self.columns]
-        return np.stack(by_row, axis=1)
+        return self.by_row(self.columns)
 
-    def judge(
+    def by_row(self, columns: Sequence[MeasuredColumn]) -> Indices:
+        """(m, n) places of columns of as many rows among the observations, in the rows' order."""
+        row = self.readings.row
+        ordered = [c.observations[np.argsort(row[c.observations])] for c in columns]
+        return np.stack(ordered, axis=1)
+
+    def assess(
         self,
         value: Floats | None = None,
         geometry: Geometry | None = None,
         kept: Indices | None = None,
         free: Free | None = None,
     ) -> Misfit:
-        """How far other values, other poses, a part of the data or a freer instrument are off."""
+        """The misfit of other values, other poses, a part of the data or a freer instrument."""
         readings = self.readings
         if value is not None:
-            readings = Readings(
-                readings.row, readings.observable, readings.strut, value, readings.scale
-            )
+            readings = replace(readings, value=value)
         if kept is not None:
             readings = readings.kept(kept)
-        place = self.geometry if geometry is None else geometry
-        supposed = value is not None or geometry is not None
-        setup, residual, fitted = fit_instrument(
-            place,
+        placement, residual, fitted = fit_instrument(
+            self.geometry if geometry is None else geometry,
             self.instrument,
             readings,
             free or Free.stated(self.instrument),
-            roughly=supposed,
+            roughly=value is not None or geometry is not None,
         )
         column = readings.observable * 100_000 + readings.strut
-        shown = (readings.value - residual) / readings.scale
-        reach = math.sqrt(sum(float(np.var(shown[column == each])) for each in np.unique(column)))
+        predicted = (readings.value - residual) / readings.scale
+        variances = [float(np.var(predicted[column == number])) for number in np.unique(column)]
+        reach = math.sqrt(sum(variances))
         redundancy = residual.size - fitted
-        return Misfit(residual, residual / readings.scale, column, reach, setup, redundancy)
+        return Misfit(residual, residual / readings.scale, column, reach, placement, redundancy)
 
-    def rms(self, judged: Misfit, mend: Hypothesis, unit: str) -> float:
-        """Of the residuals of one SI unit, of those observations that a mend keeps."""
+    def negated(self, columns: Sequence[MeasuredColumn], words: str) -> Hypothesis:
+        """That some columns are of the other sign."""
+        value = self.readings.value.copy()
+        for column in columns:
+            value[column.observations] *= -1.0
+        return Hypothesis(words, tuple(column.name for column in columns), self.assess(value))
+
+    def other_command(
+        self, geometry: Geometry | None, words: str, where: tuple[str, ...]
+    ) -> Iterator[Hypothesis]:
+        """That the machine was commanded to another geometry; nothing where it cannot be there."""
+        if geometry is not None:
+            yield Hypothesis(words, where, self.assess(geometry=geometry), of_command=True)
+
+    def rms(self, misfit: Misfit, hypothesis: Hypothesis, unit: str) -> float:
+        """Of the residuals of one SI unit, of those observations that a hypothesis keeps."""
         observable = self.readings.observable
-        residual = judged.residual
-        if mend.kept is not None:
-            observable = observable[mend.kept]
+        residual = misfit.residual
+        if hypothesis.kept is not None:
+            observable = observable[hypothesis.kept]
             if residual.size != observable.size:
-                residual = residual[mend.kept]
-        mine = residual[np.isin(observable, [i for i, u in enumerate(UNITS) if u == unit])]
-        return _rms(mine, mend.trimmed) if mine.size else 0.0
+                residual = residual[hypothesis.kept]
+        of_unit = residual[np.array(UNITS)[observable] == unit]
+        return _rms(of_unit, hypothesis.trimmed) if of_unit.size else 0.0
 
-    def moved(self, joints: Floats) -> Geometry | None:
-        """Where the nominal machine would be at other joints (n_row, n_joint); None: nowhere."""
+    def geometry_at_joints(self, joints: Floats) -> Geometry | None:
+        """The nominal machine at other joints (n_row, n_joint); None: it has no pose there."""
         kernel = self.machine.kernel
         poses, _ = kernel.forward(joints, status=True)
         if not np.isfinite(poses).all():
             return None
-        placements = kernel.placement_of(poses)
-        return Geometry.of(self.machine, joints, placements)
+        return Geometry.of(kernel, joints, kernel.placement_of(poses))
 
-    def commanded(self, poses: Floats) -> Geometry | None:
-        """Where it would be at other commanded poses (n_row, n_commanded); None: not reached."""
+    def geometry_at_poses(self, poses: Floats) -> Geometry | None:
+        """The nominal machine at other poses (n_row, n_commanded); None: it does not reach them."""
         joints, placements, status = self.machine.kernel.place(poses)
-        if (status > 1).any():  # out of travel is a place, though not a good one
+        if (status > 1).any():  # out of travel there is still a pose
             return None
-        return Geometry.of(self.machine, joints, placements)
+        return Geometry.of(self.machine.kernel, joints, placements)
 
     @cached_property
     def poses(self) -> Floats:
         """(n_row, n_commanded) the commanded poses, as the nominal machine has them."""
-        at = [self.machine.dof.index(freedom) for freedom in self.machine.commanded]
-        poses: Floats = self.machine.kernel.pose_of(self.measurements.placements)[:, at]
+        columns = [self.machine.dof.index(freedom) for freedom in self.machine.commanded]
+        poses: Floats = self.machine.kernel.pose_of(self.measurements.placements)[:, columns]
         return poses
 
     def lines(self, rows: Iterable[int]) -> tuple[int, ...]:
@@ -260,14 +282,14 @@ class View:
 
     def named_rows(self, rows: Iterable[int]) -> str:
         """Rows for people, "rows 3 and 7", from 1, or their lines where there is a file."""
-        given = [int(row) for row in rows]
-        lines = self.lines(given)
+        indices = list(rows)
+        lines = self.lines(indices)
         word = "line" if lines else "row"
-        numbers = [str(each) for each in (lines or [row + 1 for row in given])]
+        numbers = [str(number) for number in (lines or [row + 1 for row in indices])]
         shown = numbers[:6] + ([f"{len(numbers) - 6} more"] if len(numbers) > 6 else [])
         return f"{word}{'s' if len(numbers) > 1 else ''} {listed(shown)}"
 
-    def amount(self, value: float, unit: str) -> str:
+    def format(self, value: float, unit: str) -> str:
         """For people, in the machine file's unit: "0.12 mm"."""
         if unit == "1":
             return f"{value:.3g}"
@@ -282,23 +304,23 @@ def listed(words: Iterable[str]) -> str:
 
 
 @dataclass(frozen=True)
-class OfMend:
-    """A registry's line: a kind of blunder that a supposition shows.
+class HypothesisKind:
+    """A registry's line: a kind of blunder that a hypothesis shows.
 
-    `suppose(view)` yields what to try; `free`: it has numbers of its own to fit, and is asked only
+    `propose(view)` yields what to try; `free`: it has numbers of its own to fit, and is asked only
     where none of those without explains the data.
     """
 
     code: str
     doc: str
-    suppose: Callable[[View], Iterator[Hypothesis]]
+    propose: Callable[[View], Iterator[Hypothesis]]
     free: bool = False
 
 
 @dataclass(frozen=True)
-class OfLook:
+class InspectionKind:
     """A registry's line: a kind of fault that shows in the data as such."""
 
     code: str
     doc: str
-    look: Callable[[View], Iterator[Suspicion]]
+    inspect: Callable[[View], Iterator[Suspicion]]

@@ -6,7 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from truepose.calibration.data_checks._base import ALLOWED, REDUNDANT, OfLook, Suspicion, View
+from truepose.calibration.data_checks._base import (
+    ALLOWED,
+    REDUNDANT,
+    InspectionKind,
+    Suspicion,
+    View,
+)
 
 FEW = 3
 """Rows below which a constant or a coincidence says nothing."""
@@ -16,21 +22,22 @@ EQUAL = 1e-3
 the command, all of them, were not measured."""
 
 
-def look_constant(view: View) -> Iterator[Suspicion]:
+def inspect_constant(view: View) -> Iterator[Suspicion]:
     """The same number in every row although the machine moved."""
     predicted = view.readings.value - view.as_given.residual
     for column in view.columns:
-        value = view.readings.value[column.at]
-        if column.at.size < FEW or np.ptp(value) > 0.0:
+        value = view.readings.value[column.observations]
+        if column.observations.size < FEW or np.ptp(value) > 0.0:
             continue
         # As far as one constant is from all predictions at the best.
-        spread = float(predicted[column.at].std())
-        allowed = float(view.readings.scale[column.at].max())
+        spread = float(predicted[column.observations].std())
+        allowed = float(view.readings.scale[column.observations].max())
         if spread > ALLOWED * allowed:
             yield Suspicion(
                 "constant-column",
-                f"{view.instrument.name}: {column.name} is the same in all {column.at.size} rows, "
-                f"where the machine moves it by {view.amount(spread, column.unit)} (rms)",
+                f"{view.instrument.name}: {column.name} is the same in all "
+                f"{column.observations.size} rows, "
+                f"where the machine moves it by {view.format(spread, column.unit)} (rms)",
                 view.instrument.name,
                 (column.name,),
                 before=spread,
@@ -38,17 +45,17 @@ def look_constant(view: View) -> Iterator[Suspicion]:
             )
 
 
-def look_command(view: View) -> Iterator[Suspicion]:
+def inspect_command(view: View) -> Iterator[Suspicion]:
     """Readings equal to where the controller thinks it is."""
     if view.as_given.redundancy < REDUNDANT:
         return  # any readings agree with an instrument that is put where they fit
     exact = []
     for column in view.columns:
-        gap = np.abs(view.as_given.residual[column.at])
-        noise = view.measurements.uncertainty[view.at[column.at]]
-        spread = float(view.readings.value[column.at].std())
+        gap = np.abs(view.as_given.residual[column.observations])
+        noise = view.measurements.uncertainty[view.observations[column.observations]]
+        spread = float(view.readings.value[column.observations].std())
         near = EQUAL * np.minimum(noise, EQUAL * spread)
-        if column.at.size >= FEW and spread > 0.0 and (gap < near).all():
+        if column.observations.size >= FEW and spread > 0.0 and (gap < near).all():
             exact.append(column)
     if exact:
         names = tuple(column.name for column in exact)
@@ -59,12 +66,12 @@ def look_command(view: View) -> Iterator[Suspicion]:
             "not a measurement",
             view.instrument.name,
             names,
-            before=float(np.abs(view.as_given.residual[exact[0].at]).max()),
+            before=float(np.abs(view.as_given.residual[exact[0].observations]).max()),
             unit=exact[0].unit,
         )
 
 
-CONSTANT = OfLook(
-    "constant-column", "a column does not change although the machine moves", look_constant
+CONSTANT = InspectionKind(
+    "constant-column", "a column does not change although the machine moves", inspect_constant
 )
-COMMAND = OfLook("copied-command", "readings equal to the command", look_command)
+COMMAND = InspectionKind("copied-command", "readings equal to the command", inspect_command)

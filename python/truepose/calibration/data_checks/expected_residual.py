@@ -22,7 +22,7 @@ from truepose.sources.tolerance import DimensionalTolerance
 MACHINES = 24
 """Machines that are drawn, each tolerance at one of its ends: the spread is known to a seventh."""
 
-TAKEN = 5e-3
+ASSUMED = 5e-3
 """Where a file states no tolerance: this share of the machine's size, and this angle in rad."""
 
 
@@ -33,7 +33,7 @@ def expected_residual(machine: Machine, measurements: Measurements, geometry: Ge
     counts with its own length. Coordinates of one row share one number, and so do angles and
     directions, because an unknown frame may turn one into another.
     """
-    spread = _by_tolerance(machine, measurements, geometry)
+    by_tolerance = _by_tolerance(machine, measurements, geometry)
     linear, angular, own = _by_others(machine, measurements)
     row, observable = measurements.row, measurements.observable
     size = _size(machine, geometry)
@@ -42,7 +42,7 @@ def expected_residual(machine: Machine, measurements: Measurements, geometry: Ge
         [np.hypot(linear, own)[row], linear[row]],
         np.hypot(angular, linear / size)[row],
     )
-    allowed: Floats = np.sqrt(spread**2 + others**2 + measurements.uncertainty**2)
+    allowed: Floats = np.sqrt(by_tolerance**2 + others**2 + measurements.uncertainty**2)
     return allowed
 
 
@@ -54,42 +54,40 @@ def _size(machine: Machine, geometry: Geometry) -> float:
 
 
 def _bands(machine: Machine) -> Deviation | None:
-    found = [source for source in machine.sources if isinstance(source, DimensionalTolerance)]
-    return found[0].bands if found else None
+    bands = (s.bands for s in machine.sources if isinstance(s, DimensionalTolerance))
+    return next(bands, None)
 
 
 def _by_tolerance(machine: Machine, measurements: Measurements, geometry: Geometry) -> Floats:
     bands = _bands(machine)
     unit = np.array(UNITS)[measurements.observable]
-    taken = np.where(unit == "m", TAKEN * _size(machine, geometry), TAKEN)
+    assumed = np.where(unit == "m", ASSUMED * _size(machine, geometry), ASSUMED)
     if bands is None:
-        return taken
+        return assumed
     nominal = nominal_readings(machine, measurements, geometry=geometry)
     ends = np.random.default_rng(0).choice([-1.0, 1.0], (MACHINES, bands.n_variable))
     start = machine.kernel.pose_of(measurements.placements)
     squares = []
     for signs in ends:
-        moved = np.zeros(len(machine.parameters))
+        change = np.zeros(len(machine.parameters))
         np.add.at(
-            moved, bands.parameters, (bands.shift + bands.signed_half * signs[bands.variables])[0]
+            change, bands.parameters, (bands.shift + bands.signed_half * signs[bands.variables])[0]
         )
         columns = np.unique(bands.parameters)
-        values = machine.nominal + moved
+        values = machine.nominal + change
         kernel = machine.kernel.replace(
             {machine.parameters[column]: float(values[column]) for column in columns}
         )
         poses, _ = kernel.forward(measurements.joints, start, status=True)
         placements = kernel.placement_of(poses)
-        centres = kernel.joint_centres(measurements.joints, placements)
-        drawn = Geometry.of(machine, measurements.joints, placements)
-        drawn = Geometry(drawn.points, drawn.rotations, centres)
-        gap = nominal_readings(machine, measurements, geometry=drawn)
-        squares.append(difference(measurements.observable, gap, nominal) ** 2)
-    found = np.stack(squares)
-    solved = np.isfinite(found)
+        drawn = Geometry.of(kernel, measurements.joints, placements)
+        readings = nominal_readings(machine, measurements, geometry=drawn)
+        squares.append(difference(measurements.observable, readings, nominal) ** 2)
+    table = np.stack(squares)
+    solved = np.isfinite(table)
     # Where no drawn machine could be solved, as near a singularity: as if no tolerance were given.
-    mean = np.where(solved, found, 0.0).sum(axis=0) / np.maximum(solved.sum(axis=0), 1)
-    return _shared(measurements, np.where(solved.any(axis=0), mean, taken**2))
+    mean = np.where(solved, table, 0.0).sum(axis=0) / np.maximum(solved.sum(axis=0), 1)
+    return _shared(measurements, np.where(solved.any(axis=0), mean, assumed**2))
 
 
 def _shared(measurements: Measurements, squares: Floats) -> Floats:
@@ -119,8 +117,8 @@ def _by_others(machine: Machine, measurements: Measurements) -> tuple[Floats, Fl
     length in itself as much as to any parameter of that unit.
     """
     linear, angular, own = np.zeros((3, measurements.n_row))
-    at = [machine.dof.index(freedom) for freedom in machine.commanded]
-    poses = machine.kernel.pose_of(measurements.placements)[:, at]
+    columns = [machine.dof.index(freedom) for freedom in machine.commanded]
+    poses = machine.kernel.pose_of(measurements.placements)[:, columns]
     moves = np.array([component in "xyz" for component in machine.components])
     metres = np.array([unit == "m" for unit in machine.units])
     number = {id(condition): condition for condition in measurements.conditions}
@@ -134,16 +132,16 @@ def _by_others(machine: Machine, measurements: Measurements) -> tuple[Floats, Fl
         for source in acting(machine, condition):
             if isinstance(source, DimensionalTolerance):
                 continue
-            moved = source.deviation(machine, condition, block)
-            if not moved.parameters.size:
+            deviation = source.deviation(machine, condition, block)
+            if not deviation.parameters.size:
                 continue
-            slope, _ = machine.kernel.sensitivity_at(joints, placements, moved.parameters)
+            slope, _ = machine.kernel.sensitivity_at(joints, placements, deviation.parameters)
             slope = np.nan_to_num(slope)
-            shift = np.broadcast_to(moved.shift, (rows.size, moved.parameters.size))
-            half = np.broadcast_to(moved.half, shift.shape)
+            shift = np.broadcast_to(deviation.shift, (rows.size, deviation.parameters.size))
+            half = np.broadcast_to(deviation.half, shift.shape)
             known += np.einsum("nik,nk->ni", slope, shift)
             squares += np.einsum("nik,nk->ni", slope**2, half**2)
-            lengths = metres[moved.parameters]
+            lengths = metres[deviation.parameters]
             if lengths.any():
                 own[rows] += (np.abs(shift) + half)[:, lengths].max(axis=1)
         total = known**2 + squares

@@ -6,27 +6,27 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from truepose.calibration.data_checks._base import Hypothesis, OfMend, View
+from truepose.calibration.data_checks._base import Hypothesis, HypothesisKind, View
 from truepose.calibration.data_checks.nominal import Placement
 from truepose.calibration.data_checks.placement import Free
 from truepose.spatial import rotation_angle
 
 
-def suppose_target(view: View) -> Iterator[Hypothesis]:
-    """The point that is looked at stands off the stated one, along the platform's axes."""
+def propose_target(view: View) -> Iterator[Hypothesis]:
+    """The target is not at the stated point; the offset is along the platform's axes."""
     instrument = view.instrument
     if instrument.target_unknown or not _sees_point(view):
         return
     free = Free(tuple(instrument.frame.unknown), True, instrument.bias_unknown)
-    judged = view.judge(free=free)
-    off = judged.setup.target - np.array(instrument.target)
-    shown = ", ".join(view.amount(float(each), "m") for each in off)
-    words = f"the target stands ({shown}) off the stated point, in the platform's axes"
-    yield Hypothesis(words, _columns(view), judged)
+    misfit = view.assess(free=free)
+    off = misfit.placement.target - np.array(instrument.target)
+    offset = ", ".join(view.format(float(component), "m") for component in off)
+    words = f"the target stands ({offset}) off the stated point, in the platform's axes"
+    yield Hypothesis(words, view.column_names, misfit)
 
 
-def suppose_frame(view: View) -> Iterator[Hypothesis]:
-    """The frame stands elsewhere, or is turned, by one rigid motion for all rows."""
+def propose_frame(view: View) -> Iterator[Hypothesis]:
+    """The frame is displaced and turned from the stated one, by one rigid motion for all rows."""
     instrument = view.instrument
     if all(instrument.frame.unknown) or not _sees_frame(view):
         return
@@ -34,15 +34,15 @@ def suppose_frame(view: View) -> Iterator[Hypothesis]:
     spatial = "z" in view.machine.components
     unknown = (True, True, spatial, spatial, spatial, True)
     free = Free(unknown, instrument.target_unknown, instrument.bias_unknown)
-    judged = view.judge(free=free)
-    stated, found = Placement.stated(instrument), judged.setup
-    off = float(np.linalg.norm(found.origin - stated.origin))
-    turn = float(rotation_angle(found.rotation @ stated.rotation.T))
+    misfit = view.assess(free=free)
+    stated, fitted = Placement.stated(instrument), misfit.placement
+    off = float(np.linalg.norm(fitted.origin - stated.origin))
+    turn = float(rotation_angle(fitted.rotation @ stated.rotation.T))
     words = (
-        f"the readings are in another frame than stated: its origin {view.amount(off, 'm')} away, "
-        f"turned by {view.amount(turn, 'rad')}"
+        f"the readings are in another frame than stated: its origin {view.format(off, 'm')} away, "
+        f"turned by {view.format(turn, 'rad')}"
     )
-    yield Hypothesis(words, _columns(view), judged)
+    yield Hypothesis(words, view.column_names, misfit)
 
 
 def _sees_point(view: View) -> bool:
@@ -55,11 +55,7 @@ def _sees_frame(view: View) -> bool:
     ) or any(column.name in ("a", "b", "c") for column in view.columns)
 
 
-def _columns(view: View) -> tuple[str, ...]:
-    return tuple(column.name for column in view.columns)
-
-
-TARGET = OfMend(
-    "target-offset", "the target's offset is forgotten or wrong", suppose_target, free=True
+TARGET = HypothesisKind(
+    "target-offset", "the target's offset is forgotten or wrong", propose_target, free=True
 )
-FRAME = OfMend("other-frame", "read in another frame than stated", suppose_frame, free=True)
+FRAME = HypothesisKind("other-frame", "read in another frame than stated", propose_frame, free=True)

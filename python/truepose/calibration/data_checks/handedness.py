@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from truepose.calibration.data_checks._base import Hypothesis, OfMend, View
+from truepose.calibration.data_checks._base import Hypothesis, HypothesisKind, View
 
 _COORDINATES = ("x", "y", "z", "direction.x", "direction.y", "direction.z")
 
@@ -15,13 +15,9 @@ def propose(view: View) -> Iterator[Hypothesis]:
         columns = [
             c for c in view.columns if c.name == observable or c.name.endswith(f".{observable}")
         ]
-        if not columns:
-            continue
-        value = view.readings.value.copy()
-        for column in columns:
-            value[column.at] *= -1.0
-        words = f"the {observable[-1]} axis points the other way (a left-handed frame)"
-        yield Hypothesis(words, tuple(column.name for column in columns), view.judge(value))
+        if columns:
+            words = f"the {observable[-1]} axis points the other way (a left-handed frame)"
+            yield view.negated(columns, words)
 
 
-KIND = OfMend("flipped-axis", "one axis points the other way", propose)
+KIND = HypothesisKind("flipped-axis", "one axis points the other way", propose)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose._kernel import Machine as KernelMachine
 from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments._base import Frame, Instrument
 from truepose.calibration.measurements import Measurements
@@ -41,9 +42,9 @@ class Geometry:
     centres: Floats
 
     @classmethod
-    def of(cls, machine: Machine, joints: Floats, placements: Floats) -> Geometry:
+    def of(cls, kernel: KernelMachine, joints: Floats, placements: Floats) -> Geometry:
         """Of joints (n, n_joint) and the placements (n, 7) that they lead to."""
-        centres = machine.kernel.joint_centres(joints, placements)
+        centres = kernel.joint_centres(joints, placements)
         return cls(placements[:, :3], quaternion_to_matrix(placements[:, 3:]), centres)
 
     def rows(self, rows: Indices) -> Geometry:
@@ -70,7 +71,7 @@ class Placement:
 def read(
     geometry: Geometry,
     instrument: Instrument,
-    setup: Placement,
+    placement: Placement,
     row: Indices,
     observable: Indices,
     strut: Indices,
@@ -78,21 +79,21 @@ def read(
     """(k,) what one instrument reads: observation k is of row `row[k]` of the geometry; SI."""
     value: Floats = np.empty(row.size)
     turned = geometry.rotations
-    from_origin = geometry.points + turned @ setup.target - setup.origin
+    from_origin = geometry.points + turned @ placement.target - placement.origin
     of_point = (observable < A) | (observable == DISTANCE)
     if of_point.any():
-        seen = from_origin @ setup.rotation
+        seen = from_origin @ placement.rotation
         table = np.column_stack([seen, np.linalg.norm(seen, axis=1)])
         column = np.where(observable == DISTANCE, 3, observable)
         value[of_point] = table[row[of_point], column[of_point]]
     of_angle = (observable >= A) & (observable < DISTANCE)
     if of_angle.any():
-        angles = matrix_to_euler(setup.rotation.T @ turned)
+        angles = matrix_to_euler(placement.rotation.T @ turned)
         value[of_angle] = angles[row[of_angle], observable[of_angle] - A]
     of_strut = observable >= LENGTH
     if of_strut.any():
         value[of_strut] = _of_struts(
-            geometry, instrument, setup, row[of_strut], observable[of_strut], strut[of_strut]
+            geometry, instrument, placement, row[of_strut], observable[of_strut], strut[of_strut]
         )
     return value
 
@@ -100,7 +101,7 @@ def read(
 def _of_struts(
     geometry: Geometry,
     instrument: Instrument,
-    setup: Placement,
+    placement: Placement,
     row: Indices,
     observable: Indices,
     strut: Indices,
@@ -110,7 +111,7 @@ def _of_struts(
     length = np.linalg.norm(along, axis=1)
     value: Floats = length.copy()
     direction = along / length[:, np.newaxis]
-    framed = direction @ setup.rotation
+    framed = direction @ placement.rotation
     of_direction = (observable >= DIRECTION) & (observable < ANGLE)
     value[of_direction] = framed[of_direction, observable[of_direction] - DIRECTION]
     of_turn = observable == ANGLE
@@ -127,27 +128,27 @@ def _of_struts(
 def nominal_readings(
     machine: Machine,
     measurements: Measurements,
-    setups: Sequence[Placement] | None = None,
+    placements: Sequence[Placement] | None = None,
     geometry: Geometry | None = None,
 ) -> Floats:
     """(n_observation,) what the instruments read of the nominal machine, SI, at the joints given.
 
-    Each instrument stands where it is stated to, or as in `setups`; what is unknown of it counts as
-    its start. Biases count as zero. Raises nothing: a row that is not placed gives NaN.
+    Each instrument stands where it is stated to, or as in `placements`; what is unknown of it
+    counts as its start. Biases count as zero. Raises nothing: a row that is not placed gives NaN.
     """
     if geometry is None:
-        geometry = Geometry.of(machine, measurements.joints, measurements.placements)
+        geometry = Geometry.of(machine.kernel, measurements.joints, measurements.placements)
     value = np.empty(measurements.n_observation)
-    of = measurements.instrument[measurements.row]
+    instrument_of = measurements.instrument[measurements.row]
     for index, instrument in enumerate(measurements.instruments):
-        mine = np.flatnonzero(of == index)
-        setup = Placement.stated(instrument) if setups is None else setups[index]
-        value[mine] = read(
+        own = np.flatnonzero(instrument_of == index)
+        placement = Placement.stated(instrument) if placements is None else placements[index]
+        value[own] = read(
             geometry,
             instrument,
-            setup,
-            measurements.row[mine],
-            measurements.observable[mine],
-            measurements.strut[mine],
+            placement,
+            measurements.row[own],
+            measurements.observable[own],
+            measurements.strut[own],
         )
     return value

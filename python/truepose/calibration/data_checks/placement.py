@@ -34,7 +34,7 @@ TILT = 0.2
 """rad by which a frame is tilted where a search did not lead anywhere."""
 
 FAINT = 1e-5
-"""Derivatives below this share of the largest are none: differences do not tell them from zero."""
+"""Derivatives below this share of the largest count as zero: differences cannot resolve them."""
 
 FLAT = 0.02
 """Points that reach this share of their width out of a plane count as in it."""
@@ -101,9 +101,9 @@ def fit_instrument(
     *,
     roughly: bool = False,
 ) -> tuple[Placement, Floats, int]:
-    """(setup, residual (k,) read minus predicted, number of unknowns fitted), SI.
+    """(placement, residual (k,) read minus predicted, number of unknowns fitted), SI.
 
-    `roughly`: only from the likeliest start, and no further than what a supposition needs, most of
+    `roughly`: only from the likeliest start, and no further than what a hypothesis needs, most of
     which are wrong anyway.
     """
     columns, which = np.unique(
@@ -113,21 +113,21 @@ def fit_instrument(
     axes = np.flatnonzero(free.frame)
     count = axes.size + 3 * free.target + n_bias
 
-    def setup_of(start: Placement, unknown: Floats) -> Placement:
-        moved = np.zeros(6)
-        moved[axes] = unknown[: axes.size]
+    def placement_of(start: Placement, unknown: Floats) -> Placement:
+        change = np.zeros(6)
+        change[axes] = unknown[: axes.size]
         target = start.target
         if free.target:
             target = target + unknown[axes.size : axes.size + 3]
         return Placement(
-            start.origin + moved[:3], vector_to_matrix(moved[3:]) @ start.rotation, target
+            start.origin + change[:3], vector_to_matrix(change[3:]) @ start.rotation, target
         )
 
     def residual_of(start: Placement, unknown: Floats) -> Floats:
         predicted = read(
             geometry,
             instrument,
-            setup_of(start, unknown),
+            placement_of(start, unknown),
             readings.row,
             readings.observable,
             readings.strut,
@@ -149,11 +149,11 @@ def fit_instrument(
     best: tuple[float, Placement, Floats] | None = None
     for start in starts:
         over = partial(_over, residual_of, start, readings.scale)
-        found = _least_squares(over, count, steps, settled)
-        residual = residual_of(start, found)
+        unknown = _least_squares(over, count, steps, settled)
+        residual = residual_of(start, unknown)
         size = float(np.mean((residual / readings.scale) ** 2))
         if best is None or size < best[0]:
-            best = (size, setup_of(start, found), residual)
+            best = (size, placement_of(start, unknown), residual)
         if best[0] < ENOUGH**2:
             break
     assert best is not None
@@ -190,16 +190,16 @@ def _starts(
                 yield Placement(first.origin, tilt @ first.rotation, first.target)
 
 
-def _trilaterated(geometry: Geometry, setup: Placement, readings: Readings) -> Iterator[Floats]:
+def _trilaterated(geometry: Geometry, placement: Placement, readings: Readings) -> Iterator[Floats]:
     """Points (3,) with given distances to the target's: d^2 - P^2 = o^2 - 2 P.o, linear in o, o^2.
 
     And the mirror image behind the plane in which the points most nearly lie.
     """
-    mine = readings.observable == DISTANCE
-    points = (geometry.points + geometry.rotations @ setup.target)[readings.row[mine]]
+    of_distance = readings.observable == DISTANCE
+    points = (geometry.points + geometry.rotations @ placement.target)[readings.row[of_distance]]
     middle = points.mean(axis=0)
     points = points - middle
-    right = readings.value[mine] ** 2 - (points**2).sum(axis=1)
+    right = readings.value[of_distance] ** 2 - (points**2).sum(axis=1)
     mean = right.mean()
     _, size, axes = np.linalg.svd(points)
     thin = size[-1] < FLAT * size[0] or size.size < 3
@@ -241,10 +241,10 @@ def _least_squares(
     function: Callable[[Floats], Floats], count: int, steps: int, settled: float
 ) -> Floats:
     """(count,) that minimise the sum of squares, from zero; Levenberg's damping."""
-    at = np.zeros(count)
+    unknown = np.zeros(count)
     if not count:
-        return at
-    value = function(at)
+        return unknown
+    value = function(unknown)
     cost, damping = float(value @ value), 1e-9
     for _ in range(steps):
         jacobian = np.empty((value.size, count))
@@ -252,7 +252,7 @@ def _least_squares(
             # Readings are lengths and angles of a machine of metres: 1e-7 of either.
             step = np.zeros(count)
             step[k] = 1e-7
-            jacobian[:, k] = (function(at + step) - value) / 1e-7
+            jacobian[:, k] = (function(unknown + step) - value) / 1e-7
         size = np.linalg.norm(jacobian, axis=0)
         # What changes nothing to first order must not be made large by its own scale.
         size = np.maximum(size, max(FAINT * float(size.max()), np.finfo(float).tiny))
@@ -260,13 +260,13 @@ def _least_squares(
         for _ in range(12):
             rows = np.vstack([scaled, np.sqrt(damping) * np.eye(count)])
             right = np.concatenate([-value, np.zeros(count)])
-            tried = at + np.linalg.lstsq(rows, right, rcond=None)[0] / size
+            tried = unknown + np.linalg.lstsq(rows, right, rcond=None)[0] / size
             other = function(tried)
             if (less := float(other @ other)) <= cost:
                 gained, damping = cost - less, max(damping / 10.0, 1e-12)
-                at, value, cost = tried, other, less
+                unknown, value, cost = tried, other, less
                 break
             damping *= 10.0
         if gained <= settled * cost:
             break
-    return at
+    return unknown

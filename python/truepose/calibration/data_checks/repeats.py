@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from truepose.calibration.data_checks._base import OfLook, Suspicion, View
+from truepose.calibration.data_checks._base import InspectionKind, Suspicion, View
 
 DISAGREE = 6.0
 """Difference of two readings of one pose, in its standard deviation, that is no noise."""
@@ -15,21 +15,21 @@ FINE = 10.0
 """A reading whose last digit is this many times below its uncertainty does not repeat by chance."""
 
 
-def look_doubled(view: View) -> Iterator[Suspicion]:
+def inspect_doubled(view: View) -> Iterator[Suspicion]:
     """The same command and the same readings to the last digit."""
     if not _fine(view):
         return
     seen: dict[tuple[bytes, ...], int] = {}
     doubled: list[int] = []
     for row in view.rows.tolist():
-        mine = view.readings.row == row
-        value = view.readings.value[mine]
+        of_row = view.readings.row == row
+        value = view.readings.value[of_row]
         if not value.any():
             return  # a contact reads zero everywhere
         key = (
             view.measurements.joints[row].tobytes(),
             value.tobytes(),
-            view.readings.observable[mine].tobytes(),
+            view.readings.observable[of_row].tobytes(),
         )
         if key in seen:
             doubled += [seen[key], row]
@@ -41,26 +41,28 @@ def look_doubled(view: View) -> Iterator[Suspicion]:
             f"{view.instrument.name}: {view.named_rows(rows)} have the same command and the same "
             "reading to the last digit: copied rows, which would count as measured twice",
             view.instrument.name,
-            tuple(column.name for column in view.columns),
+            view.column_names,
             rows,
             view.lines(rows),
         )
 
 
-def look_disagreeing(view: View) -> Iterator[Suspicion]:
+def inspect_disagreeing(view: View) -> Iterator[Suspicion]:
     """The same command under the same condition, and readings that differ by more than noise."""
     rows: list[int] = []
     largest = 0.0
     for column in view.columns:
         seen: dict[tuple[bytes, int], int] = {}
-        for at in column.at.tolist():
-            row = int(view.readings.row[at])
+        for observation in column.observations.tolist():
+            row = int(view.readings.row[observation])
             condition = id(view.measurements.conditions[row])
             key = (view.measurements.joints[row].tobytes(), condition)
-            first = seen.setdefault(key, at)
-            gap = abs(view.readings.value[at] - view.readings.value[first])
-            noise = np.hypot(*view.measurements.uncertainty[view.at[[at, first]]])
-            if first != at and gap > DISAGREE * noise:
+            first = seen.setdefault(key, observation)
+            gap = abs(view.readings.value[observation] - view.readings.value[first])
+            noise = np.hypot(
+                *view.measurements.uncertainty[view.observations[[observation, first]]]
+            )
+            if first != observation and gap > DISAGREE * noise:
                 rows += [int(view.readings.row[first]), row]
                 largest = max(largest, float(gap / noise))
     if rows:
@@ -71,7 +73,7 @@ def look_disagreeing(view: View) -> Iterator[Suspicion]:
             f"that differ by up to {largest:.0f} standard uncertainties: the machine or the "
             "instrument moved, or the stated uncertainty is too small",
             view.instrument.name,
-            tuple(column.name for column in view.columns),
+            view.column_names,
             named,
             view.lines(named),
             refuses=False,
@@ -82,15 +84,20 @@ def _fine(view: View) -> bool:
     """Whether equal readings say something: many in a row, or digits far below the noise."""
     if len(view.columns) >= 3:
         return True
-    return all(_digits_below_noise(view, column.at) for column in view.columns)
+    return all(_digits_below_noise(view, column.observations) for column in view.columns)
 
 
-def _digits_below_noise(view: View, at: np.ndarray) -> bool:
-    values = np.unique(view.readings.value[at])
+def _digits_below_noise(view: View, observations: np.ndarray) -> bool:
+    values = np.unique(view.readings.value[observations])
     if values.size < 2:
         return False
-    return bool(np.diff(values).min() * FINE < view.measurements.uncertainty[view.at[at]].min())
+    return bool(
+        np.diff(values).min() * FINE
+        < view.measurements.uncertainty[view.observations[observations]].min()
+    )
 
 
-DOUBLED = OfLook("repeated-rows", "a row is there twice", look_doubled)
-DISAGREEING = OfLook("repeats-disagree", "repeats differ by more than noise", look_disagreeing)
+DOUBLED = InspectionKind("repeated-rows", "a row is there twice", inspect_doubled)
+DISAGREEING = InspectionKind(
+    "repeats-disagree", "repeats differ by more than noise", inspect_disagreeing
+)

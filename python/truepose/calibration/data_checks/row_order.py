@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from truepose.calibration.data_checks._base import Hypothesis, OfMend, View
+from truepose.calibration.data_checks._base import Hypothesis, HypothesisKind, View
 
 
-def suppose_shifted(view: View) -> Iterator[Hypothesis]:
+def propose_shifted(view: View) -> Iterator[Hypothesis]:
     """Every reading one row later or earlier than it stands; the row without one is left out."""
     table = view.table
     if table is None or len(table) < 4:
@@ -20,13 +20,11 @@ def suppose_shifted(view: View) -> Iterator[Hypothesis]:
         value = view.readings.value.copy()
         value[into] = view.readings.value[out]
         kept = np.sort(into.ravel())
-        said = f"the readings stand {words} beside what was commanded"
-        yield Hypothesis(
-            said, tuple(c.name for c in view.columns), view.judge(value, kept=kept), kept
-        )
+        shifted = f"the readings stand {words} beside what was commanded"
+        yield Hypothesis(shifted, view.column_names, view.assess(value, kept=kept), kept)
 
 
-def suppose_exchanged(view: View) -> Iterator[Hypothesis]:
+def propose_exchanged(view: View) -> Iterator[Hypothesis]:
     """Each row given the readings that lie nearest to what it should show, if none is given twice.
 
     An outlier has no row of its own that it would fit better, so that it is no exchange.
@@ -38,16 +36,18 @@ def suppose_exchanged(view: View) -> Iterator[Hypothesis]:
     scale, value = view.readings.scale[table], view.readings.value[table]
     gaps = (value[np.newaxis] - expected[:, np.newaxis]) / scale[:, np.newaxis]
     nearest = (gaps**2).sum(axis=2).argmin(axis=1)
-    moved = np.flatnonzero(nearest != np.arange(len(table)))
-    if not moved.size or np.unique(nearest).size != len(table):
+    exchanged = np.flatnonzero(nearest != np.arange(len(table)))
+    if not exchanged.size or np.unique(nearest).size != len(table):
         return
-    mended = view.readings.value.copy()
-    mended[table] = value[nearest]
-    rows = tuple(view.rows[moved].tolist())
+    reordered = view.readings.value.copy()
+    reordered[table] = value[nearest]
+    rows = tuple(view.rows[exchanged].tolist())
     words = f"the readings of {view.named_rows(rows)} stand in each other's place"
-    where = tuple(column.name for column in view.columns)
-    yield Hypothesis(words, where, view.judge(mended), trimmed=False, rows=rows)
+    misfit = view.assess(reordered)
+    yield Hypothesis(words, view.column_names, misfit, trimmed=False, rows=rows)
 
 
-SHIFTED = OfMend("shifted-rows", "readings stand one row beside their commands", suppose_shifted)
-EXCHANGED = OfMend("exchanged-rows", "readings stand in other rows", suppose_exchanged)
+SHIFTED = HypothesisKind(
+    "shifted-rows", "readings stand one row beside their commands", propose_shifted
+)
+EXCHANGED = HypothesisKind("exchanged-rows", "readings stand in other rows", propose_exchanged)

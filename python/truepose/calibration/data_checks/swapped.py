@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import combinations, permutations
 
-import numpy as np
-
-from truepose.calibration.data_checks._base import Hypothesis, MeasuredColumn, OfMend, View, listed
+from truepose.calibration.data_checks._base import (
+    Hypothesis,
+    HypothesisKind,
+    MeasuredColumn,
+    View,
+    listed,
+)
 
 FAMILIES = (("x", "y", "z"), ("a", "b", "c"))
 """Columns whose exchange is no wonder; those of struts go by what they measure."""
@@ -39,17 +43,16 @@ def _reordered(view: View, columns: Sequence[MeasuredColumn]) -> Iterator[Hypoth
 def _exchanged(
     view: View, columns: Sequence[MeasuredColumn], order: Sequence[int]
 ) -> Iterator[Hypothesis]:
-    moved = [(a, columns[order[k]]) for k, a in enumerate(columns) if order[k] != k]
-    if len({column.at.size for pair in moved for column in pair}) != 1:
+    pairs = [(a, columns[order[k]]) for k, a in enumerate(columns) if order[k] != k]
+    if len({column.observations.size for pair in pairs for column in pair}) != 1:
         return
     value = view.readings.value.copy()
-    for into, out in moved:
-        at = into.at[np.argsort(view.readings.row[into.at])]
-        of = out.at[np.argsort(view.readings.row[out.at])]
-        value[at] = view.readings.value[of]
-    names = tuple(column.name for column, _ in moved)
+    for into, out in pairs:
+        target, source = view.by_row([into, out]).T
+        value[target] = view.readings.value[source]
+    names = tuple(column.name for column, _ in pairs)
     words = f"the readings {listed(names)} stand in each other's place"
-    yield Hypothesis(words, names, view.judge(value))
+    yield Hypothesis(words, names, view.assess(value))
 
 
 def _joints(view: View) -> Iterator[Hypothesis]:
@@ -57,11 +60,9 @@ def _joints(view: View) -> Iterator[Hypothesis]:
     for i, j in combinations(range(len(names)), 2):
         joints = view.measurements.joints.copy()
         joints[:, [i, j]] = joints[:, [j, i]]
-        geometry = view.moved(joints)
-        if geometry is not None:
-            where = (f"joint.{names[i]}", f"joint.{names[j]}")
-            words = f"the joints {names[i]} and {names[j]} stand in each other's place"
-            yield Hypothesis(words, where, view.judge(geometry=geometry), of_command=True)
+        where = (f"joint.{names[i]}", f"joint.{names[j]}")
+        words = f"the joints {names[i]} and {names[j]} stand in each other's place"
+        yield from view.other_command(view.geometry_at_joints(joints), words, where)
 
 
 def _commands(view: View) -> Iterator[Hypothesis]:
@@ -71,11 +72,11 @@ def _commands(view: View) -> Iterator[Hypothesis]:
             continue
         poses = view.poses.copy()
         poses[:, [i, j]] = poses[:, [j, i]]
-        geometry = view.commanded(poses)
-        if geometry is not None:
-            where = (f"command.{freedoms[i]}", f"command.{freedoms[j]}")
-            words = f"the commands {freedoms[i]} and {freedoms[j]} stand in each other's place"
-            yield Hypothesis(words, where, view.judge(geometry=geometry), of_command=True)
+        where = (f"command.{freedoms[i]}", f"command.{freedoms[j]}")
+        words = f"the commands {freedoms[i]} and {freedoms[j]} stand in each other's place"
+        yield from view.other_command(view.geometry_at_poses(poses), words, where)
 
 
-KIND = OfMend("swapped-columns", "two or three columns stand in each other's place", propose)
+KIND = HypothesisKind(
+    "swapped-columns", "two or three columns stand in each other's place", propose
+)

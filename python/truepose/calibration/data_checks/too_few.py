@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from truepose.calibration.data_checks._base import MeasuredColumn, OfLook, Suspicion, View
+from truepose.calibration.data_checks._base import InspectionKind, MeasuredColumn, Suspicion, View
 
 BELOW_DIGIT = 20.0
-"""A standard uncertainty this many times below the last digit is none: rounding alone has 0.29."""
+"""A standard uncertainty this many times below the last digit is absurd: rounding has 0.29."""
 
 OVERSTATED = 0.1
 """Residuals, nothing fitted, below this share of the stated uncertainty: chance gives about 1."""
@@ -18,12 +18,12 @@ SOME = 8
 """Readings from which a scatter or a last digit can be told."""
 
 
-def look_few(view: View) -> Iterator[Suspicion]:
+def inspect_few(view: View) -> Iterator[Suspicion]:
     """Fewer readings than the instrument's own unknowns need."""
     instrument = view.instrument
     unknown = sum(instrument.frame.unknown) + 3 * instrument.target_unknown
     unknown += len(view.columns) * instrument.bias_unknown
-    count = view.at.size
+    count = view.observations.size
     if count > unknown:
         return
     needed = unknown + 1 - count
@@ -32,11 +32,11 @@ def look_few(view: View) -> Iterator[Suspicion]:
         f"{instrument.name}: {count} readings, and {unknown} unknowns of the instrument itself: "
         f"at least {needed} more before anything is said of the machine",
         instrument.name,
-        tuple(column.name for column in view.columns),
+        view.column_names,
     )
 
 
-def look_uncertainty(view: View) -> Iterator[Suspicion]:
+def inspect_uncertainty(view: View) -> Iterator[Suspicion]:
     """Uncertainties far below the last digit, or far above the scatter."""
     for column in view.columns:
         yield from _below_digit(view, column)
@@ -44,13 +44,13 @@ def look_uncertainty(view: View) -> Iterator[Suspicion]:
 
 
 def _below_digit(view: View, column: MeasuredColumn) -> Iterator[Suspicion]:
-    digit = last_digit(view.readings.value[column.at], column.unit)
-    noise = float(np.median(view.measurements.uncertainty[view.at[column.at]]))
+    digit = last_digit(view.readings.value[column.observations], column.unit)
+    noise = float(np.median(view.measurements.uncertainty[view.observations[column.observations]]))
     if digit is not None and digit > BELOW_DIGIT * noise:
         yield Suspicion(
             "absurd-uncertainty",
-            f"{view.instrument.name}: {column.name} is given to {view.amount(digit, column.unit)}, "
-            f"its standard uncertainty as {view.amount(noise, column.unit)}: rounding alone is "
+            f"{view.instrument.name}: {column.name} is given to {view.format(digit, column.unit)}, "
+            f"its standard uncertainty as {view.format(noise, column.unit)}: rounding alone is "
             f"{digit / noise / 12**0.5:.0f} times that",
             view.instrument.name,
             (column.name,),
@@ -61,12 +61,12 @@ def _below_digit(view: View, column: MeasuredColumn) -> Iterator[Suspicion]:
 
 
 def _overstated(view: View, column: MeasuredColumn) -> Iterator[Suspicion]:
-    noise = view.measurements.uncertainty[view.at[column.at]]
-    if column.at.size < SOME or view.as_given.redundancy < SOME:
+    noise = view.measurements.uncertainty[view.observations[column.observations]]
+    if column.observations.size < SOME or view.as_given.redundancy < SOME:
         return
-    if not view.readings.value[column.at].any():
+    if not view.readings.value[column.observations].any():
         return
-    ratio = float(np.sqrt(np.mean((view.as_given.residual[column.at] / noise) ** 2)))
+    ratio = float(np.sqrt(np.mean((view.as_given.residual[column.observations] / noise) ** 2)))
     if 0.0 < ratio < OVERSTATED:
         yield Suspicion(
             "absurd-uncertainty",
@@ -97,5 +97,7 @@ def last_digit(values: np.ndarray, unit: str) -> float | None:
     return None
 
 
-FEW = OfLook("too-few-data", "fewer readings than unknowns of the instrument", look_few)
-UNCERTAINTY = OfLook("absurd-uncertainty", "an uncertainty far off the scatter", look_uncertainty)
+FEW = InspectionKind("too-few-data", "fewer readings than unknowns of the instrument", inspect_few)
+UNCERTAINTY = InspectionKind(
+    "absurd-uncertainty", "an uncertainty far off the scatter", inspect_uncertainty
+)

@@ -14,38 +14,38 @@ little off, but another one, or other data."""
 
 
 def inspect(view: View) -> Iterator[Suspicion]:
-    """The data are off and nothing in the registry of suppositions mends them."""
-    judged = view.as_given
-    size = judged.size()
+    """The data are off and no hypothesis of the registry explains them."""
+    misfit = view.as_given
+    size = misfit.size()
     if not size > ALLOWED:
         return
-    worst = int(np.argmax(np.abs(judged.quotients)))
-    unit = next(c.unit for c in view.columns if worst in c.at)
-    same = np.flatnonzero(np.isin(np.arange(judged.residual.size), _of_unit(view, unit)))
-    residual = judged.residual[same]
+    worst = int(np.argmax(np.abs(misfit.quotients)))
+    unit = next(c.unit for c in view.columns if worst in c.observations)
+    same = np.flatnonzero(np.isin(np.arange(misfit.residual.size), _of_unit(view, unit)))
+    residual = misfit.residual[same]
     predicted = view.readings.value[same] - residual
     rms = float(np.sqrt(np.mean(residual**2)))
     reach = float(np.sqrt(np.mean((predicted - predicted.mean()) ** 2)))
     reach = max(reach, float(np.abs(predicted.mean())) if unit == "m" and _absolute(view) else 0.0)
     refuses = rms > ABSURD * reach
-    far = np.flatnonzero(np.abs(judged.quotients) > 2.0 * ALLOWED)
+    far = np.flatnonzero(np.abs(misfit.quotients) > 2.0 * ALLOWED)
     rows = tuple(np.unique(view.readings.row[far]).tolist())
     part = 0 < len(rows) < view.rows.size or view.rows.size == 1
     where = view.named_rows(rows) if part and rows else "all rows"
     if same.size == 1:
         off = (
-            f"reads {view.amount(float(view.readings.value[worst]), unit)} where the nominal "
-            f"machine has {view.amount(float(predicted[0]), unit)}"
+            f"reads {view.format(float(view.readings.value[worst]), unit)} where the nominal "
+            f"machine has {view.format(float(predicted[0]), unit)}"
         )
     else:
-        off = f"is {view.amount(rms, unit)} (rms) off what the nominal machine would show"
+        off = f"is {view.format(rms, unit)} (rms) off what the nominal machine would show"
     yield Suspicion(
         "far-off",
         f"{view.instrument.name}: {off}, {size:.0f} times what tolerances and noise allow "
         f"({where}), and no known blunder explains it"
         + (": these are not readings of this machine as described" if refuses else ""),
         view.instrument.name,
-        tuple(column.name for column in view.columns),
+        view.column_names,
         rows,
         view.lines(rows),
         before=rms,
@@ -55,7 +55,7 @@ def inspect(view: View) -> Iterator[Suspicion]:
 
 
 def _of_unit(view: View, unit: str) -> np.ndarray:
-    return np.concatenate([column.at for column in view.columns if column.unit == unit])
+    return np.concatenate([column.observations for column in view.columns if column.unit == unit])
 
 
 def _absolute(view: View) -> bool:

@@ -8,19 +8,25 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.calibration.data_checks._base import Hypothesis, MeasuredColumn, OfMend, View, listed
+from truepose.calibration.data_checks._base import (
+    Hypothesis,
+    HypothesisKind,
+    MeasuredColumn,
+    View,
+    listed,
+)
 
 LENGTHS = ((10.0, "10"), (25.4, "25.4, the inch"), (100.0, "100"), (1000.0, "1000"))
 ANGLES = ((180.0 / math.pi, "180/pi"),)
 
 
-def suppose_length(view: View) -> Iterator[Hypothesis]:
+def propose_length(view: View) -> Iterator[Hypothesis]:
     """All lengths, or one column, too large or too small by a factor; so the commands."""
     yield from _measured(view, [c for c in view.columns if c.unit == "m"], LENGTHS)
     yield from _commanded(view, "m", LENGTHS)
 
 
-def suppose_angle(view: View) -> Iterator[Hypothesis]:
+def propose_angle(view: View) -> Iterator[Hypothesis]:
     """Degrees declared as radians, or radians as degrees, in angles read or commanded."""
     yield from _measured(view, [c for c in view.columns if c.unit == "rad"], ANGLES)
     yield from _commanded(view, "rad", ANGLES)
@@ -40,23 +46,23 @@ def _measured(
     sets = [columns, *([column] for column in columns if len(columns) > 1)]
     for chosen in sets:
         names = tuple(column.name for column in chosen)
-        at = np.concatenate([column.at for column in chosen])
+        observations = np.concatenate([column.observations for column in chosen])
         for factor, word in _factors(factors):
             value = view.readings.value.copy()
             if factor > 1.0 and chosen[0].unit == "rad":
-                value[at] = _unwrapped(view, at, factor)
-            value[at] /= factor
+                value[observations] = _unwrapped(view, observations, factor)
+            value[observations] /= factor
             are = "are" if len(names) > 1 else "is"
-            yield Hypothesis(f"{listed(names)} {are} {word}", names, view.judge(value))
+            yield Hypothesis(f"{listed(names)} {are} {word}", names, view.assess(value))
 
 
-def _unwrapped(view: View, at: Indices, factor: float) -> Floats:
+def _unwrapped(view: View, observations: Indices, factor: float) -> Floats:
     """Angles that were read a factor too large: how many turns were taken off them is not known.
 
     The number of turns that comes nearest to what is expected is put back.
     """
-    value = view.readings.value[at]
-    expected = value - view.as_given.residual[at]
+    value = view.readings.value[observations]
+    expected = value - view.as_given.residual[observations]
     turns = np.round((factor * expected - value) / (2.0 * math.pi))
     unwrapped: Floats = value + 2.0 * math.pi * turns
     return unwrapped
@@ -66,31 +72,27 @@ def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> I
     machine, joints = view.machine, view.measurements.joints
     parameters = machine.parameters
     # A drive's coordinate has the unit of its offset.
-    mine = [
+    of_unit = [
         k
         for k, name in enumerate(machine.joints)
         if machine.units[parameters.index(f"drive.{name}.offset")] == unit
     ]
     freedoms = [k for k, name in enumerate(machine.commanded) if (name in "xyz") == (unit == "m")]
     for factor, word in _factors(factors):
-        if mine:
-            moved = joints.copy()
-            moved[:, mine] /= factor
-            geometry = view.moved(moved)
-            if geometry is not None:
-                where = tuple(f"joint.{machine.joints[k]}" for k in mine)
-                yield Hypothesis(
-                    f"the joints are {word}", where, view.judge(geometry=geometry), of_command=True
-                )
+        if of_unit:
+            scaled = joints.copy()
+            scaled[:, of_unit] /= factor
+            where = tuple(f"joint.{machine.joints[k]}" for k in of_unit)
+            geometry = view.geometry_at_joints(scaled)
+            yield from view.other_command(geometry, f"the joints are {word}", where)
         if freedoms:
             poses = view.poses.copy()
             poses[:, freedoms] /= factor
-            geometry = view.commanded(poses)
-            if geometry is not None:
-                where = tuple(f"command.{machine.commanded[k]}" for k in freedoms)
-                words = f"the commands {listed(machine.commanded[k] for k in freedoms)} are {word}"
-                yield Hypothesis(words, where, view.judge(geometry=geometry), of_command=True)
+            names = [machine.commanded[k] for k in freedoms]
+            where = tuple(f"command.{name}" for name in names)
+            words = f"the commands {listed(names)} are {word}"
+            yield from view.other_command(view.geometry_at_poses(poses), words, where)
 
 
-LENGTH = OfMend("wrong-unit", "lengths in another unit than declared", suppose_length)
-ANGLE = OfMend("degrees-radians", "degrees for radians, or the reverse", suppose_angle)
+LENGTH = HypothesisKind("wrong-unit", "lengths in another unit than declared", propose_length)
+ANGLE = HypothesisKind("degrees-radians", "degrees for radians, or the reverse", propose_angle)

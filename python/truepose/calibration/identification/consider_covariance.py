@@ -21,10 +21,14 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.assessment import ROUNDING, Reason, both
+from truepose.calibration.acceptance.assessment import ROUNDING, Reason, at_worst_pose, is_kept
 from truepose.calibration.acceptance.decision import Gate
-from truepose.calibration.acceptance.observability import of_machine, prior_root, row_covariance
-from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
+from truepose.calibration.acceptance.observability import (
+    covariance_root,
+    project_out_instruments,
+    row_covariance,
+)
+from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty, tool_components
 from truepose.calibration.identification.fit import Fit, whitened
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.tool_effects import tool_effects
@@ -34,15 +38,13 @@ from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.machine import Machine
 
 SLIGHT = 1.05
-"""An uncertainty that the considered tolerances make less than so much larger needs no warning."""
+"""If the considered tolerances raise an uncertainty by less than this, there is no warning."""
 
 SOURCE = 0.5
-"""Of the uncertainty: tolerances that make up so much of it are named as its cause."""
+"""Share of the uncertainty from which tolerances are named as its cause."""
 
 _OF_GAIN = ("not-determined", "not-told-apart", "less-than-tolerance", "no-gain", "not-identified")
 """Codes of the reasons that a remedy is for."""
-
-_ANGLES = {"rx": "a", "ry": "b", "rz": "c"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,8 @@ class Considered:
     """The tool with all tolerances, those that were identified and those that were not.
 
     `labels` of the latter, and `every` tolerance. `before` is None where something that moves the
-    tool has no tolerance; `alone` is `after` were the others exact, `part` what these make of it.
+    tool has no tolerance; `alone` is `after` if those not identified were exact, `part` is what
+    they contribute to it.
     `relative`: without what moves the whole machine in an instrument's unknown frame.
     """
 
@@ -72,36 +75,36 @@ def consider_covariance(
     `identify`: as it was asked; `joints`, `placements`: of the poses at which the tool counts, all
     of them within reach of the calibrated machine.
     """
-    joint = _with_the_rest(machine, fitted, identify)
-    if joint is None:
+    every = _with_unidentified(machine, fitted, identify)
+    if every is None:
         return None
-    count = joint.n_machine
-    found = np.array([joint.names.index(each) for each in fitted.unknowns.names], np.intp)
-    values = np.zeros(joint.count)
-    values[found] = fitted.values
-    rest = np.setdiff1d(np.arange(count), found)
-    problem = IdentificationProblem(machine, fitted.measurements, joint)
+    count = every.n_machine
+    identified = np.array([every.names.index(name) for name in fitted.unknowns.names], np.intp)
+    values = np.zeros(every.count)
+    values[identified] = fitted.values
+    unidentified = np.setdiff1d(np.arange(count), identified)
+    problem = IdentificationProblem(machine, fitted.measurements, every)
     rows = np.sqrt(fitted.weights)[:, np.newaxis] * whitened(problem, values) / fitted.birge
-    effects, _ = tool_effects(machine, joint, values, joints, placements)
-    components = [_ANGLES.get(name, name) for name in machine.components]
-    tool = Tool.of(effects, components, placements[:, :3])
-    prior = np.asarray(joint.prior_covariance, np.float64)[:count, :count]
+    effects, _ = tool_effects(machine, every, values, joints, placements)
+    tool = Tool.of(effects, tool_components(machine), placements[:, :3])
+    prior = np.asarray(every.prior_covariance, np.float64)[:count, :count]
     sigma: Floats = np.sqrt(np.diagonal(prior))
     relative = False
-    if joint.count > count:
-        gauge = tool.sort(row_covariance(of_machine(rows, count, sigma)), with_gauge=True).gauge
+    if every.count > count:
+        gauge = tool.sort(
+            row_covariance(project_out_instruments(rows, count, sigma)), with_gauge=True
+        ).gauge
         relative, tool = len(gauge) > 0, tool.relative(gauge)
     none = np.zeros((0, count))
-    before = None
-    if np.isfinite(sigma[tool.moved]).all():
-        before = tool.uncertainty(prior_root(prior), none)
     exact = np.zeros((count, fitted.unknowns.n_machine))
-    exact[found[: exact.shape[1]]] = _root(fitted.covariance[: exact.shape[1], : exact.shape[1]])
-    root, part = _roots(fitted, joint, rows, found, rest)
+    exact[identified[: exact.shape[1]]] = covariance_root(
+        fitted.covariance[: exact.shape[1], : exact.shape[1]]
+    )
+    root, part = _roots(fitted, every, rows, identified, unidentified)
     return Considered(
-        tuple(joint.labels[at] for at in rest),
-        joint.labels[:count],
-        before,
+        tuple(every.labels[at] for at in unidentified),
+        every.labels[:count],
+        tool.beforehand(prior),
         tool.uncertainty(root, none),
         tool.uncertainty(exact, none),
         tool.uncertainty(part, none),
@@ -110,7 +113,7 @@ def consider_covariance(
     )
 
 
-def _with_the_rest(machine: Machine, fitted: Fit, identify: Sequence[str]) -> Unknowns | None:
+def _with_unidentified(machine: Machine, fitted: Fit, identify: Sequence[str]) -> Unknowns | None:
     """What was identified, and all tolerances that were not; None where there are none."""
     if not identify:
         return None
@@ -118,73 +121,71 @@ def _with_the_rest(machine: Machine, fitted: Fit, identify: Sequence[str]) -> Un
         every = unknowns_of(machine, fitted.measurements)
     except RequestError:  # no tolerance at all
         return None
-    chosen = set(fitted.unknowns.names)
-    left = [name for name in every.names[: every.n_machine] if name not in chosen]
-    if not left:
+    identified = set(fitted.unknowns.names)
+    unidentified = [name for name in every.names[: every.n_machine] if name not in identified]
+    if not unidentified:
         return None
-    return unknowns_of(machine, fitted.measurements, [*identify, *left])
-
-
-def _root(covariance: Floats) -> Floats:
-    """(n, n) with covariance = root root^T."""
-    sigma = np.sqrt(np.diagonal(covariance))
-    scale = np.where(sigma > 0.0, sigma, 1.0)
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    root: Floats = scale[:, np.newaxis] * vectors * np.sqrt(np.maximum(values, 0.0))
-    return root
+    return unknowns_of(machine, fitted.measurements, [*identify, *unidentified])
 
 
 def _roots(
-    fitted: Fit, joint: Unknowns, rows: Floats, found: Indices, rest: Indices
+    fitted: Fit, every: Unknowns, rows: Floats, identified: Indices, unidentified: Indices
 ) -> tuple[Floats, Floats]:
     """Roots (n_machine, k) of the covariance of all errors, and of what the rest makes of it.
 
     `rows` (m, n) of all unknowns, weighted; `found`: where those of the fit are among them.
     """
     own = fitted.unknowns
-    n, count = own.n_machine, joint.n_machine
-    gain = fitted.covariance @ rows[:, found].T
-    follows = -gain @ rows[:, rest]
-    beforehand = prior_root(joint.prior_covariance[:count, :count])
+    n, count = own.n_machine, every.n_machine
+    gain = fitted.covariance @ rows[:, identified].T
+    response = -gain @ rows[:, unidentified]
+    beforehand = covariance_root(every.prior_covariance[:count, :count])
     known = np.zeros((own.count, beforehand.shape[1]))
-    known[:n] = beforehand[found[:n]]
+    known[:n] = beforehand[identified[:n]]
     held = Prior.of(own).rows if fitted.use_prior else np.zeros((0, own.count))
-    moved = fitted.covariance @ (held.T @ (held @ known)) + follows @ beforehand[rest]
+    of_identified = (
+        fitted.covariance @ (held.T @ (held @ known)) + response @ beforehand[unidentified]
+    )
     noise = np.asarray(np.linalg.qr(gain[:n].T, mode="r"), np.float64).T
     # The fit takes what was not identified for nominal: middles of bands off zero stay in it.
-    middle = follows[:n] @ joint.prior_mean[rest]
+    middle = response[:n] @ every.prior_mean[unidentified]
     of_prior = np.zeros_like(beforehand)
-    of_prior[found[:n]], of_prior[rest] = moved[:n], beforehand[rest]
+    of_prior[identified[:n]], of_prior[unidentified] = of_identified[:n], beforehand[unidentified]
     of_data = np.zeros((count, noise.shape[1] + 1))
-    of_data[found[:n]] = np.column_stack([noise, middle])
-    alone = prior_root(joint.prior_covariance[np.ix_(rest, rest)])
+    of_data[identified[:n]] = np.column_stack([noise, middle])
+    alone = covariance_root(every.prior_covariance[np.ix_(unidentified, unidentified)])
     part = np.zeros((count, alone.shape[1] + 1))
-    part[found[:n]] = np.column_stack([follows[:n] @ alone, middle])
-    part[rest, :-1] = alone
+    part[identified[:n]] = np.column_stack([response[:n] @ alone, middle])
+    part[unidentified, :-1] = alone
     return np.hstack([of_prior, of_data]), part
 
 
 def with_considered(
-    gate: Gate, found: Considered | None, target: tuple[float | None, float | None]
+    gate: Gate, considered: Considered | None, target: tuple[float | None, float | None]
 ) -> Gate:
-    """The gate with what all tolerances leave uncertain, and its answer by that.
+    """The gate with the uncertainty that all tolerances leave, and its answer by that.
 
     `target`: what is asked of the tool, m and rad.
     """
-    if found is None or any(each.code == "not-determined" for each in gate.reasons):
+    if considered is None or any(reason.code == "not-determined" for reason in gate.reasons):
         return gate
-    reasons = [each for each in gate.reasons if each.code != "no-gain"]
-    within = _is_within(found, target)
-    reasons += _no_gain(found, gate.margin, within=within)
-    codes = {each.code for each in reasons}
-    warnings = [each for each in gate.warnings if each.code not in ("one-sided", "not-needed")]
+    reasons = [reason for reason in gate.reasons if reason.code != "no-gain"]
+    within = _keeps_target(considered, target)
+    reasons += _no_gain(considered, gate.margin, within=within)
+    codes = {reason.code for reason in reasons}
+    warnings = [
+        warning for warning in gate.warnings if warning.code not in ("one-sided", "not-needed")
+    ]
     if within and codes not in ({"no-gain"}, {"not-identified"}):
-        text = "what is asked of the tool is kept without calibration: it is not needed"
+        text = (
+            "the machine as filed already keeps the accuracy that is asked: "
+            "calibration is not needed"
+        )
         warnings.append(Reason("not-needed", text))
     if not codes & set(_OF_GAIN):
-        warnings += _one_sided(found, gate.margin)
+        warnings += _one_sided(considered, gate.margin)
     if "not-identified" not in codes:
-        warnings += _heed(found)
+        warnings += _unidentified_warning(considered)
     remedy = gate.remedy if codes & (set(_OF_GAIN) - {"not-identified"}) else None
     return replace(
         gate,
@@ -192,55 +193,59 @@ def with_considered(
         reasons=tuple(reasons),
         warnings=tuple(warnings),
         remedy=remedy,
-        before=found.before,
-        after=found.after,
-        relative=gate.relative or found.relative,
+        before=considered.before,
+        after=considered.after,
+        relative=gate.relative or considered.relative,
     )
 
 
-def _pairs(found: Considered) -> list[tuple[str, str, float, float]]:
+def _pairs(considered: Considered) -> list[tuple[str, str, float, float]]:
     """(name, unit, after, before) of what had an uncertainty."""
     return [
         (name, unit, size, was)
-        for name, unit, size, was in both(found.after, found.before)
+        for name, unit, size, was in at_worst_pose(considered.after, considered.before)
         if was is not None and (was > 0.0 or size > 0.0)
     ]
 
 
-def _no_gain(found: Considered, margin: float, *, within: bool) -> list[Reason]:
-    """The tool is not known better than before: the gate's rule, with all tolerances."""
-    pairs = _pairs(found)
-    worse = [each for each in pairs if each[2] > (1.0 + ROUNDING) * each[3]]
+def _no_gain(considered: Considered, margin: float, *, within: bool) -> list[Reason]:
+    """The tool is not known better than before: the gate's rule, applied to all tolerances."""
+    pairs = _pairs(considered)
+    worse = [pair for pair in pairs if pair[2] > (1.0 + ROUNDING) * pair[3]]
     gained = any(size <= margin * was for _, _, size, was in pairs)
     if not pairs or (gained and not worse):
         return []
     texts = [
-        f"{name} uncertain by {sentences.quantity(size, unit, units=found.shown)}, against "
-        f"{sentences.quantity(was, unit, units=found.shown)} of the machine as filed"
+        f"{name} uncertain by {sentences.quantity(size, unit, units=considered.shown)}, against "
+        f"{sentences.quantity(was, unit, units=considered.shown)} of the machine as filed"
         for name, unit, size, was in worse or pairs
     ]
-    ending = "; but what is asked of the tool is kept without calibration" if within else ""
-    if not _is_source(found):
+    ending = "; but the machine as filed already keeps the accuracy that is asked" if within else ""
+    if not _is_source(considered):
         texts[0] = texts[0].replace(" uncertain", " would be uncertain", 1)
         text = f"at the worst pose of the workspace {', and '.join(texts)}{ending}"
         return [Reason("no-gain", text)]
     text = (
-        f"the tolerances that were not identified ({_named(found)}) leave {', and '.join(texts)}, "
-        f"at the worst pose of the workspace: identify them too{ending}"
+        f"the tolerances that were not identified ({_named(considered)}) leave "
+        f"{', and '.join(texts)}, at the worst pose of the workspace: identify them too{ending}"
     )
     return [Reason("not-identified", text)]
 
 
-def _is_source(found: Considered) -> bool:
+def _is_source(considered: Considered) -> bool:
     """Whether the tolerances that were not identified are what makes the tool uncertain."""
-    pairs = zip(both(found.part, None), both(found.after, None), strict=True)
+    pairs = zip(
+        at_worst_pose(considered.part, None),
+        at_worst_pose(considered.after, None),
+        strict=True,
+    )
     return any(size > 0.0 and part >= SOURCE * size for (*_, part, _), (*_, size, _) in pairs)
 
 
-def _one_sided(found: Considered, margin: float) -> list[Reason]:
+def _one_sided(considered: Considered, margin: float) -> list[Reason]:
     sizes = (
-        (name, sentences.quantity(size, unit, units=found.shown))
-        for name, unit, size, was in _pairs(found)
+        (name, sentences.quantity(size, unit, units=considered.shown))
+        for name, unit, size, was in _pairs(considered)
         if was > 0.0 and size > margin * was
     )
     return [
@@ -249,34 +254,38 @@ def _one_sided(found: Considered, margin: float) -> list[Reason]:
     ]
 
 
-def _heed(found: Considered) -> list[Reason]:
+def _unidentified_warning(considered: Considered) -> list[Reason]:
     """What the tolerances that were not identified add, where it is more than slight."""
-    pairs = list(zip(both(found.after, None), both(found.alone, None), strict=True))
+    pairs = list(
+        zip(
+            at_worst_pose(considered.after, None),
+            at_worst_pose(considered.alone, None),
+            strict=True,
+        )
+    )
     more = [
-        f"{name} would be known to {sentences.quantity(less, unit, units=found.shown)} in place of "
-        f"{sentences.quantity(size, unit, units=found.shown)}"
+        f"{name} would be known to {sentences.quantity(less, unit, units=considered.shown)} "
+        f"instead of {sentences.quantity(size, unit, units=considered.shown)}"
         for (name, unit, size, _), (*_, less, _) in pairs
         if size > SLIGHT * less
     ]
     if not more:
         return []
     text = (
-        f"{_named(found)} were not identified and count with their tolerances: "
-        f"were they exact, {' and '.join(more)}; identify them too if that is too much"
+        f"{_named(considered)} were not identified and count with their tolerances: "
+        f"if they were exact, {' and '.join(more)}; identify them too if this is too uncertain"
     )
     return [Reason("not-identified", text)]
 
 
-def _named(found: Considered) -> str:
-    return sentences.listed(sentences.collapsed(found.labels, found.every))
+def _named(considered: Considered) -> str:
+    return sentences.listed(sentences.collapsed(considered.labels, considered.every))
 
 
-def _is_within(found: Considered, target: tuple[float | None, float | None]) -> bool:
+def _keeps_target(considered: Considered, target: tuple[float | None, float | None]) -> bool:
     """Whether the machine as filed keeps what is asked."""
-    before = found.before
-    was = (None, None) if before is None else (before.position_max, before.rotation_max)
-    pairs = [(asked, size) for asked, size in zip(target, was, strict=True) if asked is not None]
-    return bool(pairs) and all(size is not None and size <= asked for asked, size in pairs)
+    before = considered.before
+    return is_kept(target, (None, None) if before is None else before.worst)
 
 
 __all__ = ["Considered", "consider_covariance", "with_considered"]

@@ -18,13 +18,14 @@ from truepose.arrays import Floats
 from truepose.calibration.identification.frames import (
     FAR,
     TURNED,
+    frame_starts,
     rebase_frame,
     rotated_starts,
-    with_frames_found,
 )
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.robust import LOSS_ROUNDS, noise_of, weights_of
 from truepose.calibration.identification.unknowns import Unknowns
+from truepose.calibration.least_squares import singular_decomposition
 from truepose.calibration.measurements import Measurements
 from truepose.errors import Problem as Refused
 from truepose.errors import RequestError
@@ -37,8 +38,8 @@ ROUNDING = 1e-13
 """Columns of the equations shorter than this share of the longest are rounding."""
 
 HELD = 1e-3
-"""How firmly an undetermined direction is held, in shares of the largest singular value: it is
-nowhere else, for nothing pulls at it."""
+"""Weight of the rows that hold an undetermined direction, in shares of the largest singular value;
+no other equation acts on it."""
 
 SETTLED = ("cost", "step", "gradient")
 
@@ -101,9 +102,9 @@ class Fit:
     @property
     def deviations(self) -> Floats:
         """(n,) standard uncertainties; infinite where an unknown is not determined."""
-        found: Floats = np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0))
+        deviations: Floats = np.sqrt(np.maximum(np.diagonal(self.covariance), 0.0))
         open_ = (np.abs(self.null_space) > 1e-6).any(axis=0)
-        return np.where(open_, np.inf, found)
+        return np.where(open_, np.inf, deviations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,19 +134,14 @@ class Equations:
         nothing = norms <= ROUNDING * norms.max(initial=0.0)
         norms[nothing], equations[:, nothing] = 0.0, 0.0
         variances = np.diagonal(unknowns.prior_covariance)
-        known = np.isfinite(variances)
+        has_prior = np.isfinite(variances)
         scale = np.where(norms > 0.0, 1.0 / np.where(norms > 0.0, norms, 1.0), 1.0)
-        scale[known] = np.sqrt(variances[known])
-        count = unknowns.count
+        scale[has_prior] = np.sqrt(variances[has_prior])
         scaled = equations * scale
         if left_out is not None and len(left_out):
             basis = np.linalg.qr((left_out / scale).T)[0].T
             scaled = scaled - scaled @ basis.T @ basis
-        factor = np.linalg.qr(scaled, mode="r")
-        _, found, directions = np.linalg.svd(factor, full_matrices=True)
-        singular = np.zeros(count)
-        singular[: found.size] = found
-        return cls(scale, singular, directions)
+        return cls(scale, *singular_decomposition(np.asarray(np.linalg.qr(scaled, mode="r"))))
 
     @property
     def seen(self) -> np.ndarray:
@@ -168,7 +164,7 @@ class Equations:
         covariance: Floats = rows.T @ rows
         return covariance
 
-    def holding(self) -> Floats:
+    def gauge_rows(self) -> Floats:
         """(k, n) rows that hold what is not determined."""
         firmness = HELD * float(self.singular.max(initial=1.0))
         rows: Floats = firmness * self.null_space / self.scale
@@ -217,7 +213,7 @@ def fit(
     evaluations, same = 0, True
     freed, left_out = np.empty((0, unknowns.count)), None
     for _ in range(LOSS_ROUNDS):
-        held = prior.with_rows(equations.holding())
+        held = prior.with_rows(equations.gauge_rows())
         solved = problem.solve(prior=held, weights=weights / scale**2, start=values)
         evaluations += solved.evaluations[0]
         # Readings that fit to the last digit leave nothing that a step could be judged by.
@@ -274,7 +270,7 @@ def place_instruments(
     """The problem, its instruments where the machine as filed has them, and values (n,) of that.
 
     Of several starts of the frames the one that fits best is taken, one that settles before one
-    that does not; frames that then still are far from fitting are turned further.
+    that does not; frames that are still far from fitting are then tried in other rotations.
 
     Raises `RequestError` (no-fit) where from no start the readings can be followed.
     """
@@ -283,7 +279,7 @@ def place_instruments(
     of = measurements.instrument[measurements.row]
     for number in [None, *unknowns.frames]:
         if number is None:
-            starts = with_frames_found(machine, measurements)
+            starts = frame_starts(machine, measurements)
         elif best is None:
             starts = rotated_starts(machine, measurements, number)
         else:
@@ -291,14 +287,14 @@ def place_instruments(
             residual = best[2].residual(best[3])[of == number]
             near = not best[0] and float(np.sum(residual**2)) <= FAR**2 * residual.size
             starts = [] if near else rotated_starts(machine, best[2].measurements, number)
-        for each in starts:
+        for start in starts:
             try:
-                found = _instruments(machine, each, unknowns.of_instruments)
+                placed = _fit_instruments(machine, start, unknowns.of_instruments)
             except RequestError as failure:
                 refused = failure
                 continue
-            if best is None or found[:2] < best[:2]:
-                best = found
+            if best is None or placed[:2] < best[:2]:
+                best = placed
     if best is None:
         assert refused is not None
         raise refused
@@ -307,12 +303,12 @@ def place_instruments(
     turns = [at for own in alone.frames.values() for at in own[3:6] if at is not None]
     if np.abs(values[turns]).max(initial=0.0) > TURNED:
         standing = rebase_frame(standing, alone, values)
-        values = _instruments(machine, standing, alone)[3]
-    machine_too = np.concatenate([np.zeros(unknowns.n_machine), values])
-    return IdentificationProblem(machine, standing, unknowns), machine_too
+        values = _fit_instruments(machine, standing, alone)[3]
+    of_all = np.concatenate([np.zeros(unknowns.n_machine), values])
+    return IdentificationProblem(machine, standing, unknowns), of_all
 
 
-def _instruments(
+def _fit_instruments(
     machine: Machine, measurements: Measurements, alone: Unknowns
 ) -> tuple[bool, float, IdentificationProblem, Floats]:
     """(whether unsettled, cost, problem, values) of the instruments' unknowns alone.
@@ -324,7 +320,7 @@ def _instruments(
     unsettled = False
     if alone.count:
         none = Prior.none(alone.count)
-        held = none.with_rows(Equations.of(whitened(problem, values), none, alone).holding())
+        held = none.with_rows(Equations.of(whitened(problem, values), none, alone).gauge_rows())
         solved = problem.solve(prior=held, start=values)
         values = solved.values[0]
         unsettled = solved.ending[0] not in SETTLED
@@ -335,7 +331,7 @@ def _instruments(
 
 
 def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bool) -> None:
-    """Refuse fewer equations than unknowns: how many more, and of what kind."""
+    """Refuse fewer equations than unknowns, saying how many readings are lacking."""
     free = unknowns.count
     if use_prior:
         free -= int(unknowns.has_prior.sum())
@@ -343,8 +339,8 @@ def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bo
     if lacking <= 0:
         return
     rows = max(measurements.n_row, 1)
-    each = max(measurements.n_observation // rows, 1)
-    more = -(-lacking // each)
+    readings_a_row = max(measurements.n_observation // rows, 1)
+    more = -(-lacking // readings_a_row)
     raise RequestError(
         Refused(
             "too-few-measurements",

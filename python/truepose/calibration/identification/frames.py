@@ -1,4 +1,4 @@
-"""Where an instrument stands, to begin with: closed forms on the nominal machine.
+"""Where the search for an instrument's frame starts: closed forms on the nominal machine.
 
 The search for an unknown frame is not linear in its rotation, so it starts from the rigid motion
 that fits the nominal points best (B. K. P. Horn, Closed-form solution of absolute orientation using
@@ -31,28 +31,32 @@ _NUMBER = {name: number for number, name in enumerate(OBSERVABLES)}
 _ORIGIN, _ROTATION = slice(0, 3), slice(3, 6)
 
 FAR = 10.0
-"""Root mean square of an instrument's residuals, in uncertainties, from which its frame is sought
-further; a machine within wide tolerances may be so far off too, and then nothing is lost."""
+"""Root mean square of an instrument's residuals, in uncertainties, from which further rotations of
+its frame are tried; a machine with wide tolerances may be as far off, which only costs time."""
 
 TURNED = 0.5
-"""rad of a rotation unknown from which the frame is set down where it was found: half a turn of one
-is infinite."""
+"""rad of a rotation unknown from which the frame is rebased to where it was found: the unknown of
+half a turn is infinite."""
 
 _ALONG = 1.0 - 1e-6
 """Cosine from which two axes are one."""
 
 
-def with_frames_found(machine: Machine, measurements: Measurements) -> list[Measurements]:
+def frame_starts(machine: Machine, measurements: Measurements) -> list[Measurements]:
     """The measurements with unknown frames set to where the nominal machine says they are.
 
     Usually one; where distances leave two sides of a plane open, one for each. Frames that no
     closed form finds start where they are declared; see `rotated_starts`.
     """
-    found = [measurements]
+    alternatives = [measurements]
     for number, instrument in enumerate(measurements.instruments):
         starts = _closed_forms(machine, measurements, number) or [instrument.frame]
-        found = [_replaced(each, number, start) for each in found for start in starts]
-    return found
+        alternatives = [
+            _with_frame(alternative, number, start)
+            for alternative in alternatives
+            for start in starts
+        ]
+    return alternatives
 
 
 def rotated_starts(machine: Machine, measurements: Measurements, number: int) -> list[Measurements]:
@@ -66,60 +70,60 @@ def rotated_starts(machine: Machine, measurements: Measurements, number: int) ->
     axes = np.flatnonzero(frame.unknown[_ROTATION])
     if not axes.size or _closed_forms(machine, measurements, number):
         return []
-    points, _ = _looked_at(measurements, number)
+    points, _ = _target_points(measurements, number)
     read = _table(measurements, number)
     rotation = quaternion_to_matrix(frame.rotation)
     return [
-        _replaced(measurements, number, _with_origin(frame, turn @ rotation, points, read))
-        for turn in _turns(axes)
+        _with_frame(measurements, number, _with_origin(frame, turn @ rotation, points, read))
+        for turn in _start_rotations(axes)
     ]
 
 
 def rebase_frame(measurements: Measurements, unknowns: Unknowns, values: Floats) -> Measurements:
     """The measurements with unknown frames moved by the values (n,) that were found for them."""
     for number, own in unknowns.frames.items():
-        moved = np.array([0.0 if at is None else values[at] for at in own[:6]])
+        change = np.array([0.0 if at is None else values[at] for at in own[:6]])
         frame = measurements.instruments[number].frame
         # The kernel's rotation unknowns: the quaternion (1, turn / 2), not of length 1.
-        quaternion = np.concatenate([[1.0], 0.5 * moved[_ROTATION]])
+        quaternion = np.concatenate([[1.0], 0.5 * change[_ROTATION]])
         turn = quaternion_to_matrix(quaternion / np.linalg.norm(quaternion))
         frame = dataclasses.replace(
             frame,
-            origin=tuple((np.array(frame.origin) + moved[_ORIGIN]).tolist()),
+            origin=tuple((np.array(frame.origin) + change[_ORIGIN]).tolist()),
             rotation=matrix_to_quaternion(turn @ quaternion_to_matrix(frame.rotation)),
         )
-        measurements = _replaced(measurements, number, frame)
+        measurements = _with_frame(measurements, number, frame)
     return measurements
 
 
-def _turns(axes: np.ndarray) -> list[Floats]:
+def _start_rotations(axes: np.ndarray) -> list[Floats]:
     """Rotations (3, 3) about the base axes of these numbers, none of them the identity."""
     if axes.size == 3:
-        found: list[Floats] = []
+        cubes: list[Floats] = []
         for order in itertools.permutations(range(3)):
             for signs in itertools.product((1.0, -1.0), repeat=3):
                 cube = np.eye(3)[list(order)] * np.array(signs)
                 if np.linalg.det(cube) > 0.0 and np.trace(cube) < 2.5:
-                    found.append(cube)
-        return found
+                    cubes.append(cube)
+        return cubes
     if axes.size == 1:
         eighths = np.arange(1, 8)[:, np.newaxis] * np.pi / 4.0
         return list(vector_to_matrix(eighths * np.eye(3)[axes[0]]))
     first, second = np.eye(3)[axes]
     return [
-        vector_to_matrix(angle * (np.cos(way) * first + np.sin(way) * second))
+        vector_to_matrix(angle * (np.cos(azimuth) * first + np.sin(azimuth) * second))
         for angle in (np.pi / 3.0, np.pi / 1.5, np.pi)
-        for way in np.arange(8) * np.pi / 4.0
+        for azimuth in np.arange(8) * np.pi / 4.0
     ]
 
 
-def _replaced(measurements: Measurements, number: int, frame: Frame) -> Measurements:
+def _with_frame(measurements: Measurements, number: int, frame: Frame) -> Measurements:
     instruments = list(measurements.instruments)
     instruments[number] = dataclasses.replace(instruments[number], frame=frame)
     return dataclasses.replace(measurements, instruments=tuple(instruments))
 
 
-def _looked_at(measurements: Measurements, number: int) -> tuple[Floats, Floats]:
+def _target_points(measurements: Measurements, number: int) -> tuple[Floats, Floats]:
     """Target points (n, 3) in the base frame and rotations (n, 3, 3) of an instrument's rows."""
     rows = np.flatnonzero(measurements.instrument == number)
     rotations = quaternion_to_matrix(measurements.placements[rows, 3:])
@@ -134,17 +138,17 @@ def _closed_forms(machine: Machine, measurements: Measurements, number: int) -> 
     if not unknown.any():
         return [frame]
     read = _table(measurements, number)
-    points, rotations = _looked_at(measurements, number)
+    points, rotations = _target_points(measurements, number)
     if "distance" in read and unknown[_ORIGIN].any():
-        return _by_distances(frame, points, read["distance"])
+        return _trilaterate(frame, points, read["distance"])
     if not unknown[_ROTATION].any():
         return [_with_origin(frame, quaternion_to_matrix(frame.rotation), points, read)]
     if any(f"direction.{axis}" in read for axis in "xyz"):
-        product = _of_directions(machine, measurements, number)
+        product = _direction_product(machine, measurements, number)
     elif all(angle in read for angle in "abc"):
-        product = _of_angles(rotations, read)
+        product = _angle_product(rotations, read)
     else:
-        product = _of_points(frame, points, read)
+        product = _point_product(frame, points, read)
     rotation = None if product is None else _rotation_by(frame, product)
     return [] if rotation is None else [_with_origin(frame, rotation, points, read)]
 
@@ -164,7 +168,7 @@ def _rotation_by(frame: Frame, product: Floats) -> Floats | None:
 
 
 def _with_origin(frame: Frame, rotation: Floats, points: Floats, read: dict[str, Floats]) -> Frame:
-    """The frame so turned, its origin where the coordinates read of points (n, 3) put it."""
+    """The frame with this rotation, its origin where the readings of points (n, 3) put it."""
     origin = np.array(frame.origin)
     free = np.array(frame.unknown[_ORIGIN])
     axes = [at for at, axis in enumerate("xyz") if axis in read]
@@ -179,22 +183,23 @@ def _with_origin(frame: Frame, rotation: Floats, points: Floats, read: dict[str,
 
 def _table(measurements: Measurements, number: int) -> dict[str, Floats]:
     """What an instrument read of the platform by row, NaN where it did not; by observable."""
-    mine = measurements.instrument[measurements.row] == number
+    own = measurements.instrument[measurements.row] == number
     rows = np.flatnonzero(measurements.instrument == number)
-    place = np.searchsorted(rows, measurements.row[mine])
+    place = np.searchsorted(rows, measurements.row[own])
     table: dict[str, Floats] = {}
-    for what in np.unique(measurements.observable[mine]).tolist():
-        chosen = measurements.observable[mine] == what
+    for code in np.unique(measurements.observable[own]).tolist():
+        of_code = measurements.observable[own] == code
         values = np.full(rows.size, np.nan)
-        values[place[chosen]] = measurements.value[mine][chosen]
-        table[OBSERVABLES[what]] = values
+        values[place[of_code]] = measurements.value[own][of_code]
+        table[OBSERVABLES[code]] = values
     return table
 
 
-def _of_points(frame: Frame, points: Floats, read: dict[str, Floats]) -> Floats | None:
+def _point_product(frame: Frame, points: Floats, read: dict[str, Floats]) -> Floats | None:
     """(3, 3) sum over points of (in the base frame) (as read)^T, both from their means.
 
-    None where they do not fix the rotation. About one axis alone what is read across it does.
+    None where they do not fix the rotation. For a rotation about one axis, the two coordinates
+    across it are enough.
     """
     axes = [at for at, axis in enumerate("xyz") if axis in read]
     unread = [at for at in range(3) if at not in axes]
@@ -209,13 +214,13 @@ def _of_points(frame: Frame, points: Floats, read: dict[str, Floats]) -> Floats 
         seen[:, at] = read["xyz"[at]]
     whole = np.isfinite(seen).all(axis=1)
     points, seen = points[whole], seen[whole]
-    if len(points) < 2 or (about.size > 1 and not _spread_out(seen)):
+    if len(points) < 2 or (about.size > 1 and not _are_off_a_line(seen)):
         return None
     product: Floats = (points - points.mean(axis=0)).T @ (seen - seen.mean(axis=0))
     return product if product.any() else None
 
 
-def _of_angles(rotations: Floats, read: dict[str, Floats]) -> Floats | None:
+def _angle_product(rotations: Floats, read: dict[str, Floats]) -> Floats | None:
     """(3, 3) sum of the platform's rotations (n, 3, 3), each with its reading taken back."""
     angles = np.stack([read[angle] for angle in "abc"], axis=1)
     whole = np.isfinite(angles).all(axis=1)
@@ -225,7 +230,7 @@ def _of_angles(rotations: Floats, read: dict[str, Floats]) -> Floats | None:
     return product
 
 
-def _spread_out(points: Floats) -> bool:
+def _are_off_a_line(points: Floats) -> bool:
     """Whether points fix a rotation: they are not on a line."""
     if len(points) < 3:
         return False
@@ -233,7 +238,7 @@ def _spread_out(points: Floats) -> bool:
     return bool(singular[1] > 1e-3 * singular[0])
 
 
-def _by_distances(frame: Frame, points: Floats, distances: Floats) -> list[Frame]:
+def _trilaterate(frame: Frame, points: Floats, distances: Floats) -> list[Frame]:
     """Trilateration: differences of squared distances are linear in the centre.
 
     Points in a plane leave the centre's height over it, up to its sign: both are starts.
@@ -266,18 +271,18 @@ def _by_distances(frame: Frame, points: Floats, distances: Floats) -> list[Frame
     return frames
 
 
-def _of_directions(machine: Machine, measurements: Measurements, number: int) -> Floats | None:
+def _direction_product(machine: Machine, measurements: Measurements, number: int) -> Floats | None:
     """(3, 3) sum of the directions that nominal struts have times those that a camera read."""
-    mine = np.flatnonzero(measurements.instrument[measurements.row] == number)
+    own = np.flatnonzero(measurements.instrument[measurements.row] == number)
     centres = machine.kernel.joint_centres(measurements.joints, measurements.placements)
     along = centres[:, :, 1] - centres[:, :, 0]
     along /= np.linalg.norm(along, axis=2, keepdims=True)
     read: dict[tuple[int, int], dict[int, float]] = {}
-    for at in mine.tolist():
-        what = int(measurements.observable[at]) - _NUMBER["direction.x"]
-        key = int(measurements.row[at]), int(measurements.strut[at])
-        if 0 <= what < 3:
-            read.setdefault(key, {})[what] = float(measurements.value[at])
+    for observation in own.tolist():
+        axis = int(measurements.observable[observation]) - _NUMBER["direction.x"]
+        key = int(measurements.row[observation]), int(measurements.strut[observation])
+        if 0 <= axis < 3:
+            read.setdefault(key, {})[axis] = float(measurements.value[observation])
     product = np.zeros((3, 3))
     count = 0
     for (row, strut), seen in read.items():

@@ -192,11 +192,11 @@ class IdentificationProblem:
         if not unknowns.properties:
             return terms, constant
         parts = [np.repeat(constant, self.measurements.n_row, axis=0)]
-        for number, effect in property_effects(
+        for number, change in property_effects(
             self.machine, self.measurements, unknowns, (columns, shifts)
         ):
-            moved, slopes = effect
-            terms += [(number, int(column)) for column in moved]
+            own, slopes = change
+            terms += [(number, int(column)) for column in own]
             parts.append(slopes)
         return terms, np.hstack(parts)
 
@@ -210,14 +210,14 @@ def row_shifts(
     expansion is to be found need not have one in the file.
     """
     known = machine
-    for each in unknowns.properties.values():
-        started = each.changed(known, 0.0)
+    for identified in unknowns.properties.values():
+        started = identified.changed(known, 0.0)
         assert started is not None  # looked at where the unknowns were chosen
         known = started
     parts: list[tuple[np.ndarray, ParameterDeviation]] = []
     for rows, condition in _by_condition(measurements):
         parts.append((rows, _shifts(known, measurements, condition, rows)))
-    columns = np.unique(np.concatenate([moved[0] for _, moved in parts])).astype(np.intp)
+    columns = np.unique(np.concatenate([deviation[0] for _, deviation in parts])).astype(np.intp)
     shifts = np.zeros((measurements.n_row, columns.size))
     for rows, (own, values) in parts:
         place = np.searchsorted(columns, own)
@@ -230,12 +230,12 @@ def property_effects(
     machine: Machine, measurements: Measurements, unknowns: Unknowns, base: ParameterDeviation
 ) -> Iterator[tuple[int, ParameterDeviation]]:
     """(number, (parameters, their change (n_row, k) per unit)) of every unknown property."""
-    for number, each in unknowns.properties.items():
-        changed = each.changed(machine, each.step)
+    for number, identified in unknowns.properties.items():
+        changed = identified.changed(machine, identified.step)
         assert changed is not None
-        moved = row_shifts(changed, measurements, unknowns)
-        columns, total = sum_deviations([moved, (base[0], -base[1])])
-        slopes = total / each.step
+        shifts = row_shifts(changed, measurements, unknowns)
+        columns, total = sum_deviations([shifts, (base[0], -base[1])])
+        slopes = total / identified.step
         used = slopes.any(axis=0)
         yield number, (columns[used], slopes[:, used])
 

@@ -1,4 +1,4 @@
-"""Properties that can be identified beside parameters: what heat or load does to a strut's length.
+"""Properties that can be identified beside parameters: how heat or load changes a strut's length.
 
 A property shifts parameters in proportion to itself, differently at every row: an expansion
 coefficient by the strut's rise in temperature, a compliance by the load on it. By how much is asked
@@ -100,4 +100,4 @@ class Property:
 def properties_of(machine: Machine) -> dict[str, Property]:
     """Every property that could be identified, by name."""
     every = (Property(kind, index) for kind in PROPERTIES for index in range(len(machine.struts)))
-    return {each.name(machine): each for each in every}
+    return {identifiable.name(machine): identifiable for identifiable in every}

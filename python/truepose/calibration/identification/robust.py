@@ -2,8 +2,8 @@
 
 Huber's loss: squared up to `HUBER` standard uncertainties, linear beyond, by weights that are found
 anew from the residuals until they stay (P. J. Huber, Robust Estimation of a Location Parameter,
-Ann. Math. Statist. 35 (1964) 73-101). Good readings lose next to nothing: of a normal distribution
-one in 370 lies beyond three.
+Ann. Math. Statist. 35 (1964) 73-101). Good readings keep almost all their weight: of a normal
+distribution one in 370 lies beyond three.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS
+from truepose.calibration.observables import column_name
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.fit import Fit
@@ -95,13 +95,11 @@ def outliers(
     size[~kept] = fit.standardised
     if checked is not None:
         size[kept] = checked.standardised[kept]
-    found = []
+    odd = []
     for at in np.flatnonzero(np.abs(size) >= OUTLIER).tolist():
         row = int(data.row[at])
-        what = OBSERVABLES[int(data.observable[at])]
-        if what in OF_STRUTS:
-            what = f"strut.{machine.struts[int(data.strut[at])].name}.{what}"
+        what = column_name(machine, int(data.observable[at]), int(data.strut[at]))
         name = data.instruments[int(data.instrument[row])].name
         line, sigmas = int(data.lines[row]), float(size[at])
-        found.append(Outlier(row, line, name, what, sigmas, bool(kept[at])))
-    return tuple(sorted(found, key=lambda each: -abs(each.sigmas)))
+        odd.append(Outlier(row, line, name, what, sigmas, bool(kept[at])))
+    return tuple(sorted(odd, key=lambda outlier: -abs(outlier.sigmas)))

@@ -1,4 +1,4 @@
-"""What unknowns do at the tool over the workspace, and what could be measured besides."""
+"""What unknowns do at the tool over the workspace, and further measurements that could help."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from truepose.machine import Condition, Machine
 from truepose.runs.poses import OK, requested_poses
 
 MOST_POSES = 300
-"""Poses of the workspace at which the tool is looked at; more are thinned evenly."""
+"""Poses of the workspace at which the tool's uncertainty is computed; more are thinned evenly."""
 
 FURTHER = (5, 20)
 """Numbers of further poses that are tried as a remedy."""
@@ -64,22 +64,24 @@ def tool_effects(
     """
     change = unknowns.parameter_change(values)
     columns, moved = unknowns.columns, unknowns.columns
-    found = np.zeros((len(joints), len(machine.components), unknowns.n_machine))
+    effects = np.zeros((len(joints), len(machine.components), unknowns.n_machine))
     slopes, status = machine.kernel.sensitivity_moved(
         joints, placements, columns, moved, change[np.newaxis, :]
     )
-    found += slopes @ unknowns.effects[:, : unknowns.n_machine]
+    effects += slopes @ unknowns.effects[:, : unknowns.n_machine]
     if unknowns.properties:
-        rows = _plain(joints, placements, (machine.condition,) * len(joints))
+        rows = _without_readings(joints, placements, (machine.condition,) * len(joints))
         base = row_shifts(machine, rows, unknowns)
         for number, (own, amounts) in property_effects(machine, rows, unknowns, base):
             sensitivity, _ = machine.kernel.sensitivity_at(joints, placements, own)
-            found[:, :, number] = np.einsum("pck,pk->pc", sensitivity, amounts)
+            effects[:, :, number] = np.einsum("pck,pk->pc", sensitivity, amounts)
     usable = status == OK
-    return found[usable], usable
+    return effects[usable], usable
 
 
-def _plain(joints: Floats, placements: Floats, conditions: tuple[Condition, ...]) -> Measurements:
+def _without_readings(
+    joints: Floats, placements: Floats, conditions: tuple[Condition, ...]
+) -> Measurements:
     """Rows without a reading."""
     count = len(joints)
     nothing = np.empty(0, np.intp)
@@ -104,32 +106,32 @@ def candidates(machine: Machine, fit: Fit) -> list[Candidate]:
 
     Their cost is the number of readings.
     """
-    found = []
+    additions = []
     data = fit.measurements
     for number, instrument in enumerate(data.instruments):
         read = data.observables(number)
         missing = [axis for axis in "xyz" if axis not in read and axis in machine.components]
         if instrument.kind == "coordinate" and missing:
             what = " and ".join(missing)
-            rows = _added(machine, fit, number, missing)
-            found.append(
+            rows = _more_coordinates(machine, fit, number, missing)
+            additions.append(
                 Candidate(f"{instrument.name}: {what}", len(rows), f"probe in {what} too", rows)
             )
     for number, instrument in enumerate(data.instruments):
         for count in FURTHER:
-            more = _further(machine, fit, number, count)
+            more = _more_poses(machine, fit, number, count)
             if more is not None:
                 sentence = (
                     f"measure {count} more poses over the whole workspace with {instrument.name}"
                 )
                 name = f"{instrument.name}: {count} poses"
-                found.append(Candidate(name, len(more), sentence, more))
+                additions.append(Candidate(name, len(more), sentence, more))
     axes = [axis for axis in "xyz" if axis in machine.components]
     if not any(set(axes) <= set(data.observables(at)) for at in range(len(data.instruments))):
-        rows = _tracked(machine, fit, axes)
+        rows = _tracker_rows(machine, fit, axes)
         sentence = f"measure {', '.join(axes)} of the tool at these poses, as a laser tracker does"
-        found.append(Candidate("tracker", 2 * len(rows), sentence, rows))
-    return [each for each in found if np.isfinite(each.rows).all()]
+        additions.append(Candidate("tracker", 2 * len(rows), sentence, rows))
+    return [candidate for candidate in additions if np.isfinite(candidate.rows).all()]
 
 
 def _rows(machine: Machine, fit: Fit, data: Measurements) -> Floats:
@@ -143,43 +145,45 @@ def _observing(
     data: Measurements, rows: np.ndarray, observables: list[str], uncertainty: float, by: int
 ) -> Measurements:
     """The rows `rows` of data, each with these observables and no values."""
-    chosen = data.select(np.isin(np.arange(data.n_row), rows))
-    codes = np.array([OBSERVABLES.index(each) for each in observables], np.intp)
-    count = chosen.n_row * codes.size
+    kept = data.select(np.isin(np.arange(data.n_row), rows))
+    codes = np.array([OBSERVABLES.index(name) for name in observables], np.intp)
+    count = kept.n_row * codes.size
     return dataclasses.replace(
-        chosen,
-        instrument=np.full(chosen.n_row, by, np.intp),
-        row=np.repeat(np.arange(chosen.n_row), codes.size),
-        observable=np.tile(codes, chosen.n_row),
+        kept,
+        instrument=np.full(kept.n_row, by, np.intp),
+        row=np.repeat(np.arange(kept.n_row), codes.size),
+        observable=np.tile(codes, kept.n_row),
         strut=np.full(count, -1, np.intp),
         value=np.zeros(count),
         uncertainty=np.full(count, uncertainty),
     )
 
 
-def _typical(data: Measurements, number: int) -> float:
-    mine = data.instrument[data.row] == number
-    return float(np.median(data.uncertainty[mine])) if mine.any() else 1e-5
+def _typical_uncertainty(data: Measurements, number: int) -> float:
+    own = data.instrument[data.row] == number
+    return float(np.median(data.uncertainty[own])) if own.any() else 1e-5
 
 
-def _added(machine: Machine, fit: Fit, number: int, axes: list[str]) -> Floats:
+def _more_coordinates(machine: Machine, fit: Fit, number: int, axes: list[str]) -> Floats:
     data = fit.measurements
     rows = np.flatnonzero(data.instrument == number)
-    return _rows(machine, fit, _observing(data, rows, axes, _typical(data, number), number))
+    return _rows(
+        machine, fit, _observing(data, rows, axes, _typical_uncertainty(data, number), number)
+    )
 
 
-def _further(machine: Machine, fit: Fit, number: int, count: int) -> Floats | None:
+def _more_poses(machine: Machine, fit: Fit, number: int, count: int) -> Floats | None:
     """More rows of one instrument, of the kind that it has most, over the workspace."""
     data = fit.measurements
-    mine = np.flatnonzero(data.instrument == number)
-    if machine.workspace is None or not mine.size:
+    own = np.flatnonzero(data.instrument == number)
+    if machine.workspace is None or not own.size:
         return None
     poses = machine.poses()
     poses = poses[np.linspace(0, len(poses) - 1, count).round().astype(np.intp)]
     joints, placements, status = machine.kernel.place(poses)
     usable = status == OK
     joints, placements = joints[usable], placements[usable]
-    first = mine[0]
+    first = own[0]
     of_first = data.row == first
     size = int(of_first.sum())
     total = len(joints)
@@ -200,7 +204,7 @@ def _further(machine: Machine, fit: Fit, number: int, count: int) -> Floats | No
     return _rows(machine, fit, more) if total else None
 
 
-def _tracked(machine: Machine, fit: Fit, axes: list[str]) -> Floats:
+def _tracker_rows(machine: Machine, fit: Fit, axes: list[str]) -> Floats:
     """Coordinates of the tool point in the base frame at every row, to 10 um."""
     data = fit.measurements
     tracker = Instrument("tracker", "position", Frame())

@@ -20,7 +20,7 @@ from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property, properties_of
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.calibration.observables import UNITS, column_name
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.files.units import QuantityError, UnitSystem
@@ -78,6 +78,22 @@ class Unknowns:
         change: Floats = self.effects @ values
         return change
 
+    def nominal_sizes(self, machine: Machine) -> Floats:
+        """(n_machine,) the size that an unknown changes: of one parameter, or of equal ones, SI.
+
+        NaN for what moves several that differ, such as the coordinates of a radius, and for
+        properties.
+        """
+        sizes = np.full(self.n_machine, np.nan)
+        for number in range(self.n_machine):
+            rows = np.flatnonzero(self.effects[:, number])
+            nominal = machine.nominal[self.columns[rows]]
+            # Rods that are equal are one number for people, coordinates that move apart are not.
+            alike = rows.size and (self.effects[rows, number] == 1.0).all()
+            if alike and np.ptp(nominal) <= 1e-9 * np.abs(nominal).max():
+                sizes[number] = nominal[0]
+        return sizes
+
     @property
     def of_instruments(self) -> Unknowns:
         """The instruments' alone; the machine stays as its file has it."""
@@ -105,7 +121,7 @@ class Unknowns:
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _MachineUnknown:
     """One unknown of the machine, before all are put together."""
 
     name: str
@@ -131,9 +147,9 @@ def unknowns_of(
 
     Raises `RequestError` (unknown-parameter, no-unknowns, bad-band, no-stiffness, bad-prior).
     """
-    bands = _bands(machine)
-    tolerated = _of_tolerances(machine, bands)
-    wanted = _wanted(machine, tolerated, identify)
+    bands = bands_of(machine)
+    tolerated = _tolerance_unknowns(machine, bands)
+    wanted = _chosen_unknowns(machine, tolerated, identify)
     if not wanted:
         raise RequestError(
             Problem(
@@ -145,54 +161,55 @@ def unknowns_of(
                 hint='--identify "strut.*.length"',
             )
         )
-    columns = sorted({column for each in wanted for column in each.effects})
+    columns = sorted({column for unknown in wanted for column in unknown.effects})
     place = {column: at for at, column in enumerate(columns)}
-    instruments = _of_instruments(machine, measurements, len(wanted))
+    instruments = _instrument_unknowns(machine, measurements, len(wanted))
     count = len(wanted) + len(instruments.names)
     effects = np.zeros((len(columns), count))
     covariance = np.diag(np.full(count, np.inf))
-    for number, each in enumerate(wanted):
-        for column, effect in each.effects.items():
+    for number, unknown in enumerate(wanted):
+        for column, effect in unknown.effects.items():
             effects[place[column], number] = effect
-        covariance[number, number] = each.sigma**2
+        covariance[number, number] = unknown.sigma**2
     if bands is not None and bands.correlation is not None:
         _correlate(covariance, wanted, bands)
     extra = len(instruments.names)
     return Unknowns(
-        tuple(each.name for each in wanted) + tuple(instruments.names),
-        tuple(each.unit for each in wanted) + tuple(instruments.units),
-        tuple(each.label for each in wanted) + tuple(instruments.labels),
+        tuple(unknown.name for unknown in wanted) + tuple(instruments.names),
+        tuple(unknown.unit for unknown in wanted) + tuple(instruments.units),
+        tuple(unknown.label for unknown in wanted) + tuple(instruments.labels),
         len(wanted),
         np.array(columns, np.intp),
         effects,
-        np.array([each.mean for each in wanted] + [0.0] * extra),
+        np.array([unknown.mean for unknown in wanted] + [0.0] * extra),
         covariance,
-        np.array([each.half for each in wanted] + [np.inf] * extra),
-        {at: each.property for at, each in enumerate(wanted) if each.property is not None},
+        np.array([unknown.half for unknown in wanted] + [np.inf] * extra),
+        {at: unknown.property for at, unknown in enumerate(wanted) if unknown.property is not None},
         instruments.frames,
         instruments.biases,
         machine.shown,
     )
 
 
-def _bands(machine: Machine) -> Deviation | None:
-    for source in machine.sources:
-        if isinstance(source, DimensionalTolerance):
-            return source.bands
-    return None
+def bands_of(machine: Machine) -> Deviation | None:
+    """The bands of the machine's tolerances; None where its file has none."""
+    of_tolerances = (
+        source.bands for source in machine.sources if isinstance(source, DimensionalTolerance)
+    )
+    return next(of_tolerances, None)
 
 
-def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
+def _tolerance_unknowns(machine: Machine, bands: Deviation | None) -> list[_MachineUnknown]:
     """One unknown for each variable that has a band, in the order of the parameters."""
     if bands is None:
         return []
-    found = []
-    swing, shift = bands.signed_half[0], bands.shift[0]
+    unknowns = []
+    half_width, shift = bands.signed_half[0], bands.shift[0]
     for variable in dict.fromkeys(bands.variables[bands.banded].tolist()):
         members = np.flatnonzero(bands.variables == variable)
-        leader = members[np.argmax(np.abs(swing[members]))]
-        half = float(abs(swing[leader]))
-        effects = swing[members] / half
+        leader = members[np.argmax(np.abs(half_width[members]))]
+        half = float(abs(half_width[leader]))
+        effects = half_width[members] / half
         group = bands.group_names.get(int(bands.groups[leader]))
         mean = float(shift[leader] * np.sign(effects[members == leader][0]))
         if np.abs(shift[members] - effects * mean).max() > SCREEN * half:
@@ -208,8 +225,8 @@ def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
             )
         parameter = int(bands.parameters[leader])
         name = machine.parameters[parameter] if group is None else group
-        found.append(
-            _Wanted(
+        unknowns.append(
+            _MachineUnknown(
                 name,
                 machine.units[parameter],
                 label_of(name) if group is None else group,
@@ -220,28 +237,34 @@ def _of_tolerances(machine: Machine, bands: Deviation | None) -> list[_Wanted]:
                 int(variable),
             )
         )
-    return found
+    return unknowns
 
 
-def _wanted(
-    machine: Machine, tolerated: Sequence[_Wanted], identify: Sequence[str]
-) -> list[_Wanted]:
+def _chosen_unknowns(
+    machine: Machine, tolerated: Sequence[_MachineUnknown], identify: Sequence[str]
+) -> list[_MachineUnknown]:
     if not identify:
         return list(tolerated)
-    known: dict[str, _Wanted] = {}
+    known: dict[str, _MachineUnknown] = {}
     for name, unit, column in zip(
         machine.parameters, machine.units, range(len(machine.parameters)), strict=True
     ):
-        known[name] = _Wanted(name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf)
-    for name, each in properties_of(machine).items():
-        unit, label = each.unit, each.label(machine)
-        known[name] = _Wanted(name, unit, label, {}, 0.0, np.inf, np.inf, None, each)
+        known[name] = _MachineUnknown(
+            name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf
+        )
+    for name, identifiable in properties_of(machine).items():
+        unit, label = identifiable.unit, identifiable.label(machine)
+        known[name] = _MachineUnknown(
+            name, unit, label, {}, 0.0, np.inf, np.inf, None, identifiable
+        )
     # A member of a group stands for its group: one cannot move without the other.
     of_group = {
-        machine.parameters[column]: each.name for each in tolerated for column in each.effects
+        machine.parameters[column]: unknown.name
+        for unknown in tolerated
+        for column in unknown.effects
     }
-    known |= {each.name: each for each in tolerated}
-    chosen: dict[str, _Wanted] = {}
+    known |= {unknown.name: unknown for unknown in tolerated}
+    chosen: dict[str, _MachineUnknown] = {}
     problems = []
     for text in identify:
         pattern, _, band = (part.strip() for part in text.partition("="))
@@ -272,14 +295,16 @@ def _wanted(
                 problems.append(_no_stiffness(machine, name))
     if problems:
         raise RequestError(*problems)
-    order = {name: at for at, name in enumerate([each.name for each in tolerated] + list(known))}
-    return sorted(chosen.values(), key=lambda each: order[each.name])
+    order = {
+        name: at for at, name in enumerate([unknown.name for unknown in tolerated] + list(known))
+    }
+    return sorted(chosen.values(), key=lambda unknown: order[unknown.name])
 
 
 _DIMENSION_OF_UNIT = {"m": "length", "rad": "angle", "1/K": "expansion", "1": "ratio"}
 
 
-def _with_band(machine: Machine, wanted: _Wanted, band: str) -> _Wanted:
+def _with_band(machine: Machine, wanted: _MachineUnknown, band: str) -> _MachineUnknown:
     """The unknown with a half band of its own, uniform. Raises `QuantityError`."""
     if not band:
         return wanted
@@ -313,17 +338,17 @@ def _no_stiffness(machine: Machine, name: str) -> Problem:
     )
 
 
-def _correlate(covariance: Floats, wanted: Sequence[_Wanted], bands: Deviation) -> None:
+def _correlate(covariance: Floats, wanted: Sequence[_MachineUnknown], bands: Deviation) -> None:
     assert bands.correlation is not None
-    for i, one in enumerate(wanted):
-        for j, other in enumerate(wanted):
-            if i != j and one.variable is not None and other.variable is not None:
-                coefficient = bands.correlation[one.variable, other.variable]
-                covariance[i, j] = coefficient * one.sigma * other.sigma
+    for i, first in enumerate(wanted):
+        for j, second in enumerate(wanted):
+            if i != j and first.variable is not None and second.variable is not None:
+                coefficient = bands.correlation[first.variable, second.variable]
+                covariance[i, j] = coefficient * first.sigma * second.sigma
 
 
 @dataclass
-class _OfInstruments:
+class _InstrumentUnknowns:
     names: list[str]
     units: list[str]
     labels: list[str]
@@ -331,47 +356,50 @@ class _OfInstruments:
     biases: dict[tuple[int, int, int], int]
 
 
-def _of_instruments(machine: Machine, measurements: Measurements, first: int) -> _OfInstruments:
+def _instrument_unknowns(
+    machine: Machine, measurements: Measurements, first: int
+) -> _InstrumentUnknowns:
     """Unknowns of the instruments that measured anything, numbered from `first` on."""
-    found = _OfInstruments([], [], [], {}, {})
+    unknowns = _InstrumentUnknowns([], [], [], {}, {})
 
-    def take(name: str, unit: str, label: str) -> int:
-        found.names.append(name)
-        found.units.append(unit)
-        found.labels.append(label)
-        return first + len(found.names) - 1
+    def add(name: str, unit: str, label: str) -> int:
+        unknowns.names.append(name)
+        unknowns.units.append(unit)
+        unknowns.labels.append(label)
+        return first + len(unknowns.names) - 1
 
     by = measurements.instrument[measurements.row]
     for number, instrument in enumerate(measurements.instruments):
-        mine = by == number
-        if not mine.any():
+        own = by == number
+        if not own.any():
             continue
-        found.frames[number] = _frame_and_target(instrument, take)
+        unknowns.frames[number] = _frame_and_target(instrument, add)
         if not instrument.bias_unknown:
             continue
-        read = zip(measurements.observable[mine], measurements.strut[mine], strict=True)
-        for observable, strut in sorted({(int(one), int(other)) for one, other in read}):
-            what = OBSERVABLES[observable]
-            part = f"strut.{machine.struts[strut].name}." if what in OF_STRUTS else ""
-            found.biases[number, observable, strut] = take(
-                f"{instrument.name}.bias.{part}{what}",
+        read = zip(measurements.observable[own], measurements.strut[own], strict=True)
+        for observable, strut in sorted(
+            {(int(code), int(strut_number)) for code, strut_number in read}
+        ):
+            column = column_name(machine, observable, strut)
+            unknowns.biases[number, observable, strut] = add(
+                f"{instrument.name}.bias.{column}",
                 UNITS[observable],
-                f"constant that {instrument.name} adds to {part}{what}",
+                f"constant that {instrument.name} adds to {column}",
             )
-    return found
+    return unknowns
 
 
-def _frame_and_target(instrument: Instrument, take: object) -> tuple[int | None, ...]:
-    assert callable(take)
+def _frame_and_target(instrument: Instrument, add: object) -> tuple[int | None, ...]:
+    assert callable(add)
     own: list[int | None] = []
     named = [(f"frame.{axis}", "m", f"origin {axis}") for axis in "xyz"]
     named += [(f"frame.r{axis}", "rad", f"rotation about {axis}") for axis in "xyz"]
     for (key, unit, what), unknown in zip(named, instrument.frame.unknown, strict=True):
         name, label = f"{instrument.name}.{key}", f"frame of {instrument.name}, {what}"
-        own.append(take(name, unit, label) if unknown else None)
+        own.append(add(name, unit, label) if unknown else None)
     for axis in "xyz":
         name, label = f"{instrument.name}.target.{axis}", f"target of {instrument.name}, {axis}"
-        own.append(take(name, "m", label) if instrument.target_unknown else None)
+        own.append(add(name, "m", label) if instrument.target_unknown else None)
     return tuple(own)
 
 

@@ -1,11 +1,11 @@
 """Validation on rows that were not used: k-fold, or a set that the measurements state.
 
-Every fold fits the others' rows, instruments' frames and all, and then says what the left-out rows
-should have read; so does the machine as its file has it, with the same frames' freedom. A fit that
-only follows its own noise shows here.
+For every fold the other folds are fitted, the instruments' frames included, and the fit predicts
+the readings of the fold's rows; so does the machine as its file has it, its instruments fitted to
+the same rows. A fit that only follows the noise of its own rows is found out here.
 
-A reading that the other rows cannot foretell is not predicted: where they leave the frame, target
-or constant of its instrument open. Of the others the fit says how uncertain its prediction is.
+A reading is not predicted where the other rows leave the frame, target or constant of its
+instrument open. For every prediction the fit states how uncertain it is.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ FEW = 0.1
 """Share of the readings up to which those that do not fit are left out of what is counted."""
 
 LEAST_ROWS = 4
-"""Fewer rows are not divided."""
+"""Fewer rows are not divided into folds."""
 
 CONSISTENT = 1.5
 """Up to this times what the fit promises for them, rows that were not used agree with it."""
@@ -60,8 +60,8 @@ class Validation:
     @property
     def standardised(self) -> Floats:
         """(m,) `after` over what the fit promises for it, noise and prediction; NaN where not."""
-        found: Floats = self.after / np.sqrt(self.noise**2 + self.promised)
-        return found
+        quotients: Floats = self.after / np.sqrt(self.noise**2 + self.promised)
+        return quotients
 
     @property
     def consistent(self) -> bool:
@@ -111,12 +111,12 @@ def validate(
     anywhere and so cannot be predicted. None where there are too few rows, or where what is
     left for the fit determines none of the readings.
     """
-    found = np.full((3, whole.n_observation), np.nan)
+    predicted = np.full((3, whole.n_observation), np.nan)
     fitting = ~whole.held_out
     if whole.held_out.any():
         kept = whole.select(whole.held_out)
-        found[:, whole.held_out[whole.row]] = _predicted(machine, kept, fitted)
-        checked = _counted(STATED, 1, whole, found, fitted)
+        predicted[:, whole.held_out[whole.row]] = _predicted(machine, kept, fitted)
+        checked = _validation_of(STATED, 1, whole, predicted, fitted)
         if checked is not None:
             return checked
     rows = int(fitting.sum())
@@ -137,18 +137,18 @@ def validate(
             )
         except RequestError:  # what is left does not say enough: the others still do
             continue
-        found[:, left_out[whole.row]] = _predicted(machine, whole.select(left_out), others)
-    return _counted(FOLDS, count, whole, found, fitted)
+        predicted[:, left_out[whole.row]] = _predicted(machine, whole.select(left_out), others)
+    return _validation_of(FOLDS, count, whole, predicted, fitted)
 
 
-def _counted(
-    kind: str, folds: int, whole: Measurements, found: Floats, fitted: Fit
+def _validation_of(
+    kind: str, folds: int, whole: Measurements, predicted: Floats, fitted: Fit
 ) -> Validation | None:
     """Of (3, m) residuals before and after and promised variances; None where all are NaN."""
-    used: Flags = np.asarray(np.isfinite(found).all(axis=0))
+    used: Flags = np.asarray(np.isfinite(predicted).all(axis=0))
     if not used.any():
         return None
-    before, after, promised = found
+    before, after, promised = predicted
     checked = Validation(kind, folds, used, before, after, promised, fitted.birge)
     # Readings that do not fit, where they are few, would be all that the root mean square shows.
     sizes = checked.standardised
@@ -169,9 +169,11 @@ def _predicted(machine: Machine, rows: Measurements, fitted: Fit) -> Floats:
     problem = IdentificationProblem(machine, standing, fitted.unknowns)
     slope = problem.jacobian(fitted.values) / rows.uncertainty[:, np.newaxis]
     promised = np.einsum("ij,jk,ik->i", slope, fitted.covariance, slope)
-    found = np.stack([problem.residual(fitted.as_filed), problem.residual(fitted.values), promised])
-    found[:, _left_open(rows, fitted, slope)] = np.nan
-    return found
+    residuals = np.stack(
+        [problem.residual(fitted.as_filed), problem.residual(fitted.values), promised]
+    )
+    residuals[:, _left_open(rows, fitted, slope)] = np.nan
+    return residuals
 
 
 def _left_open(rows: Measurements, fitted: Fit, slope: Floats) -> Flags:
@@ -181,10 +183,10 @@ def _left_open(rows: Measurements, fitted: Fit, slope: Floats) -> Flags:
     along = np.abs(turning @ fitted.null_space.T).max(axis=1, initial=0.0)
     changing = along > OPEN * np.linalg.norm(turning, axis=1)
     open_: Flags = np.asarray((np.abs(fitted.null_space) > OPEN).any(axis=0))
-    mine = np.zeros(len(rows.instruments), np.bool_)
+    affected = np.zeros(len(rows.instruments), np.bool_)
     for instrument, own in unknowns.frames.items():
-        mine[instrument] = any(number is not None and open_[number] for number in own)
+        affected[instrument] = any(number is not None and open_[number] for number in own)
     for (instrument, _, _), number in unknowns.biases.items():
-        mine[instrument] |= open_[number]
-    flags: Flags = changing & mine[rows.instrument[rows.row]]
+        affected[instrument] |= open_[number]
+    flags: Flags = changing & affected[rows.instrument[rows.row]]
     return flags

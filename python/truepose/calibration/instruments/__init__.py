@@ -31,8 +31,8 @@ from truepose.calibration.instruments._base import (
 
 REGISTRY: Mapping[str, Kind] = MappingProxyType(
     {
-        each.KIND.name: each.KIND
-        for each in (
+        module.KIND.name: module.KIND
+        for module in (
             pose,
             position,
             coordinate,

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.calibration.observables import OF_STRUTS, si_unit
 from truepose.spatial import Quaternion
 
 Vector = tuple[float, float, float]
@@ -68,7 +68,7 @@ class Instrument:
         given = self.uncertainty.get(observable)
         if given is not None:
             return given
-        return self.uncertainty.get(UNITS[OBSERVABLES.index(observable)])
+        return self.uncertainty.get(si_unit(observable))
 
 
 FrameRule = Callable[[Sequence[str], Sequence[str]], Freedoms]
@@ -84,7 +84,7 @@ class Kind:
     read, by the column that holds them: {"x": "x"}; a strut's columns are `strut.<name>.length`,
     here `length`. `least`, `most`: how many of them an instrument has, None: all that the platform
     moves in. `fixed`: observables that are 0 in every row, without a column. `optional`: a column
-    that may be missing or blank and then is 0. `frame`: which of a frame's freedoms are to be found
+    that may be missing or blank and then is 0. `frame`: which of a frame's freedoms are identified
     where the file says `frame = "unknown"`; None: what it reads has no frame. `has_target`:
     whether what it reads depends on a target point. `keys`: of `axis`, `zero`, `end` those that it
     takes.
@@ -113,15 +113,15 @@ class Kind:
         return self.by if self.phrases is None else self.phrases(observables)
 
     def observed(self, components: Sequence[str]) -> tuple[str, ...]:
-        """The observables that an instrument of this kind has of a machine if nobody says which.
+        """The observables that an instrument of this kind reads by default.
 
         All that the platform can change, of a kind that reads some coordinates the last of them:
         the height. `components`: those of x y z rx ry rz that the platform moves in. Those of
         struts are of every strut.
         """
         possible = self.fixed or tuple(dict.fromkeys(self.reads.values()))
-        found = tuple(each for each in possible if moved(each, components))
-        return found if self.most is None else found[-1:]
+        readable = tuple(observable for observable in possible if moved(observable, components))
+        return readable if self.most is None else readable[-1:]
 
 
 def moved(observable: str, components: Sequence[str]) -> bool:

@@ -8,7 +8,7 @@ from truepose.calibration.instruments._base import ANGLES, Kind, listed, of_read
 
 
 def _phrase(observables: Sequence[str]) -> str:
-    return f"by the angles {listed(each for each in ANGLES if each in observables)} alone"
+    return f"by the angles {listed(angle for angle in ANGLES if angle in observables)} alone"
 
 
 KIND = Kind(

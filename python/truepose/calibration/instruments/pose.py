@@ -8,7 +8,7 @@ from truepose.calibration.instruments._base import ANGLES, AXES, Kind, of_readin
 
 
 def _phrase(observables: Sequence[str]) -> str:
-    read = [each for each in (*AXES, *ANGLES) if each in observables]
+    read = [observable for observable in (*AXES, *ANGLES) if observable in observables]
     return f"by whole poses ({' '.join(read)})" if read else "by whole poses"
 
 
@@ -16,7 +16,7 @@ KIND = Kind(
     "pose",
     "Position and orientation of the platform, such as a tracker with several targets finds.",
     "by whole poses",
-    {each: each for each in (*AXES, *ANGLES)},
+    {observable: observable for observable in (*AXES, *ANGLES)},
     least=None,
     frame=of_readings,
     phrases=_phrase,

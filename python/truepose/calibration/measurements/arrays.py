@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +24,7 @@ from truepose.calibration.measurements.rows import (
     measurements_in,
     reading_columns,
 )
-from truepose.errors import Problem, RequestError
+from truepose.errors import Fault, Problem, RequestError
 from truepose.files.data_file import cut_short
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
@@ -53,25 +53,25 @@ def measurements_of(
     Commanded `poses` (n_row, n_commanded), or `joints` (n_row, n_joint). `values`: (n_row,) by the
     columns of a file ("x", "strut.1.length"), NaN where nothing was read; none of a contact.
     `uncertainty`: standard, one for all, or by column one or (n_row,); default the instrument's.
-    `condition`: of all rows or of each; default cold and without a load on the tool. `held_out`
-    (n_row,): kept from the fit. `frame_unknown`: all of the instrument's frame that its kind sees
-    is to be found, from the frame given on.
+    `condition`: of all rows or of each; default at reference temperature, no load on the tool.
+    `held_out` (n_row,): kept from the fit. `frame_unknown`: all of the instrument's frame that its
+    kind sees is to be found, from the frame given on.
 
     Raises `RequestError` with everything that is wrong.
     """
     problems: list[Problem] = []
-    maker = _Maker(machine, instrument, problems)
-    columns = maker.columns(values or {})
-    commanded = maker.commanded(poses, joints)
+    arguments = _Arguments(machine, instrument, problems)
+    columns = arguments.columns(values or {})
+    commanded = arguments.commanded(poses, joints)
     if problems or commanded is None:
         raise RequestError(*problems)
     n = len(commanded)
-    table = {name: maker.of_rows(name, given, n) for name, given in columns.items()}
-    stated = maker.uncertainties(uncertainty, table, n)
+    table = {name: arguments.of_rows(name, column, n) for name, column in columns.items()}
+    stated = arguments.uncertainties(uncertainty, table, n)
     flags = np.zeros(n, np.bool_) if held_out is None else np.array(held_out, np.bool_)
     if flags.shape != (n,):
-        maker.refuse("held_out", f"shape {flags.shape}", f"({n},) flags")
-    conditions = maker.conditions(condition, n)
+        arguments.refuse("held_out", f"shape {flags.shape}", f"({n},) flags")
+    conditions = arguments.conditions(condition, n)
     if problems:
         raise RequestError(*problems)
     rows = MeasurementRows(
@@ -84,10 +84,12 @@ def measurements_of(
         joints=commanded if poses is None else None,
         whole=frozenset({instrument.name} if frame_unknown else ()),
     )
-    found = measurements_in(machine, (instrument,), rows, _Report(problems, rows))
+    measurements = measurements_in(machine, (instrument,), rows, _Report(problems, rows))
     if problems:
         raise RequestError(*cut_short(problems))
-    return found if conditions is None else dataclasses.replace(found, conditions=conditions)
+    if conditions is None:
+        return measurements
+    return dataclasses.replace(measurements, conditions=conditions)
 
 
 def joined(*several: Measurements) -> Measurements:
@@ -99,8 +101,8 @@ def joined(*several: Measurements) -> Measurements:
     if not several:
         raise RequestError(_bad("measurements", "nothing", "one or more"))
     instruments: dict[str, Instrument] = {}
-    for each in several:
-        for instrument in each.instruments:
+    for part in several:
+        for instrument in part.instruments:
             if instruments.setdefault(instrument.name, instrument) != instrument:
                 raise RequestError(
                     _bad(
@@ -109,31 +111,35 @@ def joined(*several: Measurements) -> Measurements:
                         "a name of its own for each instrument",
                     )
                 )
-    if len({each.joints.shape[1] for each in several}) > 1:
+    if len({part.joints.shape[1] for part in several}) > 1:
         raise RequestError(
             _bad("joints", "measurements of machines with other joints", "those of one machine")
         )
     names = list(instruments)
-    numbers = [np.array([names.index(i.name) for i in e.instruments], np.intp) for e in several]
-    first = np.cumsum([0, *(each.n_row for each in several)])[:-1].tolist()
-    files = dict.fromkeys(each.file for each in several)
+    numbers = [
+        np.array([names.index(i.name) for i in part.instruments], np.intp) for part in several
+    ]
+    first = np.cumsum([0, *(part.n_row for part in several)])[:-1].tolist()
+    files = dict.fromkeys(part.file for part in several)
     return Measurements(
         instruments=tuple(instruments.values()),
-        joints=np.concatenate([each.joints for each in several]),
-        placements=np.concatenate([each.placements for each in several]),
+        joints=np.concatenate([part.joints for part in several]),
+        placements=np.concatenate([part.placements for part in several]),
         instrument=np.concatenate(
-            [of[each.instrument] for of, each in zip(numbers, several, strict=True)]
+            [of[part.instrument] for of, part in zip(numbers, several, strict=True)]
         ),
-        conditions=_same_objects([c for each in several for c in each.conditions]),
-        held_out=np.concatenate([each.held_out for each in several]),
-        row=np.concatenate([each.row + at for each, at in zip(several, first, strict=True)]),
-        observable=np.concatenate([each.observable for each in several]),
-        strut=np.concatenate([each.strut for each in several]),
-        value=np.concatenate([each.value for each in several]),
-        uncertainty=np.concatenate([each.uncertainty for each in several]),
-        lines=np.concatenate([each.lines for each in several]),
-        file=", ".join(each for each in files if each),
-        file_hash=", ".join(dict.fromkeys(each.file_hash for each in several if each.file_hash)),
+        conditions=_same_objects([c for part in several for c in part.conditions]),
+        held_out=np.concatenate([part.held_out for part in several]),
+        row=np.concatenate(
+            [part.row + offset for part, offset in zip(several, first, strict=True)]
+        ),
+        observable=np.concatenate([part.observable for part in several]),
+        strut=np.concatenate([part.strut for part in several]),
+        value=np.concatenate([part.value for part in several]),
+        uncertainty=np.concatenate([part.uncertainty for part in several]),
+        lines=np.concatenate([part.lines for part in several]),
+        file=", ".join(file for file in files if file),
+        file_hash=", ".join(dict.fromkeys(part.file_hash for part in several if part.file_hash)),
     )
 
 
@@ -143,11 +149,11 @@ def _same_objects(conditions: Sequence[Condition]) -> tuple[Condition, ...]:
     by_identity: dict[int, Condition] = {}
     for condition in conditions:
         if id(condition) not in by_identity:
-            same = next((each for each in kept if each == condition), None)
+            same = next((other for other in kept if other == condition), None)
             if same is None:
                 kept.append(condition)
             by_identity[id(condition)] = condition if same is None else same
-    return tuple(by_identity[id(each)] for each in conditions)
+    return tuple(by_identity[id(condition)] for condition in conditions)
 
 
 def _bad(path: str, found: str, expected: str, hint: str | None = None) -> Problem:
@@ -162,7 +168,7 @@ def _bad(path: str, found: str, expected: str, hint: str | None = None) -> Probl
 
 
 @dataclass
-class _Maker:
+class _Arguments:
     """Arrays as the caller gave them -> arrays of the right shape, or problems."""
 
     machine: Machine
@@ -206,7 +212,7 @@ class _Maker:
             if name not in self.known:
                 hint = did_you_mean(name, self.known)
                 self.refuse(f"values.{name}", name, one_of(self.known, limit=16), hint)
-        return {name: given for name, given in values.items() if name in self.known}
+        return {name: column for name, column in values.items() if name in self.known}
 
     def commanded(self, poses: ArrayLike | None, joints: ArrayLike | None) -> Floats | None:
         """(n_row, n_commanded) poses or (n_row, n_joint) joints, whichever is given."""
@@ -214,9 +220,9 @@ class _Maker:
             found = "neither" if poses is None else "both"
             self.refuse("poses", found, "either poses or joints, as they were commanded")
             return None
-        path, given = ("poses", poses) if joints is None else ("joints", joints)
+        path, argument = ("poses", poses) if joints is None else ("joints", joints)
         names = self.machine.commanded if joints is None else self.machine.joints
-        table = self._numbers(path, given)
+        table = self._numbers(path, argument)
         if table is None:
             return None
         expected = f"(n_row, {len(names)}) finite numbers: {', '.join(names)}"
@@ -229,9 +235,9 @@ class _Maker:
             return None
         return table
 
-    def of_rows(self, name: str, given: ArrayLike, n: int, what: str = "values") -> Floats:
+    def of_rows(self, name: str, values: ArrayLike, n: int, what: str = "values") -> Floats:
         """(n_row,) of one column; one number stands for all rows."""
-        table = self._numbers(f"{what}.{name}", given)
+        table = self._numbers(f"{what}.{name}", values)
         if table is not None and table.shape in ((), (n,)) and not np.isinf(table).any():
             return np.broadcast_to(table, (n,)).copy()
         if table is not None:
@@ -241,18 +247,24 @@ class _Maker:
 
     def uncertainties(
         self,
-        given: float | Mapping[str, ArrayLike] | None,
+        uncertainty: float | Mapping[str, ArrayLike] | None,
         readings: Mapping[str, Floats],
         n: int,
     ) -> dict[str, Floats]:
         """Columns of uncertainties, by the name that they have in a file."""
-        if given is None or self.instrument.kind not in REGISTRY:
+        if uncertainty is None or self.instrument.kind not in REGISTRY:
             return {}
         kind = REGISTRY[self.instrument.kind]
-        own = [name for name, each in self.known.items() if each.word in kind.reads] or kind.fixed
-        read = [name for name in own if name in readings or kind.fixed or kind.optional]
+        columns = [name for name, column in self.known.items() if column.word in kind.reads]
+        read = [
+            name
+            for name in columns or kind.fixed
+            if name in readings or kind.fixed or kind.optional
+        ]
         by_column: Mapping[str, ArrayLike]
-        by_column = given if isinstance(given, Mapping) else dict.fromkeys(read, given)
+        by_column = (
+            uncertainty if isinstance(uncertainty, Mapping) else dict.fromkeys(read, uncertainty)
+        )
         result = {}
         for name, amount in by_column.items():
             if name not in self.known:
@@ -260,34 +272,34 @@ class _Maker:
                 self.refuse(f"uncertainty.{name}", name, one_of(read, limit=16), hint)
                 continue
             column = self.of_rows(name, amount, n, "uncertainty")
-            if name in readings and not isinstance(given, Mapping):
+            if name in readings and not isinstance(uncertainty, Mapping):
                 column[np.isnan(readings[name]) & (not kind.optional)] = np.nan
             result[name + UNCERTAINTY] = column
         return result
 
     def conditions(
-        self, given: Condition | Sequence[Condition] | None, n: int
+        self, condition: Condition | Sequence[Condition] | None, n: int
     ) -> tuple[Condition, ...] | None:
         """(n_row,) conditions, of parts that the machine has; None: the default."""
-        if given is None:
+        if condition is None:
             return None
-        every = (given,) * n if isinstance(given, Condition) else tuple(given)
+        every = (condition,) * n if isinstance(condition, Condition) else tuple(condition)
         if len(every) != n:
             self.refuse(
                 "condition", f"{len(every)} conditions", f"one, or one for each of {n} rows"
             )
             return None
         same = _same_objects(every)
-        for condition in {id(each): each for each in same}.values():
+        for condition in {id(condition): condition for condition in same}.values():
             try:
                 self.machine.check_condition(condition)
             except RequestError as error:
                 self.problems += error.problems
         return same
 
-    def _numbers(self, path: str, given: ArrayLike | None) -> Floats | None:
+    def _numbers(self, path: str, values: ArrayLike | None) -> Floats | None:
         try:
-            return np.array(given, np.float64)
+            return np.array(values, np.float64)
         except (TypeError, ValueError):
             self.refuse(path, "something that is not an array of numbers", "numbers")
             return None
@@ -310,22 +322,10 @@ class _Report:
     problems: list[Problem]
     rows: MeasurementRows
 
-    def __call__(
-        self,
-        code: str,
-        message: str,
-        *,
-        row: int | None = None,
-        column: str | None = None,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
+    def __call__(self, fault: Fault, *, row: int | None = None, column: str | None = None) -> None:
+        problem = fault.about(column).at(path=column)
         where = "" if row is None else f" (row {row})"
-        message = message if column is None else f"{column}: {message}"
-        self.problems.append(
-            Problem(code, message + where, path=column, found=found, expected=expected, hint=hint)
-        )
+        self.problems.append(replace(problem, message=problem.message + where))
 
     def shown(self, column: str, row: int) -> str:
         """A number as it was given, SI."""

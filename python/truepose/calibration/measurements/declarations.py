@@ -17,7 +17,7 @@ import math
 import re
 import tomllib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
 
 import numpy as np
@@ -25,7 +25,7 @@ import numpy as np
 from truepose._kernel import toml_lines
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument, Kind
 from truepose.calibration.instruments._base import Vector
-from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.calibration.observables import si_unit
 from truepose.errors import Fault, Problem
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.document import Document, Key
@@ -122,7 +122,7 @@ def _not_toml(error: Exception, head: str, file: str) -> Problem:
     line, found = None, None
     if match is not None:
         reason = reason[: match.start()]
-        written = [at for at, each in enumerate(head.split("\n"), 1) if each]
+        written = [number for number, text in enumerate(head.split("\n"), 1) if text]
         line = int(match[1]) if match[1] else (written[-1] if written else None)
         all_lines = head.split("\n")
         found = all_lines[line - 1].strip()[:80] if line and line <= len(all_lines) else None
@@ -152,7 +152,7 @@ def expected_name(reserved: frozenset[str]) -> str:
 
 
 class _RefusedError(Exception):
-    """A value is no good; what is wrong is told already."""
+    """A value is refused; its problem is noted already."""
 
 
 class _Reader:
@@ -166,20 +166,20 @@ class _Reader:
 
     def read(self) -> None:
         data = self.document.data
-        for key in data:
-            if key not in TOP_KEYS:
-                self._unknown_key((key,), TOP_KEYS)
+        self._check_keys((), data, TOP_KEYS)
         if "machine" in data:
             self.header.machine = self._text(("machine",))
             self.header.machine_line = self.document.line(("machine",))
         tables = data.get("instrument", {})
         if not isinstance(tables, dict) or not all(isinstance(t, dict) for t in tables.values()):
             self._tell(
-                "wrong-type",
-                "instruments are tables with a name",
+                Fault(
+                    "wrong-type",
+                    "instruments are tables with a name",
+                    found=shown_value(tables),
+                    expected=f"{_MARK} [instrument.tracker]",
+                ),
                 ("instrument",),
-                found=shown_value(tables),
-                expected=f"{_MARK} [instrument.tracker]",
             )
             return
         self.header.declared = tuple(tables)
@@ -194,20 +194,19 @@ class _Reader:
         before = len(self.header.problems)
         if not name_is_good(name, self.reserved):
             self._tell(
-                "bad-name",
-                "an instrument cannot have this name",
+                Fault(
+                    "bad-name",
+                    "an instrument cannot have this name",
+                    found=shown_value(name),
+                    expected=expected_name(self.reserved),
+                ),
                 key,
-                found=shown_value(name),
-                expected=expected_name(self.reserved),
             )
         table = self.document.data["instrument"][name]
         kind = self._kind(key, table)
         if kind is None:
             return None
-        known = self._keys(kind)
-        for word in table:
-            if word not in known:
-                self._unknown_key((*key, word), known)
+        self._check_keys(key, table, self._keys(kind))
         end = str(self._if_there(key, table, "end", self._end, "base"))
         frame = self._frame_of(key, table, kind, end)
         target = self._if_there(key, table, "target", self._target, ((0.0, 0.0, 0.0), False))
@@ -216,7 +215,11 @@ class _Reader:
         if "axis" in kind.keys:
             zero = self._zero(key, table, axis, zero)
         uncertainty = self._if_there(
-            key, table, "uncertainty", lambda at, value: self._uncertainty(at, value, kind), {}
+            key,
+            table,
+            "uncertainty",
+            lambda place, value: self._uncertainty(place, value, kind),
+            {},
         )
         bias = self._if_there(key, table, "bias", self._bias, False)
         if len(self.header.problems) > before:
@@ -241,23 +244,27 @@ class _Reader:
     def _kind(self, key: Key, table: dict[str, Any]) -> Kind | None:
         if "kind" not in table:
             self._tell(
-                "missing-key",
-                "missing",
+                Fault(
+                    "missing-key",
+                    "missing",
+                    found="nothing",
+                    expected=one_of(f'"{name}"' for name in REGISTRY),
+                ),
                 (*key, "kind"),
-                found="nothing",
-                expected=one_of(f'"{each}"' for each in REGISTRY),
             )
             return None
         word = table["kind"]
         if isinstance(word, str) and word in REGISTRY:
             return REGISTRY[word]
         self._tell(
-            "unknown-choice",
-            f"there is no instrument of kind {shown_value(word)}",
+            Fault(
+                "unknown-choice",
+                f"there is no instrument of kind {shown_value(word)}",
+                found=shown_value(word),
+                expected=one_of(f'"{name}"' for name in REGISTRY),
+                hint=did_you_mean(word, REGISTRY) if isinstance(word, str) else None,
+            ),
             (*key, "kind"),
-            found=shown_value(word),
-            expected=one_of(f'"{each}"' for each in REGISTRY),
-            hint=did_you_mean(word, REGISTRY) if isinstance(word, str) else None,
         )
         return None
 
@@ -277,29 +284,34 @@ class _Reader:
         except _RefusedError:
             return default
 
-    # Values. Each raises `_RefusedError` once it has told what is wrong.
+    # Values. Each raises `_RefusedError` once it has noted what is wrong.
 
     def _frame_of(self, key: Key, table: dict[str, Any], kind: Kind, end: str) -> Frame:
         without = kind.frame is None or end == "platform"
         if "frame" not in table:
             if not without:
                 self._tell(
-                    "missing-key",
-                    "missing",
+                    Fault(
+                        "missing-key",
+                        "missing",
+                        found="nothing",
+                        expected='"base", "unknown" or a table: '
+                        '{ origin = ["0 mm", "0 mm", "0 mm"], '
+                        'rotation = ["0 deg", "0 deg", "0 deg"] }',
+                        hint="readings mean nothing without the frame that they are in",
+                    ),
                     (*key, "frame"),
-                    found="nothing",
-                    expected='"base", "unknown" or a table: '
-                    '{ origin = ["0 mm", "0 mm", "0 mm"], rotation = ["0 deg", "0 deg", "0 deg"] }',
-                    hint="readings mean nothing without the frame that they are in",
                 )
             return Frame()
         if without and table["frame"] != "base":
             self._tell(
-                "unknown-choice",
-                "what this instrument reads does not depend on a frame",
+                Fault(
+                    "unknown-choice",
+                    "what this instrument reads does not depend on a frame",
+                    found=shown_value(table["frame"]),
+                    expected='no frame, or "base"',
+                ),
                 (*key, "frame"),
-                found=shown_value(table["frame"]),
-                expected='no frame, or "base"',
             )
             return Frame()
         frame = self._if_there(key, table, "frame", self._frame, Frame())
@@ -313,16 +325,15 @@ class _Reader:
             return Frame()
         if not isinstance(value, dict):
             self._refuse(
-                "unknown-choice" if isinstance(value, str) else "wrong-type",
-                f"expected a frame, found {type_phrase(value)}",
+                Fault(
+                    "unknown-choice" if isinstance(value, str) else "wrong-type",
+                    f"expected a frame, found {type_phrase(value)}",
+                ),
                 key,
                 value,
                 '"base", "unknown" or a table with origin, rotation, unknown',
             )
-        known = ("origin", "rotation", "unknown")
-        for word in value:
-            if word not in known:
-                self._unknown_key((*key, word), known)
+        self._check_keys(key, value, ("origin", "rotation", "unknown"))
         frame = Frame()
         if "origin" in value:
             origin = self._three((*key, "origin"), value["origin"], "length")
@@ -330,33 +341,32 @@ class _Reader:
         if "rotation" in value:
             rotation = self._rotation((*key, "rotation"), value["rotation"])
             frame = dataclasses.replace(frame, rotation=rotation)
-        if "unknown" in value:
-            unknown = value["unknown"]
-            words = unknown if isinstance(unknown, list) else [unknown]
-            bad = [word for word in words if word not in FRAME_FREEDOMS]
-            if bad:
+        unknown = value.get("unknown", [])
+        words = unknown if isinstance(unknown, list) else [unknown]
+        for word in words:
+            if word not in FRAME_FREEDOMS:
+                expected = "a list of some of " + ", ".join(f'"{name}"' for name in FRAME_FREEDOMS)
+                place = (*key, "unknown")
                 self._refuse(
-                    "unknown-choice",
-                    "no freedom of a frame",
-                    (*key, "unknown"),
-                    bad[0],
-                    "a list of some of " + ", ".join(f'"{each}"' for each in FRAME_FREEDOMS),
+                    Fault("unknown-choice", "no freedom of a frame"), place, word, expected
                 )
-            flags = tuple(each in words for each in FRAME_FREEDOMS)
-            frame = dataclasses.replace(frame, unknown=flags)
-        return frame
+        return dataclasses.replace(frame, unknown=tuple(name in words for name in FRAME_FREEDOMS))
 
     def _rotation(self, key: Key, value: Any) -> Quaternion:
         """Three angles a b c, or the four numbers of a unit quaternion w x y z."""
         if not isinstance(value, list) or len(value) != 4:
             return euler_to_quaternion(self._three(key, value, "angle"))
-        w, x, y, z = (self._number((*key, at), entry, "ratio") for at, entry in enumerate(value))
+        w, x, y, z = (
+            self._number((*key, index), entry, "ratio") for index, entry in enumerate(value)
+        )
         size = math.hypot(w, x, y, z)
         if abs(size - 1.0) > NEARLY:
             expected = "a unit quaternion [w, x, y, z], or three angles"
-            self._refuse("wrong-type", "the quaternion is not of length 1", key, value, expected)
+            self._refuse(
+                Fault("wrong-type", "the quaternion is not of length 1"), key, value, expected
+            )
         if abs(size - 1.0) <= ROUNDING:
-            return (w, x, y, z)
+            size = 1.0
         return (w / size, x / size, y / size, z / size)
 
     def _target(self, key: Key, value: Any) -> tuple[Vector, bool]:
@@ -364,29 +374,30 @@ class _Reader:
             return (0.0, 0.0, 0.0), True
         if not isinstance(value, dict):
             return self._three(key, value, "length"), False
-        for word in value:
-            if word not in ("start", "unknown"):
-                self._unknown_key((*key, word), ("start", "unknown"))
+        self._check_keys(key, value, ("start", "unknown"))
         start = (0.0, 0.0, 0.0)
         if "start" in value:
             start = self._three((*key, "start"), value["start"], "length")
         unknown = value.get("unknown", True)
         if not isinstance(unknown, bool):
             self._refuse(
-                "wrong-type", "expected true or false", (*key, "unknown"), unknown, "true or false"
+                Fault("wrong-type", "expected true or false"),
+                (*key, "unknown"),
+                unknown,
+                "true or false",
             )
         return start, unknown
 
     def _bias(self, key: Key, value: Any) -> bool:
         if value != UNKNOWN:
             message = "a bias is either unknown, or taken off the readings"
-            self._refuse("unknown-choice", message, key, value, '"unknown", or no such key')
+            self._refuse(Fault("unknown-choice", message), key, value, '"unknown", or no such key')
         return True
 
     def _end(self, key: Key, value: Any) -> str:
         if value not in ("base", "platform"):
             expected = 'one of "base", "platform"'
-            self._refuse("unknown-choice", "no end of a strut", key, value, expected)
+            self._refuse(Fault("unknown-choice", "no end of a strut"), key, value, expected)
         return str(value)
 
     def _direction(self, key: Key, value: Any) -> Vector:
@@ -394,31 +405,32 @@ class _Reader:
         size = math.hypot(x, y, z)
         if not (math.isfinite(size) and size > 0.0):
             self._refuse(
-                "zero-direction",
-                "a direction has a length above zero",
+                Fault("zero-direction", "a direction has a length above zero"),
                 key,
                 value,
                 "at least one component that is not zero",
             )
         if abs(size - 1.0) <= ROUNDING:
-            return (x, y, z)  # to the last digit as it is written
+            size = 1.0  # to the last digit as it is written
         return (x / size, y / size, z / size)
 
     def _zero(self, key: Key, table: dict[str, Any], axis: Vector, zero: Vector | None) -> Vector:
         """The zero direction, made across the axis; where none is given, some direction is."""
         around = np.array(axis)
-        given = np.eye(3)[int(np.argmin(np.abs(around)))] if zero is None else np.array(zero)
-        if zero is not None and abs(given @ around) <= ROUNDING:
+        direction = np.eye(3)[int(np.argmin(np.abs(around)))] if zero is None else np.array(zero)
+        if zero is not None and abs(direction @ around) <= ROUNDING:
             return zero
-        across = given - (given @ around) * around
+        across = direction - (direction @ around) * around
         size = float(np.linalg.norm(across))
         if size < 1e-6:
             self._tell(
-                "zero-direction",
-                "the zero direction is along the axis",
+                Fault(
+                    "zero-direction",
+                    "the zero direction is along the axis",
+                    found=shown_value(table.get("zero")),
+                    expected="a direction across the axis",
+                ),
                 (*key, "zero"),
-                found=shown_value(table.get("zero")),
-                expected="a direction across the axis",
             )
             return (1.0, 0.0, 0.0)
         x, y, z = (across / size).tolist()
@@ -426,7 +438,7 @@ class _Reader:
 
     def _uncertainty(self, key: Key, value: Any, kind: Kind) -> dict[str, float]:
         """Standard uncertainties by observable: one text for each dimension, or by column."""
-        observed = dict(kind.reads) or {each: each for each in kind.fixed}
+        observed = dict(kind.reads) or {observable: observable for observable in kind.fixed}
         if isinstance(value, dict):
             result = {}
             for word, entry in value.items():
@@ -437,19 +449,22 @@ class _Reader:
                 result[observed[word]] = self._positive((*key, word), entry, (dimension,))[0]
             return result
         entries = value if isinstance(value, list) else [value]
-        dimensions = tuple(dict.fromkeys(_dimension(each) for each in observed.values()))
+        dimensions = tuple(dict.fromkeys(map(_dimension, observed.values())))
         result = {}
-        for at, entry in enumerate(entries):
-            where = (*key, at) if isinstance(value, list) else key
+        for index, entry in enumerate(entries):
+            where = (*key, index) if isinstance(value, list) else key
             amount, dimension = self._positive(where, entry, dimensions)
-            mine = [each for each in observed.values() if _dimension(each) == dimension]
-            if not result.keys().isdisjoint(mine):
+            same = [name for name in observed.values() if _dimension(name) == dimension]
+            if not result.keys().isdisjoint(same):
                 plural = DIMENSIONS[dimension].plural
                 expected = f"one for all {plural}, or a table by column"
                 self._refuse(
-                    "excluding-keys", f"two uncertainties of {plural}", where, entry, expected
+                    Fault("excluding-keys", f"two uncertainties of {plural}"),
+                    where,
+                    entry,
+                    expected,
                 )
-            result.update(dict.fromkeys(mine, amount))
+            result.update(dict.fromkeys(same, amount))
         return result
 
     def _positive(self, key: Key, value: Any, dimensions: tuple[str, ...]) -> tuple[float, str]:
@@ -464,12 +479,11 @@ class _Reader:
             except QuantityError as error:
                 if error.code == "wrong-dimension" and dimension != tried[-1]:
                     continue
-                self._quantity(key, error, [DIMENSIONS[each].phrase for each in tried])
+                self._quantity(key, error, [DIMENSIONS[name].phrase for name in tried])
             if amount > 0.0:
                 return amount, dimension if dimension in dimensions else dimensions[0]
             self._refuse(
-                "not-positive",
-                "a standard uncertainty is above zero",
+                Fault("not-positive", "a standard uncertainty is above zero"),
                 key,
                 value,
                 f"{DIMENSIONS[dimension].phrase} above zero",
@@ -482,13 +496,17 @@ class _Reader:
         if not isinstance(value, list) or len(value) != 3:
             found = f"a list of {len(value)}" if isinstance(value, list) else type_phrase(value)
             self._refuse(
-                "wrong-type",
-                f"expected a list of 3 {DIMENSIONS[dimension].plural}, found {found}",
+                Fault(
+                    "wrong-type",
+                    f"expected a list of 3 {DIMENSIONS[dimension].plural}, found {found}",
+                ),
                 key,
                 value,
                 f'["0{unit}", "0{unit}", "1{unit}"]' if unit else "[0, 0, 1]",
             )
-        x, y, z = (self._number((*key, at), entry, dimension) for at, entry in enumerate(value))
+        x, y, z = (
+            self._number((*key, index), entry, dimension) for index, entry in enumerate(value)
+        )
         return (x, y, z)
 
     def _number(self, key: Key, value: Any, dimension: str) -> float:
@@ -502,11 +520,13 @@ class _Reader:
         if isinstance(value, str):
             return value
         self._tell(
-            "wrong-type",
-            f"expected text, found {type_phrase(value)}",
+            Fault(
+                "wrong-type",
+                f"expected text, found {type_phrase(value)}",
+                found=shown_value(value),
+                expected="the name of a machine",
+            ),
             key,
-            found=shown_value(value),
-            expected="the name of a machine",
         )
         return None
 
@@ -515,38 +535,35 @@ class _Reader:
         if error.code == "no-unit":
             hint = "write the unit with the number, in quotation marks"
         expected = error.expected if len(wanted) == 1 else " or ".join(wanted)
-        self._tell(error.code, error.message, key, found=error.found, expected=expected, hint=hint)
+        self._tell(replace(error.fault, expected=expected, hint=hint), key)
         raise _RefusedError
 
-    def _refuse(self, code: str, message: str, key: Key, value: Any, expected: str) -> NoReturn:
-        self._tell(code, message, key, found=shown_value(value), expected=expected)
+    def _refuse(self, fault: Fault, key: Key, value: Any, expected: str) -> NoReturn:
+        self._tell(replace(fault, found=shown_value(value), expected=expected), key)
         raise _RefusedError
+
+    def _check_keys(self, key: Key, table: dict[str, Any], known: Iterable[str]) -> None:
+        """Refuse the keys of a table that are not among the `known` ones."""
+        for word in table:
+            if word not in known:
+                self._unknown_key((*key, word), known)
 
     def _unknown_key(self, key: Key, known: Iterable[str]) -> None:
         word, words = str(key[-1]), list(known)
         self._tell(
-            "unknown-key",
-            "unknown key",
+            Fault(
+                "unknown-key",
+                "unknown key",
+                found=word,
+                expected=one_of(words) if words else "no key",
+                hint=did_you_mean(word, words),
+            ),
             key,
-            found=word,
-            expected=one_of(words) if words else "no key",
-            hint=did_you_mean(word, words),
         )
 
-    def _tell(
-        self,
-        code: str,
-        message: str,
-        key: Key,
-        *,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
-        self.header.problems.append(
-            self.document.problem(Fault(code, message, found, expected, hint), key)
-        )
+    def _tell(self, fault: Fault, key: Key) -> None:
+        self.header.problems.append(self.document.problem(fault, key))
 
 
 def _dimension(observable: str) -> str:
-    return BY_UNIT[UNITS[OBSERVABLES.index(observable)]]
+    return BY_UNIT[si_unit(observable)]

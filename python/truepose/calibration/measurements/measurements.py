@@ -1,8 +1,8 @@
 """Measurements: what instruments read of a machine, row by row, ready to be fitted.
 
 A row is one pose at which one instrument measured; an observation is one number of a row.
-`measurement_file.py` reads them from a file, `measurement_arrays.py` makes them from arrays, and
-`measurement_writer.py` writes them.
+`read_csv.py` reads them from a file, `arrays.py` makes them from arrays, and `write_csv.py` writes
+them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from truepose.machine.condition import Condition
 
 
 def unloaded_at_reference(condition: Condition) -> Condition:
-    """The condition of a row that says nothing: at reference throughout, nothing on the tool."""
+    """The condition of a row that states none: at reference temperature, with an unloaded tool."""
     return dataclasses.replace(
         condition,
         default_temperature=condition.reference_temperature,
@@ -75,8 +75,8 @@ class Measurements:
 
     def observables(self, instrument: int) -> tuple[str, ...]:
         """Names of what an instrument, by its index, read in any row, in the order of the table."""
-        mine = self.observable[self.instrument[self.row] == instrument]
-        return tuple(OBSERVABLES[each] for each in np.unique(mine).tolist())
+        read = self.observable[self.instrument[self.row] == instrument]
+        return tuple(OBSERVABLES[number] for number in np.unique(read).tolist())
 
     @property
     def digest(self) -> str:
@@ -84,7 +84,7 @@ class Measurements:
         if self.file_hash:
             return self.file_hash
         arrays = (self.joints, self.row, self.observable, self.strut, self.value, self.uncertainty)
-        parts = b"".join(np.ascontiguousarray(each).tobytes() for each in arrays)
+        parts = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
         return hashlib.sha256(parts).hexdigest()
 
     def select(self, rows: ArrayLike) -> Measurements:
@@ -99,7 +99,7 @@ class Measurements:
             joints=self.joints[wanted],
             placements=self.placements[wanted],
             instrument=self.instrument[wanted],
-            conditions=tuple(self.conditions[at] for at in np.flatnonzero(wanted).tolist()),
+            conditions=tuple(self.conditions[row] for row in np.flatnonzero(wanted).tolist()),
             held_out=self.held_out[wanted],
             lines=self.lines[wanted],
             row=number[self.row[kept]].astype(np.intp),

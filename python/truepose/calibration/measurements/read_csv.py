@@ -90,7 +90,8 @@ def _columns(machine: Machine) -> list[Column]:
 
     columns = [Column(INSTRUMENT, None, required=False)]
     columns += [
-        Column(f"command.{each}", FREEDOMS[each], required=False) for each in machine.commanded
+        Column(f"command.{freedom}", FREEDOMS[freedom], required=False)
+        for freedom in machine.commanded
     ]
     columns += [
         Column(f"joint.{drive.name}", drive.coordinate, required=False) for drive in machine.drives
@@ -108,7 +109,7 @@ def _parts(machine: Machine) -> tuple[str, ...]:
 
 @dataclass
 class _Reading:
-    """One file on its way to measurements; every problem of it is collected."""
+    """Makes measurements of one file and collects every problem in it."""
 
     machine: Machine
     header: Header
@@ -117,7 +118,7 @@ class _Reading:
     problems: list[Problem] = field(default_factory=list)
 
     def measurements(self) -> Measurements | None:
-        """The measurements, as far as problems let them be made."""
+        """The measurements; None where problems leave nothing to make them of."""
         self.problems += self.header.problems
         self.problems += self._of_this_machine(self.read.problems)
         self._check_machine()
@@ -156,11 +157,11 @@ class _Reading:
         return measurements_in(self.machine, self.header.instruments, rows, report)
 
     def _of_this_machine(self, problems: Iterable[Problem]) -> Iterator[Problem]:
-        """Columns that name what the machine does not have are not misspelt: they are another's."""
+        """Columns of unknown joints, freedoms, struts mean another machine; others are misspelt."""
         strange: dict[str, list[Problem]] = {}
         for problem in problems:
             word = problem.path or ""
-            beginning = next((each for each in _OF_MACHINE if word.startswith(each)), None)
+            beginning = next((prefix for prefix in _OF_MACHINE if word.startswith(prefix)), None)
             if problem.code != "unknown-column":
                 yield problem
             elif beginning is not None and not self._knows(word):
@@ -203,21 +204,21 @@ class _Reading:
         """Whether the machine has the strut that a column names: then its end is misspelt."""
         strut = column.partition(".")[2]
         return column.startswith("strut.") and any(
-            strut.startswith(f"{each.name}.") for each in self.machine.struts
+            strut.startswith(f"{known.name}.") for known in self.machine.struts
         )
 
     def _words_beside(self, column: str) -> list[str]:
-        """The columns that one that is not known may have been meant to be, in short."""
+        """The columns that an unknown one may be a misspelling of, shortened."""
         if column.startswith("strut."):
             name = next(
                 (s.name for s in self.machine.struts if column.startswith(f"strut.{s.name}.")), "1"
             )
-            return [each for each in reading_columns(self.machine) if f".{name}." in each]
+            return [known for known in reading_columns(self.machine) if f".{name}." in known]
         return [
             INSTRUMENT,
-            *(f"command.{each}" for each in self.machine.commanded),
-            *(f"joint.{each}" for each in self.machine.joints),
-            *(name for name, each in reading_columns(self.machine).items() if each.strut < 1),
+            *(f"command.{freedom}" for freedom in self.machine.commanded),
+            *(f"joint.{joint}" for joint in self.machine.joints),
+            *(name for name, column in reading_columns(self.machine).items() if column.strut < 1),
             "temperature.default",
             *WRENCH,
             SET,
@@ -259,82 +260,93 @@ class _Reading:
 
     def _check_columns(self, table: DataTable) -> None:
         """Whether there are columns of commands or joints, and of readings."""
-        strange = {p.path for p in self.problems if p.code == "other-machine"}
+        strange = [p.path for p in self.problems if p.code == "other-machine" and p.path]
         unknown = any(p.code in ("unknown-column", "unknown-part") for p in self.problems)
         columns = table.columns
-        given = [
+        beginnings = [
             beginning
             for beginning in ("command.", "joint.")
-            if any(each.startswith(beginning) for each in columns)
-            or any(each and each.startswith(beginning) for each in strange)
+            if any(column.startswith(beginning) for column in (*columns, *strange))
         ]
-        if len(given) > 1:
+        if len(beginnings) > 1:
             self._tell(
-                "excluding-columns",
-                "the file has both joints and commanded poses",
-                found=", ".join(e for e in columns if e.startswith(("command.", "joint."))),
-                expected="either columns command.* or columns joint.*",
-                hint="what the controller was sent counts",
-            )
-        commands = ", ".join(f"command.{each}" for each in self.machine.commanded)
-        joints = ", ".join(f"joint.{each}" for each in self.machine.joints)
-        if not given and not unknown:
-            self._tell(
-                "missing-column",
-                "nothing says where the machine was commanded to",
-                found=", ".join(columns) or "no column",
-                expected=f"{commands}; or {joints}",
-            )
-        for beginning in given if len(given) == 1 else ():
-            of_machine = [beginning + each for each in self._own(beginning)]
-            lacking = [each for each in of_machine if each not in columns]
-            if lacking and not any(each and each.startswith(beginning) for each in strange):
-                self._tell(
-                    "missing-column",
-                    f"there is no column {', '.join(lacking)}",
-                    found=", ".join(e for e in columns if e.startswith(beginning)),
-                    expected=", ".join(of_machine),
+                Fault(
+                    "excluding-columns",
+                    "the file has both joints and commanded poses",
+                    found=", ".join(
+                        column for column in columns if column.startswith(("command.", "joint."))
+                    ),
+                    expected="either columns command.* or columns joint.*",
+                    hint="what the controller was sent counts",
                 )
-        kinds = [REGISTRY[each.kind] for each in self.header.instruments]
-        readings = [each for each in columns if each in reading_columns(self.machine)]
+            )
+        if not beginnings and not unknown:
+            commands = ", ".join(f"command.{freedom}" for freedom in self.machine.commanded)
+            joints = ", ".join(f"joint.{joint}" for joint in self.machine.joints)
+            self._tell(
+                Fault(
+                    "missing-column",
+                    "nothing says where the machine was commanded to",
+                    found=", ".join(columns) or "no column",
+                    expected=f"{commands}; or {joints}",
+                )
+            )
+        for beginning in beginnings if len(beginnings) == 1 else ():
+            of_machine = [beginning + name for name in self._own(beginning)]
+            lacking = [column for column in of_machine if column not in columns]
+            if lacking and not any(column.startswith(beginning) for column in strange):
+                self._tell(
+                    Fault(
+                        "missing-column",
+                        f"there is no column {', '.join(lacking)}",
+                        found=", ".join(
+                            column for column in columns if column.startswith(beginning)
+                        ),
+                        expected=", ".join(of_machine),
+                    )
+                )
+        kinds = [REGISTRY[instrument.kind] for instrument in self.header.instruments]
+        readings = [column for column in columns if column in reading_columns(self.machine)]
         silent = any(kind.optional or kind.fixed for kind in kinds)
-        wrong = unknown or any(each and each.startswith("strut.") for each in strange)
+        wrong = unknown or any(column.startswith("strut.") for column in strange)
         if not readings and not silent and not wrong:
             self._tell(
-                "nothing-measured",
-                "no column holds what was measured",
-                found=", ".join(columns) or "no column",
-                expected="x, y, z, a, b, c, distance, strut.*.length, strut.*.direction.x or "
-                "strut.*.angle",
+                Fault(
+                    "nothing-measured",
+                    "no column holds what was measured",
+                    found=", ".join(columns) or "no column",
+                    expected="x, y, z, a, b, c, distance, strut.*.length, strut.*.direction.x or "
+                    "strut.*.angle",
+                )
             )
         elif readings and not self.header.declared:
             return
         if INSTRUMENT not in columns and len(self.header.declared) > 1:
             self._tell(
-                "missing-column",
-                "there is no column instrument, but more than one instrument",
-                found=", ".join(self.header.declared),
-                expected="a column instrument with the name of one in each row",
+                Fault(
+                    "missing-column",
+                    "there is no column instrument, but more than one instrument",
+                    found=", ".join(self.header.declared),
+                    expected="a column instrument with the name of one in each row",
+                )
             )
 
-    def _tell(
-        self, code: str, message: str, *, found: str, expected: str, hint: str | None = None
-    ) -> None:
+    def _tell(self, fault: Fault) -> None:
         """A problem of the header of the table."""
         line = None if self.read.table is None else self.read.table.header_line
-        self.problems.append(
-            Problem(code, message, self.file, line, found=found, expected=expected, hint=hint)
-        )
+        self.problems.append(fault.at(self.file, line))
 
     def _stacked(self, table: DataTable, beginning: str, names: tuple[str, ...]) -> Floats | None:
         """(n_row, n) of columns that are all there, else None."""
         columns = [table.numbers.get(beginning + name) for name in names]
-        found = [column for column in columns if column is not None]
-        return np.stack(found, axis=1) if len(found) == len(names) else None
+        present = [column for column in columns if column is not None]
+        return np.stack(present, axis=1) if len(present) == len(names) else None
 
     def _instruments(self, table: DataTable) -> Indices:
-        """(n_row,) the instrument of each row, -1 where there is none that is good."""
-        numbers = {each.name: at for at, each in enumerate(self.header.instruments)}
+        """(n_row,) each row's instrument, -1 where none that is declared and valid is named."""
+        numbers = {
+            instrument.name: number for number, instrument in enumerate(self.header.instruments)
+        }
         words = table.texts.get(INSTRUMENT)
         declared = self.header.declared
         if words is None:
@@ -375,22 +387,10 @@ class _Report:
     problems: list[Problem]
     misnamed: bool
 
-    def __call__(
-        self,
-        code: str,
-        message: str,
-        *,
-        row: int | None = None,
-        column: str | None = None,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
-        if code == "missing-column" and self.misnamed:
+    def __call__(self, fault: Fault, *, row: int | None = None, column: str | None = None) -> None:
+        if fault.code == "missing-column" and self.misnamed:
             return
-        problem = self.table.problem(
-            Fault(code, message, found, expected, hint), row=row, column=column
-        )
+        problem = self.table.problem(fault, row=row, column=column)
         if row is None:
             problem = replace(problem, line=self.table.header_line)
         self.problems.append(problem)

@@ -19,6 +19,7 @@ from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
 from truepose.calibration.measurements.measurements import Measurements, unloaded_at_reference
 from truepose.calibration.observables import OBSERVABLES
+from truepose.errors import Fault
 from truepose.files.data_file import MOST_PROBLEMS
 from truepose.files.wording import counted, one_of
 from truepose.machine import Condition, Machine
@@ -57,9 +58,9 @@ class ReadingColumn:
 def reading_columns(machine: Machine) -> dict[str, ReadingColumn]:
     """Every column that readings of a machine can have, in the order of a file."""
     columns = {word: ReadingColumn(word, dimension) for word, dimension in SINGLE.items()}
-    for at, strut in enumerate(machine.struts):
+    for number, strut in enumerate(machine.struts):
         for word, dimension in OF_A_STRUT.items():
-            columns[f"strut.{strut.name}.{word}"] = ReadingColumn(word, dimension, at)
+            columns[f"strut.{strut.name}.{word}"] = ReadingColumn(word, dimension, number)
     return columns
 
 
@@ -104,17 +105,7 @@ class MeasurementRows:
 class Report(Protocol):
     """Where problems go, with their place as the source of the rows knows it."""
 
-    def __call__(
-        self,
-        code: str,
-        message: str,
-        *,
-        row: int | None = None,
-        column: str | None = None,
-        found: str | None = None,
-        expected: str | None = None,
-        hint: str | None = None,
-    ) -> None:
+    def __call__(self, fault: Fault, *, row: int | None = None, column: str | None = None) -> None:
         """Note a problem of a row (from 0), a column, or the whole."""
 
     def shown(self, column: str, row: int) -> str:
@@ -132,12 +123,12 @@ def measurements_in(
     for number in range(len(instruments)):
         observed.of_instrument(number)
     table = observed.table()
-    found = [
+    framed = [
         _with_frame(machine, instrument, number, rows, table)
         for number, instrument in enumerate(instruments)
     ]
     return Measurements(
-        instruments=tuple(found),
+        instruments=tuple(framed),
         joints=placed[0],
         placements=placed[1],
         instrument=rows.instrument,
@@ -170,8 +161,8 @@ def _with_frame(
     rule = REGISTRY[instrument.kind].frame
     if instrument.name not in rows.whole or rule is None:
         return instrument
-    mine = rows.instrument[table.row] == number
-    read = [OBSERVABLES[each] for each in np.unique(table.observable[mine]).tolist()]
+    of_instrument = rows.instrument[table.row] == number
+    read = [OBSERVABLES[code] for code in np.unique(table.observable[of_instrument]).tolist()]
     frame = dataclasses.replace(instrument.frame, unknown=rule(read, machine.components))
     return dataclasses.replace(instrument, frame=frame)
 
@@ -182,41 +173,45 @@ def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Fl
     placements = np.full((rows.n_row, 7), math.nan)
     if rows.commands is not None:
         good = np.isfinite(rows.commands).all(axis=1)
-        for column in (f"command.{each}" for each in machine.commanded):
+        for column in (f"command.{freedom}" for freedom in machine.commanded):
             good &= ~rows.spoilt(column)
-        at = np.flatnonzero(good)
-        joints[at], placements[at], status = machine.kernel.place(rows.commands[at])
+        usable = np.flatnonzero(good)
+        joints[usable], placements[usable], status = machine.kernel.place(rows.commands[usable])
         failed = np.flatnonzero(status)
-        for number, (row, code) in enumerate(zip(at[failed], status[failed], strict=True)):
+        for number, (row, code) in enumerate(zip(usable[failed], status[failed], strict=True)):
             name = why = STATUS[code]
             if number < MOST_PROBLEMS:  # the others are only counted
                 faults = machine.kernel.explain(rows.commands[row])
                 why = f"{name}: {faults_text(machine, faults)}" if faults else name
             report(
-                "commanded-out-of-reach",
-                "the machine cannot be commanded to this pose",
+                Fault(
+                    "commanded-out-of-reach",
+                    "the machine cannot be commanded to this pose",
+                    found=why,
+                    expected="a pose within the travel of every drive",
+                    hint="is it a pose of this machine, in the unit of the header?",
+                ),
                 row=int(row),
-                found=why,
-                expected="a pose within the travel of every drive",
-                hint="is it a pose of this machine, in the unit of the header?",
             )
     if rows.joints is not None:
         good = np.asarray(np.isfinite(rows.joints).all(axis=1), np.bool_)
-        for column in (f"joint.{each}" for each in machine.joints):
+        for column in (f"joint.{joint}" for joint in machine.joints):
             good &= ~rows.spoilt(column)
-        at = np.flatnonzero(good & _within_travel(machine, rows, good, report))
-        joints[at] = rows.joints[at]
-        poses, status = machine.kernel.forward(rows.joints[at], status=True)
+        usable = np.flatnonzero(good & _within_travel(machine, rows, good, report))
+        joints[usable] = rows.joints[usable]
+        poses, status = machine.kernel.forward(rows.joints[usable], status=True)
         solved = status == 0
-        placements[at[solved]] = machine.kernel.placement_of(poses[solved])
-        for row, code in zip(at[~solved].tolist(), status[~solved].tolist(), strict=True):
+        placements[usable[solved]] = machine.kernel.placement_of(poses[solved])
+        for row, code in zip(usable[~solved].tolist(), status[~solved].tolist(), strict=True):
             report(
-                "commanded-out-of-reach",
-                "the machine has no pose at these joints",
+                Fault(
+                    "commanded-out-of-reach",
+                    "the machine has no pose at these joints",
+                    found=STATUS[code],
+                    expected="joints at which the platform can be",
+                    hint="are they joints of this machine, in the unit of the header?",
+                ),
                 row=row,
-                found=STATUS[code],
-                expected="joints at which the platform can be",
-                hint="are they joints of this machine, in the unit of the header?",
             )
     return joints, placements
 
@@ -224,9 +219,9 @@ def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Fl
 def _within_travel(machine: Machine, rows: MeasurementRows, good: Flags, report: Report) -> Flags:
     assert rows.joints is not None
     within = np.ones(rows.n_row, np.bool_)
-    for at, drive in enumerate(machine.drives):
+    for joint, drive in enumerate(machine.drives):
         first, last = drive.travel
-        value = rows.joints[:, at]
+        value = rows.joints[:, joint]
         slack = 1e-9 * (last - first) if math.isfinite(last - first) else 0.0
         outside = good & ((value < first - slack) | (value > last + slack))
         within &= ~outside
@@ -235,29 +230,33 @@ def _within_travel(machine: Machine, rows: MeasurementRows, good: Flags, report:
         for row in np.flatnonzero(outside).tolist():
             column = f"joint.{drive.name}"
             report(
-                "commanded-out-of-reach",
-                "the joint is out of its travel",
+                Fault(
+                    "commanded-out-of-reach",
+                    "the joint is out of its travel",
+                    found=report.shown(column, row),
+                    expected=f"a joint from {ends[0]} to {ends[1]} {unit.label}",
+                ),
                 row=row,
                 column=column,
-                found=report.shown(column, row),
-                expected=f"a joint from {ends[0]} to {ends[1]} {unit.label}",
             )
     return within
 
 
 def _conditions(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Condition, ...]:
     """(n_row,) the condition of each row; equal ones are the same object."""
-    cold = unloaded_at_reference(machine.condition)
+    unloaded = unloaded_at_reference(machine.condition)
     for part, values in rows.temperatures.items():
         column = f"temperature.{part}"
         for row in np.flatnonzero((values <= 0.0) & ~rows.spoilt(column)).tolist():
             report(
-                "not-positive",
-                "a temperature is above absolute zero",
+                Fault(
+                    "not-positive",
+                    "a temperature is above absolute zero",
+                    found=report.shown(column, row),
+                    expected="a temperature above absolute zero",
+                ),
                 row=row,
                 column=column,
-                found=report.shown(column, row),
-                expected="a temperature above absolute zero",
             )
     names = [*rows.temperatures, *WRENCH]
     blank = np.full(rows.n_row, math.nan)
@@ -266,26 +265,26 @@ def _conditions(machine: Machine, rows: MeasurementRows, report: Report) -> tupl
     known: dict[tuple[tuple[str, float], ...], Condition] = {}
     result = []
     for values_of_row in table:
-        told = {
+        stated = {
             name: value
             for name, value in zip(names, values_of_row, strict=True)
             if math.isfinite(value) and (value > 0.0 if name not in WRENCH else value != 0.0)
         }
-        if told.get(DEFAULT_PART) == cold.reference_temperature:
-            del told[DEFAULT_PART]  # as where a row says nothing
-        key = tuple(told.items())
+        if stated.get(DEFAULT_PART) == unloaded.reference_temperature:
+            del stated[DEFAULT_PART]  # as where a row says nothing
+        key = tuple(stated.items())
         if key not in known:
-            known[key] = _condition(cold, told)
+            known[key] = _condition(unloaded, stated)
         result.append(known[key])
     return tuple(result)
 
 
-def _condition(cold: Condition, told: Mapping[str, float]) -> Condition:
-    if not told:
-        return cold
-    loads = [told.get(name, 0.0) for name in WRENCH]
-    temperatures = {part: value for part, value in told.items() if part not in WRENCH}
-    return cold.replace(temperature=temperatures, force=loads[:3], moment=loads[3:])
+def _condition(unloaded: Condition, stated: Mapping[str, float]) -> Condition:
+    if not stated:
+        return unloaded
+    loads = [stated.get(name, 0.0) for name in WRENCH]
+    temperatures = {part: value for part, value in stated.items() if part not in WRENCH}
+    return unloaded.replace(temperature=temperatures, force=loads[:3], moment=loads[3:])
 
 
 class _Observations:
@@ -304,52 +303,55 @@ class _Observations:
         self.rows = rows
         self.report = report
         self.columns = columns
-        self._found: list[tuple[Indices, int, int, Floats, Floats]] = []
+        self._blocks: list[tuple[Indices, int, int, Floats, Floats]] = []
 
     def table(self) -> _Table:
-        """Everything that was found."""
-        if not self._found:
+        """All observations."""
+        if not self._blocks:
             none = np.empty(0, np.intp)
             return _Table(none, none, none, np.empty(0), np.empty(0))
-        row = np.concatenate([rows for rows, *_ in self._found])
-        observable = np.concatenate([np.full(len(r), o, np.intp) for r, o, *_ in self._found])
-        strut = np.concatenate([np.full(len(r), s, np.intp) for r, _, s, *_ in self._found])
-        value = np.concatenate([values for *_, values, _ in self._found])
-        stated = np.concatenate([stated for *_, stated in self._found])
+        row = np.concatenate([rows for rows, *_ in self._blocks])
+        observable = np.concatenate([np.full(len(r), o, np.intp) for r, o, *_ in self._blocks])
+        strut = np.concatenate([np.full(len(r), s, np.intp) for r, _, s, *_ in self._blocks])
+        value = np.concatenate([values for *_, values, _ in self._blocks])
+        stated = np.concatenate([stated for *_, stated in self._blocks])
         order = np.lexsort((observable, strut, row))
         return _Table(row[order], observable[order], strut[order], value[order], stated[order])
 
     def of_instrument(self, number: int) -> None:
-        """Look at the rows of one instrument."""
+        """Check the rows of one instrument, and add what they observe."""
         instrument = self.instruments[number]
         kind = REGISTRY[instrument.kind]
-        mine = self.rows.instrument == number
-        if not mine.any():
-            if (self.rows.instrument >= 0).all():  # else a row that is nobody's may be its
+        own_rows = self.rows.instrument == number
+        if not own_rows.any():
+            # A row of an unknown instrument may be meant to be its.
+            if (self.rows.instrument >= 0).all():
                 self.report(
-                    "no-rows",
-                    f"no row is of the instrument {instrument.name}",
-                    found="nothing",
-                    expected=f'a row with "{instrument.name}" in the column instrument',
+                    Fault(
+                        "no-rows",
+                        f"no row is of the instrument {instrument.name}",
+                        found="nothing",
+                        expected=f'a row with "{instrument.name}" in the column instrument',
+                    )
                 )
             return
-        self._refuse_unwanted(instrument, kind, mine)
-        own = {name: each for name, each in self.columns.items() if each.word in kind.reads}
-        self._require(instrument, kind, mine, own)
-        self._check_signs(kind, mine, own)
+        self._refuse_unwanted(instrument, kind, own_rows)
+        own = {name: column for name, column in self.columns.items() if column.word in kind.reads}
+        self._require(instrument, kind, own_rows, own)
+        self._check_signs(kind, own_rows, own)
         if any(word.startswith("direction") for word in kind.reads):
-            self._check_directions(mine)
+            self._check_directions(own_rows)
         for name, reading in own.items():
-            filled = mine & self.rows.filled(name)
+            filled = own_rows & self.rows.filled(name)
             values = self.rows.readings.get(name, np.zeros(self.rows.n_row))
             if kind.optional:
-                filled, values = mine, np.where(self.rows.filled(name), values, 0.0)
+                filled, values = own_rows, np.where(self.rows.filled(name), values, 0.0)
             observable = kind.reads[reading.word]
             self._add(instrument, name, observable, reading.strut, filled, values)
         for observable in kind.fixed:
             if moved(observable, self.machine.components):
                 zero = np.zeros(self.rows.n_row)
-                self._add(instrument, observable, observable, -1, mine, zero)
+                self._add(instrument, observable, observable, -1, own_rows, zero)
 
     def _add(
         self,
@@ -360,78 +362,86 @@ class _Observations:
         filled: Flags,
         values: Floats,
     ) -> None:
-        at = np.flatnonzero(filled)
-        if not at.size:
+        rows = np.flatnonzero(filled)
+        if not rows.size:
             return
         if observable in ("a", "b", "c", "angle"):
             values = within_a_turn(values)
         stated = self._stated(instrument, column, observable, filled)
         number = OBSERVABLES.index(observable)
-        self._found.append((at, number, strut, values[at], stated[at]))
+        self._blocks.append((rows, number, strut, values[rows], stated[rows]))
 
     def _stated(
         self, instrument: Instrument, column: str, observable: str, filled: Flags
     ) -> Floats:
         """(n_row,) standard uncertainties: the row's own, else the instrument's."""
         name = column + UNCERTAINTY
-        given = self.rows.uncertainties.get(name, np.full(self.rows.n_row, math.nan))
+        of_row = self.rows.uncertainties.get(name, np.full(self.rows.n_row, math.nan))
         spoilt = self.rows.spoilt(name)
-        for row in np.flatnonzero(filled & (given <= 0.0) & ~spoilt).tolist():
+        for row in np.flatnonzero(filled & (of_row <= 0.0) & ~spoilt).tolist():
             self.report(
-                "not-positive",
-                "a standard uncertainty is above zero",
+                Fault(
+                    "not-positive",
+                    "a standard uncertainty is above zero",
+                    found=self.report.shown(name, row),
+                    expected="a standard uncertainty above zero",
+                    hint="a reading without uncertainty would outweigh all others",
+                ),
                 row=row,
                 column=name,
-                found=self.report.shown(name, row),
-                expected="a standard uncertainty above zero",
-                hint="a reading without uncertainty would outweigh all others",
             )
         stated = instrument.uncertainty_of(observable)
         if stated is not None:
-            return np.where(np.isnan(given), stated, given)
-        lacking = np.flatnonzero(filled & np.isnan(given) & ~spoilt)
+            return np.where(np.isnan(of_row), stated, of_row)
+        lacking = np.flatnonzero(filled & np.isnan(of_row) & ~spoilt)
         if lacking.size:
             self.report(
-                "no-uncertainty",
-                f"nothing says how uncertain {column} of {instrument.name} is, "
-                f"in {counted(lacking.size, 'row')}",
+                Fault(
+                    "no-uncertainty",
+                    f"nothing says how uncertain {column} of {instrument.name} is, "
+                    f"in {counted(lacking.size, 'row')}",
+                    found="no standard uncertainty",
+                    expected=f"an uncertainty of the instrument, or a column {name}",
+                ),
                 row=int(lacking[0]),
                 column=column,
-                found="no standard uncertainty",
-                expected=f"an uncertainty of the instrument, or a column {name}",
             )
-        return given
+        return of_row
 
-    def _refuse_unwanted(self, instrument: Instrument, kind: Kind, mine: Flags) -> None:
+    def _refuse_unwanted(self, instrument: Instrument, kind: Kind, own_rows: Flags) -> None:
         words = one_of(kind.reads) if kind.reads else "no column of readings"
         for name in self.rows.readings:
             reading = self.columns[name]
             if reading.word in kind.reads:
                 continue
-            for row in np.flatnonzero(mine & self.rows.filled(name)).tolist():
+            for row in np.flatnonzero(own_rows & self.rows.filled(name)).tolist():
                 self.report(
-                    "unwanted-value",
-                    f"the instrument of this row, {instrument.name}, does not read this",
+                    Fault(
+                        "unwanted-value",
+                        f"the instrument of this row, {instrument.name}, does not read this",
+                        found=self._shown(name, row),
+                        expected=f"an empty cell; the kind {kind.name} reads {words}",
+                    ),
                     row=row,
                     column=name,
-                    found=self._shown(name, row),
-                    expected=f"an empty cell; the kind {kind.name} reads {words}",
                 )
         for name, values in self.rows.uncertainties.items():
             column = name.removesuffix(UNCERTAINTY)
-            read = mine & self.rows.filled(column)
+            read = own_rows & self.rows.filled(column)
             if kind.optional and self.columns[column].word in kind.reads:
-                read = mine
+                read = own_rows
             if column in kind.fixed and moved(column, self.machine.components):
-                read = mine
-            for row in np.flatnonzero(mine & ~read & ~np.isnan(values)).tolist():
+                read = own_rows
+            for row in np.flatnonzero(own_rows & ~read & ~np.isnan(values)).tolist():
                 self.report(
-                    "unwanted-value",
-                    "an uncertainty of what the row does not have",
+                    Fault(
+                        "unwanted-value",
+                        "an uncertainty of what the row does not have",
+                        found=self.report.shown(name, row),
+                        expected=f"an empty cell, or a value in the column {column}",
+                    ),
                     row=row,
                     column=name,
-                    found=self.report.shown(name, row),
-                    expected=f"an empty cell, or a value in the column {column}",
                 )
 
     def _shown(self, column: str, row: int) -> str:
@@ -440,7 +450,7 @@ class _Observations:
         return self.report.shown(column, row)
 
     def _require(
-        self, instrument: Instrument, kind: Kind, mine: Flags, own: Mapping[str, ReadingColumn]
+        self, instrument: Instrument, kind: Kind, own_rows: Flags, own: Mapping[str, ReadingColumn]
     ) -> None:
         """Whether every row of the instrument has the readings that its kind must have."""
         if kind.least == 0 or kind.optional:
@@ -448,88 +458,104 @@ class _Observations:
         if kind.least is None:
             for name, reading in own.items():
                 if moved(kind.reads[reading.word], self.machine.components):
-                    self._require_column(instrument, name, mine)
+                    self._require_column(instrument, name, own_rows)
             return
-        used = [name for name in own if (mine & self.rows.filled(name)).any()]
+        used = [name for name in own if (own_rows & self.rows.filled(name)).any()]
         if not used:
             some = one_of(own, limit=8)
             self.report(
-                "missing-column",
-                f"nothing is read by the instrument {instrument.name}, of kind {kind.name}",
-                row=int(np.flatnonzero(mine)[0]),
-                found="no value in its rows",
-                expected=f"a column of readings: {some}",
+                Fault(
+                    "missing-column",
+                    f"nothing is read by the instrument {instrument.name}, of kind {kind.name}",
+                    found="no value in its rows",
+                    expected=f"a column of readings: {some}",
+                ),
+                row=int(np.flatnonzero(own_rows)[0]),
             )
             return
         if kind.most is not None and len(used) > kind.most:
             self.report(
-                "unwanted-value",
-                f"the instrument {instrument.name} reads {len(used)} columns",
-                row=int(np.flatnonzero(mine & self.rows.filled(used[kind.most]))[0]),
+                Fault(
+                    "unwanted-value",
+                    f"the instrument {instrument.name} reads {len(used)} columns",
+                    found=", ".join(used),
+                    expected=f"at most {kind.most} of {', '.join(kind.reads)} of kind {kind.name}",
+                    hint='an instrument that reads x, y and z is of kind "position"',
+                ),
+                row=int(np.flatnonzero(own_rows & self.rows.filled(used[kind.most]))[0]),
                 column=used[kind.most],
-                found=", ".join(used),
-                expected=f"at most {kind.most} of {', '.join(kind.reads)} of kind {kind.name}",
-                hint='an instrument that reads x, y and z is of kind "position"',
             )
-        empty = mine & ~np.any([self.rows.filled(name) for name in used], axis=0)
+        empty = own_rows & ~np.any([self.rows.filled(name) for name in used], axis=0)
         for row in np.flatnonzero(empty).tolist():
             self.report(
-                "empty-cell",
-                f"the row has no reading of the instrument {instrument.name}",
+                Fault(
+                    "empty-cell",
+                    f"the row has no reading of the instrument {instrument.name}",
+                    found="nothing",
+                    expected=f"a value in a column of {', '.join(used[:8])}",
+                ),
                 row=row,
-                found="nothing",
-                expected=f"a value in a column of {', '.join(used[:8])}",
             )
 
-    def _require_column(self, instrument: Instrument, name: str, mine: Flags) -> None:
+    def _require_column(self, instrument: Instrument, name: str, own_rows: Flags) -> None:
         if name not in self.rows.readings:
             self.report(
-                "missing-column",
-                f"there is no column {name}, which the instrument {instrument.name} "
-                f"of kind {instrument.kind} needs",
-                found="no such column",
-                expected=f"{name}, as the platform moves in it",
+                Fault(
+                    "missing-column",
+                    f"there is no column {name}, which the instrument {instrument.name} "
+                    f"of kind {instrument.kind} needs",
+                    found="no such column",
+                    expected=f"{name}, as the platform moves in it",
+                )
             )
             return
-        for row in np.flatnonzero(mine & ~self.rows.filled(name)).tolist():
+        for row in np.flatnonzero(own_rows & ~self.rows.filled(name)).tolist():
             self.report(
-                "empty-cell",
-                f"the instrument of this row, {instrument.name}, needs a value",
+                Fault(
+                    "empty-cell",
+                    f"the instrument of this row, {instrument.name}, needs a value",
+                    found="nothing",
+                    expected="a number",
+                ),
                 row=row,
                 column=name,
-                found="nothing",
-                expected="a number",
             )
 
-    def _check_signs(self, kind: Kind, mine: Flags, own: Mapping[str, ReadingColumn]) -> None:
+    def _check_signs(self, kind: Kind, own_rows: Flags, own: Mapping[str, ReadingColumn]) -> None:
         for name, reading in own.items():
             values = self.rows.readings.get(name)
             if values is None or kind.reads[reading.word] not in ("length", "distance"):
                 continue
-            for row in np.flatnonzero(mine & (values <= 0.0) & ~self.rows.spoilt(name)).tolist():
+            for row in np.flatnonzero(
+                own_rows & (values <= 0.0) & ~self.rows.spoilt(name)
+            ).tolist():
                 self.report(
-                    "not-positive",
-                    "a length is above zero",
+                    Fault(
+                        "not-positive",
+                        "a length is above zero",
+                        found=self.report.shown(name, row),
+                        expected="a length above zero",
+                    ),
                     row=row,
                     column=name,
-                    found=self.report.shown(name, row),
-                    expected="a length above zero",
                 )
 
-    def _check_directions(self, mine: Flags) -> None:
+    def _check_directions(self, own_rows: Flags) -> None:
         """The three components of a strut's direction: all or none, and of length one."""
         for strut in self.machine.struts:
             names = [f"strut.{strut.name}.direction.{axis}" for axis in "xyz"]
-            filled = np.array([mine & self.rows.filled(name) for name in names])
-            for at, name in enumerate(names):
-                for row in np.flatnonzero(filled.any(axis=0) & ~filled[at]).tolist():
+            filled = np.array([own_rows & self.rows.filled(name) for name in names])
+            for component, name in enumerate(names):
+                for row in np.flatnonzero(filled.any(axis=0) & ~filled[component]).tolist():
                     self.report(
-                        "empty-cell" if name in self.rows.readings else "missing-column",
-                        "a direction has three components",
+                        Fault(
+                            "empty-cell" if name in self.rows.readings else "missing-column",
+                            "a direction has three components",
+                            found="nothing",
+                            expected="a number",
+                        ),
                         row=row,
                         column=name,
-                        found="nothing",
-                        expected="a number",
                     )
             good = filled.all(axis=0) & ~np.any([self.rows.spoilt(name) for name in names], axis=0)
             if not good.any():
@@ -538,12 +564,14 @@ class _Observations:
             length = np.linalg.norm(vectors, axis=1)
             for row in np.flatnonzero(good & (np.abs(length - 1.0) > UNIT_LENGTH)).tolist():
                 self.report(
-                    "not-a-direction",
-                    f"the direction of strut {strut.name} is no unit vector",
+                    Fault(
+                        "not-a-direction",
+                        f"the direction of strut {strut.name} is no unit vector",
+                        found=f"a vector of length {length[row]:.6g}",
+                        expected=f"a length of 1, within {UNIT_LENGTH:g}",
+                    ),
                     row=row,
                     column=names[0].removesuffix(".x"),
-                    found=f"a vector of length {length[row]:.6g}",
-                    expected=f"a length of 1, within {UNIT_LENGTH:g}",
                 )
 
 

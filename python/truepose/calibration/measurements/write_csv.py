@@ -13,7 +13,7 @@ from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, In
 from truepose.calibration.measurements.measurements import Measurements
 from truepose.calibration.measurements.read_csv import CHECK, FIT, INSTRUMENT, SET
 from truepose.calibration.measurements.rows import UNCERTAINTY, WRENCH, reading_columns
-from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.calibration.observables import OBSERVABLES, si_unit
 from truepose.errors import Problem, RequestError
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.units import FileUnit, meant, unit_of
@@ -42,16 +42,16 @@ def measurements_text(machine: Machine, measurements: Measurements) -> str:
         head += _declared(machine, instrument)
     columns = _Columns(machine)
     columns.words(INSTRUMENT, _names(measurements))
-    for at, drive in enumerate(machine.drives):
-        columns.numbers(f"joint.{drive.name}", drive.coordinate, measurements.joints[:, at])
+    for joint, drive in enumerate(machine.drives):
+        columns.numbers(f"joint.{drive.name}", drive.coordinate, measurements.joints[:, joint])
     _readings(machine, measurements, columns)
     _conditions(machine, measurements, columns)
-    columns.words(SET, [CHECK if each else FIT for each in measurements.held_out.tolist()])
+    columns.words(SET, [CHECK if held_out else FIT for held_out in measurements.held_out.tolist()])
     return "\n".join([*head, *columns.lines(), ""])
 
 
 def _names(measurements: Measurements) -> list[str]:
-    return [measurements.instruments[at].name for at in measurements.instrument.tolist()]
+    return [measurements.instruments[number].name for number in measurements.instrument.tolist()]
 
 
 def _declared(machine: Machine, instrument: Instrument) -> list[str]:
@@ -67,14 +67,13 @@ def _declared(machine: Machine, instrument: Instrument) -> list[str]:
     if instrument.bias_unknown:
         lines.append('bias = "unknown"')
     words = {observable: word for word, observable in kind.reads.items()} or {
-        each: each for each in kind.fixed
+        observable: observable for observable in kind.fixed
     }
     stated = []
     for observable, word in words.items():
         amount = instrument.uncertainty_of(observable)
         if amount is not None:
-            dimension = BY_UNIT[UNITS[OBSERVABLES.index(observable)]]
-            (text,) = _each(machine, [amount], dimension)
+            (text,) = _quantity_texts(machine, [amount], BY_UNIT[si_unit(observable)])
             stated.append(f'"{word}" = {text}')
     if stated:
         lines.append(f"uncertainty = {{ {', '.join(stated)} }}")
@@ -86,7 +85,7 @@ def _declared(machine: Machine, instrument: Instrument) -> list[str]:
 
 
 def _frame(machine: Machine, frame: Frame) -> str:
-    """The line of a frame, its rotation as a quaternion, which angles give back with less care."""
+    """The line of a frame; its rotation as a quaternion, because angles would round it."""
     parts = []
     if any(frame.origin):
         parts.append(f"origin = {_texts(machine, frame.origin, 'length')}")
@@ -100,10 +99,10 @@ def _frame(machine: Machine, frame: Frame) -> str:
 
 
 def _texts(machine: Machine, values: Iterable[float], dimension: str) -> str:
-    return f"[{', '.join(_each(machine, values, dimension))}]"
+    return f"[{', '.join(_quantity_texts(machine, values, dimension))}]"
 
 
-def _each(machine: Machine, values: Iterable[float], dimension: str) -> list[str]:
+def _quantity_texts(machine: Machine, values: Iterable[float], dimension: str) -> list[str]:
     """Values as text with their unit."""
     unit = _unit(machine, dimension)
     numbers = _in_file(np.array(list(values), np.float64), unit)
@@ -161,7 +160,7 @@ class _Columns:
         blank = np.isnan(values)
         numbers = _in_file(np.where(blank, 1.0, values), unit).tolist()
         self._cells.append(
-            ["" if no else repr(each) for each, no in zip(numbers, blank.tolist(), strict=True)]
+            ["" if no else repr(number) for number, no in zip(numbers, blank.tolist(), strict=True)]
         )
 
     def lines(self) -> list[str]:
@@ -171,8 +170,8 @@ class _Columns:
 
 def _readings(machine: Machine, measurements: Measurements, columns: _Columns) -> None:
     """The columns of readings, each with its uncertainties."""
-    kinds = [REGISTRY[each.kind] for each in measurements.instruments]
-    mine = measurements.instrument[measurements.row]
+    kinds = [REGISTRY[instrument.kind] for instrument in measurements.instruments]
+    instrument_of = measurements.instrument[measurements.row]
     for name, reading in reading_columns(machine).items():
         value = np.full(measurements.n_row, math.nan)
         stated = np.full(measurements.n_row, math.nan)
@@ -184,14 +183,14 @@ def _readings(machine: Machine, measurements: Measurements, columns: _Columns) -
             if observable is None:
                 continue
             which = (
-                (mine == number)
+                (instrument_of == number)
                 & (measurements.observable == OBSERVABLES.index(observable))
                 & (measurements.strut == reading.strut)
             )
-            at = measurements.row[which]
-            stated[at] = measurements.uncertainty[which]
+            rows = measurements.row[which]
+            stated[rows] = measurements.uncertainty[which]
             if reading.word in kind.reads:
-                value[at] = measurements.value[which]
+                value[rows] = measurements.value[which]
                 silent = silent and not which.any()
             elif np.any(measurements.value[which] != 0.0):
                 raise RequestError(
@@ -211,21 +210,21 @@ def _conditions(machine: Machine, measurements: Measurements, columns: _Columns)
     """The columns of temperatures and loads, those that say something."""
     conditions = measurements.conditions
     reference = machine.condition.reference_temperature
-    for condition in {id(each): each for each in conditions}.values():
+    for condition in {id(condition): condition for condition in conditions}.values():
         lost = _lost(machine, condition)
         if lost is not None:
             raise RequestError(_bad("conditions", lost, "temperatures, force and moment only"))
-    defaults = np.array([each.default_temperature for each in conditions])
+    defaults = np.array([condition.default_temperature for condition in conditions])
     if (defaults != reference).any():
         columns.numbers(f"temperature.{DEFAULT_PART}", "temperature", defaults)
-    named = dict.fromkeys(part for each in conditions for part in each.part_temperatures)
+    named = dict.fromkeys(part for condition in conditions for part in condition.part_temperatures)
     for part in named:
-        values = [each.part_temperatures.get(part, math.nan) for each in conditions]
+        values = [condition.part_temperatures.get(part, math.nan) for condition in conditions]
         columns.numbers(f"temperature.{part}", "temperature", np.array(values))
-    wrenches = np.array([each.wrench for each in conditions]).reshape(-1, 6)
-    for at, (name, dimension) in enumerate(WRENCH.items()):
-        if wrenches[:, at].any():
-            columns.numbers(name, dimension, wrenches[:, at])
+    wrenches = np.array([condition.wrench for condition in conditions]).reshape(-1, 6)
+    for component, (name, dimension) in enumerate(WRENCH.items()):
+        if wrenches[:, component].any():
+            columns.numbers(name, dimension, wrenches[:, component])
 
 
 def _lost(machine: Machine, condition: Condition) -> str | None:

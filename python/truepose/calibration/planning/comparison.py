@@ -1,4 +1,4 @@
-"""How many readings of one instrument do what so many of another do, at the tool.
+"""How many readings of one instrument reach, at the tool, what so many of another reach.
 
 Every number of readings is planned: what is compared is the best that each instrument can do.
 """
@@ -48,14 +48,14 @@ class Comparison:
     def sentences(self) -> tuple[str, ...]:
         """One for each instrument but the first, for people."""
         first = f"{_readings(self.counts[0], self.names[0])}"
-        found = []
+        sentences = []
         for name, count in zip(self.names[1:], self.counts[1:], strict=True):
             if count is None:
-                found.append(f"not even {_readings(self.most, name)} do what {first} do")
+                sentences.append(f"not even {_readings(self.most, name)} do what {first} do")
             else:
                 verb = "does" if count == 1 else "do"
-                found.append(f"{_readings(count, name)} {verb} what {first} do")
-        return tuple(found)
+                sentences.append(f"{_readings(count, name)} {verb} what {first} do")
+        return tuple(sentences)
 
 
 def compare_instruments(
@@ -72,8 +72,9 @@ def compare_instruments(
     """How many planned readings of each instrument leave what `budget` of the first leave.
 
     Of the criterion "tool" of `plan`, in which position and rotation count; the options are those
-    of `plan`. All are judged in the machine's base frame but for where the whole machine stands,
-    where any of them cannot tell that. `progress(instruments done, instruments)`.
+    of `plan`. The tool is assessed in the machine's base frame, without the place of the whole
+    machine where one of the instruments cannot determine that. `progress(instruments done,
+    instruments)`.
 
     Raises `RequestError` as `plan` does, and plan-instrument for fewer than two.
     """
@@ -89,31 +90,25 @@ def compare_instruments(
         )
     wanted = tuple(identify)
     fields = [
-        Field(machine, each, candidates=candidates, condition=condition, identify=wanted)
-        for each in instruments
+        Field(machine, instrument, candidates=candidates, condition=condition, identify=wanted)
+        for instrument in instruments
     ]
-    # One ruler for all: what the least telling of them leaves to be judged.
+    # One measure for all: the effects that the least informative of them can determine.
     ruler = min(fields, key=lambda field: field.mean_before)
     for field in fields:
-        field.judge_as(ruler)
+        field.assess_as(ruler)
     most = MOST_TIMES * count
     counts: list[int | None] = []
     rms = []
-    goal = np.inf
-    for at, field in enumerate(fields):
-        if at == 0:
-            found = _planned(field.candidates, count, seed)
-            goal = found.value
-            counts.append(count)
-        else:
-            number = _fewest(field.candidates, goal, most, seed)
-            counts.append(number)
-            found = _planned(field.candidates, number or most, seed)
-        rms.append(field.after(found.chosen)[0])
+    goal = _planned(fields[0].candidates, count, seed)
+    for index, field in enumerate(fields):
+        counts.append(_fewest(field.candidates, goal.value, most, seed) if index else count)
+        design = _planned(field.candidates, counts[-1] or most, seed) if index else goal
+        rms.append(field.after(design.chosen)[0])
         if progress is not None:
-            progress(at + 1, len(fields))
+            progress(index + 1, len(fields))
     before = ruler.after(np.empty(0, np.intp))[0]
-    names = tuple(each.name for each in instruments)
+    names = tuple(instrument.name for instrument in instruments)
     return Comparison(names, tuple(counts), np.array(rms), before, most)
 
 

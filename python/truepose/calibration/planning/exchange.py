@@ -9,7 +9,7 @@ M = prior + sum of B^T B, and the covariance of the unknowns is C = M^-1. Two cr
 
 A start, greedy or at random, is bettered by exchanging one of its candidates for another until no
 exchange helps, then by excursions, which add several before they drop as many. Removing and adding
-a block changes C by k columns, so that all candidates are judged for one removal by matrices of k
+a block changes C by k columns, so that all candidates are assessed for one removal by matrices of k
 rows: with C' = C + s U U^T,
 
     B C' B^T = B C B^T + s P P^T,                  P = B U
@@ -93,15 +93,19 @@ class Candidates:
         if self.blocks.ndim != 3 or 0 in self.blocks.shape:
             raise ValueError(f"blocks have shape {self.blocks.shape}, expected (n_candidate, k, n)")
         self.count, self.readings, size = self.blocks.shape
-        given = np.asarray(tool, np.float64)
-        if given.ndim not in (2, 3) or given.shape[-1] != size or 0 in given.shape:
+        tool_effects = np.asarray(tool, np.float64)
+        if (
+            tool_effects.ndim not in (2, 3)
+            or tool_effects.shape[-1] != size
+            or 0 in tool_effects.shape
+        ):
             raise ValueError(
-                f"tool has shape {given.shape}, expected (n_pose, n_component, {size})"
+                f"tool has shape {tool_effects.shape}, expected (n_pose, n_component, {size})"
             )
         known = np.zeros((size, size)) if prior is None else np.array(prior, np.float64)
         if known.shape != (size, size):
             raise ValueError(f"prior has shape {known.shape}, expected ({size}, {size})")
-        for name, values in (("blocks", self.blocks), ("tool", given), ("prior", known)):
+        for name, values in (("blocks", self.blocks), ("tool", tool_effects), ("prior", known)):
             if not np.isfinite(values).all():
                 raise ValueError(f"{name} has a value that is not finite")
         rows = self.blocks.reshape(-1, size)
@@ -114,8 +118,8 @@ class Candidates:
         self.rows = self.blocks.reshape(-1, size)
         self.prior = known * np.outer(self.scale, self.scale)
         self.prior[np.diag_indices(size)] += np.where(self.open, WIDE, 0.0)
-        tool_rows = given.reshape(-1, size) * self.scale
-        self.weight: Floats = tool_rows.T @ tool_rows / len(given)
+        tool_rows = tool_effects.reshape(-1, size) * self.scale
+        self.weight: Floats = tool_rows.T @ tool_rows / len(tool_effects)
 
     def information(self, chosen: ArrayLike) -> Floats:
         """(n, n) information of the prior and the candidates `chosen` (m,), scaled."""
@@ -133,15 +137,15 @@ class Candidates:
     def values(self, sets: ArrayLike, criterion: Criterion = "tool") -> Floats:
         """(n_set,) the criterion of each set of candidates `sets` (n_set, m)."""
         numbers = np.asarray(sets, np.intp)
-        found = np.empty(len(numbers))
-        for each, chosen in enumerate(numbers):
+        values = np.empty(len(numbers))
+        for index, chosen in enumerate(numbers):
             lower = np.linalg.cholesky(self.information(chosen))
             if criterion == "determinant":
-                found[each] = 2.0 * np.log(np.diagonal(lower) / self.scale).sum()
+                values[index] = 2.0 * np.log(np.diagonal(lower) / self.scale).sum()
             else:
                 half = np.linalg.inv(lower)
-                found[each] = np.einsum("ij,jk,ik->", half, self.weight, half, optimize=True)
-        return found
+                values[index] = np.einsum("ij,jk,ik->", half, self.weight, half, optimize=True)
+        return values
 
 
 def best(
@@ -173,7 +177,7 @@ def best(
     if count > candidates.count and not again:
         raise ValueError(f"{count} of {candidates.count} candidates were asked for")
     generator = np.random.default_rng(seed)
-    found: list[tuple[float, list[int]]] = []
+    attempts: list[tuple[float, list[int]]] = []
     for start in range(1 + starts):
         if start == 0:
             state = _greedy(candidates, criterion, count, again)
@@ -183,11 +187,11 @@ def best(
         _exchange(state, criterion, again)
         if excursions:
             state = _excursions(state, criterion, again)
-        found.append((state.loss(), state.chosen))
+        attempts.append((state.loss(), state.chosen))
         if progress is not None:
             progress(start + 1, 1 + starts)
-    chosen = ordered(candidates, min(found, key=lambda each: each[0])[1], criterion)
-    reached = np.array([candidates.value(each, criterion) for _, each in found])
+    chosen = ordered(candidates, min(attempts, key=lambda attempt: attempt[0])[1], criterion)
+    reached = np.array([candidates.value(selection, criterion) for _, selection in attempts])
     return Design(chosen, candidates.value(chosen, criterion), reached)
 
 
@@ -367,7 +371,7 @@ def _exchange(state: ExchangeState, criterion: Criterion, repeats: bool) -> None
             if not repeats:
                 gains[state.chosen] = -np.inf
             number = int(np.argmax(gains))
-            # To take it again gives back exactly what removing it cost.
+            # Taking it again would restore exactly what removing it lost.
             if number == own or gains[number] - change.lost <= least:
                 continue
             # Differences of large losses are rounding: the set itself has the last word.

@@ -23,7 +23,7 @@ from truepose.calibration.measurements.declarations import (
     reserved_names,
     separated,
 )
-from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.calibration.observables import si_unit
 from truepose.calibration.planning.poses import workspace_poses
 from truepose.calibration.planning.readings import observed
 from truepose.errors import MachineFileError, Problem, RequestError
@@ -68,15 +68,15 @@ def _of_word(machine: Machine, text: str, match: re.Match[str]) -> Instrument:
     uncertainty: dict[str, float] = {}
     for amount in match["amounts"].split(","):
         value, unit = _amount(text, amount, chosen)
-        uncertainty |= {each: value for each in chosen if UNITS[OBSERVABLES.index(each)] == unit}
+        uncertainty |= {name: value for name in chosen if si_unit(name) == unit}
     name = "-".join([kind.name, *(word.replace(".", "-") for word in reads)])
     instrument = Instrument(name, kind.name, Frame(), uncertainty=uncertainty)
-    return _standing(machine, instrument)
+    return _with_frame_unknown(machine, instrument)
 
 
 def _amount(text: str, amount: str, reads: list[str]) -> tuple[float, str]:
     """An uncertainty above zero, SI, and the unit of what it is one of."""
-    units = dict.fromkeys(UNITS[OBSERVABLES.index(each)] for each in reads)
+    units = dict.fromkeys(map(si_unit, reads))
     error: QuantityError | None = None
     for unit in units:
         try:
@@ -101,12 +101,12 @@ def _of_file(machine: Machine, text: str) -> tuple[Instrument, ...]:
     path, name = text, ""
     if not Path(text).exists() and ":" in text:
         path, _, name = text.rpartition(":")
-    found = read_instruments(path, machine)
+    declared = read_instruments(path, machine)
     if not name:
-        return found
-    named = tuple(each for each in found if each.name == name)
+        return declared
+    named = tuple(instrument for instrument in declared if instrument.name == name)
     if not named:
-        names = [each.name for each in found]
+        names = [instrument.name for instrument in declared]
         raise _refusal(
             f"the file declares no instrument called {name}",
             found=name,
@@ -139,16 +139,16 @@ def read_instruments(path: str | Path, machine: Machine) -> tuple[Instrument, ..
             expected="kind, frame and uncertainty of an instrument in lines that begin with #:",
         )
     return tuple(
-        _standing(machine, each) if each.name in header.whole else each
-        for each in header.instruments
+        _with_frame_unknown(machine, instrument) if instrument.name in header.whole else instrument
+        for instrument in header.instruments
     )
 
 
-def _standing(machine: Machine, instrument: Instrument) -> Instrument:
-    """The instrument with everything to be found of its frame that it can tell.
+def _with_frame_unknown(machine: Machine, instrument: Instrument) -> Instrument:
+    """The instrument with every freedom of its frame unknown that its readings determine.
 
     One of distances stands beside the workspace, half its diagonal away along the last axis in
-    which the platform moves, where nothing else is said: from within, distances tell little.
+    which the platform moves, where no origin is stated: from within, distances determine little.
     """
     kind = REGISTRY[instrument.kind]
     if kind.frame is None:
@@ -167,7 +167,9 @@ def _beside(machine: Machine) -> tuple[float, float, float]:
         return (0.0, 0.0, 0.0)
     low, high = points.min(axis=0), points.max(axis=0)
     place = 0.5 * (low + high)
-    axis = max((at for at, name in enumerate("xyz") if name in machine.components), default=2)
+    axis = max(
+        (number for number, name in enumerate("xyz") if name in machine.components), default=2
+    )
     place[axis] = low[axis] - 0.5 * math.dist(low, high)
     x, y, z = place.tolist()
     return (x, y, z)
@@ -179,17 +181,17 @@ def distinct(machine: Machine, instruments: tuple[Instrument, ...]) -> tuple[Ins
 
 
 def _renamed(reserved: frozenset[str], instruments: tuple[Instrument, ...]) -> Iterator[Instrument]:
-    taken: set[str] = set()
-    for each in instruments:
-        name, number = each.name, 2
+    used: set[str] = set()
+    for instrument in instruments:
+        name, number = instrument.name, 2
         if not name_is_good(name, reserved):
             raise _refusal(
                 "an instrument cannot have this name", found=name, expected=expected_name(reserved)
             )
-        while name in taken:
-            name, number = f"{each.name}-{number}", number + 1
-        taken.add(name)
-        yield dataclasses.replace(each, name=name)
+        while name in used:
+            name, number = f"{instrument.name}-{number}", number + 1
+        used.add(name)
+        yield dataclasses.replace(instrument, name=name)
 
 
 def _refusal(

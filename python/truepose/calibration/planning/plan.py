@@ -3,9 +3,9 @@
 Every pose of the workspace that can be measured is a candidate: what the instrument would read
 there changes by so much a unit of every unknown (the machine's and the instrument's own). A set of
 poses leaves the unknowns with the covariance C = (prior + sum of the readings' information)^-1, in
-which what is unknown of the instrument is allowed for by itself, and the tool with S C S^T at a
+which the instrument's own unknowns are included, and the tool with S C S^T at a
 pose, S being the machine's sensitivity there. The set whose mean of the trace of that over the
-workspace is least, rotations weighed with the characteristic length, is looked for by exchange
+workspace is least, rotations weighted by the characteristic length, is searched by exchange
 (`exchange.py`).
 """
 
@@ -19,7 +19,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.calibration.acceptance.observability import of_machine, row_covariance
+from truepose.calibration.acceptance.observability import project_out_instruments, row_covariance
 from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
@@ -54,7 +54,7 @@ DOMINATED = 0.5
 dominated by its prior."""
 
 UNDETERMINED = 1e3
-"""What is known of a combination of unknowns is taken for nothing below so many times `WIDE`."""
+"""A combination of unknowns counts as undetermined below so many times `WIDE` of information."""
 
 SEEN = 1e-12
 """Share of a squared effect along what is undetermined that is no rounding."""
@@ -109,9 +109,9 @@ class Plan:
 
     @property
     def prior_dominated(self) -> tuple[str, ...]:
-        """Labels of the unknowns that the readings tell less of than the prior does."""
+        """Labels of the unknowns of which the readings give less information than the prior."""
         weak = self.from_data < DOMINATED
-        return tuple(self.unknowns.labels[at] for at in np.flatnonzero(weak).tolist())
+        return tuple(self.unknowns.labels[number] for number in np.flatnonzero(weak).tolist())
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -157,10 +157,10 @@ def plan(
     field = Field(
         machine, instrument, candidates=candidates, condition=condition, identify=identify
     )
-    found = exchange.best(
+    design = exchange.best(
         field.candidates, count, criterion=criterion, starts=starts, seed=seed, progress=progress
     )
-    ordered = found.chosen
+    ordered = design.chosen
     rms, highest = field.curve(ordered)
     way = short_way(machine, field.placed.poses[ordered])
     rank = np.empty(count, np.intp)
@@ -179,7 +179,7 @@ def plan(
         highest,
         before,
         np.minimum(field.deviations(ordered), before),
-        found.value,
+        design.value,
         len(field.placed),
         field.placed.left_out,
         count > len(field.placed),
@@ -189,7 +189,7 @@ def plan(
 
 
 class Field:
-    """What a plan chooses from: the poses placed, what would be read at them, and the workspace.
+    """What a plan chooses from: the candidate poses, what would be read there, and the workspace.
 
     `placed`: the poses that may be measured. `candidates`: their readings as plain arrays. `tool`
     (n_pose, n_component, n): displacement and rotation of the tool per unit of each unknown, over
@@ -206,8 +206,9 @@ class Field:
         identify: Iterable[str] = (),
     ) -> None:
         self.machine = machine
-        given = (instrument,) if isinstance(instrument, Instrument) else tuple(instrument)
-        self.instruments = given
+        self.instruments = (
+            (instrument,) if isinstance(instrument, Instrument) else tuple(instrument)
+        )
         if candidates is None:
             offered = Placed(machine, workspace_poses(machine), of_file=True)
             over = offered
@@ -217,13 +218,13 @@ class Field:
             if machine.workspace is not None:
                 over = Placed(machine, workspace_poses(machine), of_file=True)
         regular = offered.away_from_singularities()
-        measurements = planned(machine, given, offered, condition)
+        measurements = planned(machine, self.instruments, offered, condition)
         self.condition = measurements.conditions[0]
         self.unknowns = unknowns_of(machine, measurements, identify=tuple(identify))
         blocks = whitened(machine, measurements, self.unknowns, len(offered))
         usable = regular & self._readable(blocks)
         if not usable.any():
-            names = ", ".join(each.name for each in given)
+            names = ", ".join(measuring.name for measuring in self.instruments)
             raise RequestError(
                 Problem(
                     "plan-instrument",
@@ -240,7 +241,7 @@ class Field:
         self._parts = [part for part in (components, ~components) if part.any()]
         self._weights = np.where(components, 1.0, machine.characteristic_length)[:, np.newaxis]
         self._blocks = blocks[usable]
-        self.candidates = self._judged()
+        self.candidates = self._weighted_candidates()
 
     def _readable(self, blocks: Floats) -> Flags:
         """(n,) of candidates (n, k, n_unknown) where no reading is near a singularity of its own.
@@ -254,17 +255,17 @@ class Field:
             return finite
         return np.asarray((sizes <= STEEP * np.median(sizes[finite], axis=0)).all(axis=1), np.bool_)
 
-    def _judged(self) -> Candidates:
+    def _weighted_candidates(self) -> Candidates:
         return Candidates(self._blocks, self.tool * self._weights, _information(self.unknowns))
 
-    def judge_as(self, other: Field) -> None:
-        """Judge the tool as another field of the same machine does: by the same effects."""
+    def assess_as(self, other: Field) -> None:
+        """Assess the tool as another field of the same machine does: by the same effects."""
         n_machine = self.unknowns.n_machine
         tool = np.zeros((*other.tool.shape[:2], self.unknowns.count))
         tool[:, :, :n_machine] = other.tool[:, :, :n_machine]
         self.tool = tool
         self.relative = other.relative
-        self.candidates = self._judged()
+        self.candidates = self._weighted_candidates()
 
     @property
     def mean_before(self) -> float:
@@ -273,8 +274,8 @@ class Field:
 
     def curve(self, ordered: Indices) -> tuple[Floats, Floats]:
         """(m + 1, n_quantity) rms and highest uncertainty after 0, 1, ... m of the candidates."""
-        each = [self.after(ordered[:count]) for count in range(len(ordered) + 1)]
-        return np.array([rms for rms, _ in each]), np.array([highest for _, highest in each])
+        after = [self.after(ordered[:count]) for count in range(len(ordered) + 1)]
+        return np.array([rms for rms, _ in after]), np.array([highest for _, highest in after])
 
     def after(self, chosen: Indices) -> tuple[Floats, Floats]:
         """(n_quantity,) rms and highest standard uncertainty at the tool after some candidates."""
@@ -295,10 +296,10 @@ class Field:
 
 
 class CombinationVariance:
-    """What is known of combinations of unknowns after some candidates, scaled as these are.
+    """Variances of linear combinations of unknowns after some candidates, scaled as these are.
 
-    Unknowns with a prior are always known somehow; of those without, the readings alone decide: the
-    Schur complement of the information on them has an eigenvalue near zero where they do not.
+    Unknowns with a prior always have a finite variance; the others are determined by the readings
+    only: where those do not, the Schur complement of the information has an eigenvalue near zero.
     """
 
     def __init__(self, candidates: Candidates, chosen: Indices) -> None:
@@ -364,30 +365,30 @@ def _tool(
     """(n_pose, n_component, n) what each unknown does to the tool, over poses that can be used.
 
     Where an instrument's own frame is unknown no reading tells where the whole machine stands: that
-    part of every effect is taken away, as the gate does, and the flag is set.
+    part of every effect is removed, as in the acceptance, and the flag is set.
     """
     n_machine = unknowns.n_machine
-    found, solved = tool_effects(
+    own_effects, solved = tool_effects(
         machine, unknowns, unknowns.prior_mean, over.joints, over.placements
     )
-    effects = np.zeros((*found.shape[:2], unknowns.count))
-    effects[:, :, :n_machine] = found
+    effects = np.zeros((*own_effects.shape[:2], unknowns.count))
+    effects[:, :, :n_machine] = own_effects
     if n_machine == unknowns.count:
         return effects, False
     sigma = np.sqrt(np.diagonal(unknowns.prior_covariance))[:n_machine]
     triangle = np.linalg.qr(blocks.reshape(-1, unknowns.count), mode="r")
-    seen = row_covariance(of_machine(triangle, n_machine, sigma))
+    seen = row_covariance(project_out_instruments(triangle, n_machine, sigma))
     # The tool's rotations are named as angles there.
     names = ["abc"["xyz".index(name[1])] if name[0] == "r" else name for name in machine.components]
-    tool = Tool.of(found, names, over.placements[solved, :3])
+    tool = Tool.of(own_effects, names, over.placements[solved, :3])
     gauge = tool.sort(seen, with_gauge=True).gauge
     effects[:, :, :n_machine] = tool.relative(gauge).effects
     return effects, len(gauge) > 0
 
 
-def _dataset(found: Plan) -> xr.Dataset:
-    machine, unknowns = found.machine, found.unknowns
-    n_pose = len(found.poses)
+def _dataset(plan: Plan) -> xr.Dataset:
+    machine, unknowns = plan.machine, plan.unknowns
+    n_pose = len(plan.poses)
     units = {
         "joint": joint_units(machine),
         "quantity": [str(unit) for unit in quantity_coords(machine)["quantity_units"].values],
@@ -398,22 +399,22 @@ def _dataset(found: Plan) -> xr.Dataset:
         return data_variable(Variable(dims, unit, meaning), values, units)
 
     data = {
-        "joint": variable(("pose", "joint"), found.joints, "joint", "commanded joints"),
+        "joint": variable(("pose", "joint"), plan.joints, "joint", "commanded joints"),
         "rank": variable(
-            ("pose",), found.rank, "1", "place, from 1, in the order in which poses buy most"
+            ("pose",), plan.rank, "1", "place, from 1, in the order in which poses buy most"
         ),
         "rms": variable(
-            ("count", "quantity"), found.rms, "quantity", "rms uncertainty at the tool over poses"
+            ("count", "quantity"), plan.rms, "quantity", "rms uncertainty at the tool over poses"
         ),
         "highest": variable(
-            ("count", "quantity"), found.highest, "quantity", "highest uncertainty at the tool"
+            ("count", "quantity"), plan.highest, "quantity", "highest uncertainty at the tool"
         ),
         "before": variable(
-            ("sought",), found.before, "sought", "standard uncertainty of the unknown before"
+            ("sought",), plan.before, "sought", "standard uncertainty of the unknown before"
         ),
-        "after": variable(("sought",), found.after, "sought", "the same after all poses"),
+        "after": variable(("sought",), plan.after, "sought", "the same after all poses"),
         "from_data": variable(
-            ("sought",), found.from_data, "1", "share of what is known that is measured"
+            ("sought",), plan.from_data, "1", "share of what is known that is measured"
         ),
     }
     labels = {
@@ -425,18 +426,18 @@ def _dataset(found: Plan) -> xr.Dataset:
         "sought_units": label("sought", units["sought"], "unit of the unknown"),
         **quantity_coords(machine),
     }
-    for at, freedom in enumerate(machine.commanded):
-        unit = commanded_units(machine)[at]
+    for column, freedom in enumerate(machine.commanded):
+        unit = commanded_units(machine)[column]
         meaning = f"pose {freedom}, commanded"
-        labels[f"pose_{freedom}"] = label("pose", found.poses[:, at], meaning, unit)
-    attrs = provenance(machine, found.condition)
+        labels[f"pose_{freedom}"] = label("pose", plan.poses[:, column], meaning, unit)
+    attrs = provenance(machine, plan.condition)
     attrs |= {
-        "instruments": ", ".join(each.name for each in found.instruments),
-        "criterion": found.criterion,
-        "criterion_value": found.value,
-        "candidates": found.n_candidate,
-        "candidates_left_out": found.left_out,
-        "without_place_of_machine": int(found.relative),
-        "seed": str(found.seed),
+        "instruments": ", ".join(instrument.name for instrument in plan.instruments),
+        "criterion": plan.criterion,
+        "criterion_value": plan.value,
+        "candidates": plan.n_candidate,
+        "candidates_left_out": plan.left_out,
+        "without_place_of_machine": int(plan.relative),
+        "seed": str(plan.seed),
     }
     return xr.Dataset(data, labels, attrs)

@@ -1,4 +1,4 @@
-"""Which poses a plan may choose from, over which it judges the tool, and a short way through some.
+"""Which poses a plan may choose from, where it assesses the tool, and a short way through some.
 
 Candidates are poses of the workspace that the machine reaches within travel and joint limits, away
 from singularities. A way through poses is short in the distance that weighs an angle with the
@@ -23,7 +23,7 @@ from truepose.machine.workspace import GridAxis, Workspace, grid
 from truepose.runs.poses import OK, SkippedPoses, no_pose_left, requested_poses
 
 MOST_POSES = 1024
-"""Poses of a workspace that are looked at, about: a finer grid betters a plan by little."""
+"""About how many poses of a workspace are considered: a finer grid hardly improves a plan."""
 
 CONDITIONED = 0.1
 """A candidate's conditioning is at least this share of the best in the workspace: nearer to a
@@ -55,11 +55,11 @@ def _axes(workspace: Workspace) -> tuple[GridAxis, ...]:
         largest = int(np.argmax(counts))
         counts[largest] = (counts[largest] + 1) // 2
     while True:
-        open_ = [at for at, count in enumerate(counts) if count > 1]
+        open_ = [axis for axis, count in enumerate(counts) if count > 1]
         if not open_:
             break
-        fewest = min(open_, key=lambda at: counts[at])
-        finer = [2 * c - 1 if at == fewest else c for at, c in enumerate(counts)]
+        fewest = min(open_, key=lambda axis: counts[axis])
+        finer = [2 * c - 1 if axis == fewest else c for axis, c in enumerate(counts)]
         if np.prod(finer, dtype=float) > MOST_POSES:
             break
         counts = finer
@@ -85,17 +85,20 @@ class Placed:
     """
 
     def __init__(self, machine: Machine, poses: ArrayLike, *, of_file: bool = False) -> None:
-        given = requested_poses(machine, poses)
-        self.joints, self.placements, status = machine.kernel.place(given)
-        conditioning, regular = machine.kernel.conditioning(given, status=True)
+        requested = requested_poses(machine, poses)
+        self.joints, self.placements, status = machine.kernel.place(requested)
+        conditioning, regular = machine.kernel.conditioning(requested, status=True)
         status = np.where(status == OK, regular, status)
         usable = status == OK
         if not usable.any():
             left_out = SkippedPoses()
             left_out.add(np.flatnonzero(~usable), status)
-            raise no_pose_left(machine, given, left_out, of_file=of_file)
+            raise no_pose_left(machine, requested, left_out, of_file=of_file)
         self.left_out = int((~usable).sum())
-        self.poses, self.conditioning = given[usable], np.asarray(conditioning[usable], np.float64)
+        self.poses, self.conditioning = (
+            requested[usable],
+            np.asarray(conditioning[usable], np.float64),
+        )
         self.joints, self.placements = self.joints[usable], self.placements[usable]
 
     def __len__(self) -> int:

@@ -1,8 +1,8 @@
 """A plan on its way to the machine: a program that stops at every pose, and a table to fill in.
 
 The program moves in straight lines of the commanded freedoms, as controllers do. Every line is
-looked at beforehand; where it leaves what the machine can reach, the way goes by home. Axis words
-are machine coordinates in mm or inches and degrees (ISO 6983-1).
+checked beforehand; where it leaves what the machine can reach, the way leads through home. Axis
+words are machine coordinates in mm or inches and degrees (ISO 6983-1).
 """
 
 from __future__ import annotations
@@ -72,12 +72,12 @@ def way_through(machine: Machine, poses: Floats) -> Way:
     places, numbers = [home], [-1]
     problems = []
     for leg in range(len(poses) + 1):
-        ends = [each for each in (leg - 1, leg) if 0 <= each < len(poses)]
+        ends = [number for number in (leg - 1, leg) if 0 <= number < len(poses)]
         if not straight[leg]:
-            blocked = [each for each in ends if not from_home[each]]
+            blocked = [number for number in ends if not from_home[number]]
             # From home and to home there is no other way.
             if blocked or len(ends) < 2:
-                problems += [_no_way(machine, poses, leg, each) for each in blocked or ends]
+                problems += [_no_way(machine, poses, leg, number) for number in blocked or ends]
             places.append(home)
             numbers.append(-1)
         if leg < len(poses):
@@ -147,11 +147,11 @@ def _lines(
     unit = _program_unit(machine)
     scale = {"mm": MILLIMETRE, "inch": INCH}[unit]
     total = int(way.pose.max()) + 1
-    names = ", ".join(each.name for each in instruments)
-    yield f"; {_plain(machine.name)}: {total} poses to measure" + (
-        f" with {_plain(names)}" if names else ""
+    names = ", ".join(instrument.name for instrument in instruments)
+    yield f"; {_ascii(machine.name)}: {total} poses to measure" + (
+        f" with {_ascii(names)}" if names else ""
     )
-    yield f"; planned by truepose {version()} for {_plain(machine.file)}"
+    yield f"; planned by truepose {version()} for {_ascii(machine.file)}"
     yield "; in machine coordinates: without work offsets and tool length"
     yield f"; G4 P is in seconds; the machine rests {dwell:g} s at every pose"
     yield "; begins and ends at home" + (
@@ -188,9 +188,9 @@ def _number(value: float, digits: int) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def _plain(text: str) -> str:
-    """Text that can stand in a comment of any controller."""
-    kept = "".join(each if " " <= each <= "~" else "?" for each in text)
+def _ascii(text: str) -> str:
+    """Text as printable ASCII without round brackets, for a comment of any controller."""
+    kept = "".join(character if " " <= character <= "~" else "?" for character in text)
     return kept.replace("(", "[").replace(")", "]")
 
 
@@ -216,8 +216,8 @@ def template(machine: Machine, poses: Floats, instruments: Sequence[Instrument])
     lines = [*head, ", ".join([INSTRUMENT, *commanded, *readings])]
     for pose in poses:
         cells = [repr(float(unit.to_file(value))) for unit, value in zip(units, pose, strict=True)]
-        blank = [""] * len(readings)
-        lines += [", ".join([each.name, *cells, *blank]).rstrip() for each in instruments]
+        rest = [*cells, *[""] * len(readings)]
+        lines += [", ".join([instrument.name, *rest]).rstrip() for instrument in instruments]
     return "\n".join(lines) + "\n"
 
 

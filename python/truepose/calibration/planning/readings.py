@@ -39,17 +39,16 @@ def observed(machine: Machine, instrument: Instrument) -> tuple[str, ...]:
             instrument,
             "the poses of a contact are those that keep its point in place: nothing is to choose",
             found=instrument.kind,
-            expected=one_of(sorted(name for name, each in REGISTRY.items() if not each.fixed)),
+            expected=one_of(sorted(name for name, kind in REGISTRY.items() if not kind.fixed)),
         )
-    possible = tuple(
-        each for each in dict.fromkeys(kind.reads.values()) if moved(each, machine.components)
-    )
-    named = tuple(each for each in possible if each in instrument.uncertainty)
+    readable = tuple(dict.fromkeys(kind.reads.values()))
+    possible = tuple(name for name in readable if moved(name, machine.components))
+    named = tuple(name for name in possible if name in instrument.uncertainty)
     usual = kind.observed(machine.components)
-    reads = named or tuple(e for e in usual if instrument.uncertainty_of(e) is not None)
-    stated = [each for each in kind.reads.values() if each in instrument.uncertainty]
+    reads = named or tuple(name for name in usual if instrument.uncertainty_of(name) is not None)
+    stated = [name for name in readable if name in instrument.uncertainty]
     if not possible or (stated and not set(stated) & set(possible)):
-        unmoved = ", ".join(dict.fromkeys(stated or kind.reads.values()))
+        unmoved = ", ".join(stated or readable)
         raise _refusal(
             instrument,
             "this machine does not move in what it reads",
@@ -93,12 +92,12 @@ def planned(
                 expected="an instrument, or several",
             )
         )
-    columns = [_columns(machine, each) for each in instruments]
-    sizes = [len(each) for each in columns]
-    one = np.concatenate([np.array(each, np.float64) for each in columns])
+    columns = [_columns(machine, instrument) for instrument in instruments]
+    sizes = [len(rows) for rows in columns]
+    at_one_pose = np.concatenate([np.array(rows, np.float64) for rows in columns])
     n_pose, n_instrument = len(placed), len(instruments)
     own = np.repeat(np.arange(n_instrument), sizes)
-    table = np.tile(one, (n_pose, 1))
+    table = np.tile(at_one_pose, (n_pose, 1))
     state = unloaded_at_reference(machine.condition) if condition is None else condition
     machine.check_condition(state)
     return Measurements(

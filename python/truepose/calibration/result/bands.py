@@ -7,16 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats, Indices
+from truepose.calibration.identification.unknowns import bands_of
 from truepose.machine import Machine
-from truepose.sources.deviation import Deviation
-from truepose.sources.tolerance import DimensionalTolerance
-
-
-def bands_of(machine: Machine) -> Deviation | None:
-    """The bands of the machine's tolerances; None where its file has none."""
-    return next(
-        (each.bands for each in machine.sources if isinstance(each, DimensionalTolerance)), None
-    )
 
 
 @dataclass(frozen=True)
@@ -46,7 +38,7 @@ def tolerance_covariance(machine: Machine) -> ToleranceCovariance:
     shift = np.zeros(count)
     np.add.at(shift, bands.parameters, bands.shift[0])
     effects = np.zeros((count, bands.n_variable))
-    sigmas = np.array([each.sigmas for each in bands.distribution], np.float64)
+    sigmas = np.array([distribution.sigmas for distribution in bands.distribution], np.float64)
     np.add.at(effects, (bands.parameters, bands.variables), bands.signed_half[0] / sigmas)
     correlation = np.eye(bands.n_variable) if bands.correlation is None else bands.correlation
     return ToleranceCovariance(shift, effects, correlation)
@@ -95,14 +87,14 @@ def banded(columns: Indices, effects: Floats, covariance: Floats, names: tuple[s
         row = np.zeros(effects.shape[1])
         # A parameter's own variable is its deviation; a group's is the unknown, whatever the signs.
         row[unknown] = np.sign(effects[members[0], unknown]) if len(members) == 1 else 1.0
-        for each in members:
-            effect = float(effects[each, unknown] * row[unknown])
-            column_effects.append((each, len(rows), effect))
+        for member in members:
+            effect = float(effects[member, unknown] * row[unknown])
+            column_effects.append((member, len(rows), effect))
         rows.append(row)
         called.append(names[unknown] if len(members) > 1 else "")
-    for each in dict.fromkeys(mixed):
-        column_effects.append((each, len(rows), 1.0))
-        rows.append(effects[each])
+    for member in dict.fromkeys(mixed):
+        column_effects.append((member, len(rows), 1.0))
+        rows.append(effects[member])
         called.append("")
     to_variables = np.array(rows).reshape(len(rows), effects.shape[1])
     of_variables = to_variables @ covariance @ to_variables.T
@@ -111,10 +103,10 @@ def banded(columns: Indices, effects: Floats, covariance: Floats, names: tuple[s
     correlation = of_variables / np.outer(scale, scale)
     correlation = np.clip(0.5 * (correlation + correlation.T), -1.0, 1.0)
     np.fill_diagonal(correlation, 1.0)
-    found = np.zeros((len(columns), len(rows)))
+    by_variable = np.zeros((len(columns), len(rows)))
     for at, variable, effect in column_effects:
-        found[at, variable] = effect * deviation[variable]
-    return Banded(columns[moved], found[moved], correlation, tuple(called))
+        by_variable[at, variable] = effect * deviation[variable]
+    return Banded(columns[moved], by_variable[moved], correlation, tuple(called))
 
 
 def _shared(effects: Floats) -> list[bool]:
@@ -125,5 +117,5 @@ def _shared(effects: Floats) -> list[bool]:
         touched = linked[:, shared].any(axis=1)
         more = (linked & touched[:, np.newaxis]).any(axis=0)
         if np.array_equal(more, shared):
-            return [bool(each) for each in shared]
+            return [bool(flag) for flag in shared]
         shared = more

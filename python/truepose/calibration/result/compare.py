@@ -25,7 +25,12 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.calibration.result.bands import tolerance_covariance
-from truepose.calibration.result.directions import deviation_of, directions, tilted, turned
+from truepose.calibration.result.directions import (
+    deviation_jacobian,
+    deviation_of,
+    direction_at,
+    directions,
+)
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import Shown, ShownUnits
 from truepose.machine import Machine
@@ -40,13 +45,13 @@ _ROUNDING = 1e-12
 """Of the number of parameters: an eigenvalue so small, of a correlation matrix, is zero."""
 
 _CERTAIN = 1e-3
-"""Standard deviations: from here on it counts along what neither file has an uncertainty of."""
+"""Standard deviations from which a difference counts as a change where no file is uncertain."""
 
 _EXACT = 1e-12
 """Relative to a parameter: a smaller difference is rounding."""
 
 _ROUNDED = 1e-15
-"""m, rad: the same of what is near zero, and has no size to be exact to."""
+"""m, rad: the same for parameters near zero, of which a relative size says nothing."""
 
 _TURNED = 0.5
 """Cosine of the angle by which a direction may have turned."""
@@ -78,7 +83,7 @@ class _Change:
 
     @property
     def changed(self) -> bool:
-        """Whether the machine did."""
+        """Whether the machine changed."""
         return bool(self.each.any()) or self.probability < 0.5 * ALPHA
 
 
@@ -97,32 +102,34 @@ def compare(old: Machine, new: Machine, poses: ArrayLike | None = None) -> xr.Da
     _require_same(old, new)
     before, after, change = _change(old, new)
     requested = requested_poses(old, poses)
-    walk = PoseRun(before, requested, old.condition)
+    run = PoseRun(before, requested, old.condition)
     columns = np.arange(len(old.parameters))
     blocks = []
-    for block in walk:
+    for block in run:
         kernel = after.kernel
-        moved, solved = kernel.displacement(
+        displacement, solved = kernel.displacement(
             block.joints, block.placements, columns[:1], np.zeros((1, 1))
         )
-        usable = walk.keep(block.indices, solved)
+        usable = run.keep(block.indices, solved)
         slopes, _ = before.kernel.sensitivity_at(block.joints, block.placements, columns)
-        spread = slopes[usable] @ change.covariance @ slopes[usable].transpose(0, 2, 1)
-        blocks.append((block.indices[usable], moved[usable], spread))
+        covariance = slopes[usable] @ change.covariance @ slopes[usable].transpose(0, 2, 1)
+        blocks.append((block.indices[usable], displacement[usable], covariance))
     if not sum(len(indices) for indices, _, _ in blocks):
-        raise no_pose_left(before, requested, walk.left_out, of_file=poses is None)
-    indices, moved, spread = (np.concatenate(each) for each in zip(*blocks, strict=True))
-    return _dataset(old, new, change, requested, walk.left_out, indices, moved, spread)
+        raise no_pose_left(before, requested, run.left_out, of_file=poses is None)
+    indices, displacement, covariance = (
+        np.concatenate(parts) for parts in zip(*blocks, strict=True)
+    )
+    return _dataset(old, new, change, requested, run.left_out, indices, displacement, covariance)
 
 
 def _require_same(old: Machine, new: Machine) -> None:
     """Raise where the two are not the same machine with other numbers."""
     for what in ("dof", "commanded", "joints", "parameters"):
-        one, other = getattr(old, what), getattr(new, what)
-        if one != other:
-            lacking = sorted(set(one) ^ set(other)) or list(one)
+        first, second = getattr(old, what), getattr(new, what)
+        if first != second:
+            lacking = sorted(set(first) ^ set(second)) or list(first)
             raise _not_same(old, new, f"their {what} differ: {', '.join(lacking[:6])}")
-    kinds = [[(each.name, each.kind) for each in machine.drives] for machine in (old, new)]
+    kinds = [[(drive.name, drive.kind) for drive in machine.drives] for machine in (old, new)]
     if kinds[0] != kinds[1]:
         raise _not_same(old, new, "their drives are of other kinds")
 
@@ -141,33 +148,35 @@ def _not_same(old: Machine, new: Machine, why: str) -> RequestError:
 
 def _change(old: Machine, new: Machine) -> tuple[Machine, Machine, _Change]:
     """Both machines at their estimates, and what differs, in the old one's axes."""
-    was, found = tolerance_covariance(old), tolerance_covariance(new)
-    values = [machine.nominal + what.shift for machine, what in ((old, was), (new, found))]
+    was, now = tolerance_covariance(old), tolerance_covariance(new)
+    values = [machine.nominal + what.shift for machine, what in ((old, was), (new, now))]
     names = old.parameters
     before, after = (
-        machine.replace(dict(zip(names, map(float, each), strict=True)))
-        for machine, each in zip((old, new), values, strict=True)
+        machine.replace(dict(zip(names, map(float, estimate), strict=True)))
+        for machine, estimate in zip((old, new), values, strict=True)
     )
-    effects, first, second = found.effects.copy(), values[0], values[1].copy()
-    for one, other in zip(directions(old), directions(new), strict=True):
-        at = list(one.columns)
-        if np.array_equal(one.axis, other.axis):
+    effects, old_values, new_values = now.effects.copy(), values[0], values[1].copy()
+    for was_along, now_along in zip(directions(old), directions(new), strict=True):
+        at = list(was_along.columns)
+        if np.array_equal(was_along.axis, now_along.axis):
             continue
-        along = tilted(other.axis, second[at])
-        if one.axis @ along < _TURNED:
-            where = f"{one.table}.{one.part}.{one.key}"
+        along = direction_at(now_along.axis, new_values[at])
+        if was_along.axis @ along < _TURNED:
+            where = f"{was_along.table}.{was_along.part}.{was_along.key}"
             raise _not_same(old, new, f"{where} points quite another way")
-        effects[at] = turned(other.axis, second[at], one.axis) @ effects[at]
-        second[at] = deviation_of(one.axis, along)
-    after_covariance = effects @ found.correlation @ effects.T
-    return before, after, _tested(first, second, was.covariance, after_covariance)
+        effects[at] = (
+            deviation_jacobian(now_along.axis, new_values[at], was_along.axis) @ effects[at]
+        )
+        new_values[at] = deviation_of(was_along.axis, along)
+    after_covariance = effects @ now.correlation @ effects.T
+    return before, after, _tested(old_values, new_values, was.covariance, after_covariance)
 
 
-def _tested(old: Floats, new: Floats, was: Floats, found: Floats) -> _Change:
+def _tested(old: Floats, new: Floats, was: Floats, now: Floats) -> _Change:
     difference = new - old
     scale = np.maximum(np.abs(old), np.abs(new))
     difference[np.abs(difference) <= _EXACT * scale + _ROUNDED] = 0.0
-    covariance = was + found
+    covariance = was + now
     deviation = np.sqrt(np.diagonal(covariance))
     scaled = np.where(deviation > 0.0, deviation, 1.0)
     moved = difference != 0.0
@@ -184,7 +193,7 @@ def _tested(old: Floats, new: Floats, was: Floats, found: Floats) -> _Change:
         old,
         new,
         np.sqrt(np.diagonal(was)),
-        np.sqrt(np.diagonal(found)),
+        np.sqrt(np.diagonal(now)),
         covariance,
         normalised,
         limit,
@@ -231,15 +240,15 @@ def _dataset(
     left_out: SkippedPoses,
     indices: np.ndarray,
     displacement: Floats,
-    spread: Floats,
+    covariance: Floats,
 ) -> xr.Dataset:
     turning = np.array([name.startswith("r") for name in old.components])
-    uncertainty = np.sqrt(np.maximum(np.einsum("ncc->nc", spread), 0.0))
+    uncertainty = np.sqrt(np.maximum(np.einsum("ncc->nc", covariance), 0.0))
     sizes, along = [], []
     chosen = [(name, part) for name, part in zip(_QUANTITIES, (~turning, turning), strict=True)]
     chosen = [(name, part) for name, part in chosen if part.any()]
     for _, part in chosen:
-        size, deviation = _along(displacement[:, part], spread[:, part][:, :, part])
+        size, deviation = _along(displacement[:, part], covariance[:, part][:, :, part])
         sizes.append(size)
         along.append(deviation)
     component = ["rad" if turns else "m" for turns in turning]
@@ -324,7 +333,7 @@ def _dataset(
     return dataset
 
 
-def _along(displacement: Floats, spread: Floats) -> tuple[Floats, Floats]:
+def _along(displacement: Floats, covariance: Floats) -> tuple[Floats, Floats]:
     """Length (n,) of displacements (n, k), and their standard uncertainty along themselves."""
     size = np.linalg.norm(displacement, axis=1)
     unit = np.divide(
@@ -333,9 +342,9 @@ def _along(displacement: Floats, spread: Floats) -> tuple[Floats, Floats]:
         out=np.zeros_like(displacement),
         where=size[:, np.newaxis] > 0.0,
     )
-    variance = np.einsum("nc,ncd,nd->n", unit, spread, unit)
+    variance = np.einsum("nc,ncd,nd->n", unit, covariance, unit)
     # What does not move has no direction: the largest uncertainty of any.
-    largest = np.linalg.eigvalsh(spread)[:, -1]
+    largest = np.linalg.eigvalsh(covariance)[:, -1]
     return size, np.sqrt(np.maximum(np.where(size > 0.0, variance, largest), 0.0))
 
 
@@ -351,34 +360,34 @@ def _provenance(which: str, machine: Machine) -> dict[str, str]:
     }
 
 
-def verdict(found: xr.Dataset, units: ShownUnits) -> str:
+def verdict(dataset: xr.Dataset, units: ShownUnits) -> str:
     """One sentence on what `compare` found, for people."""
-    if not found.attrs["changed"]:
-        normalised = np.abs(found["normalised_difference"].values)
+    if not dataset.attrs["changed"]:
+        normalised = np.abs(dataset["normalised_difference"].values)
         largest = int(normalised.argmax())
         if not normalised[largest]:
             return "No change beyond uncertainty: no parameter differs."
-        name = str(found["parameter"].values[largest])
+        name = str(dataset["parameter"].values[largest])
         return (
             f"No change beyond uncertainty: {name} differs most, by {normalised[largest]:.2g} "
-            f"standard uncertainties; {_allowed(found, units)}."
+            f"standard uncertainties; {_allowed(dataset, units)}."
         )
-    tool = _at_tool(found, units)
-    each = found["parameter_changed"].values
-    if not each.any():
+    tool = _at_tool(dataset, units)
+    flags = dataset["parameter_changed"].values
+    if not flags.any():
         return (
             "The machine changed: no parameter stands out by itself, but all together differ by "
-            f"more than their uncertainty (chi-square {found.attrs['chi_square']:.4g} of "
-            f"{found.attrs['chi_square_dof']}); {tool}."
+            f"more than their uncertainty (chi-square {dataset.attrs['chi_square']:.4g} of "
+            f"{dataset.attrs['chi_square_dof']}); {tool}."
         )
-    order = np.argsort(-np.abs(found["normalised_difference"].values), kind="stable")
-    order = order[: int(each.sum())]
+    order = np.argsort(-np.abs(dataset["normalised_difference"].values), kind="stable")
+    order = order[: int(flags.sum())]
     parts = [
         _amount(
-            str(found["parameter"].values[at]),
-            float(found["difference"].values[at]),
-            float(found["standard_uncertainty"].values[at]),
-            units.small(str(found["parameter_units"].values[at])),
+            str(dataset["parameter"].values[at]),
+            float(dataset["difference"].values[at]),
+            float(dataset["standard_uncertainty"].values[at]),
+            units.small(str(dataset["parameter_units"].values[at])),
         )
         for at in order[:_NAMED]
     ]
@@ -392,27 +401,27 @@ def _amount(name: str, value: float, deviation: float, unit: Shown) -> str:
     return f"{name} by {change:.4g} {unit.label} ({sign} {twice:.2g})"
 
 
-def _allowed(found: xr.Dataset, units: ShownUnits) -> str:
-    """What the difference would do to the tool, where it is no sign of a change."""
-    likely = float(found.attrs["chi_square_probability"])
+def _allowed(dataset: xr.Dataset, units: ShownUnits) -> str:
+    """How far the files differ at the tool, and how likely that is without a change."""
+    likely = float(dataset.attrs["chi_square_probability"])
     return (
-        f"taken as they are the two files differ at the tool by up to {_largest(found, units)}, "
-        "and what both files say of their uncertainty allows it: without a change all parameters "
-        f"together differ so much in {100.0 * likely:.3g} % of cases"
+        f"the two files differ at the tool by up to {_largest(dataset, units)}, which is within "
+        "their uncertainties: without a change all parameters together differ as much in "
+        f"{100.0 * likely:.3g} % of cases"
     )
 
 
-def _at_tool(found: xr.Dataset, units: ShownUnits) -> str:
-    verb = "moves" if found["quantity"].values[0] == "position" else "turns"
-    return f"the tool {verb} by up to {_largest(found, units)}"
+def _at_tool(dataset: xr.Dataset, units: ShownUnits) -> str:
+    verb = "moves" if dataset["quantity"].values[0] == "position" else "turns"
+    return f"the tool {verb} by up to {_largest(dataset, units)}"
 
 
-def _largest(found: xr.Dataset, units: ShownUnits) -> str:
+def _largest(dataset: xr.Dataset, units: ShownUnits) -> str:
     """What the difference does to the tool at the worst pose: a size, (its uncertainty, k = 2)."""
-    unit = units.error(str(found["quantity"].values[0]))
-    sizes = found["moved"].values[:, 0]
+    unit = units.error(str(dataset["quantity"].values[0]))
+    sizes = dataset["moved"].values[:, 0]
     at = int(sizes.argmax())
-    deviation = float(found["moved_uncertainty"].values[at, 0])
+    deviation = float(dataset["moved_uncertainty"].values[at, 0])
     sign = "\N{PLUS-MINUS SIGN}"
     size, twice = unit.per_si * sizes[at], 2.0 * unit.per_si * deviation
     return f"{size:.4g} {unit.label} ({sign} {twice:.2g}, k = 2)"

@@ -2,9 +2,8 @@
 
 A direction has two parameters `u`, `v`: it points along `axis + u t1 + v t2`, where the tangents t1
 and t2 follow from the nominal axis alone (`tangents` in `crates/kernel/src/spatial/vector.rs`). A
-machine file has the axis only. So a direction that was found to be off is written as a new axis,
-from which its deviations then count about new tangents: what is known of `u`, `v` has to be turned
-with them.
+machine file has the axis only. So a direction that deviates is written as a new axis, from which
+its deviations count about new tangents: the covariance of `u`, `v` has to be transformed with them.
 """
 
 from __future__ import annotations
@@ -36,22 +35,22 @@ class PartDirection:
 def directions(machine: Machine) -> Iterator[PartDirection]:
     """All directions of a machine whose deviations are parameters, in the parameters' order."""
     parts: tuple[Drive | Guide, ...] = (*machine.drives, *machine.guides)
-    rows = {each.part: each for each in parts}
+    rows = {part.part: part for part in parts}
     names = machine.parameters
     for column, name in enumerate(names):
         if not name.endswith(_FIRST):
             continue
         path, _, key = name.removesuffix(_FIRST).rpartition(".")
         table, _, part = path.partition(".")
-        other = names.index(name.removesuffix(_FIRST) + _SECOND)
+        second = names.index(name.removesuffix(_FIRST) + _SECOND)
         axis = np.array(rows[path].fields[key], np.float64)
-        yield PartDirection(table, part, key, (column, other), axis / np.linalg.norm(axis))
+        yield PartDirection(table, part, key, (column, second), axis / np.linalg.norm(axis))
 
 
-def tilted(axis: ArrayLike, deviation: ArrayLike) -> Floats:
+def direction_at(axis: ArrayLike, deviation: ArrayLike) -> Floats:
     """(3,) the unit vector at the deviations (2,) `u`, `v` from the unit `axis` (3,)."""
-    moved: Floats = np.asarray(axis, np.float64) + np.asarray(deviation) @ tangents(axis)
-    return moved / np.linalg.norm(moved)
+    along: Floats = np.asarray(axis, np.float64) + np.asarray(deviation) @ tangents(axis)
+    return along / np.linalg.norm(along)
 
 
 def deviation_of(axis: ArrayLike, direction: ArrayLike) -> Floats:
@@ -60,11 +59,11 @@ def deviation_of(axis: ArrayLike, direction: ArrayLike) -> Floats:
     The two are at less than a right angle.
     """
     unit, along = np.asarray(axis, np.float64), np.asarray(direction, np.float64)
-    found: Floats = (tangents(unit) @ along) / (unit @ along)
-    return found
+    ratios: Floats = (tangents(unit) @ along) / (unit @ along)
+    return ratios
 
 
-def turned(axis: ArrayLike, deviation: ArrayLike, new_axis: ArrayLike) -> Floats:
+def deviation_jacobian(axis: ArrayLike, deviation: ArrayLike, new_axis: ArrayLike) -> Floats:
     """(2, 2) change of the `u`, `v` about `new_axis` for one of those about `axis`.
 
     Where the direction is at the deviation (2,) from `axis`.
@@ -73,6 +72,6 @@ def turned(axis: ArrayLike, deviation: ArrayLike, new_axis: ArrayLike) -> Floats
     along = np.asarray(axis, np.float64) + np.asarray(deviation) @ across
     length = np.linalg.norm(along)
     along /= length
-    moved = (across - np.outer(across @ along, along)) / length
+    slopes = (across - np.outer(across @ along, along)) / length
     seen = deviation_of(unit, along)
-    return np.asarray((tangents(unit) - np.outer(seen, unit)) @ moved.T / (unit @ along))
+    return np.asarray((tangents(unit) - np.outer(seen, unit)) @ slopes.T / (unit @ along))

@@ -4,9 +4,9 @@ Every parameter that the unknowns move has its identified value, or, with `as_sh
 that the controller has and gets the deviation as the middle of its band. Bands are normal, of the
 identified covariance, with all correlations. What the file says besides, comments included, stays.
 
-An accuracy that is asked of every machine inside the bands, because the file does not say of how
-many, is asked at a coverage: ends of normal bands are no ends, and what a calibration knows, it
-knows by the correlations, which the worst case does not count.
+An accuracy that the original asks in the worst case (it states no coverage) is asked at a coverage
+in the calibrated file: normal bands have no ends, and a calibration knows most by the correlations,
+which the worst case does not use.
 """
 
 from __future__ import annotations
@@ -21,14 +21,19 @@ import tomlkit
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property
+from truepose.calibration.identification.unknowns import bands_of
 from truepose.calibration.result.bands import (
     Banded,
     ToleranceCovariance,
     banded,
-    bands_of,
     tolerance_covariance,
 )
-from truepose.calibration.result.directions import PartDirection, directions, tilted, turned
+from truepose.calibration.result.directions import (
+    PartDirection,
+    deviation_jacobian,
+    direction_at,
+    directions,
+)
 from truepose.calibration.result.toml_edits import MachineText, warning_comment
 from truepose.errors import MachineFileError, Problem, RequestError
 from truepose.files.writing import replacing, require_writable
@@ -137,13 +142,13 @@ def write_calibrated(
     """
     path, original = Path(path), Path(original)
     require_writable(path, [ENDING], [original])
-    given = np.asarray(values, np.float64)[: unknowns.n_machine]
-    spread = np.asarray(covariance, np.float64)[: unknowns.n_machine, : unknowns.n_machine]
-    _require_determined(path, unknowns, given, spread)
-    result = _Result.of(machine, unknowns, given, spread, as_shifts)
+    own_values = np.asarray(values, np.float64)[: unknowns.n_machine]
+    own_covariance = np.asarray(covariance, np.float64)[: unknowns.n_machine, : unknowns.n_machine]
+    _require_determined(path, unknowns, own_values, own_covariance)
+    result = _Result.of(machine, unknowns, own_values, own_covariance, as_shifts)
     text = MachineText(original, machine, _changed(original, machine))
     _write_values(text, machine, result)
-    for edit in property_edits(machine, unknowns, given):
+    for edit in property_edits(machine, unknowns, own_values):
         text.set_property(*edit)
     _write_bands(text, machine, result, coverage)
     given_at = text.set_coverage(Accuracy(at=AT).at_text)
@@ -211,18 +216,18 @@ class _Result:
         deviation = effects @ values
         nominal = np.array(machine.nominal) + (0.0 if as_shifts else deviation)
         axes = []
-        for each in directions(machine):
-            at = list(each.columns)
+        for direction in directions(machine):
+            at = list(direction.columns)
             if not nominal[at].any():
                 continue
-            axis = tilted(each.axis, nominal[at])
+            axis = direction_at(direction.axis, nominal[at])
             if moved[at].any():
-                effects[at] = turned(each.axis, nominal[at], axis) @ effects[at]
+                effects[at] = deviation_jacobian(direction.axis, nominal[at], axis) @ effects[at]
                 if as_shifts:
                     deviation[at] = effects[at] @ values
                 moved[at] = True
             nominal[at] = 0.0
-            axes.append((each, axis))
+            axes.append((direction, axis))
         columns = np.flatnonzero(moved)
         bands = banded(columns, effects[columns], covariance, unknowns.names[: unknowns.n_machine])
         shift = deviation if as_shifts else np.zeros(count)
@@ -231,7 +236,7 @@ class _Result:
 
 def _write_values(text: MachineText, machine: Machine, result: _Result) -> None:
     """Nominal values and directions that differ from those of the file."""
-    turned_columns = {column for each, _ in result.axes for column in each.columns}
+    turned_columns = {column for direction, _ in result.axes for column in direction.columns}
     filed = np.array(machine.nominal)
     for name in machine.replaced:
         filed[machine.parameters.index(name)] = np.nan
@@ -239,8 +244,8 @@ def _write_values(text: MachineText, machine: Machine, result: _Result) -> None:
         same = result.nominal[column] == filed[column]
         if not same and column not in turned_columns and not name.endswith((".u", ".v")):
             text.set_parameter(name, float(result.nominal[column]))
-    for each, axis in result.axes:
-        text.set_direction(each.table, each.part, each.key, axis)
+    for direction, axis in result.axes:
+        text.set_direction(direction.table, direction.part, direction.key, axis)
 
 
 def _write_bands(text: MachineText, machine: Machine, result: _Result, coverage: float) -> None:
@@ -291,12 +296,12 @@ def _normal(shift: float, effect: float, coverage: float, group: str | None) -> 
 def _variable_names(machine: Machine, bands: Banded) -> list[str]:
     """What each variable is called: its parameter, or its group, which is called as no other is."""
     columns = [int(np.flatnonzero(bands.effects[:, v])[0]) for v in range(len(bands.names))]
-    found = []
+    names = []
     for column, name in zip(columns, bands.names, strict=True):
-        taken = name in machine.parameters
+        is_parameter = name in machine.parameters
         own = machine.parameters[bands.columns[column]]
-        found.append((f"{name} as calibrated" if taken else name) if name else own)
-    return found
+        names.append((f"{name} as calibrated" if is_parameter else name) if name else own)
+    return names
 
 
 def _forget_correlations(text: MachineText, machine: Machine, result: _Result) -> None:
@@ -341,7 +346,7 @@ def _write_provenance(
     if warnings:
         table["warning"] = list(warnings)
     text.append(tomlkit.dumps({"calibration": table}))
-    lines = "".join(f"{warning_comment(each)}\n" for each in warnings)
+    lines = "".join(f"{warning_comment(warning)}\n" for warning in warnings)
     text.toml = tomlkit.parse(lines + text.text())
 
 
@@ -357,11 +362,11 @@ def _require_same(
     off = np.abs(written.nominal - result.nominal) > _SAME * np.abs(result.nominal)
     if off.any():
         raise _not_written(path, f"{filed.parameters[int(np.flatnonzero(off)[0])]} differs")
-    axes = {each.columns: axis for each, axis in result.axes}
-    for each in directions(written):
-        wanted = axes.get(each.columns)
-        if wanted is not None and np.abs(each.axis - wanted).max() > _SAME:
-            raise _not_written(path, f"{each.table}.{each.part}.{each.key} differs")
+    axes = {direction.columns: axis for direction, axis in result.axes}
+    for direction in directions(written):
+        wanted = axes.get(direction.columns)
+        if wanted is not None and np.abs(direction.axis - wanted).max() > _SAME:
+            raise _not_written(path, f"{direction.table}.{direction.part}.{direction.key} differs")
     _require_same_bands(path, filed, result, written)
     if written.accuracy != asked or written.condition != filed.condition:
         raise _not_written(path, "condition or accuracy differ")
@@ -371,7 +376,7 @@ def _require_same(
 
 
 def _require_same_bands(path: Path, machine: Machine, result: _Result, written: Machine) -> None:
-    found, old, moved, bands = (
+    read_back, filed, moved, bands = (
         tolerance_covariance(written),
         tolerance_covariance(machine),
         result.moved,
@@ -386,16 +391,16 @@ def _require_same_bands(path: Path, machine: Machine, result: _Result, written: 
     # Of a band about a shift the ends are written, which have the shift's rounding.
     slack = _SAME_BAND * deviation + _SAME * np.abs(result.shift[moved])
     most = np.outer(slack, deviation) + np.outer(deviation, slack)
-    off = np.abs(found.covariance - wanted)[np.ix_(moved, moved)] > most
+    off = np.abs(read_back.covariance - wanted)[np.ix_(moved, moved)] > most
     if off.any():
         raise _not_written(
             path, f"the band of {_first(machine, moved, np.asarray(off.any(axis=1)))} differs"
         )
-    shifted = np.asarray(np.abs(found.shift - result.shift)[moved] > slack)
+    shifted = np.asarray(np.abs(read_back.shift - result.shift)[moved] > slack)
     if shifted.any():
         raise _not_written(path, f"the shift of {_first(machine, moved, shifted)} differs")
     others = np.setdiff1d(np.arange(count), moved)
-    lost = _has_band(found)[others] != _has_band(old)[others]
+    lost = _has_band(read_back)[others] != _has_band(filed)[others]
     if lost.any():
         raise _not_written(path, f"the tolerance of {_first(machine, others, lost)} differs")
 

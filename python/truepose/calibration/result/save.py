@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from truepose.arrays import Floats
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.observability import prior_root, prior_rows
+from truepose.calibration.acceptance.observability import covariance_root, prior_rows
 from truepose.calibration.acceptance.tool_uncertainty import Tool
-from truepose.calibration.calibrate import Calibration
 from truepose.calibration.dataset import covariance_of, determined_covariance, verdict_of
 from truepose.calibration.identification.tool_effects import tool_effects, workspace_poses
 from truepose.calibration.result.file import DEFAULT_COVERAGE, Provenance, write_calibrated
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
+
+if TYPE_CHECKING:
+    from truepose.calibration.calibrate import Calibration
 
 
 def save(
@@ -38,14 +41,14 @@ def save(
 
     Raises `RequestError` (calibration-refused, and what `write_calibrated` raises).
     """
-    said = verdict_of(calibration)
+    verdict = verdict_of(calibration)
     if not (calibration.accepted or force):
         raise RequestError(
             Problem(
                 "calibration-refused",
                 "this calibration must not be used as it is",
                 str(path),
-                found=said,
+                found=verdict,
                 expected="a calibration that the gate accepts",
                 hint="force=True writes it with the warning inside",
             )
@@ -75,7 +78,7 @@ def save(
         coverage=coverage,
         as_shifts=as_shifts,
         warnings=(
-            *(() if calibration.accepted else (said,)),
+            *(() if calibration.accepted else (verdict,)),
             *_of_properties(calibration, covariance),
         ),
     )
@@ -114,10 +117,10 @@ def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
     effects, _ = tool_effects(machine, unknowns, calibration.fit.values, joints, placements)
     stated = effects.copy()
     stated[:, :, list(unknowns.properties)] = 0.0
-    root, none = prior_root(covariance), np.zeros((0, unknowns.n_machine))
+    root, none = covariance_root(covariance), np.zeros((0, unknowns.n_machine))
     components = calibration.gate.after.components
     whole, known = (
-        Tool.of(each, components, None).uncertainty(root, none) for each in (effects, stated)
+        Tool.of(slopes, components, None).uncertainty(root, none) for slopes in (effects, stated)
     )
     names = sentences.listed(
         sentences.collapsed(
@@ -131,8 +134,8 @@ def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
         unit, with_them, without = "rad", whole.rotation_max, known.rotation_max
         what = "rotation"
     return [
-        f"the uncertainty of what was found of {names} is not in this file, which has no place for "
-        f"it: by the rest of what was found the tool's {what} at the worst pose is known to "
+        f"the uncertainty of {names} is not in this file, which has no key for it: without it the "
+        f"tool's {what} at the worst pose is known to "
         f"{sentences.quantity(without, unit, units=machine.shown)}, with it, at this file's "
         "temperatures and loads, to "
         f"{sentences.quantity(with_them, unit, units=machine.shown)}"

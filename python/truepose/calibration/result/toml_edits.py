@@ -157,7 +157,7 @@ class MachineText:
         dimension = BY_UNIT[self._machine.units[at]]
         written: dict[str, Any] = dict(stated)
         if "band" in written:
-            written["band"] = [self.written(each, dimension, None) for each in written["band"]]
+            written["band"] = [self.written(end, dimension, None) for end in written["band"]]
         if "standard_deviation" in written:
             deviation = self.written(written["standard_deviation"], dimension, None)
             written["standard_deviation"] = deviation
@@ -194,8 +194,8 @@ class MachineText:
                     del rows[index][key]
                 continue
             text = rows[index].as_string().splitlines() if isinstance(rows, AoT) else []
-            found = [line.strip() for line in text if line.strip().startswith("#")]
-            comments = [line for line in found if line != CORRELATION_NOTE] + comments
+            notes = [line.strip() for line in text if line.strip().startswith("#")]
+            comments = [line for line in notes if line != CORRELATION_NOTE] + comments
             del rows[index]
         if not rows:
             del self.toml["correlation"]
@@ -204,7 +204,7 @@ class MachineText:
     def add_correlation(self, between: Sequence[str], correlation: Floats) -> None:
         """Write the correlation matrix (n, n) of the variables called `between`, all digits."""
         lines = [
-            "[" + ", ".join(repr(float(each)) for each in correlation[at, :at]) + "]"
+            "[" + ", ".join(repr(float(coefficient)) for coefficient in correlation[at, :at]) + "]"
             for at in range(1, len(between))
         ]
         names = ", ".join(tomlkit.item(name).as_string() for name in between)
@@ -251,11 +251,11 @@ class MachineText:
         path = f"{table}.{part}.{key}" if part else f"{table}"
         names = [f"{path}.{axis}" for axis in _XYZ]
         shared = self._document.value((*self._document.key(f"{table}.{part}"), key))
-        values = dict(zip(self._machine.parameters, self._machine.kernel.nominal, strict=True))
-        given = shared if isinstance(shared, list) else [None] * len(_XYZ)
+        nominal = dict(zip(self._machine.parameters, self._machine.kernel.nominal, strict=True))
+        values_given = shared if isinstance(shared, list) else [None] * len(_XYZ)
         row[key] = [
-            each if each is not None else self.written(float(values[name]), dimension, None)
-            for name, each in zip(names, given, strict=True)
+            value if value is not None else self.written(float(nominal[name]), dimension, None)
+            for name, value in zip(names, values_given, strict=True)
         ]
 
 
@@ -280,9 +280,9 @@ def _put(table: Any, key: str, inline: InlineTable) -> None:
 def inline_table(values: Mapping[str, Any]) -> InlineTable:
     """An inline table, with the spaces that people put into one."""
     keys = ", ".join(f"{key} = {tomlkit.item(value).as_string()}" for key, value in values.items())
-    found = tomlkit.value(f"{{ {keys} }}")
-    assert isinstance(found, InlineTable)
-    return found
+    table = tomlkit.value(f"{{ {keys} }}")
+    assert isinstance(table, InlineTable)
+    return table
 
 
 def _without(
@@ -290,19 +290,19 @@ def _without(
 ) -> dict[str, Any] | None:
     """A row of `[[correlation]]` without `names`; None where it has none, empty if none stay."""
     every = [*names, *kept]
-    found = [
+    names_listed = [
         name
         for word in row["between"]
         for name in ([word] if word in every else [n for n in every if fnmatchcase(n, word)])
     ]
-    if not any(name in names for name in found):
+    if not any(name in names for name in names_listed):
         return None
-    stay = [at for at, name in enumerate(found) if name not in names]
+    stay = [at for at, name in enumerate(names_listed) if name not in names]
     # A group is one variable, of which one name is enough.
-    single = list({kept[found[at]]: at for at in reversed(stay)}.values())[::-1]
+    single = list({kept[names_listed[at]]: at for at in reversed(stay)}.values())[::-1]
     if len(single) < 2:
         return {}
-    left: dict[str, Any] = {"between": [found[at] for at in single]}
+    left: dict[str, Any] = {"between": [names_listed[at] for at in single]}
     if "coefficient" in row:
         return left | {"coefficient": row["coefficient"]}
     matrix = row["matrix"]
@@ -314,14 +314,14 @@ def _without(
 def _rename(value: Any, names: Mapping[str, str]) -> None:
     """Write new names of data files wherever a key names one."""
     if isinstance(value, Mapping):
-        for key, each in value.items():
-            if isinstance(each, str) and key in _NAMES_A_FILE and each in names:
-                value[key] = names[each]  # type: ignore[index]
+        for key, entry in value.items():
+            if isinstance(entry, str) and key in _NAMES_A_FILE and entry in names:
+                value[key] = names[entry]  # type: ignore[index]
             else:
-                _rename(each, names)
+                _rename(entry, names)
     elif isinstance(value, list):
-        for each in value:
-            _rename(each, names)
+        for entry in value:
+            _rename(entry, names)
 
 
 def warning_comment(warning: str) -> str:
@@ -333,5 +333,5 @@ def _without_warnings(text: str, machine: Machine) -> str:
     """The text without the warnings of an earlier calibration, which the new one supersedes."""
     if machine.calibration is None:
         return text
-    gone = {warning_comment(each) for each in machine.calibration.warning}
+    gone = {warning_comment(warning) for warning in machine.calibration.warning}
     return "".join(line for line in text.splitlines(keepends=True) if line.strip() not in gone)

@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import astuple, dataclass
 from functools import cached_property
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from truepose.controllers._template import fill, template
 from truepose.controllers.c._known_shifts import KnownShifts, known_shifts
 from truepose.machine import Machine
 from truepose.version import version
@@ -130,12 +130,12 @@ class _Writer:
 
     def _filled(self, piece: str, ending: str = ".c.in") -> str:
         """A template with its places filled: `@name@`."""
-        text = files("truepose.controllers.c").joinpath(piece + ending).read_text("utf-8")
+        text = template(__package__, piece + ending)
         if piece == "linear" and (self.strained or not self.parasitic):
             text = _without_function(text, "regular")
         if piece == "linear" and (self.strained or not self.compliant):
             text = _without_function(text, "solve_transposed")
-        return re.sub(r"@(\w+)@", lambda match: self._places[match[1]], text)
+        return fill(text, self._places)
 
     def _needed(self) -> list[str]:
         """The formulas that the templates call."""
@@ -171,11 +171,11 @@ class _Writer:
         return {
             "p": self.prefix,
             "P": self.prefix.upper(),
-            "title": _plain(machine.name),
+            "title": _in_comment(machine.name),
             "version": version(),
-            "file": _plain(Path(machine.file).name),
+            "file": _in_comment(Path(machine.file).name),
             "changed": "".join(
-                f",\n * with {_plain(f'{key} = {value}')}"
+                f",\n * with {_in_comment(f'{key} = {value}')}"
                 for key, value in (*machine.settings.items(), *machine.replaced.items())
             ),
             "hash": machine.file_hash,
@@ -215,7 +215,7 @@ class _Writer:
             "find_loads": self._find_loads(),
             "straight": self._straight() if self.straight else "",
             "parameters": "\n".join(
-                f"        {value!r}, /* {_plain(name)} */"
+                f"        {value!r}, /* {_in_comment(name)} */"
                 for name, value in zip(machine.parameters, machine.nominal.tolist(), strict=True)
             ),
             "reference_temperature": repr(machine.condition.reference_temperature),
@@ -228,12 +228,12 @@ class _Writer:
         for number, name in enumerate(self.machine.joints):
             low, high = self.control["travel"][number]
             unit = "rad" if self.control["turns"][number] else "m"
-            yield f"  {number}  {_plain(name)}, {unit}, travel {low!r} to {high!r}"
+            yield f"  {number}  {_in_comment(name)}, {unit}, travel {low!r} to {high!r}"
 
     def _temperature_lines(self) -> Iterable[str]:
         yield "Temperatures:" if self.parts else "Temperatures have no effect."
         for number, part in enumerate(self.parts):
-            yield f"  {number}  {_plain(part)}"
+            yield f"  {number}  {_in_comment(part)}"
 
     def _known_lines(self) -> Iterable[str]:
         if not self.compliant:
@@ -429,7 +429,7 @@ def _flag(value: bool) -> str:
     return "1" if value else "0"
 
 
-def _plain(text: str) -> str:
+def _in_comment(text: str) -> str:
     """Text that may stand in a C comment."""
     for broken in ("*/", "/*", "??"):
         text = text.replace(broken, " ".join(broken))

@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from truepose.controllers._template import exact, fill, one_line, template
 from truepose.controllers.linuxcnc._description import DEGREE, MILLIMETRE, WRENCHES, Description
 from truepose.controllers.linuxcnc._safe_box import Box
-from truepose.controllers.linuxcnc._template import exact, filled, plain
 from truepose.version import version
 
 
@@ -17,12 +17,12 @@ def ini_text(description: Description, box: Box, clamp: float) -> str:
     machine = description.machine
     home = description.home / np.array([MILLIMETRE] * 3 + [DEGREE] * 3)
     home[[k for k in range(6) if k not in description.freedoms]] = 0.0
-    return filled(
-        "ini.in",
+    return fill(
+        template(__package__, "ini.in"),
         {
             "title": description.title,
             "version": version(),
-            "file": plain(machine.file.replace("\\", "/").rpartition("/")[2]),
+            "file": one_line(machine.file.replace("\\", "/").rpartition("/")[2]),
             "module": description.module,
             "n_joint": str(len(machine.joints)),
             "coordinates": " ".join(name.upper() for name in machine.commanded),
@@ -59,7 +59,7 @@ def _joints(description: Description) -> Iterable[str]:
         linear = drive.coordinate == "length"
         low, high = description.travels[index] / description.units[index]
         yield f"\n[JOINT_{index}]"
-        yield f"# drive {plain(drive.name)}"
+        yield f"# drive {one_line(drive.name)}"
         yield f"TYPE = {'LINEAR' if linear else 'ANGULAR'}"
         yield f"HOME = {exact(home[index])}"
         yield f"HOME_OFFSET = {exact(home[index])}"
@@ -73,7 +73,7 @@ def _joints(description: Description) -> Iterable[str]:
 def hal_text(description: Description, clamp: float, rate_limit: float) -> str:
     """The lines that load, order and connect the module. `clamp` in m, `rate_limit` in m/s."""
     temperatures = [
-        f"#net {name}  YOUR.SENSOR  => truepose.{name}-temperature   # {plain(part)}"
+        f"#net {name}  YOUR.SENSOR  => truepose.{name}-temperature   # {one_line(part)}"
         for name, part in zip(
             description.temperature_names, description.temperature_parts, strict=True
         )
@@ -82,13 +82,13 @@ def hal_text(description: Description, clamp: float, rate_limit: float) -> str:
         f"#net {WRENCHES[index]}  YOUR.SENSOR  => truepose.{WRENCHES[index]}"
         for index in description.wrenches
     ]
-    return filled(
-        "hal.in",
+    return fill(
+        template(__package__, "hal.in"),
         {
             "module": description.module,
             "title": description.title,
             "version": version(),
-            "file": plain(description.machine.file.replace("\\", "/").rpartition("/")[2]),
+            "file": one_line(description.machine.file.replace("\\", "/").rpartition("/")[2]),
             "temperatures": "\n".join(temperatures) or "# None: no part expands.",
             "wrench": "\n".join(wrench),
             "rate_limit": _short(rate_limit / MILLIMETRE),

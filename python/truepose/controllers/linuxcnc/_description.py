@@ -12,8 +12,8 @@ import numpy as np
 from truepose._kernel import STATUS
 from truepose.arrays import Codes, Flags, Floats
 from truepose.controllers._export import unsupported_machine
+from truepose.controllers._template import one_line
 from truepose.controllers.c import Program
-from truepose.controllers.linuxcnc._template import plain
 from truepose.machine import Drive, Guide, Machine, Strut
 
 FREEDOMS = ("x", "y", "z", "a", "b", "c")
@@ -71,7 +71,7 @@ class Description:
     @property
     def title(self) -> str:
         """The machine's name, safe anywhere."""
-        return plain(self.machine.name)
+        return one_line(self.machine.name)
 
     @property
     def home(self) -> Floats:

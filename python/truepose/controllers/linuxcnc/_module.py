@@ -6,12 +6,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from truepose.controllers._template import exact, fill, one_line, template
 from truepose.controllers.linuxcnc._description import (
     FREEDOMS,
     WRENCHES,
     Description,
 )
-from truepose.controllers.linuxcnc._template import exact, filled, plain
 from truepose.version import version
 
 PREFIX = "pkm"
@@ -34,13 +34,13 @@ def module_text(description: Description, machine_c: str, clamp: float, rate_lim
     machine = description.machine
     wrenches = description.wrenches
     condition = machine.condition
-    return filled(
-        "module.c.in",
+    return fill(
+        template(__package__, "module.c.in"),
         {
             "module": description.module,
             "title": description.title,
             "version": version(),
-            "file": plain(machine.file.replace("\\", "/").rpartition("/")[2]),
+            "file": one_line(machine.file.replace("\\", "/").rpartition("/")[2]),
             "file_hash": machine.file_hash,
             "pin_table": "\n".join(_pin_table(description)),
             "machine_c": machine_c,
@@ -70,7 +70,7 @@ def _pin_table(description: Description) -> Iterable[str]:
     for name, part in zip(
         description.temperature_names, description.temperature_parts, strict=True
     ):
-        yield f" *   {f'{name}-temperature':<22} in   degrees Celsius of {plain(part)}"
+        yield f" *   {f'{name}-temperature':<22} in   degrees Celsius of {one_line(part)}"
     commanded = " ".join(FREEDOMS[index] for index in description.freedoms)
     yield f" *   (commanded: {commanded}; loads: {', '.join(_loads(description))})"
 

@@ -398,13 +398,13 @@ def _json(nodes: NodeCorrections, judged: MapErrors, head: Mapping[str, object])
 
 def _errors(judged: MapErrors | Commandable) -> dict[str, object]:
     return {
-        "position_m": _plain(judged.position),
-        "orientation_rad": None if judged.orientation is None else _plain(judged.orientation),
+        "position_m": _extent_data(judged.position),
+        "orientation_rad": None if judged.orientation is None else _extent_data(judged.orientation),
         "points": judged.points,
     }
 
 
-def _plain(extent: Extent) -> dict[str, object]:
+def _extent_data(extent: Extent) -> dict[str, object]:
     return {"highest": extent.highest, "rms": extent.rms, "highest_at": extent.at.tolist()}
 
 

@@ -26,7 +26,7 @@ def text(result: Result) -> Iterator[str]:
     head = {
         "command": result.command,
         "attributes": {
-            str(name): _plain(value)
+            str(name): _json_value(value)
             for name, value in dataset.attrs.items()
             if not str(name).startswith("accuracy")  # SI there, in file units below
         },
@@ -63,7 +63,7 @@ def _variable(result: Result, values: Values) -> Iterator[str]:
     head = {"dims": list(values.dims), "units": units, "long_name": values.long_name}
     yield _dumped(head)[:-1] + ', "values": '
     if values.array.ndim == 0:
-        yield _dumped(_plain(values.array)) + "}"
+        yield _dumped(_json_value(values.array)) + "}"
         return
     yield "["
     for start in range(0, len(values.array), ROWS):
@@ -80,7 +80,7 @@ def _rows(block: NDArray[np.generic]) -> str:
     return _dumped(block.tolist())[1:-1]
 
 
-def _plain(value: object) -> object:
+def _json_value(value: object) -> object:
     if isinstance(value, np.generic | np.ndarray):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -66,10 +66,10 @@ const START: [f64; 4] = [1.0, 0.5, 1.0, 4.0];
 
 #[test]
 fn a_curved_valley_ends_in_its_root() {
-    let found = solved(&valley, &valley_slope, &[-1.2, 1.0], &Options::default());
-    assert!(found.status.converged());
-    assert!(found.values.iter().all(|value| (value - 1.0).abs() < 1e-12));
-    assert!(found.cost < 1e-24);
+    let solution = solved(&valley, &valley_slope, &[-1.2, 1.0], &Options::default());
+    assert!(solution.status.converged());
+    assert!(solution.values.iter().all(|value| (value - 1.0).abs() < 1e-12));
+    assert!(solution.cost < 1e-24);
     let again = solved(&valley, &valley_slope, &[1.0, 1.0], &Options::default());
     assert_eq!((again.status, again.evaluations), (Status::Gradient, 1));
 }
@@ -91,19 +91,19 @@ fn what_no_equation_sees_stays() {
     // Only the sum of the first two counts; the third is seen by nothing.
     let residual = |x: &[f64]| vec![x[0] + x[1] - 3.0, 2.0 * (x[0] + x[1]) - 6.0, 0.0];
     let slope = |_: &[f64]| vec![1.0, 1.0, 0.0, 2.0, 2.0, 0.0, 0.0, 0.0, 0.0];
-    let found = solved(&residual, &slope, &[0.0, 1.0, 7.0], &Options::default());
-    assert!(found.status.converged());
-    assert_eq!(found.values[2], 7.0);
-    assert!((found.values[0] - 1.0).abs() < 1e-12 && (found.values[1] - 2.0).abs() < 1e-12);
+    let solution = solved(&residual, &slope, &[0.0, 1.0, 7.0], &Options::default());
+    assert!(solution.status.converged());
+    assert_eq!(solution.values[2], 7.0);
+    assert!((solution.values[0] - 1.0).abs() < 1e-12 && (solution.values[1] - 2.0).abs() < 1e-12);
 }
 
 #[test]
 fn fewer_equations_than_unknowns_are_met() {
     let residual = |x: &[f64]| vec![x[0] * x[0] + x[1] - 2.0];
     let slope = |x: &[f64]| vec![2.0 * x[0], 1.0];
-    let found = solved(&residual, &slope, &[1.0, 5.0], &Options::default());
-    assert!(found.status.converged());
-    assert!(found.cost < 1e-24);
+    let solution = solved(&residual, &slope, &[1.0, 5.0], &Options::default());
+    assert!(solution.status.converged());
+    assert!(solution.cost < 1e-24);
     let nothing = solved(&|_| vec![1.0], &|_| vec![], &[], &Options::default());
     assert_eq!((nothing.status, nothing.cost), (Status::Gradient, 1.0));
 }
@@ -114,9 +114,9 @@ fn a_model_that_ends_is_not_left() {
     let slope = |x: &[f64]| vec![-1.0 / (1.0 - x[0])];
     for first_radius in [1e-3, 1.0, 1e3, f64::INFINITY] {
         let options = Options { first_radius, ..Options::default() };
-        let found = solved(&residual, &slope, &[-50.0], &options);
-        assert!(found.status.converged());
-        assert!((found.values[0] - (1.0 - (-4.0_f64).exp())).abs() < 1e-12);
+        let solution = solved(&residual, &slope, &[-50.0], &options);
+        assert!(solution.status.converged());
+        assert!((solution.values[0] - (1.0 - (-4.0_f64).exp())).abs() < 1e-12);
     }
 }
 
@@ -125,11 +125,11 @@ fn a_first_step_without_bounds_solves_what_is_linear() {
     let residual = |x: &[f64]| vec![x[0] - 1e6, 1e-3 * x[1] + x[0] - 5.0, x[1] - 1.0];
     let slope = |_: &[f64]| vec![1.0, 0.0, 1.0, 1e-3, 0.0, 1.0];
     let options = Options { first_radius: f64::INFINITY, ..Options::default() };
-    let found = solved(&residual, &slope, &[0.0, 0.0], &options);
+    let solution = solved(&residual, &slope, &[0.0, 0.0], &options);
     let bounded = solved(&residual, &slope, &[0.0, 0.0], &Options::default());
-    assert!(found.status.converged() && found.iterations <= 3);
-    assert!(bounded.iterations > found.iterations);
-    assert!((bounded.cost - found.cost).abs() < 1e-12 * found.cost);
+    assert!(solution.status.converged() && solution.iterations <= 3);
+    assert!(bounded.iterations > solution.iterations);
+    assert!((bounded.cost - solution.cost).abs() < 1e-12 * solution.cost);
 }
 
 #[test]
@@ -152,10 +152,10 @@ fn a_root_of_rounding_ends() {
         (0..24).flat_map(row).collect()
     };
     for start in [[1e-3, -2e-3, 5e-4], [3e-6, 1e-6, -2e-6], [0.5, 0.1, -0.2]] {
-        let found = solved(&residual, &slope, &start, &Options::default());
-        assert!(found.status.converged(), "{:?}", found.status);
-        assert!(found.evaluations < 200, "{}", found.evaluations);
-        assert!(found.values.iter().all(|value| value.abs() < 1e-12));
+        let solution = solved(&residual, &slope, &start, &Options::default());
+        assert!(solution.status.converged(), "{:?}", solution.status);
+        assert!(solution.evaluations < 200, "{}", solution.evaluations);
+        assert!(solution.values.iter().all(|value| value.abs() < 1e-12));
         let told = Options { rounding: 1e-24, ..Options::default() };
         assert!(solved(&residual, &slope, &start, &told).evaluations < 10);
     }
@@ -164,11 +164,11 @@ fn a_root_of_rounding_ends() {
 #[test]
 fn a_wrong_slope_stalls() {
     let wrong = |x: &[f64]| valley_slope(x).into_iter().map(|value| -value).collect();
-    let found = solved(&valley, &wrong, &[-1.2, 1.0], &Options::default());
-    assert_eq!(found.status, Status::Stalled);
+    let solution = solved(&valley, &wrong, &[-1.2, 1.0], &Options::default());
+    assert_eq!(solution.status, Status::Stalled);
     let ends = |x: &[f64]| if x[0] == -1.2 { valley_slope(x) } else { vec![f64::NAN; 4] };
-    let found = solved(&valley, &ends, &[-1.2, 1.0], &Options::default());
-    assert_eq!((found.status, found.values[0]), (Status::Stalled, -1.2));
+    let solution = solved(&valley, &ends, &[-1.2, 1.0], &Options::default());
+    assert_eq!((solution.status, solution.values[0]), (Status::Stalled, -1.2));
 }
 
 #[test]

@@ -246,7 +246,7 @@ def _at_pose(state: State, kind: str, columns: Indices) -> Witness:
         pose=state.block.requested[number],
         number=number,
         joints=state.block.joints[0],
-        variables=state.variables,
+        spread=state.variables,
         t=t,
         error=error,
         size=size,
@@ -320,7 +320,7 @@ def _answer(
             rests_on = f"{REMAINDER}, {ENGINE} ({proof.boxes:,} boxes)" if by_engine else REMAINDER
         else:
             answer, rests_on = UNDECIDED, _why_open(bound, proof)
-    rests_on += _ends_taken(witness.variables)
+    rests_on += _ends_taken(witness.spread)
     return Answer(kind, name, target, answer, seen, linear, bound, rests_on, witness)
 
 

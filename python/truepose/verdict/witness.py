@@ -66,7 +66,7 @@ class Witness:
     """One machine inside the set at one pose, in a state: `BEFORE` or `AFTER` compensation.
 
     `machine` is the nominal one in the condition of the run; `pose` (n_commanded,), m or rad, and
-    its `number` in the run; `joints` (n_joint,) as commanded there; `variables` those at this
+    its `number` in the run; `joints` (n_joint,) as commanded there; `spread` the variables at this
     pose alone (`Variables.at`) and `t` (n_variable,) their values. `error` (n_component,), m
     and rad, is exact, its part `quantity` ("position" or "orientation") of length `size`. Of a
     machine that cannot be assembled `error` is None, `size` is inf and `status` the kernel's
@@ -80,7 +80,7 @@ class Witness:
     pose: Floats
     number: int
     joints: Floats
-    variables: Variables
+    spread: Variables
     t: Floats
     error: Floats | None
     size: float
@@ -90,7 +90,7 @@ class Witness:
     @property
     def moved(self) -> ParameterDeviation:
         """Parameters (k,), each once, and their deviations (1, k) from nominal."""
-        return self.variables.parameters_moved(np.asarray(self.t, np.float64)[np.newaxis])
+        return self.spread.parameters_moved(np.asarray(self.t, np.float64)[np.newaxis])
 
     @property
     def components(self) -> Indices:
@@ -102,22 +102,21 @@ class Witness:
         """(n_parameter,) deviation from each source alone; their sum is all of it."""
         names = [source.name for source in acting(self.machine, self.machine.condition)]
         by_source = {name: np.zeros(len(self.machine.parameters)) for name in names}
-        for name, (parameters, shift) in zip(names, self.variables.alone, strict=True):
+        for name, (parameters, shift) in zip(names, self.spread.alone, strict=True):
             np.add.at(by_source[name], parameters, shift[0])
-        deviations = self.variables.half_width[0] * self.t[self.variables.variable_of]
-        for column, variable in enumerate(self.variables.variable_of):
-            by_source[self.variables.sources[variable]][self.variables.columns[column]] += (
-                deviations[column]
-            )
+        variables = self.spread
+        deviations = variables.half_width[0] * self.t[variables.variable_of]
+        for column, variable in enumerate(variables.variable_of):
+            by_source[variables.sources[variable]][variables.columns[column]] += deviations[column]
         return by_source
 
     @property
     def force(self) -> Floats | None:
         """(3,) N, base axes, of the force of unknown direction; None where there is none."""
         envelope = self.machine.condition.envelope
-        if envelope is None or not self.variables.directions:
+        if envelope is None or not self.spread.directions:
             return None
-        (members,) = self.variables.directions
+        (members,) = self.spread.directions
         return np.asarray(envelope.force * (self.t[members] @ envelope.directions))
 
     @cached_property
@@ -136,7 +135,7 @@ class Witness:
 
         Of a machine that cannot be assembled the length of what it moves the tool by.
         """
-        _, effects, _ = first_order(self.machine, self.block, self.variables)
+        _, effects, _ = first_order(self.machine, self.block, self.spread)
         along = np.nan_to_num(effects[0][self.components]) * self.t
         if self.error is None or not self.size > 0.0:
             return np.asarray(np.sqrt(np.square(along).sum(axis=0)))
@@ -145,11 +144,11 @@ class Witness:
     def causes(self) -> list[Cause]:
         """Every variable, the one with the largest part in the error first."""
         known = self.error is not None and self.size > 0.0
-        directed = [int(v) for members in self.variables.directions for v in members]
+        directed = [int(v) for members in self.spread.directions for v in members]
         shares = self._parts / self.size if known else np.full(len(self._parts), math.nan)
         causes = [
             (float(abs(self._parts[v])), self._cause(v, float(shares[v])))
-            for v in range(len(self.variables.names))
+            for v in range(len(self.spread.names))
             if v not in directed
         ]
         force = self.force
@@ -162,7 +161,7 @@ class Witness:
         return [cause for _, cause in sorted(causes, key=lambda ranked: -ranked[0])]
 
     def _cause(self, variable: int, share: float) -> Cause:
-        variables, machine = self.variables, self.machine
+        variables, machine = self.spread, self.machine
         columns = np.flatnonzero(variables.variable_of == variable)
         source, swing = variables.sources[variable], float(variables.half_width[0, columns[0]])
         parameter = int(variables.columns[columns[0]])

@@ -197,9 +197,9 @@ class _Writing:
         bands = {
             int(column)
             for column, variable in zip(
-                self._witness.variables.columns, self._witness.variables.variable_of, strict=True
+                self._witness.spread.columns, self._witness.spread.variable_of, strict=True
             )
-            if self._witness.variables.sources[variable] == "tolerance"
+            if self._witness.spread.sources[variable] == "tolerance"
         }
         columns = sorted(bands | set(np.flatnonzero(total).tolist()))
         if not columns and not acting(draft, draft.condition):
@@ -267,7 +267,7 @@ class _Writing:
             ]
         if not self._causes_stay:
             lines += ["What temperatures, forces and all else do there is in the tolerances."]
-        elif witness.variables.sources:
+        elif witness.spread.sources:
             lines += ["What follows the pose (play, phases, resolution) is its deviation there."]
         head = "".join(f"# {line}\n" for line in lines)
         self._text.toml = tomlkit.parse(f"{head}\n{self._text.text()}")

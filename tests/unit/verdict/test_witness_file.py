@@ -71,7 +71,7 @@ def witnesses(machine: Machine, poses: np.ndarray, random: np.random.Generator) 
                             pose=poses[block.indices[pose]],
                             number=int(block.indices[pose]),
                             joints=each.joints[pose],
-                            variables=of_pose,
+                            spread=of_pose,
                             t=t,
                             error=error[0] if fine else None,
                             size=float(np.linalg.norm(error[0][at])) if fine else np.inf,
@@ -329,8 +329,8 @@ def test_what_is_told_of_it_to_people(tmp_path: Path) -> None:
     machine = load_text(tmp_path, FULL)
     random = np.random.default_rng(2)
     witness = witnesses(machine, machine.poses()[:1], random)[0]
-    t = np.array(witness.variables.domain.upper)
-    (members,) = witness.variables.directions
+    t = np.array(witness.spread.domain.upper)
+    (members,) = witness.spread.directions
     t[members] = [0.6, -0.8]
     witness = dataclasses.replace(witness, t=t)
     words = witness.words(most=20)
@@ -360,14 +360,14 @@ def test_the_most_important_cause_comes_first(tmp_path: Path) -> None:
     assert witness.error is not None
     along = witness.error / witness.size
     lost = {}
-    for variable, name in enumerate(witness.variables.names):
+    for variable, name in enumerate(witness.spread.names):
         t = witness.t.copy()
         t[variable] = 0.0
         without, _ = displacement(
             machine,
             witness.joints[np.newaxis],
             witness.block.placements,
-            witness.variables.parameters_moved(t[np.newaxis]),
+            witness.spread.parameters_moved(t[np.newaxis]),
         )
         lost[name] = float(along @ (witness.error - without[0])) / witness.size
     causes = witness.causes()

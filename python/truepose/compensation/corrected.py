@@ -26,7 +26,7 @@ from truepose.runs.poses import NOT_CONVERGED, OK
 from truepose.runs.variables import Variables, variables_of
 from truepose.sources import Deviation, PoseBlock, Source
 
-Known = TypeVar("Known")
+Deviations = TypeVar("Deviations")
 """What is known of the machine at the poses of a block, in whatever form."""
 
 MOST_ROUNDS = 12
@@ -78,10 +78,10 @@ def corrected_deviations(
 
 def corrected_joints(
     block: PoseBlock,
-    first: Known,
-    shift_of: Callable[[Known], ParameterDeviation],
-    look: Callable[[PoseBlock], Known] | None,
-) -> tuple[Floats, Known, np.ndarray]:
+    first: Deviations,
+    shift_of: Callable[[Deviations], ParameterDeviation],
+    look: Callable[[PoseBlock], Deviations] | None,
+) -> tuple[Floats, Deviations, np.ndarray]:
     """Corrected joints (n, n_joint), what is known at them, and kernel status (n,).
 
     `first` is what is known at the nominal command of the block, `shift_of` it are parameters and

@@ -167,14 +167,14 @@ class Motion:
         """(n or 1, k, v + m) linear forms of some parameters."""
         rows = np.zeros((len(self.half_width), len(parameters), self.effects.shape[2]))
         for row, parameter in enumerate(parameters):
-            for variable, swing in self.of_parameter(int(parameter)):
-                rows[:, row, variable] += swing
+            for variable, half_width in self.of_parameter(int(parameter)):
+                rows[:, row, variable] += half_width
         return rows
 
     def add(self, rows: Floats, parameter: int, slopes: Floats) -> None:
         """Add to forms (n, c, v + m) what they change by with a parameter, slopes (n or 1, c)."""
-        for variable, swing in self.of_parameter(parameter):
-            rows[:, :, variable] += slopes * swing[:, np.newaxis]
+        for variable, half_width in self.of_parameter(parameter):
+            rows[:, :, variable] += slopes * half_width[:, np.newaxis]
 
     def values(self, parameters: Indices) -> Floats:
         """(n or 1, ...) of parameters (...)."""

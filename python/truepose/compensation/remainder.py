@@ -104,7 +104,7 @@ class Remainder:
         ]
         self._parts = parts
         self._parameters = np.concatenate([part.parameters for part in parts])
-        self._known = not machine.kernel.overconstrained and all(part.known for part in parts)
+        self._known = not machine.kernel.overconstrained and all(part.is_proven for part in parts)
 
     def bound(
         self, block: PoseBlock, variables: Variables, value: Floats, effects: Floats

@@ -47,8 +47,8 @@ class Guides:
         """Parameters whose sensitivities `closures` takes, (k,)."""
 
     @property
-    def known(self) -> bool:
-        """Whether all guides are of kinds that are known here."""
+    def is_proven(self) -> bool:
+        """Whether all guides are of kinds whose remainder is proven here."""
         return all(guide.kind in KINDS for guide in self._guides)
 
     def closures(self, motion: Motion, sensitivity: Floats) -> list[Closures]:

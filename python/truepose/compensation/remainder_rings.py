@@ -41,9 +41,9 @@ class Rings:
         """Parameters whose sensitivities `closures` takes, (k,)."""
 
     @property
-    def known(self) -> bool:
-        """Whether nothing is there that is not known here."""
-        return self._bases.known
+    def is_proven(self) -> bool:
+        """Whether the remainder of all that is there is proven here."""
+        return self._bases.is_proven
 
     def closures(self, motion: Motion, sensitivity: Floats) -> list[Closures]:
         """At the poses of a motion, from sensitivities (n, m, k) to `parameters`."""

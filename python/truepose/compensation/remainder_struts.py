@@ -73,8 +73,8 @@ class Bases:
         self._lengths = [int(machine.kernel.length_parameters[at]) for at in struts]
 
     @property
-    def known(self) -> bool:
-        """Whether all drives are of kinds that are known here."""
+    def is_proven(self) -> bool:
+        """Whether all drives are of kinds whose remainder is proven here."""
         return all(drive.kind in KINDS for _, drive in self._drives.values())
 
     def base(self, motion: Motion, which: int) -> _Base:
@@ -181,12 +181,12 @@ class Bases:
         if tilt.reach.any():
             # Of what `_tilted_crank` says, with all that is added to angle, axis and base at once.
             size, lean = norm(base), tilt.reach
-            swing, rise = np.abs(sine[:, 0]), 1.0 - cosine[:, 0]
+            turned_by, rise = np.abs(sine[:, 0]), 1.0 - cosine[:, 0]
             more, tilted = majorants.turn(reach), majorants.unit(lean, tilt.along)
-            whole = (swing + 2.0 * rise + 3.0 * more) * tilted + (rise + more) * tilted**2
+            whole = (turned_by + 2.0 * rise + 3.0 * more) * tilted + (rise + more) * tilted**2
             bent = bent + whole * (size + own)
-            bent = bent - (swing + 2.0 * rise) * (1.0 + tilt.along) * lean * size
-            signed = signed + (swing + 2.0 * rise) * lean * (0.5 * lean * size + own)
+            bent = bent - (turned_by + 2.0 * rise) * (1.0 + tilt.along) * lean * size
+            signed = signed + (turned_by + 2.0 * rise) * lean * (0.5 * lean * size + own)
             signed = signed + 3.0 * reach * lean * size + rise * lean**2 * size
             second += self._tilted_crank(motion, tilt, tilts, (form, point), (base, sine, cosine))
         place = motion.values(origin) + arm
@@ -247,9 +247,9 @@ class Struts:
         """Parameters whose sensitivities `closures` takes, (k,)."""
 
     @property
-    def known(self) -> bool:
-        """Whether nothing is there that is not known here."""
-        return self._bases.known
+    def is_proven(self) -> bool:
+        """Whether the remainder of all that is there is proven here."""
+        return self._bases.is_proven
 
     def closures(self, motion: Motion, sensitivity: Floats) -> list[Closures]:
         """At the poses of a motion, from sensitivities (n, m, k) to `parameters`."""

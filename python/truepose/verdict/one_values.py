@@ -250,12 +250,12 @@ class OneValues:
         if table not in ARRAY_TABLES or table not in self._text.toml:
             return
         shared = self._shared(table)
-        common = _plain(shared[key]) if key in shared else None
+        common = _unwrap(shared[key]) if key in shared else None
         relying: list[tuple[Any, Row]] = []
         for row in self._text.toml[table]:
             path = f"{table}.{row['name']}"
             if key in row:
-                _edit_in_place(row, key, edit(path, _plain(row[key])))
+                _edit_in_place(row, key, edit(path, _unwrap(row[key])))
             elif common is not None:
                 relying.append((row, edit(path, common)))
         if common is None or all(new == common for _, new in relying):
@@ -274,13 +274,13 @@ def _edit_in_place(row: Any, key: str, new: Row) -> None:
     old = row[key]
     if not new:
         del row[key]
-    elif _plain(old) == new:
+    elif _unwrap(old) == new:
         return
     elif isinstance(old, Table):
         for name in [name for name in old if name not in new]:
             del old[name]
         for name, value in new.items():
-            if _plain(old.get(name)) != value:
+            if _unwrap(old.get(name)) != value:
                 old[name] = _value(value)
     else:
         row[key] = _value(new)
@@ -290,7 +290,7 @@ def _without(row: Row, keys: tuple[str, ...] | list[str]) -> Row:
     return {key: value for key, value in row.items() if key not in keys}
 
 
-def _plain(item: Any) -> Any:
+def _unwrap(item: Any) -> Any:
     return item.unwrap() if hasattr(item, "unwrap") else item
 
 

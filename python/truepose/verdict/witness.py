@@ -163,7 +163,7 @@ class Witness:
     def _cause(self, variable: int, share: float) -> Cause:
         variables, machine = self.spread, self.machine
         columns = np.flatnonzero(variables.variable_of == variable)
-        source, swing = variables.sources[variable], float(variables.half_width[0, columns[0]])
+        source, half_width = variables.sources[variable], float(variables.half_width[0, columns[0]])
         parameter = int(variables.columns[columns[0]])
         value = float(self.t[variable])
         same = [
@@ -172,7 +172,7 @@ class Witness:
             if variables.sources[variables.variable_of[column]] == source
         ]
         # Where a source has several bands on a parameter its middle is none of theirs alone.
-        deviation = swing * value
+        deviation = half_width * value
         if len(same) == 1:
             deviation = float(self.by_source[source][parameter])
         distribution = variables.distributions[variable]
@@ -182,7 +182,7 @@ class Witness:
         )
         room = AT_END * (upper - lower)
         end = 1.0 if value >= upper - room else -1.0 if value <= lower + room else 0.0
-        end *= math.copysign(1.0, swing)
+        end *= math.copysign(1.0, half_width)
         return Cause(
             source,
             machine.parameters[parameter],
@@ -190,7 +190,7 @@ class Witness:
             {1.0: "upper", -1.0: "lower"}.get(end, ""),
             deviation,
             machine.units[parameter],
-            0.0 if distribution.bounded else value * math.copysign(distribution.sigmas, swing),
+            0.0 if distribution.bounded else value * math.copysign(distribution.sigmas, half_width),
             share,
         )
 

@@ -1,7 +1,9 @@
-"""Studies made by hand for tests of tables, figures and files: no loader, no kernel, no budget.
+"""Studies made by hand for tests of tables, figures and files: no budget is evaluated.
 
 The machines are stand-ins with closed-form kinematics, the errors are smooth made-up functions of
-the pose with the schema of docs/results.md. Numbers mean nothing; shapes, names and units do.
+the pose with the schema of docs/results.md. Numbers mean nothing; shapes, names and units do. What
+a stand-in does not say itself a machine of the library with as many drives and struts answers, so
+that a new figure may ask its machine whatever it likes.
 """
 
 from __future__ import annotations
@@ -13,6 +15,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+import truepose as tp
+from build_machine import MACHINES
 from truepose.files.shown_units import Shown, ShownUnits
 from truepose.machine.workspace import Accuracy
 from truepose.reporting.study import Study
@@ -26,7 +30,14 @@ MADE_UNITS = ShownUnits(small_angle=Shown("µrad", 1e6))
 UNIT_OF = {"x": "m", "y": "m", "z": "m"}
 
 
-class PlanarKernel:
+class StandIn(SimpleNamespace):
+    """What is said here; for all else what it stands for."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.__dict__["stands_for"], name)
+
+
+class PlanarKernel(StandIn):
     """Two vertical guideways at x = 0 and x = 0.6 m, two struts of 0.5 m that meet in the tool."""
 
     rails = np.array([0.0, 0.6])
@@ -48,12 +59,13 @@ class PlanarKernel:
         return centres
 
 
-class HexapodKernel:
+class HexapodKernel(StandIn):
     """Six telescopic struts between two circles; turns are left out of the drawing."""
 
     home = np.array([0.0, 0.0, 0.6, 0.0, 0.0, 0.0])
 
-    def __init__(self) -> None:
+    def __init__(self, **said: Any) -> None:
+        super().__init__(**said)
         turn = np.deg2rad(np.repeat([0, 120, 240], 2) + np.tile([-12, 12], 3))
         other = np.deg2rad(np.repeat([0, 120, 240], 2) + np.tile([-45, 45], 3))
         self.base = 0.4 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
@@ -77,13 +89,18 @@ class HexapodKernel:
         return centres
 
 
-def _machine(name: str, dof: str, kernel: Any, drives: list[Any], **others: Any) -> Any:
+def _machine(
+    name: str, dof: str, kernel: type[StandIn], drives: list[Any], model: str, **others: Any
+) -> Any:
+    stands_for = tp.load(MACHINES / f"{model}.toml")
     components = [
         component
         for component, freedom in zip(("x", "y", "z", "rx", "ry", "rz"), "xyzabc", strict=True)
         if freedom in dof
     ]
-    return SimpleNamespace(
+    made_kernel = kernel(stands_for=stands_for.kernel)
+    return StandIn(
+        stands_for=stands_for,
         name=name,
         description="",
         origin="",
@@ -95,14 +112,14 @@ def _machine(name: str, dof: str, kernel: Any, drives: list[Any], **others: Any)
         dof=tuple(dof),
         commanded=tuple(dof),
         components=tuple(components),
-        kernel=kernel,
+        kernel=made_kernel,
         drives=tuple(drives),
         joints=tuple(drive.name for drive in drives),
         struts=tuple(
             SimpleNamespace(name=str(i), drive=drive.name) for i, drive in enumerate(drives, 1)
         ),
         characteristic_length=0.5,
-        home=kernel.home,
+        home=made_kernel.home,
         parameters=("strut.1.base.x", "strut.1.length", "drive.d1.axis.u"),
         nominal=np.array([0.25, 0.5, 0.0]),
         units=("m", "m", "1"),
@@ -137,7 +154,7 @@ def planar_study(count: int = 5) -> Study:
         )
         for i in (1, 2)
     ]
-    machine = _machine("planar", "xy", PlanarKernel(), drives)
+    machine = _machine("planar", "xy", PlanarKernel, drives, "planar_two_slider")
     x, y = np.meshgrid(np.linspace(0.2, 0.4, count), np.linspace(0.1, 0.3, count))
     return _study(machine, np.stack([x.ravel(), y.ravel()], axis=1))
 
@@ -150,7 +167,7 @@ def hexapod_study(count: int = 5) -> Study:
         )
         for i in range(1, 7)
     ]
-    machine = _machine("hexapod", "xyzabc", HexapodKernel(), drives)
+    machine = _machine("hexapod", "xyzabc", HexapodKernel, drives, "hexapod")
     side = np.linspace(-0.1, 0.1, count)
     z, y, x = np.meshgrid(side + 0.6, side, side, indexing="ij")
     poses = np.zeros((count**3, 6))

@@ -134,6 +134,7 @@ def _machine(
             gradients={"strut.1": (4.0, 0.0, 0.0), "frame": (0.0, 0.0, -5.0)},
             envelope=SimpleNamespace(force=300.0, normal=(0.0, 0.0, 1.0)),
             acceleration=(0.0, 2.0, 0.0),
+            source_keys={},
         ),
         accuracy=Accuracy(5e-4, None, "0.5 mm"),
         shown=MADE_UNITS,

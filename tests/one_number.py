@@ -57,7 +57,7 @@ class Known:
 
     def __init__(self, machine: Machine, poses: ArrayLike | None = None) -> None:
         self.machine = machine
-        self.population = Population.of(machine, poses)
+        self.population = Population(machine, poses)
         self.kinds = quantities(machine.components)
 
     @cached_property

@@ -45,7 +45,6 @@ def test_a_class_name_has_one_home() -> None:
     assert {name: where for name, where in homes.items() if len(where) > 1} == {}
 
 
-@pytest.mark.xfail(strict=True, reason="the renames follow")
 def test_names_that_say_nothing_are_rare() -> None:
     bound = empty_names(modules().values())
     assert set(AT_FIRST) == set(EMPTY_NAMES)

@@ -41,23 +41,23 @@ class State:
         block = next(iter(PoseRun(machine, poses, machine.condition)))
         self.machine = machine
         self.block: PoseBlock = block
-        self.spread: Variables
+        self.variables: Variables
         if after:
-            self.block, self.spread, status = corrected(machine, block, sources)
+            self.block, self.variables, status = corrected(machine, block, sources)
             assert (status == OK).all()
         else:
-            self.spread = variables_at(machine, block, sources)
-        self.value, self.effects, _ = first_order(machine, self.block, self.spread)
+            self.variables = variables_at(machine, block, sources)
+        self.value, self.effects, _ = first_order(machine, self.block, self.variables)
         self.bounds: Bounds = Remainder(machine).bound(
-            self.block, self.spread, self.value, self.effects
+            self.block, self.variables, self.value, self.effects
         )
-        self.mover = ExactError(machine, self.block, self.spread)
+        self.exact_error = ExactError(machine, self.block, self.variables)
         turns = np.array([name.startswith("r") for name in machine.components])
         self.quantities = [np.flatnonzero(part) for part in (~turns, turns) if part.any()]
 
     def beyond(self, pose: int, t: Floats) -> Floats:
         """(s, m) exact error less its linear model at variables t (s, v)."""
-        error, status = self.mover(np.full(len(t), pose), t)
+        error, status = self.exact_error(np.full(len(t), pose), t)
         assert (status == OK).all()
         return np.asarray(error - self.value[pose] - t @ self.effects[pose].T)
 
@@ -67,7 +67,7 @@ class State:
 
     def most_beyond(self, pose: int, random: np.random.Generator) -> tuple[Floats, Floats]:
         """Components (m,) and norms (q,) that corners, insides and climbing from them find."""
-        domain, count = self.spread.domain, self.effects.shape[2]
+        domain, count = self.variables.domain, self.effects.shape[2]
 
         def into(t: Floats) -> Floats:
             t = np.clip(t, domain.lower, domain.upper)
@@ -101,10 +101,10 @@ def it_holds(machine: Machine, poses: Floats, *, after: bool, seed: int) -> floa
     bounds, random = state.bounds, np.random.default_rng(seed)
     assert bounds.proven.all()
     worst = worst_corners(
-        state.mover, state.value, state.effects, state.spread.domain, state.quantities
+        state.exact_error, state.value, state.effects, state.variables.domain, state.quantities
     )
     m = len(machine.components)
-    down, up = state.spread.domain.reach(state.effects)
+    down, up = state.variables.domain.reach(state.effects)
     limit = np.concatenate(
         [state.value + up + bounds.components, down - state.value + bounds.components], axis=1
     )
@@ -154,7 +154,7 @@ def test_of_one_variable_it_is_the_second_difference(machine: MachineUnderTest) 
         state = State(with_sources(tool, source), machine.poses[:POSES], after=False)
         assert state.bounds.proven.all()
         for pose in range(POSES):
-            ends, _ = state.mover(np.full(2, pose), np.array([[-1.0], [1.0]]))
+            ends, _ = state.exact_error(np.full(2, pose), np.array([[-1.0], [1.0]]))
             second = np.abs(0.5 * ends.sum(axis=0) - state.value[pose])
             bound = state.bounds.components[pose]
             assert (second <= bound + ROUNDING).all()

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +25,7 @@ from truepose.runs.dataset import (
     label,
     provenance,
     quantity_coords,
+    units_of,
 )
 from truepose.runs.quantities import POSITIONS, quantities
 
@@ -139,7 +139,7 @@ def dataset_of(calibration: Calibration) -> xr.Dataset:
         name: xr.Variable(
             variable.dims,
             values[name],
-            {"long_name": variable.long_name, **_units(variable.units, units)},
+            {"long_name": variable.long_name, **units_of(variable.units, units)},
         )
         for name, variable in SCHEMA.items()
     }
@@ -374,14 +374,6 @@ def _tool_coords(calibration: Calibration) -> dict[str, xr.Variable]:
         unit = "m" if freedom in POSITIONS else "rad"
         coords[f"pose_{freedom}"] = label("pose", poses[:, at], f"pose {freedom}, commanded", unit)
     return coords
-
-
-def _units(kind: str, units: Mapping[str, list[str]]) -> dict[str, str]:
-    """`units` of a variable: one for all, or all of them and the coordinate that has each."""
-    if kind not in units:
-        return {"units": kind}
-    named = ", ".join(dict.fromkeys(units[kind])) or "1"
-    return {"units": named} if "," not in named else {"units": named, "units_by": f"{kind}_units"}
 
 
 # --- attributes ----------------------------------------------------------------------------------

@@ -208,7 +208,7 @@ def _at_95(study: Study) -> tuple[Answer, ...]:
     if machine.accuracy.at == COVERAGE:
         return study.accuracy
     with progress("coverage") as report:
-        population = Population.of(machine, progress=report)
+        population = Population(machine, progress=report)
         return tuple(
             at_coverage(
                 population,

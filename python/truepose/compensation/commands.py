@@ -68,14 +68,14 @@ def corrected_poses(
     """
     actual = ActualMachine(machine, condition)
     table = requested_poses(machine, poses)
-    found = np.full(table.shape, np.nan)
+    commanded = np.full(table.shape, np.nan)
     status = np.empty(len(table), np.uint8)
     for rows in blocks(len(table)):
-        known = actual.known(table[rows])
+        known = actual.deviations_at(table[rows])
         command = actual.command(known)
-        found[rows][known.block.indices] = command.poses
-        status[rows] = known.spread(command.status)
-    return found, status
+        commanded[rows][known.block.indices] = command.poses
+        status[rows] = known.expand_status(command.status)
+    return commanded, status
 
 
 def actual_poses(
@@ -89,16 +89,16 @@ def actual_poses(
     """
     actual = ActualMachine(machine, condition)
     table = requested_poses(machine, commanded)
-    found = np.full(table.shape, np.nan)
+    poses_reached = np.full(table.shape, np.nan)
     status = np.empty(len(table), np.uint8)
     for rows in blocks(len(table)):
         joints, _, placed = machine.kernel.place(table[rows])
         at = np.flatnonzero(has_joints(placed))
         reached, settled = actual.reached(joints[at], table[rows][at])
-        found[rows][at] = reached
+        poses_reached[rows][at] = reached
         placed[at] = _first(placed[at], settled)
         status[rows] = placed
-    return found, status
+    return poses_reached, status
 
 
 def actual_of_joints(
@@ -125,14 +125,14 @@ def actual_of_joints(
         starts = requested_poses(machine, near)
         if len(starts) != len(given):
             raise _bad(f"{len(starts)} poses for {len(given)} joints", "one pose for each")
-    found = np.full(starts.shape, np.nan)
+    commanded = np.full(starts.shape, np.nan)
     status = placed.copy()
     for rows in blocks(len(given)):
         at = np.flatnonzero(has_joints(placed[rows]))
         reached, settled = actual.reached(given[rows][at], starts[rows][at])
-        found[rows][at] = reached
+        commanded[rows][at] = reached
         status[rows][at] = settled
-    return found, status
+    return commanded, status
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,16 +150,16 @@ class PoseDeviations:
     status: Codes
     followed: bool = False
 
-    def spread(self, status: Codes) -> Codes:
+    def expand_status(self, status: Codes) -> Codes:
         """(n,) of all poses, from `status` (m,) of those in the block.
 
         That their nominal joints are out of travel does not count: what is commanded does.
         """
         if len(status) == len(self.status):
             return status
-        spread = self.status.copy()
-        spread[self.block.indices] = status
-        return spread
+        statuses = self.status.copy()
+        statuses[self.block.indices] = status
+        return statuses
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +197,9 @@ class ActualMachine:
         length = machine.characteristic_length
         self.unit = np.array([length if name in "xyz" else 1.0 for name in machine.commanded])
 
-    def known(self, poses: Floats, moved: ParameterDeviation | None = None) -> PoseDeviations:
+    def deviations_at(
+        self, poses: Floats, moved: ParameterDeviation | None = None
+    ) -> PoseDeviations:
         """What is known at `poses` (n, n_commanded).
 
         `moved`: the deviations there, where they are known already; for poses that have joints.
@@ -241,8 +243,8 @@ class ActualMachine:
             known.block, known.moved, lambda moved: moved, self._moved if known.followed else None
         )
         nominal, solved = displacement(self.machine, joints, known.block.placements, NO_DEVIATION)
-        found = self.poses_from(known.block.placements, nominal, poses)
-        return Command(joints, found, _first(corrected, solved))
+        commanded = self.poses_from(known.block.placements, nominal, poses)
+        return Command(joints, commanded, _first(corrected, solved))
 
     def error(self, known: PoseDeviations, joints: Floats) -> tuple[Floats, Codes]:
         """Where `joints` (m, n_joint) take the tool, less the poses of `known`.
@@ -261,27 +263,27 @@ class ActualMachine:
 
         Poses (n, n_commanded), NaN without one, and the status (n,).
         """
-        found = near.copy()
+        commanded = near.copy()
         status = np.full(len(near), OK, np.uint8)
         size = np.zeros(len(near))
         left = np.arange(len(near))
         for _ in range(MOST_PASSES):
             if not left.size:
                 break
-            poses = found[left]
-            known = self.known(poses)
+            poses = commanded[left]
+            known = self.deviations_at(poses)
             at, placements = known.block.indices, known.block.placements
             error, solved = self.error(known, joints[left[at]])
-            status[left] = known.spread(solved)
-            found[left[at]] = self.poses_from(placements, error, poses[at])
-            step = np.abs((found[left] - poses) / self.unit).max(axis=1)
+            status[left] = known.expand_status(solved)
+            commanded[left[at]] = self.poses_from(placements, error, poses[at])
+            step = np.abs((commanded[left] - poses) / self.unit).max(axis=1)
             # Steps shrink by one factor: the next one is foretold from the last two.
             to_come = step * np.minimum(step / np.maximum(size[left], SETTLED), 1.0)
             size[left] = step
             left = left[(to_come > SETTLED) & (status[left] == OK)]
         status[left] = _NOT_CONVERGED
-        found[status != OK] = np.nan
-        return found, status
+        commanded[status != OK] = np.nan
+        return commanded, status
 
     def poses_from(self, placements: Floats, error: Floats, near: Floats) -> Floats:
         """(n, n_commanded) `placements` (n, 7) moved on by `error` (n, n_component).
@@ -297,24 +299,24 @@ class ActualMachine:
             turn[:, self._into_angular] = error[:, self._angular]
             moved[:, 3:] = rotate_quaternions(placements[:, 3:], turn)
         poses = self.machine.kernel.pose_of(moved)
-        found = np.ascontiguousarray(poses[:, self.commanded])
+        commanded = np.ascontiguousarray(poses[:, self.commanded])
         if self._angles:
-            self._turn_towards(near, found)
-        return found
+            self._turn_towards(near, commanded)
+        return commanded
 
     def _turn_towards(self, near: Floats, poses: Floats) -> None:
         """Replace the angles of `poses` by those of the same rotations nearest to `near`."""
         angles = self._angles
         own, wanted = poses[:, angles], near[:, angles]
-        found = own - 2.0 * np.pi * np.round((own - wanted) / (2.0 * np.pi))
-        far = np.flatnonzero(np.abs(found - wanted).max(axis=1) > 0.5 * np.pi)
+        nearest = own - 2.0 * np.pi * np.round((own - wanted) / (2.0 * np.pi))
+        far = np.flatnonzero(np.abs(nearest - wanted).max(axis=1) > 0.5 * np.pi)
         if len(angles) == 3 and far.size:
             # a, b, c and a + pi, pi - b, c + pi are one rotation.
             other = own[far] * [1.0, -1.0, 1.0] + np.pi
             other -= 2.0 * np.pi * np.round((other - wanted[far]) / (2.0 * np.pi))
-            nearer = np.abs(other - wanted[far]).sum(1) < np.abs(found[far] - wanted[far]).sum(1)
-            found[far[nearer]] = other[nearer]
-        poses[:, angles] = found
+            nearer = np.abs(other - wanted[far]).sum(1) < np.abs(nearest[far] - wanted[far]).sum(1)
+            nearest[far[nearer]] = other[nearer]
+        poses[:, angles] = nearest
 
 
 def _requested(block: PoseBlock) -> Floats:
@@ -339,10 +341,10 @@ def has_joints(status: Codes) -> Flags:
 
 def _first(*statuses: Codes) -> Codes:
     """(n,) the first of several statuses of a pose that is not ok."""
-    found = statuses[0].copy()
+    combined = statuses[0].copy()
     for status in statuses[1:]:
-        np.copyto(found, status, where=found == OK)
-    return found
+        np.copyto(combined, status, where=combined == OK)
+    return combined
 
 
 def _joints(machine: Machine, joints: ArrayLike) -> Floats:

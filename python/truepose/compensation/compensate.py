@@ -12,20 +12,16 @@ from truepose.compensation.corrected import corrected_deviations
 from truepose.compensation.remainder import Remainder
 from truepose.error_budget.largest import largest
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import DatasetRows, Schema, Variable, assemble, quantity_coords, sizes
+from truepose.runs.dataset import Schema, Variable, quantity_coords
 from truepose.runs.displacement import at_shifts, displacement, sum_deviations
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
     of_band,
     of_correction,
-    requested_poses,
-    required_sources,
 )
 from truepose.runs.quantities import quantities
+from truepose.runs.run import Run
 from truepose.runs.variables import variables_of
 from truepose.sources import Deviation, PoseBlock, Source
 
@@ -84,26 +80,16 @@ def compensate(
 
     Raises as `truepose.budget`.
     """
-    given = machine.condition if condition is None else condition
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, given)
-    kinds = quantities(machine.components)
-    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
+    run = Run(machine, poses, condition, progress)
+    run.begin(SCHEMA)
     remainder = Remainder(machine)
-    walk = PoseRun(machine, table, given, progress, path=poses is None and is_path(machine))
-    for block in walk:
-        deviations = [source.deviation(machine, given, block) for source in sources]
+    for block in run:
+        deviations = [source.deviation(machine, run.condition, block) for source in run.sources]
         alone = [(d.parameters, d.shift) for d in deviations]
         shifted = at_shifts(machine, block, alone, sum_deviations(alone))
-        values, followed, edges = _correct(machine, block, sources, deviations, remainder)
-        usable = walk.keep(
-            block.indices, shifted, *map(of_correction, followed), *map(of_band, edges)
-        )
-        rows.append(block, values, usable)
-    if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
-    coords = quantity_coords(machine)
-    return assemble(machine, given, SCHEMA, rows, table, walk.left_out, coords=coords)
+        values, followed, edges = _correct(machine, block, run.sources, deviations, remainder)
+        run.fill(block, values, shifted, *map(of_correction, followed), *map(of_band, edges))
+    return run.dataset(coords=quantity_coords(machine))
 
 
 def _correct(
@@ -119,23 +105,25 @@ def _correct(
     the shifts, then those at edges of the bands.
     """
     after, deviations, corrected = corrected_deviations(block, sources, nominal)
-    spread = variables_of(machine, sources, deviations)
-    middle, effects, at_middle = first_order(machine, after, spread)
+    variables = variables_of(machine, sources, deviations)
+    middle, effects, at_middle = first_order(machine, after, variables)
     kinds = list(quantities(machine.components).values())
-    bounds = remainder.bound(after, spread, middle, effects)
+    bounds = remainder.bound(after, variables, middle, effects)
     values = {
         "joint": after.joints,
         "joint_nominal": block.joints,
         "residual_middle": middle,
-        "bound": np.maximum(*spread.domain.reach(effects)),
-        "linear_maximum": largest(middle, effects, spread.domain, kinds).length,
+        "bound": np.maximum(*variables.domain.reach(effects)),
+        "linear_maximum": largest(middle, effects, variables.domain, kinds).length,
         "remainder": bounds.norms,
         "second_order": bounds.components,
         "proven": bounds.proven,
     }
     edges = []
     for name, side in (("residual_lower", -1.0), ("residual_upper", +1.0)):
-        moved = sum_deviations([(each.parameters, each.at_edge(side)) for each in deviations])
+        moved = sum_deviations(
+            [(deviation.parameters, deviation.at_edge(side)) for deviation in deviations]
+        )
         values[name], status = displacement(machine, after.joints, after.placements, moved)
         edges.append(status)
     return values, [corrected, at_middle], edges

@@ -26,7 +26,7 @@ from truepose.runs.poses import NOT_CONVERGED, OK
 from truepose.runs.variables import Variables, variables_of
 from truepose.sources import Deviation, PoseBlock, Source
 
-Known = TypeVar("Known")
+Deviations = TypeVar("Deviations")
 """What is known of the machine at the poses of a block, in whatever form."""
 
 MOST_ROUNDS = 12
@@ -42,9 +42,9 @@ ROUNDING = 1e-13
 def corrected(
     machine: Machine, block: PoseBlock, sources: Sequence[Source]
 ) -> tuple[PoseBlock, Variables, np.ndarray]:
-    """The block with the corrected joints, the spread of all sources there, and a status (n,).
+    """The block with the corrected joints, the variables of all sources there, and a status (n,).
 
-    The spread is one about the shifts at that command. Statuses are the kernel's: not_converged
+    The variables are about the shifts at that command. Statuses are the kernel's: not_converged
     also where the command does not settle.
     """
     first = [source.deviation(machine, block.condition, block) for source in sources]
@@ -62,7 +62,9 @@ def corrected_deviations(
     joints, deviations, status = corrected_joints(
         block,
         first,
-        lambda known: sum_deviations([(each.parameters, each.shift) for each in known]),
+        lambda known: sum_deviations(
+            [(deviation.parameters, deviation.shift) for deviation in known]
+        ),
         (
             lambda sent: [
                 source.deviation(block.machine, block.condition, sent) for source in sources
@@ -76,10 +78,10 @@ def corrected_deviations(
 
 def corrected_joints(
     block: PoseBlock,
-    first: Known,
-    shift_of: Callable[[Known], ParameterDeviation],
-    look: Callable[[PoseBlock], Known] | None,
-) -> tuple[Floats, Known, np.ndarray]:
+    first: Deviations,
+    shift_of: Callable[[Deviations], ParameterDeviation],
+    look: Callable[[PoseBlock], Deviations] | None,
+) -> tuple[Floats, Deviations, np.ndarray]:
     """Corrected joints (n, n_joint), what is known at them, and kernel status (n,).
 
     `first` is what is known at the nominal command of the block, `shift_of` it are parameters and

@@ -1,6 +1,6 @@
 """How the parts of a machine move, to first order, about where its shifts and its command take it.
 
-Rows of an array (..., v + m) are linear forms: times the v variables of a spread, and the m
+Rows of an array (..., v + m) are linear forms: times the v variables of a pose, and the m
 components of what the platform moves beyond that, they are how far something moves, m or rad.
 """
 
@@ -52,9 +52,9 @@ class Motion:
 
     `joints` (n, n_joint) as commanded. `position` (n, 3), m, and `rotation` (n, 3, 3): where the
     machine takes the platform; `turned` (n, 3): rotation vector from the pose asked for to there.
-    `parameters` (n or 1, n_parameter): values; `columns`, `variables`, `half_width` and
-    `domain` are the spread's; `effects` (n, m, v + m) on displacement and rotation vector, of
-    the variables, and of these components themselves.
+    `parameters` (n or 1, n_parameter): values; `columns`, `variable_of`, `half_width`
+    and `domain` are those of the variables; `effects` (n, m, v + m) on displacement and rotation
+    vector, of the variables, and of these components themselves.
     """
 
     components: tuple[str, ...]
@@ -64,7 +64,7 @@ class Motion:
     turned: Floats
     parameters: Floats
     columns: Indices
-    variables: Indices
+    variable_of: Indices
     half_width: Floats
     domain: Domain
     effects: Floats
@@ -74,7 +74,7 @@ class Motion:
         cls,
         machine: Machine,
         block: PoseBlock,
-        spread: Variables,
+        variables: Variables,
         first: tuple[Floats, Floats],
         poses: slice,
     ) -> Motion:
@@ -86,7 +86,7 @@ class Motion:
             into, names = (moved, POSITIONS) if name in POSITIONS else (turned, ROTATIONS)
             into[:, names.index(name)] = value[:, at]
         itself = np.broadcast_to(np.eye(value.shape[1]), (*value.shape, value.shape[1]))
-        columns, shift = spread.shift
+        columns, shift = variables.shift
         shift = rows_of(shift, poses)
         parameters = np.repeat(machine.nominal[np.newaxis], len(shift), axis=0)
         parameters[:, columns] += shift
@@ -97,10 +97,10 @@ class Motion:
             vector_to_matrix(turned) @ quaternion_to_matrix(placements[:, 3:]),
             turned,
             parameters,
-            spread.columns,
-            spread.variables,
-            rows_of(spread.half_width, poses),
-            spread.domain,
+            variables.columns,
+            variables.variable_of,
+            rows_of(variables.half_width, poses),
+            variables.domain,
             np.concatenate([effects, itself], axis=2),
         )
 
@@ -157,24 +157,24 @@ class Motion:
 
     @cached_property
     def _movers(self) -> dict[int, list[tuple[int, Floats]]]:
-        found: dict[int, list[tuple[int, Floats]]] = {}
-        columns, variables = self.columns.tolist(), self.variables.tolist()
+        movers: dict[int, list[tuple[int, Floats]]] = {}
+        columns, variables = self.columns.tolist(), self.variable_of.tolist()
         for at, (parameter, variable) in enumerate(zip(columns, variables, strict=True)):
-            found.setdefault(parameter, []).append((variable, self.half_width[:, at]))
-        return found
+            movers.setdefault(parameter, []).append((variable, self.half_width[:, at]))
+        return movers
 
     def forms(self, parameters: Sequence[int] | Indices) -> Floats:
         """(n or 1, k, v + m) linear forms of some parameters."""
         rows = np.zeros((len(self.half_width), len(parameters), self.effects.shape[2]))
         for row, parameter in enumerate(parameters):
-            for variable, swing in self.of_parameter(int(parameter)):
-                rows[:, row, variable] += swing
+            for variable, half_width in self.of_parameter(int(parameter)):
+                rows[:, row, variable] += half_width
         return rows
 
     def add(self, rows: Floats, parameter: int, slopes: Floats) -> None:
         """Add to forms (n, c, v + m) what they change by with a parameter, slopes (n or 1, c)."""
-        for variable, swing in self.of_parameter(parameter):
-            rows[:, :, variable] += slopes * swing[:, np.newaxis]
+        for variable, half_width in self.of_parameter(parameter):
+            rows[:, :, variable] += slopes * half_width[:, np.newaxis]
 
     def values(self, parameters: Indices) -> Floats:
         """(n or 1, ...) of parameters (...)."""

@@ -1,6 +1,6 @@
 """What closures do to the tool in second order: a quadratic form, bounded.
 
-In z, the v variables of a spread and the m components of e, which the platform moves beyond the
+In z, the v variables of a pose and the m components of e, which the platform moves beyond the
 linear model:
 
     second order of a component = z . H z,    |z . H z| <= sum of |H[j, k]| |z[j]| |z[k]|
@@ -46,7 +46,7 @@ def quadratic(motion: Motion, closures: Sequence[Closures]) -> Quadratic:
     n, m, size = motion.effects.shape
     v = size - m
     most = np.maximum(np.abs(motion.domain.lower), np.abs(motion.domain.upper))
-    found = Quadratic(np.zeros((n, m)), np.zeros((n, m, m)), np.zeros((n, m, m, m)))
+    quadratic = Quadratic(np.zeros((n, m)), np.zeros((n, m, m)), np.zeros((n, m, m, m)))
     weights, one, other = _products(motion, closures)
     lever, carried = _turned(motion, closures)
     turns = motion.turns[:, np.newaxis]
@@ -63,23 +63,23 @@ def quadratic(motion: Motion, closures: Sequence[Closures]) -> Quadratic:
             np.swapaxes(np.concatenate(left, axis=2), 2, 3),
             np.concatenate(right, axis=2),
         )
-        found.of_more[at] = np.abs(rows[..., v:, :] @ columns[..., v:])
+        quadratic.of_more[at] = np.abs(rows[..., v:, :] @ columns[..., v:])
         form = rows[..., :v, :] @ columns
         np.abs(form, out=form)
         by_set = most @ form
-        found.of_set[at] = by_set[..., :v] @ most
-        found.mixed[at] = 2.0 * by_set[..., v:]
-    return found
+        quadratic.of_set[at] = by_set[..., :v] @ most
+        quadratic.mixed[at] = 2.0 * by_set[..., v:]
+    return quadratic
 
 
 def _turned(motion: Motion, closures: Sequence[Closures]) -> tuple[Floats, Floats | None]:
     """Forms (n, m, 3, v + m) that the turn is multiplied by, and half of those it carries."""
     n, m, size = motion.effects.shape
     turned, carried = np.zeros((n, m, 9)), None
-    for each in closures:
-        turned += each.influence @ each.turned.reshape(n, -1, 9)
-        if each.carried is not None:
-            more = 0.5 * (each.influence @ each.carried.reshape(n, -1, 3 * size))
+    for closure in closures:
+        turned += closure.influence @ closure.turned.reshape(n, -1, 9)
+        if closure.carried is not None:
+            more = 0.5 * (closure.influence @ closure.carried.reshape(n, -1, 3 * size))
             carried = more if carried is None else carried + more
     lever: Floats = turned.reshape(n, m, 3, 3) @ motion.turns[:, np.newaxis]
     if carried is None:
@@ -101,9 +101,9 @@ def _products(motion: Motion, closures: Sequence[Closures]) -> tuple[Floats, Flo
         one.append(first)
         other.append(second)
 
-    for each in closures:
-        for product in each.products:
-            weight = each.influence[:, :, :, np.newaxis] * product.coefficient[:, np.newaxis]
+    for closure in closures:
+        for product in closure.products:
+            weight = closure.influence[:, :, :, np.newaxis] * product.coefficient[:, np.newaxis]
             weight = weight.reshape(n, m, -1)
             first, second = (way.reshape(n, -1, size) for way in (product.one, product.other))
             if product.one is product.other:

@@ -104,12 +104,14 @@ class Remainder:
         ]
         self._parts = parts
         self._parameters = np.concatenate([part.parameters for part in parts])
-        self._known = not machine.kernel.overconstrained and all(part.known for part in parts)
+        self._known = not machine.kernel.overconstrained and all(part.is_proven for part in parts)
 
-    def bound(self, block: PoseBlock, spread: Variables, value: Floats, effects: Floats) -> Bounds:
-        """At the poses of a block, with the value (n, m) and the effects (n, m, v) of its spread.
+    def bound(
+        self, block: PoseBlock, variables: Variables, value: Floats, effects: Floats
+    ) -> Bounds:
+        """At the poses of a block, with its value (n, m) and effects (n, m, v) of the variables.
 
-        Those that `truepose.runs.first_order` has of the same block and spread.
+        Those that `truepose.runs.first_order` has of the same block and variables.
         """
         n, m = value.shape
         quantities = len({name.startswith("r") for name in self._machine.components})
@@ -120,18 +122,18 @@ class Remainder:
         elif self._known:
             for start in range(0, n, FEW):
                 poses = slice(start, start + FEW)
-                found = self._some(block, spread, (value, effects), poses)
-                components[poses], norms[poses] = found
+                bounds = self._some(block, variables, (value, effects), poses)
+                components[poses], norms[poses] = bounds
         proven = np.isfinite(components).all(axis=1) & np.isfinite(norms).all(axis=1)
         components[~proven], norms[~proven] = np.nan, np.nan
         return Bounds(components, norms, np.asarray(proven, np.bool_))
 
     def _some(
-        self, block: PoseBlock, spread: Variables, first: tuple[Floats, Floats], poses: slice
+        self, block: PoseBlock, variables: Variables, first: tuple[Floats, Floats], poses: slice
     ) -> tuple[Floats, Floats]:
         """Components (n, m) and norms (n, q) at some poses; not finite where not proven."""
-        motion = Motion.at(self._machine, block, spread, first, poses)
-        parameters, shift = spread.shift
+        motion = Motion.at(self._machine, block, variables, first, poses)
+        parameters, shift = variables.shift
         sensitivity, _ = self._machine.kernel.sensitivity_moved(
             block.joints[poses],
             block.placements[poses],
@@ -155,7 +157,7 @@ class _Tube:
     def __init__(self, motion: Motion, closures: list[Closures]) -> None:
         self._motion, self._closures = motion, closures
         self._second = quadratic(motion, closures)
-        self._sizes = [np.abs(each.influence) for each in closures]
+        self._sizes = [np.abs(closure.influence) for closure in closures]
         self._ones = np.zeros((len(motion.components), 2))
         self._ones[motion.linear, 0] = self._ones[motion.angular, 1] = 1.0
 
@@ -163,23 +165,25 @@ class _Tube:
         """Components (n, m) and norms (n, q); not finite where no tube was found."""
         motion, tube = self._motion, self._tube()
         second, rests = self._second.at(tube), self._rests(tube)
-        found = self._sum(second, rests)
-        for each in self._closures:
-            found[~each.closed] = np.nan
+        total = self._sum(second, rests)
+        for closure in self._closures:
+            total[~closure.closed] = np.nan
         norms = []
         for part in filter(None, (motion.linear, motion.angular)):
             size = norm(second[:, part])
-            for each, rest in zip(self._closures, rests, strict=True):
-                size = size + (norm(np.swapaxes(each.influence[:, part], 1, 2)) * rest).sum(axis=1)
+            for closure, rest in zip(self._closures, rests, strict=True):
+                size = size + (norm(np.swapaxes(closure.influence[:, part], 1, 2)) * rest).sum(
+                    axis=1
+                )
             norms.append(size)
         if len(motion.angular) == 3:
             turn = norm(motion.turn_reach) + norms[-1]
             whole = norm(motion.turned) + turn
             bent = np.where(whole <= 1.0, TURNED * whole * turn * turn, np.inf)
-            found[:, motion.angular] += bent[:, np.newaxis]
+            total[:, motion.angular] += bent[:, np.newaxis]
             norms[-1] = norms[-1] + bent
         more = 1.0 + ROUNDING
-        return found * more, np.stack(norms, axis=1) * more
+        return total * more, np.stack(norms, axis=1) * more
 
     def _tube(self) -> Floats:
         """(n, m) sizes of e that f maps into themselves, else infinite."""
@@ -204,14 +208,14 @@ class _Tube:
     def _rests(self, sizes: Floats) -> list[Floats]:
         """(n, c) of all closures, each. Sizes are summed, not squared: f stays a power series."""
         further = sizes @ self._ones
-        return [each.rest(further[:, :1], further[:, 1:]) for each in self._closures]
+        return [closure.rest(further[:, :1], further[:, 1:]) for closure in self._closures]
 
     def _sum(self, second: Floats, rests: list[Floats]) -> Floats:
         """(n, m) the second order and what the rests of all closures allow."""
-        found = second.copy()
+        total = second.copy()
         for size, rest in zip(self._sizes, rests, strict=True):
-            found += (size @ rest[:, :, np.newaxis])[:, :, 0]
-        return found
+            total += (size @ rest[:, :, np.newaxis])[:, :, 0]
+        return total
 
 
 __all__ = ["Bounds", "Remainder"]

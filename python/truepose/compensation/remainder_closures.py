@@ -55,8 +55,8 @@ def turned_about(arm: Floats, along: Floats) -> Floats:
     """(..., 3, 3) T of `along . (r x (r x arm)) / 2 = r . T r`."""
     outer = arm[..., :, np.newaxis] * along[..., np.newaxis, :]
     dot = (arm * along).sum(axis=-1)[..., np.newaxis, np.newaxis]
-    found: Floats = 0.25 * (outer + np.swapaxes(outer, -1, -2)) - 0.5 * dot * np.eye(3)
-    return found
+    matrix: Floats = 0.25 * (outer + np.swapaxes(outer, -1, -2)) - 0.5 * dot * np.eye(3)
+    return matrix
 
 
 __all__ = ["Closures", "Products", "Rest", "turned_about"]

@@ -42,13 +42,13 @@ class Guides:
         self._tool = self._names.point("tool")
         self._length = machine.characteristic_length
         held = [self._held(guide) for guide in self._guides]
-        self._columns = np.cumsum([0, *(each.size for each in held)])
+        self._columns = np.cumsum([0, *(guide.size for guide in held)])
         self.parameters = np.concatenate([np.empty(0, np.intp), *held])
         """Parameters whose sensitivities `closures` takes, (k,)."""
 
     @property
-    def known(self) -> bool:
-        """Whether all guides are of kinds that are known here."""
+    def is_proven(self) -> bool:
+        """Whether all guides are of kinds whose remainder is proven here."""
         return all(guide.kind in KINDS for guide in self._guides)
 
     def closures(self, motion: Motion, sensitivity: Floats) -> list[Closures]:
@@ -97,8 +97,8 @@ class Guides:
             whole, more = turn + further, relative + shift + further * size
             carried = majorants.turn_bent(whole) * size + majorants.turn(whole) * moved
             signed = 0.5 * whole**2 * size + whole * moved + tilted * more
-            found = carried + tilted * (more + carried)
-            return np.asarray(np.maximum(found - signed, 0.0))
+            rest = carried + tilted * (more + carried)
+            return np.asarray(np.maximum(rest - signed, 0.0))
 
         return Closures(
             -(sensitivity @ normal[:, :, np.newaxis]),
@@ -141,8 +141,8 @@ class Guides:
             signed = 0.5 * whole**2 * size + whole * (point + shift) + more * tilted
             with np.errstate(divide="ignore"):
                 skewed = np.where(askew * tilted < 1.0, tilted / (1.0 - askew * tilted), np.inf)
-            found = carried + (more + carried) * skewed + lever * askew * tilted * skewed
-            return np.repeat(np.maximum(found - signed, 0.0), 2, axis=1)
+            rest = carried + (more + carried) * skewed + lever * askew * tilted * skewed
+            return np.repeat(np.maximum(rest - signed, 0.0), 2, axis=1)
 
         other = np.swapaxes(ways @ np.swapaxes(across, 1, 2), 1, 2) @ tilts
         both = np.broadcast_to(slide[:, np.newaxis], (len(arm), 2, 1, slide.shape[2]))
@@ -170,8 +170,8 @@ class Guides:
             whole = turn + further
             swung = majorants.turn(whole)
             signed = 0.5 * whole**2 + whole * (one + other) + one * other
-            found = majorants.turn_bent(whole) + swung * other + one * (other + swung * (1 + other))
-            return np.asarray(np.maximum(found - signed, 0.0))
+            rest = majorants.turn_bent(whole) + swung * other + one * (other + swung * (1 + other))
+            return np.asarray(np.maximum(rest - signed, 0.0))
 
         leans = np.swapaxes(ways, 1, 2) @ of_platform
         carried = skew(on_platform) @ (np.swapaxes(frame.tangents, 1, 2) @ of_frame)

@@ -41,9 +41,9 @@ class Rings:
         """Parameters whose sensitivities `closures` takes, (k,)."""
 
     @property
-    def known(self) -> bool:
-        """Whether nothing is there that is not known here."""
-        return self._bases.known
+    def is_proven(self) -> bool:
+        """Whether the remainder of all that is there is proven here."""
+        return self._bases.is_proven
 
     def closures(self, motion: Motion, sensitivity: Floats) -> list[Closures]:
         """At the poses of a motion, from sensitivities (n, m, k) to `parameters`."""
@@ -97,11 +97,11 @@ class Rings:
             carried = carried + (1.0 + swung) * bent
             all_ = more + carried
             round_ = majorants.length_bent(inner, about + all_, off + all_)
-            found = majorants.length_bent(outer, leant + all_ + round_, along + all_ + round_)
+            rest = majorants.length_bent(outer, leant + all_ + round_, along + all_ + round_)
             signed = (leant + more) ** 2 / (2.0 * outer)
             signed = signed + np.abs(out) * (about + more) ** 2 / (2.0 * inner)
             signed = signed + 0.5 * whole**2 * size + whole * (point + shift)
-            return np.asarray(np.maximum(found + np.abs(out) * round_ + carried - signed, 0.0))
+            return np.asarray(np.maximum(rest + np.abs(out) * round_ + carried - signed, 0.0))
 
         moved = np.swapaxes(axes, 1, 2) @ rows + moves
         both = np.stack([across, rows[:, 2]], axis=1)[:, np.newaxis]

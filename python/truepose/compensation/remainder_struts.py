@@ -73,8 +73,8 @@ class Bases:
         self._lengths = [int(machine.kernel.length_parameters[at]) for at in struts]
 
     @property
-    def known(self) -> bool:
-        """Whether all drives are of kinds that are known here."""
+    def is_proven(self) -> bool:
+        """Whether all drives are of kinds whose remainder is proven here."""
         return all(drive.kind in KINDS for _, drive in self._drives.values())
 
     def base(self, motion: Motion, which: int) -> _Base:
@@ -146,8 +146,8 @@ class Bases:
         bent = bent + reach * majorants.unit(tilt.reach, tilt.along)
         moved, leant = self._way(motion, joint, drive), motion.forms(tilts)
         squared = -0.5 * (way * np.square(tilt.tangents[:, 0]).sum(axis=1))[:, np.newaxis]
-        second = [(squared * tilt.axis, leant[:, each], leant[:, each]) for each in (0, 1)]
-        second += [(tilt.slopes[:, each], moved, leant[:, each]) for each in (0, 1)]
+        second = [(squared * tilt.axis, leant[:, axis], leant[:, axis]) for axis in (0, 1)]
+        second += [(tilt.slopes[:, axis], moved, leant[:, axis]) for axis in (0, 1)]
         signed = 0.5 * np.abs(way) * tilt.reach**2 + reach * tilt.reach
         return _Base(place, slopes, bent, second, signed)
 
@@ -181,12 +181,12 @@ class Bases:
         if tilt.reach.any():
             # Of what `_tilted_crank` says, with all that is added to angle, axis and base at once.
             size, lean = norm(base), tilt.reach
-            swing, rise = np.abs(sine[:, 0]), 1.0 - cosine[:, 0]
+            turned_by, rise = np.abs(sine[:, 0]), 1.0 - cosine[:, 0]
             more, tilted = majorants.turn(reach), majorants.unit(lean, tilt.along)
-            whole = (swing + 2.0 * rise + 3.0 * more) * tilted + (rise + more) * tilted**2
+            whole = (turned_by + 2.0 * rise + 3.0 * more) * tilted + (rise + more) * tilted**2
             bent = bent + whole * (size + own)
-            bent = bent - (swing + 2.0 * rise) * (1.0 + tilt.along) * lean * size
-            signed = signed + (swing + 2.0 * rise) * lean * (0.5 * lean * size + own)
+            bent = bent - (turned_by + 2.0 * rise) * (1.0 + tilt.along) * lean * size
+            signed = signed + (turned_by + 2.0 * rise) * lean * (0.5 * lean * size + own)
             signed = signed + 3.0 * reach * lean * size + rise * lean**2 * size
             second += self._tilted_crank(motion, tilt, tilts, (form, point), (base, sine, cosine))
         place = motion.values(origin) + arm
@@ -218,19 +218,19 @@ class Bases:
         leant = motion.forms(tilts)
         back = -0.5 * np.square(tilt.tangents[:, 0]).sum(axis=1)[:, np.newaxis]
         back = back * (sine * cross(axis, base) + 2.0 * rise * axis * dot(axis, base))
-        found: list[_Second] = []
+        products: list[_Second] = []
         for one in (0, 1):
             change, lean = tilt.slopes[:, one], leant[:, one]
             turned = cosine * cross(change, base) + sine * raised(change, base)
-            found += [(turned, angle, lean), (back, lean, lean)]
+            products += [(turned, angle, lean), (back, lean, lean)]
             for other in (0, 1):
                 along = rise * change * dot(tilt.slopes[:, other], base)
-                found.append((along, lean, leant[:, other]))
+                products.append((along, lean, leant[:, other]))
             for at, direction in zip(point, np.eye(3)[:, np.newaxis], strict=True):
                 vector = sine * cross(change, np.broadcast_to(direction, change.shape))
                 vector = vector + rise * raised(change, direction)
-                found.append((vector, lean, motion.forms([at])[:, 0]))
-        return found
+                products.append((vector, lean, motion.forms([at])[:, 0]))
+        return products
 
 
 class Struts:
@@ -247,9 +247,9 @@ class Struts:
         """Parameters whose sensitivities `closures` takes, (k,)."""
 
     @property
-    def known(self) -> bool:
-        """Whether nothing is there that is not known here."""
-        return self._bases.known
+    def is_proven(self) -> bool:
+        """Whether the remainder of all that is there is proven here."""
+        return self._bases.is_proven
 
     def closures(self, motion: Motion, sensitivity: Floats) -> list[Closures]:
         """At the poses of a motion, from sensitivities (n, m, k) to `parameters`."""
@@ -257,32 +257,32 @@ class Struts:
         bases = [self._bases.base(motion, at) for at in range(count)]
         lengths = [self._bases.length(motion, at) for at in range(count)]
         arm = motion.arms(self._platform, self._tool)
-        base = np.stack([np.broadcast_to(each.place, (n, 3)) for each in bases], axis=1)
+        base = np.stack([np.broadcast_to(joint.place, (n, 3)) for joint in bases], axis=1)
         v = motion.position[:, np.newaxis] + arm - base
         length = norm(v)
         unit = v / length[:, :, np.newaxis]
-        stated = np.stack([np.broadcast_to(each, n) for each, _ in lengths], axis=1)
-        along = np.stack([np.broadcast_to(each, n) for _, each in lengths], axis=1)
+        stated = np.stack([np.broadcast_to(own, n) for own, _ in lengths], axis=1)
+        along = np.stack([np.broadcast_to(own, n) for _, own in lengths], axis=1)
 
         rows = self._across(motion, unit, arm, bases)
         across = norm(motion.reach(rows))
         own = self._own(motion)
         moved = norm(motion.reach(own))
-        bent = np.stack([np.broadcast_to(each.bent, n) for each in bases], axis=1)
+        bent = np.stack([np.broadcast_to(joint.bent, n) for joint in bases], axis=1)
         half = np.repeat(0.5 / length[:, :, np.newaxis], 2, axis=2)
         second = _second(motion, bases, unit)
         size, turn = norm(arm), norm(motion.turn_reach)[:, np.newaxis]
-        told = np.stack([np.broadcast_to(each.signed, n) for each in bases], axis=1)
+        told = np.stack([np.broadcast_to(joint.signed, n) for joint in bases], axis=1)
 
         def rest(shift: Floats, further: Floats) -> Floats:
             whole, more = turn + further, shift + further * size
             carried = majorants.turn_bent(whole) * size + majorants.turn(whole) * moved + bent
-            found = majorants.length_bent(length, across + more + carried, along + more + carried)
+            rest = majorants.length_bent(length, across + more + carried, along + more + carried)
             signed = (across + more) ** 2 * half[:, :, 0]
             signed = signed + 0.5 * whole**2 * size + whole * moved + told
-            return np.asarray(np.maximum(found + carried - signed, 0.0))
+            return np.asarray(np.maximum(rest + carried - signed, 0.0))
 
-        found = Closures(
+        closures = Closures(
             # A longer strut has a smaller residual.
             -sensitivity,
             (Products(half, rows, rows), *second),
@@ -291,7 +291,7 @@ class Struts:
             rest,
             np.asarray((np.abs(length - stated) <= CLOSED * length).all(axis=1)),
         )
-        return [found]
+        return [closures]
 
     def _across(self, motion: Motion, unit: Floats, arm: Floats, bases: list[_Base]) -> Floats:
         """(n, s, 2, v) forms of the relative motion across each strut."""
@@ -323,15 +323,15 @@ def carried_about(motion: Motion, own: Floats, along: Floats) -> Floats:
 
     Of forms w (n or 1, c, 3, v) in the platform's axes.
     """
-    found: Floats = -(skew(along) @ motion.rotation[:, np.newaxis]) @ own
-    return found
+    rows: Floats = -(skew(along) @ motion.rotation[:, np.newaxis]) @ own
+    return rows
 
 
 def _second(motion: Motion, bases: list[_Base], unit: Floats) -> list[Products]:
     """What the base-side joints move along their struts in second order, as far as it is told."""
     moving = [
-        [(vector, one, other) for vector, one, other in each.second if one.any() and other.any()]
-        for each in bases
+        [(vector, one, other) for vector, one, other in base.second if one.any() and other.any()]
+        for base in bases
     ]
     count = max(map(len, moving))
     if not count:

@@ -322,7 +322,7 @@ class _FitProblem:
 
     def __init__(self, actual: ActualMachine, model: SmallModel, poses: Floats) -> None:
         self._actual, self._model = actual, model
-        self._known = actual.known(poses)
+        self._known = actual.deviations_at(poses)
         self._poses = poses
         machine = actual.machine
         self._rows = _commanded_components(machine)
@@ -463,7 +463,7 @@ def _errors(
     kernel = actual.machine.kernel
     asked_for, got = kernel.placement_of(poses), kernel.placement_of(reached)
     orientation = angle_between(asked_for[:, 3:], got[:, 3:])
-    known = actual.known(poses)
+    known = actual.deviations_at(poses)
     error, _ = actual.error(known, joints)
     turning = [at for at, name in enumerate(actual.machine.components) if name not in "xyz"]
     return position, orientation, np.linalg.norm(error[:, turning], axis=1), joints
@@ -525,6 +525,7 @@ def _condition(machine: Machine) -> str:
     parts += vector("acceleration", known.acceleration, "acceleration")
     if known.gravity != STANDARD_GRAVITY:
         parts.append(f"gravity {in_file_units(machine, known.gravity, 'acceleration')}")
+    parts += [f"{key} {value}" for key, value in known.source_keys.items()]
     return "; ".join(parts)
 
 

@@ -17,27 +17,11 @@ from truepose.error_budget.guide_loads import GuideLoads
 from truepose.error_budget.largest import largest, lengths
 from truepose.machine import Condition, Machine
 from truepose.runs import displacement, percent
-from truepose.runs.dataset import (
-    QUANTITY_UNITS,
-    DatasetRows,
-    Schema,
-    Variable,
-    assemble,
-    label,
-    sizes,
-)
+from truepose.runs.dataset import Schema, Variable, label, quantity_coords
 from truepose.runs.first_order import effects_at, rows_of
-from truepose.runs.poses import (
-    OK,
-    PoseRun,
-    Progress,
-    is_path,
-    no_pose_left,
-    of_band,
-    requested_poses,
-    required_sources,
-)
+from truepose.runs.poses import OK, Progress, of_band
 from truepose.runs.quantities import quantities
+from truepose.runs.run import Run
 from truepose.runs.variables import variables_of
 from truepose.sources import Deviation, PoseBlock, Source
 
@@ -150,12 +134,11 @@ def budget(
     the condition asks for what the machine does not say (no-stiffness, no-expansion). What it warns
     of (guide-taken-rigid) is in the attribute `warnings`.
     """
-    given = machine.condition if condition is None else condition
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, given)
+    run = Run(machine, poses, condition, progress)
+    sources = run.sources
     kinds = quantities(machine.components)
-    lengths = sizes(machine, len(table), source=len(sources), quantity=len(kinds))
-    rows = DatasetRows(machine, SCHEMA, lengths)
+    lengths = {"source": len(sources), "component": len(machine.components)}
+    rows = run.begin(SCHEMA, source=len(sources))
     highest = {
         name: comparison.Highest(tuple(lengths[dim] for dim in SCHEMA[name].dims))
         for name in _HIGHEST
@@ -164,22 +147,20 @@ def budget(
     guides = GuideLoads(machine)
     distributions: list[dict[str, None]] = [{} for _ in sources]
 
-    walk = PoseRun(machine, table, given, progress, path=poses is None and is_path(machine))
-    for block in walk:
-        deviations = [source.deviation(machine, given, block) for source in sources]
-        for found, deviation in zip(distributions, deviations, strict=True):
-            found.update((str(deviation.distribution[k]), None) for k in deviation.banded)
+    for block in run:
+        deviations = [source.deviation(machine, run.condition, block) for source in sources]
+        for names, deviation in zip(distributions, deviations, strict=True):
+            names.update((str(deviation.distribution[k]), None) for k in deviation.banded)
         room = rows.room(block.indices.size)
         values, shifted, edges = _evaluate(machine, block, sources, deviations, room)
-        usable = walk.keep(block.indices, *shifted, *map(of_band, edges))
-        rows.append(block, values, usable)
+        usable = run.fill(block, values, *shifted, *map(of_band, edges))
         if usable.any():
             for name, running in highest.items():
                 running.add(values[_HIGHEST[name]][usable])
             statistics.add(values["largest"][usable])
             guides.add(block, usable)
     if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
+        raise run.no_pose_left()
 
     shares = comparison.share(statistics.highest[:, 0])
     over_all: dict[str, Any] = {name: running.value for name, running in highest.items()}
@@ -194,17 +175,12 @@ def budget(
         "source": label("source", [source.name for source in sources], "error source"),
         "distribution": label(
             "source",
-            [" / ".join(found) or "none" for found in distributions],
+            [" / ".join(names) or "none" for names in distributions],
             "distribution inside the band",
         ),
-        "quantity": label("quantity", list(kinds), "what is compared"),
-        "quantity_units": label(
-            "quantity", [QUANTITY_UNITS[kind] for kind in kinds], "unit of the quantity"
-        ),
+        **quantity_coords(machine, "what is compared"),
     }
-    dataset = assemble(
-        machine, given, SCHEMA, rows, table, walk.left_out, over_all=over_all, coords=coords
-    )
+    dataset = run.dataset(over_all=over_all, coords=coords)
     dataset.attrs["warnings"] = json.dumps(guides.warnings())
     return dataset
 
@@ -224,7 +200,9 @@ def _evaluate(
     coordinate, defined = percent.coordinates(machine, block.placements)
     per_error = percent.per_error(coordinate, defined)
     of_source = ("pose", "source")
-    values = {name: room[name] for name, each in SCHEMA.items() if each.dims[:2] == of_source}
+    values = {
+        name: room[name] for name, variable in SCHEMA.items() if variable.dims[:2] == of_source
+    }
     shifted: list[np.ndarray] = []
     at_edges: list[np.ndarray] = []
     nominal: list[np.ndarray] = []
@@ -321,18 +299,18 @@ def _together(
 
     From the `error` (n, n_component) with all of them at their shifts.
     """
-    moves = variables_of(machine, sources, deviations)
+    variables = variables_of(machine, sources, deviations)
     n_pose = block.indices.size
     status = np.full(n_pose, OK, np.uint8)
-    if not moves.names:
+    if not variables.names:
         return lengths(error, kinds), status
     far = np.empty((n_pose, len(kinds)))
-    parameters, shift = moves.shift
+    parameters, shift = variables.shift
     for start in range(0, n_pose, FEW):
         poses = slice(start, start + FEW)
         moved = (parameters, np.ascontiguousarray(rows_of(shift, poses)))
-        effects, status[poses] = effects_at(machine, block, moves, moved, poses)
-        far[poses] = largest(error[poses], effects, moves.domain, kinds).length
+        effects, status[poses] = effects_at(machine, block, variables, moved, poses)
+        far[poses] = largest(error[poses], effects, variables.domain, kinds).length
     return far, status
 
 

@@ -41,11 +41,11 @@ class Largest:
 
     def maximiser(self, effects: Floats, domain: Domain, quantities: Sequence[Indices]) -> Floats:
         """(n, q, v) the variables at which each is reached, from the same arguments."""
-        found = np.empty((*self.length.shape, effects.shape[2]))
+        maximisers = np.empty((*self.length.shape, effects.shape[2]))
         for at, columns in enumerate(quantities):
             along = self.direction[:, at, np.newaxis, : columns.size]
-            found[:, at] = domain.most_along((along @ effects[:, columns])[:, 0])
-        return found
+            maximisers[:, at] = domain.most_along((along @ effects[:, columns])[:, 0])
+        return maximisers
 
 
 def largest(
@@ -56,7 +56,7 @@ def largest(
     `quantities`: components of each length, at most three. Missing (NaN) where a number of a pose
     is not finite.
     """
-    found = largest_lengths(
+    bounds = largest_lengths(
         value,
         effects,
         domain.middle.tolist(),
@@ -64,16 +64,16 @@ def largest(
         [members.tolist() for members in domain.directions],
         [columns.tolist() for columns in quantities],
     )
-    return Largest(found[..., 0], found[..., 1], found[..., 2:])
+    return Largest(bounds[..., 0], bounds[..., 1], bounds[..., 2:])
 
 
 def lengths(error: Floats, quantities: Sequence[Indices]) -> Floats:
     """(n, q) lengths of errors (n, m) that are known: sets of one point."""
-    found = np.empty((len(error), len(quantities)))
+    longest = np.empty((len(error), len(quantities)))
     for at, columns in enumerate(quantities):
         of_kind = error[:, columns]
-        found[:, at] = np.sqrt(np.einsum("nc,nc->n", of_kind, of_kind))
-    return found
+        longest[:, at] = np.sqrt(np.einsum("nc,nc->n", of_kind, of_kind))
+    return longest
 
 
 __all__ = ["Largest", "largest", "lengths"]

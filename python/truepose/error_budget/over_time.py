@@ -12,8 +12,9 @@ from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs import displacement
-from truepose.runs.dataset import DatasetRows, Schema, Variable, assemble, label, sizes
-from truepose.runs.poses import BLOCK, OK, PoseRun, Progress, no_pose_left, requested_poses
+from truepose.runs.dataset import Schema, Variable, label
+from truepose.runs.poses import BLOCK, OK, Progress
+from truepose.runs.run import Run
 from truepose.sources import PoseBlock, Thermal
 
 SCHEMA: Schema = {
@@ -50,17 +51,14 @@ def over_time(
     """
     given = machine.condition if condition is None else condition
     moments = _times(machine, given, times)
-    table = requested_poses(machine, _home(machine) if poses is None else poses)
-    thermal = Thermal(requested=True)
-    parts = machine.parts
-    lengths = sizes(machine, len(table), time=len(moments), part=len(parts))
-    rows = DatasetRows(machine, _FILLED, lengths)
-    walk = PoseRun(machine, table, given, progress)
-    for block in walk:
+    thermal, parts = Thermal(requested=True), machine.parts
+    if poses is None:
+        poses = _home(machine)
+    run = Run(machine, poses, given, progress, sources=[thermal])
+    run.begin(_FILLED, time=len(moments), part=len(parts))
+    for block in run:
         error, status = _errors(thermal, block, moments)
-        rows.append(block, {"error": error}, walk.keep(block.indices, status))
-    if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=False)
+        run.fill(block, {"error": error}, status)
     temperatures = np.empty((len(moments), len(parts)))
     for index, part in enumerate(parts):
         temperatures[:, index] = given.temperature(part, moments)
@@ -68,18 +66,9 @@ def over_time(
         "time": label("time", moments, "time in the temperature log", "s"),
         "part": label("part", list(parts), "part of the machine"),
     }
-    found = assemble(
-        machine,
-        given,
-        _FILLED,
-        rows,
-        table,
-        walk.left_out,
-        over_all={"temperature": temperatures},
-        coords=coords,
-    )
-    found["error"] = found["error"].transpose(*SCHEMA["error"].dims)
-    return found
+    dataset = run.dataset(over_all={"temperature": temperatures}, coords=coords)
+    dataset["error"] = dataset["error"].transpose(*SCHEMA["error"].dims)
+    return dataset
 
 
 def _errors(thermal: Thermal, block: PoseBlock, times: Floats) -> tuple[Floats, np.ndarray]:
@@ -101,9 +90,9 @@ def _errors(thermal: Thermal, block: PoseBlock, times: Floats) -> tuple[Floats, 
         )
         deviation = thermal.deviation(machine, block.condition, many)
         moved = displacement.sum_deviations([(deviation.parameters, deviation.shift)])
-        found, failed = displacement.displacement(machine, many.joints, many.placements, moved)
+        errors, failed = displacement.displacement(machine, many.joints, many.placements, moved)
         shape = (moments.size, n_pose)
-        error[:, start : start + chunk] = found.reshape(*shape, -1).swapaxes(0, 1)
+        error[:, start : start + chunk] = errors.reshape(*shape, -1).swapaxes(0, 1)
         status = np.where(status == OK, failed.reshape(shape).max(axis=0), status)
     return error, status
 

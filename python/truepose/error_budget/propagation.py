@@ -34,8 +34,8 @@ def standard_uncertainty(
     if correlation is None:
         combined: Floats = np.sqrt(np.square(effects, out=scratch) @ sigmas**-2.0)
         return combined
-    each: Floats = np.divide(effects, sigmas, out=scratch)
-    squares = np.einsum("ncv,ncv->nc", each @ correlation, each)
+    standard: Floats = np.divide(effects, sigmas, out=scratch)
+    squares = np.einsum("ncv,ncv->nc", standard @ correlation, standard)
     # What cancels leaves rounding, of either sign.
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
@@ -78,9 +78,9 @@ def combine(
     finite degrees are correlated there are no effective ones, and the interval takes them as one
     variable with the fewest degrees among them, which it is where they are wholly correlated.
     """
-    each = effects / sigmas
-    weighed = each if correlation is None else each @ correlation
-    covariance = weighed @ each.transpose(0, 2, 1)
+    standard = effects / sigmas
+    weighed = standard if correlation is None else standard @ correlation
+    covariance = weighed @ standard.transpose(0, 2, 1)
     covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))
     variance = np.maximum(np.einsum("ncc->nc", covariance), 0.0)
     size = np.sqrt(variance)
@@ -88,13 +88,13 @@ def combine(
     if dofs is None or not np.isfinite(dofs).any():
         return Combined(size, covariance, dof, size, dof)
     if scales is not None:
-        each = each * scales
-        weighed = each if correlation is None else each @ correlation
-    square = np.maximum((weighed * each).sum(axis=2), 0.0)
+        standard = standard * scales
+        weighed = standard if correlation is None else standard @ correlation
+    square = np.maximum((weighed * standard).sum(axis=2), 0.0)
     sets = _correlated_sets(len(dofs), correlation)
     member = (sets[:, np.newaxis] == np.unique(sets)).astype(np.float64)
     fewest = np.array([dofs[column > 0.0].min() for column in member.T])
-    parts = np.square((weighed * each) @ member) / fewest
+    parts = np.square((weighed * standard) @ member) / fewest
     fourth, whole = parts.sum(axis=2), np.square(square)
     scale_dof = dof.copy()
     # Compared by a product: where parts of finite degrees are next to nothing, so is their sum.
@@ -126,6 +126,6 @@ def coverage_factor(dof: Floats, probability: float) -> Floats:
     """k of Student's distribution for `dof`, any shape; inf: of the normal one (GUM G.3.2)."""
     # One number of degrees of freedom at a time: there are few.
     factor = np.full(dof.shape, float(normal_quantile(0.5 + 0.5 * probability)))
-    for each in np.unique(dof[np.isfinite(dof)]):
-        factor[dof == each] = student_quantile(0.5 + 0.5 * probability, float(each))
+    for degrees in np.unique(dof[np.isfinite(dof)]):
+        factor[dof == degrees] = student_quantile(0.5 + 0.5 * probability, float(degrees))
     return factor

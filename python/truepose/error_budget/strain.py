@@ -26,16 +26,12 @@ from truepose.error_budget import worst
 from truepose.error_budget.comparison import Highest
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import DatasetRows, Schema, Variable, assemble, label, sizes
+from truepose.runs.dataset import Schema, Variable, label
 from truepose.runs.displacement import ParameterDeviation, sum_deviations
 from truepose.runs.poses import (
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
-    requested_poses,
-    required_sources,
 )
+from truepose.runs.run import Run
 from truepose.sources import Clearance, Deviation, Elastic, Loads, PoseBlock, Source
 from truepose.sources.clearance import half_clearances
 
@@ -94,31 +90,20 @@ def strain(
     """
     if not machine.kernel.overconstrained:
         raise RequestError(_nothing_strains(machine))
-    given = machine.condition if condition is None else condition
-    table = requested_poses(machine, poses)
-    sources, of_loads = _sources(machine, given)
-    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), source=len(sources)))
+    run = Run(machine, poses, condition, progress)
+    sources, of_loads = _by_loads(run.sources)
+    rows = run.begin(SCHEMA, source=len(sources))
     tally = _Tally(len(sources))
-    walk = PoseRun(machine, table, given, progress, path=poses is None and is_path(machine))
-    for block in walk:
+    for block in run:
         for source in of_loads:
-            source.deviation(machine, given, block)  # refuses what the machine cannot carry
+            source.deviation(machine, run.condition, block)  # refuses what it cannot carry
         values, fit, statuses = _evaluate(block, sources)
-        usable = walk.keep(block.indices, *statuses)
-        rows.append(block, values, usable)
-        tally.add(values, fit, usable)
+        tally.add(values, fit, run.fill(block, values, *statuses))
     if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
+        raise run.no_pose_left()
     names = np.array([source.name for source in sources], np.str_)
-    return assemble(
-        machine,
-        given,
-        SCHEMA,
-        rows,
-        table,
-        walk.left_out,
-        over_all=tally.over_all(),
-        coords={"source": label("source", names, "error source")},
+    return run.dataset(
+        over_all=tally.over_all(), coords={"source": label("source", names, "error source")}
     )
 
 
@@ -135,14 +120,14 @@ def _nothing_strains(machine: Machine) -> Problem:
     )
 
 
-def _sources(machine: Machine, condition: Condition) -> tuple[list[Source], list[Source]]:
+def _by_loads(sources: Sequence[Source]) -> tuple[list[Source], list[Source]]:
     """The sources that may not fit, and those that deflect under load; the former may be none.
 
-    Clearance is neither: it is the dead zone. Raises `RequestError` (no-source).
+    Clearance is neither: it is the dead zone.
     """
-    found = [s for s in required_sources(machine, condition) if not isinstance(s, Clearance)]
-    of_loads: list[Source] = [source for source in found if isinstance(source, _OF_LOADS)]
-    return [source for source in found if source not in of_loads], of_loads
+    of_loads: list[Source] = [source for source in sources if isinstance(source, _OF_LOADS)]
+    neither = (Clearance, *_OF_LOADS)
+    return [source for source in sources if not isinstance(source, neither)], of_loads
 
 
 @dataclass(frozen=True)
@@ -211,7 +196,7 @@ def _evaluate(
             values["force"][:, at, closures] = rest.force[:, closures]
             values["absorbed"][:, at, closures] = rest.absorbed[:, closures]
             values["strain"][:, at, closures] = rest.strain[:, closures]
-    shifts = [(each.parameters, each.shift) for each in deviations]
+    shifts = [(deviation.parameters, deviation.shift) for deviation in deviations]
     wrench = block.tool_wrench + block.own_wrench
     rest = _settle(block, sum_deviations([*shifts, *_own_weight(block)]), gaps, wrench)
     values["overall_force"] = rest.force

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
+
+from pydantic import BaseModel
 
 from truepose.files.file_table import FileTable
 from truepose.machine.condition import (
@@ -142,10 +145,10 @@ def mounting(validated: Validated) -> Vector:
     return (table.a, table.b, table.c)
 
 
-def condition(table: ConditionTable | None) -> Condition:
-    """`[condition]`, without its temperature log."""
+def condition(table: ConditionTable | None, source_tables: Iterable[BaseModel]) -> Condition:
+    """`[condition]`, without its temperature log; `source_tables`: of the keys of sources."""
     if table is None:
-        return Condition()
+        return Condition(source_tables=tuple(source_tables))
     reference = table.reference_temperature or ISO_1_REFERENCE_TEMPERATURE
     temperatures = dict(table.temperature or {})
     default = temperatures.pop(DEFAULT_PART, reference)
@@ -166,6 +169,7 @@ def condition(table: ConditionTable | None) -> Condition:
         gravity=STANDARD_GRAVITY if table.gravity is None else table.gravity,
         acceleration=_vector(table.acceleration),
         envelope=None if envelope is None else Envelope(envelope.force, envelope.normal),
+        source_tables=tuple(source_tables),
     )
 
 

@@ -7,19 +7,23 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import BaseModel, ValidationError
 
 from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
+from truepose.files.units import UnitSystem, default_units, shown_value
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine.parts import Vector, is_body
 from truepose.spatial import tangents
 
 if TYPE_CHECKING:
     from truepose.machine.temperature_log import TemperatureLog
 
+Model = TypeVar("Model", bound=BaseModel)
 
 ISO_1_REFERENCE_TEMPERATURE = 293.15
 """K: 20 degC, at which dimensions hold unless said otherwise (ISO 1)."""
@@ -82,6 +86,7 @@ class Condition:
     it names, if `part_temperatures` does not, at `time` (s; None: its last) where a run is not over
     time itself.
     `gravity` (m/s^2) acts on every mass, `acceleration` (m/s^2, base axes) is that of the platform.
+    `source_tables`: the keys of `[condition]` that error sources bring, a model of each, SI.
     """
 
     reference_temperature: float = ISO_1_REFERENCE_TEMPERATURE
@@ -95,6 +100,7 @@ class Condition:
     gravity: float = STANDARD_GRAVITY
     acceleration: Vector = (0.0, 0.0, 0.0)
     envelope: Envelope | None = None
+    source_tables: tuple[BaseModel, ...] = ()
 
     def __post_init__(self) -> None:
         temperatures = {
@@ -167,6 +173,19 @@ class Condition:
         named = dict.fromkeys([*self.part_temperatures, *self.gradients, *logged])
         return tuple(part for part in named if part != DEFAULT_PART)
 
+    def table(self, model: type[Model]) -> Model:
+        """What the condition says in the keys of a source's `model`, SI; else its defaults."""
+        return next((table for table in self.source_tables if isinstance(table, model)), model())
+
+    @property
+    def source_keys(self) -> dict[str, object]:
+        """Every key that error sources bring, and its value, SI."""
+        return {
+            key: getattr(table, key)
+            for table in self.source_tables
+            for key in type(table).model_fields
+        }
+
     @property
     def wrench(self) -> Floats:
         """(6,) force, then moment, on the tool."""
@@ -185,6 +204,7 @@ class Condition:
         gravity: float | None = None,
         acceleration: Sequence[float] | None = None,
         envelope: Envelope | float | None = None,
+        source_keys: Mapping[str, object] | None = None,
     ) -> Condition:
         """This condition with other values; what is not given stays.
 
@@ -192,9 +212,11 @@ class Condition:
         `{"default": ..., "strut.1": ...}`, where parts that are not named stay as they are.
         A default takes the place of the log's. `gradient`: K/m of parts, one number along a strut
         or drive, three of frame, platform and carriages. `envelope`: a force of any direction, N;
-        0 takes it away. Raises `RequestError` (bad-condition) for a value that is not finite or of
-        the wrong size. Parts that a machine does not have are refused where it is known: by
-        `truepose.budget`, `truepose.compensate` and `Machine.with_condition`.
+        0 takes it away. `source_keys`: keys that error sources bring, SI or with a unit, as
+        `{"humidity": "60 %"}`. Raises `RequestError` (bad-condition) for a value that is not finite
+        or of the wrong size, or a key that no source brings. Parts that a machine does not have are
+        refused where it is known: by `truepose.budget`, `truepose.compensate` and
+        `Machine.with_condition`.
         """
         changes: dict[str, object] = {}
         if isinstance(temperature, Mapping):
@@ -232,7 +254,24 @@ class Condition:
         if envelope is not None:
             given = envelope if isinstance(envelope, Envelope) else Envelope(float(envelope))
             changes["envelope"] = given if given.force > 0.0 else None
+        if source_keys is not None:
+            changes["source_tables"] = self._with_source_keys(source_keys)
         return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
+
+    def _with_source_keys(self, values: Mapping[str, object]) -> tuple[BaseModel, ...]:
+        known = self.source_keys
+        expected = one_of(known) if known else "no key: the machine's error sources bring none"
+        for key in values:
+            if key not in known:
+                raise _bad(key, key, expected, did_you_mean(key, known))
+        return tuple(
+            _validated(
+                type(table),
+                {key: value for key, value in values.items() if key in type(table).model_fields},
+                table,
+            )
+            for table in self.source_tables
+        )
 
     def __getstate__(self) -> dict[str, object]:
         return vars(self) | {name: dict(getattr(self, name)) for name in _MAPPINGS}
@@ -258,7 +297,24 @@ def _vector(name: str, values: Sequence[float]) -> Vector:
     return (x, y, z)
 
 
-def _bad(name: str, found: str, expected: str) -> RequestError:
+def _validated(model: type[BaseModel], values: Mapping[str, object], table: BaseModel) -> BaseModel:
+    """The `table` of a source with new `values` in it, SI or with a unit."""
+    if not values:
+        return table
+    try:
+        read = model.model_validate(dict(values), context={"units": UnitSystem(default_units())})
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        fault = first.get("ctx", {}).get("fault")
+        raise _bad(
+            str(first["loc"][0]),
+            shown_value(first["input"]),
+            first["msg"] if fault is None else fault.expected,
+        ) from None
+    return table.model_copy(update={key: getattr(read, key) for key in values})
+
+
+def _bad(name: str, found: str, expected: str, hint: str | None = None) -> RequestError:
     return RequestError(
         Problem(
             "bad-condition",
@@ -266,5 +322,6 @@ def _bad(name: str, found: str, expected: str) -> RequestError:
             path=f"condition.{name}",
             found=found,
             expected=expected,
+            hint=hint,
         )
     )

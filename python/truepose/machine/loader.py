@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
+from pydantic import BaseModel
+
 from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.data_file import DataFiles
 from truepose.files.document import Document, read
@@ -99,7 +101,13 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
     data_files = DataFiles(document)
     drives = build_parts.drives(validated)
     struts = build_parts.struts(validated)
-    condition = _condition(validated, data_files, drives, struts)
+    condition = _condition(
+        validated,
+        data_files,
+        drives,
+        struts,
+        dict.fromkeys(s.tables["condition"] for s in registry if "condition" in s.tables),
+    )
     workspace, home = build_workspace.workspace(document, validated, data_files, problems)
     _raise([*problems, *data_files.problems])
     guides = build_parts.guides(validated)
@@ -174,10 +182,12 @@ def _condition(
     data_files: DataFiles,
     drives: Sequence[Drive],
     struts: Sequence[Strut],
+    of_sources: Iterable[type[BaseModel]],
 ) -> Condition:
-    """The condition with its temperature log."""
+    """The condition with its temperature log and the keys that sources bring."""
     table = validated.table(ConditionTable)
-    condition = build_parts.condition(table)
+    source_tables = [validated.table(model) or model() for model in of_sources]
+    condition = build_parts.condition(table, source_tables)
     if table is None or table.temperature_log is None:
         return condition
     carriages = [drive.carriage.part for drive in drives if drive.carriage is not None]

@@ -75,10 +75,10 @@ class Copula:
 
     def variables(self, normals: Floats) -> Floats:
         """(s, k) variables t from z (s, k)."""
-        found = np.empty_like(normals)
+        variables = np.empty_like(normals)
         for column, distribution in enumerate(self.distributions):
-            found[:, column] = shaped(distribution, normals[:, column])
-        return found
+            variables[:, column] = shaped(distribution, normals[:, column])
+        return variables
 
 
 def shaped(distribution: Distribution, normals: Floats) -> Floats:
@@ -92,7 +92,7 @@ def shaped(distribution: Distribution, normals: Floats) -> Floats:
 
 def _latent(distributions: Sequence[Distribution], stated: Floats, names: Sequence[str]) -> Floats:
     """(k, k) correlation of z that gives the variables the correlation `stated` (k, k)."""
-    if all(each.name == NORMAL for each in distributions):
+    if all(distribution.name == NORMAL for distribution in distributions):
         return stated
     latent = np.eye(len(stated))
     for i in range(len(stated)):
@@ -129,5 +129,5 @@ def _semidefinite(matrix: Floats, stated: Floats, names: Sequence[str]) -> Float
         )
     lifted = (vectors * np.maximum(values, 0.0)) @ vectors.T
     size = np.sqrt(np.diag(lifted))
-    found: Floats = lifted / np.outer(size, size)
-    return found
+    correlation: Floats = lifted / np.outer(size, size)
+    return correlation

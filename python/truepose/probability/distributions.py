@@ -1,10 +1,10 @@
 """How a deviation spreads inside its band: the distribution of its variable t.
 
-A column deviates by `shift + swing * t`. The variable is standardised: its mean is 0, and its
-standard deviation 1 / sigmas, so that the half band is |swing|. Bounded distributions have t in
-[-1, 1], and reach both ends, but for listed values that lie further to one side of their mean than
-to the other: those end where the values do. GUM (JCGM 100:2008) 4.3.5, 4.3.7, 4.3.9; JCGM 101:2008,
-6.4.
+A column deviates by `shift + half_width * t`. The variable is standardised: its mean is 0, and its
+standard deviation 1 / sigmas, so that the half band is |half_width|. Bounded distributions have t
+in [-1, 1], and reach both ends, but for listed values that lie further to one side of their mean
+than to the other: those end where the values do. GUM (JCGM 100:2008) 4.3.5, 4.3.7, 4.3.9;
+JCGM 101:2008, 6.4.
 """
 
 from __future__ import annotations

@@ -37,7 +37,9 @@ class Domain:
     @classmethod
     def of(cls, distributions: Sequence[Distribution], directions: Sequence[Indices] = ()) -> Self:
         """Of variables (v,) with these distributions."""
-        ends = np.array([each.ends for each in distributions], np.float64).reshape(-1, 2)
+        ends = np.array([distribution.ends for distribution in distributions], np.float64).reshape(
+            -1, 2
+        )
         return cls(
             ends[:, 0].copy(),
             ends[:, 1].copy(),
@@ -115,10 +117,10 @@ def unit(vectors: Floats) -> Floats:
     largest = np.abs(vectors).max(axis=-1, keepdims=True)
     scaled = np.divide(vectors, largest, out=np.zeros_like(vectors), where=largest > 0.0)
     size = np.sqrt(np.square(scaled).sum(axis=-1, keepdims=True))
-    found: Floats = np.where(
+    along: Floats = np.where(
         size > 0.0, np.divide(scaled, size, out=np.zeros_like(scaled), where=size > 0.0), axis
     )
-    return found
+    return along
 
 
 __all__ = ["Domain", "unit"]

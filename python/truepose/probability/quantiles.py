@@ -130,7 +130,7 @@ def normal_quantile(u: ArrayLike) -> Floats:
 
 
 def _rational(coefficients: tuple[tuple[float, ...], tuple[float, ...]], at: Floats) -> Floats:
-    above, below = (np.polyval(each, at) for each in coefficients)
+    above, below = (np.polyval(coefficient, at) for coefficient in coefficients)
     value: Floats = above / below
     return value
 

@@ -65,6 +65,7 @@ def condition(of: Machine) -> Table:
         rows.append(("further force on the tool", force))
     if any(it.acceleration):
         rows.append(("acceleration of the platform", _vector(it.acceleration, Shown("m/s²", 1.0))))
+    rows += [(key, f"{value}") for key, value in it.source_keys.items()]
     if asked.target is not None:
         rows.append(("accuracy asked", asked.said("position")))
     if asked.angle_target is not None:

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,6 +106,8 @@ def sizes(machine: Machine, n_pose: int, **others: int) -> dict[str, int]:
         "component": len(machine.components),
         "joint": len(machine.joints),
         "closure": len(machine.closures),
+        "other_component": len(machine.components),
+        "quantity": len(quantities(machine.components)),
         **others,
     }
 
@@ -122,11 +124,8 @@ def assemble(
     coords: Mapping[str, xr.Variable] | None = None,
 ) -> xr.Dataset:
     """The Dataset of `schema`: `rows` over poses, `over_all` what has no pose, more `coords`."""
-    values = {**rows.arrays, **(over_all or {})}
-    data = {
-        name: xr.Variable(variable.dims, values[name], _attrs(machine, variable))
-        for name, variable in schema.items()
-    }
+    values, units = {**rows.arrays, **(over_all or {})}, _units(machine)
+    data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
         **_machine_coords(machine, schema),
         **_pose_coords(machine, rows, poses),
@@ -142,10 +141,8 @@ def region_dataset(
     machine: Machine, condition: Condition, schema: Schema, values: Mapping[str, Any]
 ) -> xr.Dataset:
     """The Dataset of a result over a continuous region, which has no dim pose."""
-    data = {
-        name: xr.Variable(variable.dims, values[name], _attrs(machine, variable))
-        for name, variable in schema.items()
-    }
+    units = _units(machine)
+    data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
         "component": label("component", list(machine.components), "component of the error"),
         "component_units": label("component", component_units(machine), "unit of the component"),
@@ -161,12 +158,12 @@ def label(dim: str, values: Any, long_name: str, units: str = "1") -> xr.Variabl
     return xr.Variable((dim,), values, {"long_name": long_name, "units": units})
 
 
-def quantity_coords(machine: Machine) -> dict[str, xr.Variable]:
+def quantity_coords(machine: Machine, long_name: str = "what has a size") -> dict[str, xr.Variable]:
     """What has a size, position and orientation, and its unit."""
     kinds = list(quantities(machine.components))
     units = [QUANTITY_UNITS[kind] for kind in kinds]
     return {
-        "quantity": label("quantity", kinds, "what has a size"),
+        "quantity": label("quantity", kinds, long_name),
         "quantity_units": label("quantity", units, "unit of the quantity"),
     }
 
@@ -187,22 +184,37 @@ def component_units(machine: Machine) -> list[str]:
     return ["m" if name in POSITIONS else "rad" for name in machine.components]
 
 
-def _attrs(machine: Machine, variable: Variable) -> dict[str, str]:
-    units = variable.units
-    if units == "covariance":
-        units = _PRODUCTS["rad" in component_units(machine), "m" in component_units(machine)]
-    found = {
-        "component": component_units(machine),
+def units_of(kind: str, units: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """`units` of a variable: one for all, or all of them and the coordinate that has each.
+
+    `units`: of each entry along a dim, by the dim; a `kind` that is none of them is the unit.
+    """
+    if kind not in units:
+        return {"units": kind}
+    distinct = dict.fromkeys(units[kind])
+    of_all = {"units": ", ".join(distinct) or "1"}
+    return of_all if len(distinct) < 2 else {**of_all, "units_by": f"{kind}_units"}
+
+
+def data_variable(
+    variable: Variable, values: Any, units: Mapping[str, Sequence[str]]
+) -> xr.Variable:
+    """`values` as a labelled variable, `units` as in `units_of`."""
+    of_unit = units_of(variable.units, units)
+    attrs = {"units": of_unit.pop("units"), "long_name": variable.long_name, **of_unit}
+    return xr.Variable(variable.dims, values, attrs)
+
+
+def _units(machine: Machine) -> dict[str, Sequence[str]]:
+    """Units along each dim that a machine has."""
+    components = component_units(machine)
+    return {
+        "component": components,
+        "covariance": [_PRODUCTS["rad" in components, "m" in components]],
         "joint": joint_units(machine),
         "quantity": [QUANTITY_UNITS[kind] for kind in quantities(machine.components)],
         "commanded": commanded_units(machine),
-    }.get(units)
-    if found is None:
-        return {"units": units, "long_name": variable.long_name}
-    # One unit for all, or the name of the coordinate that has each.
-    named = ", ".join(dict.fromkeys(found))
-    attrs = {"units": named, "long_name": variable.long_name}
-    return attrs if "," not in named else {**attrs, "units_by": f"{units}_units"}
+    }
 
 
 def _machine_coords(machine: Machine, schema: Schema) -> dict[str, xr.Variable]:
@@ -284,7 +296,9 @@ def _condition(condition: Condition) -> dict[str, object]:
             "default": condition.default_temperature,
             **condition.part_temperatures,
         },
-        "gradient_K_per_m": {part: list(each) for part, each in condition.gradients.items()},
+        "gradient_K_per_m": {
+            part: list(gradient) for part, gradient in condition.gradients.items()
+        },
         "temperature_log": condition.temperature_log is not None,
         "time_s": condition.time,
         "force_N": list(condition.force),
@@ -293,4 +307,9 @@ def _condition(condition: Condition) -> dict[str, object]:
         "envelope_normal": None if envelope is None else envelope.normal,
         "gravity_m_per_s2": condition.gravity,
         "acceleration_m_per_s2": list(condition.acceleration),
+        **{
+            key: value
+            for table in condition.source_tables
+            for key, value in table.model_dump(mode="json").items()
+        },
     }

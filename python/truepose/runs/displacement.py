@@ -111,12 +111,12 @@ def at_shifts(
     status that is not.
     """
     shifted = [moved for moved in alone if moved[1].any()]
-    found = np.full(block.indices.size, OK, np.uint8)
+    status_of_all = np.full(block.indices.size, OK, np.uint8)
     # One source that moves anything is all of them together.
     for moved in [*(shifted if len(shifted) > 1 else []), all_]:
         _, status = _error(machine, block, moved)
-        found = np.where(found == OK, status, found)
-    return found
+        status_of_all = np.where(status_of_all == OK, status, status_of_all)
+    return status_of_all
 
 
 def source_edges(machine: Machine, block: PoseBlock, deviation: Deviation) -> Edges:

@@ -22,24 +22,24 @@ EVERY = slice(None)
 
 
 def first_order(
-    machine: Machine, block: PoseBlock, spread: Variables, poses: slice = EVERY
+    machine: Machine, block: PoseBlock, variables: Variables, poses: slice = EVERY
 ) -> tuple[Floats, Floats, np.ndarray]:
     """Value (n, m) and effects (n, m, n_variable), m and rad, and a kernel status (n,).
 
     At some `poses` of the block; derivatives where all variables are 0, so about the shifts.
     """
     joints, placements = block.joints[poses], block.placements[poses]
-    parameters, shift = spread.shift
+    parameters, shift = variables.shift
     moved = np.ascontiguousarray(rows_of(shift, poses))
     value, status = displacement(machine, joints, placements, (parameters, moved))
-    slopes, regular = effects_at(machine, block, spread, (parameters, moved), poses)
+    slopes, regular = effects_at(machine, block, variables, (parameters, moved), poses)
     return value, slopes, np.where(status == OK, regular, status)
 
 
 def effects_at(
     machine: Machine,
     block: PoseBlock,
-    spread: Variables,
+    variables: Variables,
     moved: ParameterDeviation,
     poses: slice = EVERY,
 ) -> tuple[Floats, np.ndarray]:
@@ -48,33 +48,33 @@ def effects_at(
     At some `poses` of the block; `moved` at these.
     """
     slopes, status = machine.kernel.sensitivity_moved(
-        block.joints[poses], block.placements[poses], spread.columns, *moved
+        block.joints[poses], block.placements[poses], variables.columns, *moved
     )
-    slopes *= rows_of(spread.half_width, poses)[:, np.newaxis]
-    count = len(spread.names)
-    if np.array_equal(spread.variables, np.arange(count)):
+    slopes *= rows_of(variables.half_width, poses)[:, np.newaxis]
+    count = len(variables.names)
+    if np.array_equal(variables.variable_of, np.arange(count)):
         return slopes, status
-    member = np.zeros((spread.columns.size, count))
-    member[np.arange(spread.columns.size), spread.variables] = 1.0
+    member = np.zeros((variables.columns.size, count))
+    member[np.arange(variables.columns.size), variables.variable_of] = 1.0
     return slopes @ member, status
 
 
 class ExactError:
     """Evaluates the exact error at any poses of a block, each with variables of its own."""
 
-    def __init__(self, machine: Machine, block: PoseBlock, spread: Variables) -> None:
-        self._machine, self._block, self._spread = machine, block, spread
-        parameters, shift = spread.shift
-        every = np.union1d(parameters, spread.columns)
+    def __init__(self, machine: Machine, block: PoseBlock, variables: Variables) -> None:
+        self._machine, self._block, self._variables = machine, block, variables
+        parameters, shift = variables.shift
+        every = np.union1d(parameters, variables.columns)
         self._parameters: Indices = np.asarray(every, np.intp)
         self._shift = np.zeros((len(shift), every.size))
         self._shift[:, np.searchsorted(every, parameters)] = shift
-        self._place = np.searchsorted(every, spread.columns)
+        self._place = np.searchsorted(every, variables.columns)
 
     def __call__(self, poses: Indices, t: Floats) -> tuple[Floats, np.ndarray]:
         """Errors (s, m) and kernel status (s,) at poses (s,) of the block, variables (s, v)."""
-        moved = t[:, self._spread.variables]
-        moved *= _at(self._spread.half_width, poses)
+        moved = t[:, self._variables.variable_of]
+        moved *= _at(self._variables.half_width, poses)
         values = _at(self._shift, poses) + np.zeros((len(t), 1))
         if np.unique(self._place).size == self._place.size:
             values[:, self._place] += moved

@@ -158,7 +158,7 @@ class PoseRun:
         self.machine = machine
         self.poses = poses
         self.left_out = SkippedPoses()
-        self._condition = condition
+        self.condition = condition
         self._progress = progress
         self._times = times
         self._travel = Travel(machine) if path else None
@@ -178,7 +178,7 @@ class PoseRun:
         indices = np.arange(start, start + len(poses), dtype=np.intp)
         block = PoseBlock(
             self.machine,
-            self._condition,
+            self.condition,
             self.poses,
             indices,
             joints,
@@ -210,12 +210,12 @@ def finite_or(status: np.ndarray, *values: Floats) -> np.ndarray:
 
     The last look at what goes on into results: no infinity reaches one with a status that is ok.
     """
-    found = status
+    codes = status
     for rows in values:
         with np.errstate(over="ignore", invalid="ignore"):
             finite = np.isfinite(rows @ np.ones(rows.shape[1]))
-        found = np.where((found == OK) & ~finite, NOT_CONVERGED, found).astype(np.uint8)
-    return found
+        codes = np.where((codes == OK) & ~finite, NOT_CONVERGED, codes).astype(np.uint8)
+    return codes
 
 
 def of_band(status: np.ndarray) -> np.ndarray:
@@ -276,9 +276,9 @@ class Travel:
         at = _carried_on(np.concatenate([self._at, joints]), np.isfinite)
         steps = np.diff(at, axis=0)
         moved = np.where(np.abs(steps) > self._still, np.sign(steps), 0.0)  # NaN: no step yet
-        found = _carried_on(np.concatenate([self._direction, moved]), np.abs)
-        self._at, self._direction = at[-1:], found[-1:]
-        return found[1:]
+        direction = _carried_on(np.concatenate([self._direction, moved]), np.abs)
+        self._at, self._direction = at[-1:], direction[-1:]
+        return direction[1:]
 
 
 def _carried_on(rows: Floats, counts: Callable[[Floats], np.ndarray]) -> Floats:
@@ -297,7 +297,7 @@ def no_pose_left(
     """
     _, status = left_out.sorted()
     names, counts = np.unique(status, return_counts=True)
-    found = ", ".join(
+    reasons = ", ".join(
         f"{count} {'where ' if name == BAND else ''}{reason_text(str(name))}"
         for name, count in zip(names, counts, strict=True)
     )
@@ -320,7 +320,7 @@ def no_pose_left(
             file=machine.file,
             line=machine.workspace.line if of_file and machine.workspace else None,
             path="workspace" if of_file else None,
-            found=found + (f"; {nearest[1]}" if nearest else ""),
+            found=reasons + (f"; {nearest[1]}" if nearest else ""),
             expected="poses that the machine can reach, within travel and off singularities",
             hint="move the workspace, or check lengths, travel and working_mode"
             if nearest

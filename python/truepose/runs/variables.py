@@ -1,4 +1,4 @@
-"""Spread: what all sources leave unknown at the poses of a block, as one set of variables.
+"""Variables: what all sources leave unknown at the poses of a block, as one set of variables.
 
     deviation of the parameters = shift + sum over columns of half_width t[variable],   t in the
     domain
@@ -10,6 +10,7 @@ are worked out here once, for everything that combines them.
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,8 +22,11 @@ from truepose.arrays import Flags, Floats, Indices
 from truepose.machine import Machine
 from truepose.probability.domain import Domain
 from truepose.runs.displacement import ParameterDeviation, sum_deviations
-from truepose.sources import REGISTRY, Deviation, PoseBlock, Source
+from truepose.sources import Deviation, PoseBlock, Source
 from truepose.sources.deviation import Distribution
+
+STREAM_BYTES = 4
+"""Of a hash: numbers of a variable and of its stream have room together in 64 bits."""
 
 ROUNDING = 1e-14
 """By which a band is made wider where its middle and its half are rounded, so that none is lost."""
@@ -35,18 +39,18 @@ class Variables:
     `shift`: parameters, each once, and their values (n or 1, k0) where all variables are 0;
     `alone`: the same of each source.
     `columns` (k,): kernel parameter of each column that has a band; one may repeat.
-    `variables` (k,): which variable moves the column; `half_width` (n or 1, k): its deviation,
+    `variable_of` (k,): which variable moves the column; `half_width` (n or 1, k): its deviation,
     m, rad or 1, where that variable is +1. `distributions`, `names` (unique) and `sources` of
     the n_variable variables, and the `domain` that they lie in. `streams`, `numbers`
-    (n_variable,): identity for random numbers, whatever else acts: the place of the source in
-    the registry, and the variable's number in that source's deviation. `correlation`
+    (n_variable,): identity for random numbers, whatever else acts: `stream_of` the source's name,
+    and the variable's number in that source's deviation. `correlation`
     (n_variable, n_variable): Pearson's; None where all are independent.
     """
 
     shift: ParameterDeviation
     alone: tuple[ParameterDeviation, ...]
     columns: Indices
-    variables: Indices
+    variable_of: Indices
     half_width: Floats
     distributions: tuple[Distribution, ...]
     names: tuple[str, ...]
@@ -69,7 +73,7 @@ class Variables:
         """
         if self.domain.symmetric:
             return self
-        middle, half = self.domain.middle[self.variables], self.domain.half[self.variables]
+        middle, half = self.domain.middle[self.variable_of], self.domain.half[self.variable_of]
         half = half * (1.0 + ROUNDING)
         ones = np.ones(len(self.names))
         return dataclasses.replace(
@@ -88,14 +92,14 @@ class Variables:
         return dataclasses.replace(
             self,
             shift=_rows(self.shift, poses),
-            alone=tuple(_rows(each, poses) for each in self.alone),
+            alone=tuple(_rows(shift, poses) for shift in self.alone),
             half_width=self.half_width if len(self.half_width) == 1 else self.half_width[poses],
         )
 
     def parameters_moved(self, t: Floats) -> ParameterDeviation:
         """Parameters, each once, and their deviations (s, k) where the variables are t (s, v).
 
-        Of a spread at one pose.
+        Of the variables at one pose.
         """
         parameters, shift, moves = self._matrix
         return parameters, shift + np.asarray(t, np.float64) @ moves
@@ -105,10 +109,12 @@ class Variables:
         """Parameters (k,), shift (1, k), and what each variable moves (n_variable, k), one pose."""
         parameters, shift = self.shift
         if len(shift) != 1 or len(self.half_width) != 1:
-            raise ValueError("a spread over several poses; take one of them with at()")
+            raise ValueError("variables over several poses; take one of them with at()")
         every = np.union1d(parameters, self.columns).astype(np.intp)
         moves = np.zeros((len(self.names), every.size))
-        np.add.at(moves, (self.variables, np.searchsorted(every, self.columns)), self.half_width[0])
+        np.add.at(
+            moves, (self.variable_of, np.searchsorted(every, self.columns)), self.half_width[0]
+        )
         centre = np.zeros((1, every.size))
         centre[:, np.searchsorted(every, parameters)] = shift
         moved = centre[0].astype(np.bool_) | moves.any(axis=0)
@@ -126,39 +132,39 @@ def variables_of(
 ) -> Variables:
     """The same from what each source says there."""
     parts = [
-        _part(machine, source, position, deviation)
-        for position, (source, deviation) in enumerate(zip(sources, deviations, strict=True))
+        _part(machine, source, deviation)
+        for source, deviation in zip(sources, deviations, strict=True)
     ]
     counts = [len(part.names) for part in parts]
     first = np.cumsum([0, *counts])
     names = [name for part in parts for name in part.names]
     owners = [part.source for part in parts for _ in part.names]
-    swings = [part.half_width for part in parts]
-    rows = max((len(swing) for swing in swings), default=1)
+    half_widths = [part.half_width for part in parts]
+    rows = max((len(table) for table in half_widths), default=1)
     empty = np.empty(0, np.intp)
     alone = tuple((part.deviation.parameters, part.deviation.shift) for part in parts)
     return Variables(
         shift=sum_deviations(alone),
         alone=alone,
         columns=np.concatenate([empty, *(part.columns for part in parts)]),
-        variables=np.concatenate(
-            [empty, *(part.variables + at for part, at in zip(parts, first[:-1], strict=True))]
+        variable_of=np.concatenate(
+            [empty, *(part.variable_of + at for part, at in zip(parts, first[:-1], strict=True))]
         ),
         half_width=np.concatenate(
             [
                 np.empty((rows, 0)),
-                *(np.broadcast_to(each, (rows, each.shape[1])) for each in swings),
+                *(np.broadcast_to(table, (rows, table.shape[1])) for table in half_widths),
             ],
             axis=1,
         ),
-        distributions=tuple(each for part in parts for each in part.distributions),
+        distributions=tuple(distribution for part in parts for distribution in part.distributions),
         names=_unique(names, owners),
         sources=tuple(owners),
         streams=np.repeat([part.stream for part in parts], counts).astype(np.intp),
         numbers=np.concatenate([empty, *(part.numbers for part in parts)]),
         correlation=_correlation(parts, first),
         domain=Domain.of(
-            [each for part in parts for each in part.distributions],
+            [distribution for part in parts for distribution in part.distributions],
             [
                 members + at
                 for part, at in zip(parts, first[:-1], strict=True)
@@ -166,6 +172,11 @@ def variables_of(
             ],
         ),
     )
+
+
+def stream_of(source: str) -> int:
+    """The stream of random numbers of a source, by its name: others beside it do not change it."""
+    return int.from_bytes(hashlib.sha256(source.encode()).digest()[:STREAM_BYTES], "big")
 
 
 def _rows(moved: ParameterDeviation, poses: Flags | slice) -> ParameterDeviation:
@@ -182,36 +193,33 @@ class _Part:
     stream: int
     deviation: Deviation
     columns: Indices
-    variables: Indices
+    variable_of: Indices
     half_width: Floats
     numbers: Indices
     names: tuple[str, ...]
     distributions: tuple[Distribution, ...]
 
 
-def _part(machine: Machine, source: Source, position: int, deviation: Deviation) -> _Part:
+def _part(machine: Machine, source: Source, deviation: Deviation) -> _Part:
     banded = deviation.banded
     numbers, variables = deviation.banded_variables
     columns = deviation.parameters[banded]
     first = [int(banded[np.flatnonzero(variables == at)[0]]) for at in range(numbers.size)]
     names = []
     for at, column in enumerate(first):
-        moved = [machine.parameters[each] for each in columns[variables == at]]
+        moved = [machine.parameters[parameter] for parameter in columns[variables == at]]
         group = deviation.group_names.get(int(deviation.groups[column]))
         direction = any(at in members for members in deviation.domain.directions)
         if len(moved) == 1 and not direction:
             names.append(moved[0])
         else:
             names.append(group or f"{source.name}: {moved[0]} and others")
-    kinds: list[type] = list(REGISTRY)
-    kind = type(source)
     return _Part(
         source=source.name,
-        # One that no registry has comes after all that it has, in the order given.
-        stream=kinds.index(kind) if kind in kinds else len(kinds) + position,
+        stream=stream_of(source.name),
         deviation=deviation,
         columns=columns,
-        variables=variables,
+        variable_of=variables,
         half_width=deviation.signed_half[:, banded],
         numbers=numbers,
         names=tuple(names),
@@ -240,12 +248,12 @@ def _unique(names: Sequence[str], owners: Sequence[str]) -> tuple[str, ...]:
 
 def _correlation(parts: Sequence[_Part], first: Indices) -> Floats | None:
     """The sources' own, side by side: causes of different sources are independent."""
-    found = [part.deviation.banded_correlation for part in parts]
-    if all(each is None for each in found):
+    correlations = [part.deviation.banded_correlation for part in parts]
+    if all(correlation is None for correlation in correlations):
         return None
     matrix = np.eye(int(first[-1]))
-    for at, each in enumerate(found):
-        if each is not None:
+    for at, correlation in enumerate(correlations):
+        if correlation is not None:
             own = slice(int(first[at]), int(first[at + 1]))
-            matrix[own, own] = each
+            matrix[own, own] = correlation
     return matrix

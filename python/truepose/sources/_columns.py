@@ -49,13 +49,13 @@ class Columns:
     def deviation(self) -> Deviation:
         """All columns, (n or 1, k)."""
         shift = _side_by_side([shift for shift, _ in self._tables])
-        swing = _side_by_side([swing for _, swing in self._tables])
+        half_width = _side_by_side([half_width for _, half_width in self._tables])
         return Deviation.of(
             self._parameters,
             shift,
-            np.abs(swing),
+            np.abs(half_width),
             groups=np.array(self._groups, np.intp),
-            sign=np.where(swing < 0.0, -1.0, 1.0),
+            sign=np.where(half_width < 0.0, -1.0, 1.0),
             edge=np.array(self._edge, np.bool_),
             distribution=self._distributions,
         )
@@ -64,5 +64,5 @@ class Columns:
 def _side_by_side(columns: list[ArrayLike]) -> np.ndarray[Any, np.dtype[np.float64]]:
     if not columns:
         return np.empty((1, 0))
-    each = np.broadcast_arrays(*(np.atleast_1d(np.asarray(one, np.float64)) for one in columns))
-    return np.stack(each, axis=1)
+    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(one, np.float64)) for one in columns))
+    return np.stack(arrays, axis=1)

@@ -126,13 +126,13 @@ def _require_coefficients(
     parts: SourceBuilder, coefficients: Sequence[float], path: str, where: str = ""
 ) -> None:
     """Record a problem for the first of them that is no number from -1 to 1."""
-    for each in coefficients:
-        if not -1.0 <= each <= 1.0:
+    for coefficient in coefficients:
+        if not -1.0 <= coefficient <= 1.0:
             parts.refuse(
                 Fault(
                     "bad-correlation",
                     f"{where}a correlation coefficient is from -1 to 1",
-                    found=f"{each:g}",
+                    found=f"{coefficient:g}",
                     expected="a number from -1 to 1",
                 ),
                 path,
@@ -190,8 +190,8 @@ class _Names:
         taken: dict[int, str] = {}
         fine = True
         for word in between:
-            found = self._of(word, path)
-            doubled = next((number for number in found if number in taken), None)
+            variable = self._of(word, path)
+            doubled = next((number for number in variable if number in taken), None)
             if doubled is not None:
                 self._parts.refuse(
                     Fault(
@@ -203,8 +203,8 @@ class _Names:
                     ),
                     f"{path}.between",
                 )
-            fine = fine and bool(found) and doubled is None
-            taken |= dict.fromkeys(found, word)
+            fine = fine and bool(variable) and doubled is None
+            taken |= dict.fromkeys(variable, word)
         if fine and len(taken) < 2:
             self._parts.refuse(
                 Fault(

@@ -43,11 +43,11 @@ def not_included(machine: Machine, condition: Condition) -> tuple[str, ...]:
     def rigid(part: Body | Drive) -> bool:
         return part.expansion is None and _is_off(condition, part.part)
 
-    found = [machine.frame.part] if rigid(machine.frame) else []
+    names = [machine.frame.part] if rigid(machine.frame) else []
     if rigid(platform) and points.on_platform_away_from(platform.anchor):
-        found.append(platform.part)
+        names.append(platform.part)
     if rigid(machine.tool) and platform.expansion is None and points.tool_is_held_elsewhere:
-        found.append(machine.tool.part)
+        names.append(machine.tool.part)
     for drive in machine.drives:
         if not rigid(drive):
             continue
@@ -56,12 +56,12 @@ def not_included(machine: Machine, condition: Condition) -> tuple[str, ...]:
         else:
             counts = drive.carriage is not None or struts[drive.name].expansion is None
         if counts:
-            found.append(drive.part)
+            names.append(drive.part)
     for drive in machine.drives:
         carriage = drive.carriage
         if carriage is not None and rigid(carriage) and points.carried_off_axis(drive):
-            found.append(carriage.part)
-    return tuple(found)
+            names.append(carriage.part)
+    return tuple(names)
 
 
 def not_included_text(machine: Machine, condition: Condition) -> str:
@@ -131,8 +131,8 @@ def located(parts: SourceBuilder, problem: Problem) -> Problem:
     """A part that the file does not describe is wrong where the condition names it."""
     part = str(problem.path)
     named = (f"condition.temperature.{part}", f"condition.gradient.{part}", ASKED_BY[2])
-    found = next((path for path in (part, *named) if parts.has(path)), part)
-    return replace(problem, path=found)
+    stated = next((path for path in (part, *named) if parts.has(path)), part)
+    return replace(problem, path=stated)
 
 
 def twice(

@@ -154,15 +154,21 @@ class Actuator:
     def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """Of offsets, m or rad, and scales, (n or 1, k)."""
         columns = Columns()
-        for each in self.actuations:
-            if each.lead_error is not None:
-                add_scale_error(columns, machine, each.drive, each.lead_error, each.zero_at)
-            offset = machine.parameters.index(f"{each.drive}.offset")
-            if each.periodic is not None:
-                _add_periodic(columns, offset, each.periodic, block.drive_joints[:, each.joint])
-            if each.table is not None:
-                travel = None if block.travel is None else block.travel[:, each.joint]
-                _add_table(columns, offset, each.table, block.drive_joints[:, each.joint], travel)
+        for actuation in self.actuations:
+            if actuation.lead_error is not None:
+                add_scale_error(
+                    columns, machine, actuation.drive, actuation.lead_error, actuation.zero_at
+                )
+            offset = machine.parameters.index(f"{actuation.drive}.offset")
+            if actuation.periodic is not None:
+                _add_periodic(
+                    columns, offset, actuation.periodic, block.drive_joints[:, actuation.joint]
+                )
+            if actuation.table is not None:
+                travel = None if block.travel is None else block.travel[:, actuation.joint]
+                _add_table(
+                    columns, offset, actuation.table, block.drive_joints[:, actuation.joint], travel
+                )
         return columns.deviation()
 
 
@@ -180,7 +186,7 @@ def _actuation(parts: SourceBuilder, joint: int, drive: Drive, row: ActuatorTabl
                 ),
                 f"{path}.{key}",
             )
-    found = None
+    positioning = None
     if row.table is not None:
         for key in _IN_A_TABLE:
             if parts.has(f"{drive.part}.{key}"):
@@ -193,14 +199,14 @@ def _actuation(parts: SourceBuilder, joint: int, drive: Drive, row: ActuatorTabl
                     ),
                     f"{path}.table",
                 )
-        found = read_positioning(parts, drive, row.table, f"{path}.table")
+        positioning = read_positioning(parts, drive, row.table, f"{path}.table")
     return Actuation(
         drive.part,
         joint,
         row.lead_error,
         row.zero_at,
         row.periodic,
-        found,
+        positioning,
     )
 
 

@@ -64,7 +64,7 @@ class Backlash:
     @classmethod
     def build(cls, parts: SourceBuilder) -> Self | None:
         """From `backlash` of the drives; None where no drive has it."""
-        found = []
+        of_drives = []
         for index, (drive, row) in enumerate(
             zip(parts.drives, parts.rows(DriveBacklash), strict=True)
         ):
@@ -72,10 +72,10 @@ class Backlash:
                 continue
             if drive.feedback == "direct":
                 _refuse_direct(parts, drive)
-            found.append((index, row.backlash.play, row.backlash.threshold))
-        if not found:
+            of_drives.append((index, row.backlash.play, row.backlash.threshold))
+        if not of_drives:
             return None
-        joints, plays, thresholds = zip(*found, strict=True)
+        joints, plays, thresholds = zip(*of_drives, strict=True)
         return cls(joints, plays, thresholds)
 
     def acts(self, condition: Condition) -> bool:

@@ -68,12 +68,12 @@ class Clearance:
     def build(cls, parts: SourceBuilder) -> Self | None:
         """From the joints of the struts; None where none has play."""
         table = parts.table(ClearanceTable)
-        found = []
+        clearances = []
         for index, strut in enumerate(parts.struts):
             for end, joint in enumerate(strut.joints):
                 if not (joint.clearance or joint.axial_clearance):
                     continue
-                found.append(JointOfStrut(index, end))
+                clearances.append(JointOfStrut(index, end))
                 if joint.kind == "revolute" and joint.axis is None:
                     parts.refuse(
                         Fault(
@@ -84,9 +84,9 @@ class Clearance:
                         ),
                         f"{strut.part}.{_ENDS[end]}.axis",
                     )
-        if not found and table is None:
+        if not clearances and table is None:
             return None
-        return cls(tuple(found), 0.0 if table is None else table.threshold)
+        return cls(tuple(clearances), 0.0 if table is None else table.threshold)
 
     def acts(self, condition: Condition) -> bool:
         """In every condition."""

@@ -94,7 +94,9 @@ class Deviation:
         """A deviation from plain values: a number or a (k,) array stands for every pose."""
         columns = np.atleast_1d(np.asarray(parameters, np.intp))
         count = columns.size
-        each = (distribution,) * count if isinstance(distribution, Distribution) else distribution
+        distributions = (
+            (distribution,) * count if isinstance(distribution, Distribution) else distribution
+        )
         return cls(
             columns,
             _table(shift, count),
@@ -102,7 +104,7 @@ class Deviation:
             np.broadcast_to(np.asarray(groups, np.intp), (count,)).copy(),
             _table(sign, count),
             np.broadcast_to(np.asarray(edge, np.bool_), (count,)).copy(),
-            tuple(each),
+            tuple(distributions),
             None if correlation is None else np.array(correlation, np.float64),
             dict(group_names or {}),
             tuple(tuple(groups) for groups in directions),
@@ -126,8 +128,8 @@ class Deviation:
         if not (np.abs(self.sign) == 1.0).all():
             raise ValueError("a sign is neither +1 nor -1")
         shared: dict[int, Distribution] = {}
-        for group, each in zip(self.groups.tolist(), self.distribution, strict=True):
-            if group != OWN_GROUP and shared.setdefault(group, each) != each:
+        for group, variable in zip(self.groups.tolist(), self.distribution, strict=True):
+            if group != OWN_GROUP and shared.setdefault(group, variable) != variable:
                 raise ValueError(f"group {group} has one variable but two distributions")
         self._check_directions(shared)
         self._check_correlation()
@@ -207,7 +209,7 @@ class Deviation:
     @cached_property
     def ends(self) -> tuple[Floats, Floats]:
         """(n or 1, k) lowest and highest deviation of each column, about the shift."""
-        t = np.array([each.ends for each in self.distribution], np.float64).reshape(-1, 2)
+        t = np.array([variable.ends for variable in self.distribution], np.float64).reshape(-1, 2)
         one, other = self.signed_half * t[:, 0], self.signed_half * t[:, 1]
         return np.minimum(one, other), np.maximum(one, other)
 
@@ -217,8 +219,8 @@ class Deviation:
         if self.correlation is None:
             return None
         numbers, _ = self.banded_variables
-        found: Floats = self.correlation[np.ix_(numbers, numbers)]
-        return None if np.array_equal(found, np.eye(numbers.size)) else found
+        correlation: Floats = self.correlation[np.ix_(numbers, numbers)]
+        return None if np.array_equal(correlation, np.eye(numbers.size)) else correlation
 
     def at_edge(self, side: float) -> Floats:
         """(n or 1, k) deviations with lengths and offsets at an end of their bands.
@@ -228,7 +230,9 @@ class Deviation:
         their shift. Members of a group go to the ends of their common variable, so that one with a
         negative sign moves the other way: other corners of the band cannot happen.
         """
-        t = abs(side) * np.array([each.ends[side > 0.0] for each in self.distribution], np.float64)
+        t = abs(side) * np.array(
+            [variable.ends[side > 0.0] for variable in self.distribution], np.float64
+        )
         return self.shift + np.where(self.edge, self.signed_half * t, 0.0)
 
 

@@ -280,7 +280,7 @@ class Guideway:
             joint = block.drive_joints[:, rail.joint]
             for shape in rail.shapes:
                 reach = shape.amplitude * SHAPES[shape.shape]((joint - shape.start) / shape.period)
-                moved.along(shape.direction, **{"shift" if shape.known else "swing": reach})
+                moved.along(shape.direction, **{"shift" if shape.known else "half_width": reach})
             for profile in rail.profiles:
                 moved.along(
                     profile.direction, np.interp(joint, profile.positions, profile.deviations)
@@ -302,7 +302,7 @@ class _Moved:
         self._scale, self._offset = machine.nominal[[self._at["scale"], self._at["offset"]]]
 
     def along(
-        self, direction: Vector, shift: Floats | float = 0.0, swing: Floats | float = 0.0
+        self, direction: Vector, shift: Floats | float = 0.0, half_width: Floats | float = 0.0
     ) -> None:
         """The carriage along a unit direction, m, as one variable; coordinates have no edges."""
         group = self._columns.new_group()
@@ -310,7 +310,7 @@ class _Moved:
             if component != 0.0:
                 parameter = self._at[f"origin.{axis}"]
                 self._columns.add(
-                    parameter, component * shift, component * swing, group=group, edge=False
+                    parameter, component * shift, component * half_width, group=group, edge=False
                 )
 
     def lean(self, lean: LeanTowards, joint: Floats) -> None:

@@ -118,10 +118,10 @@ def _with_envelope(block: PoseBlock, envelope: Envelope, shift: np.ndarray) -> D
     # that is anywhere on a circle it is distributed as a sine.
     return Deviation.of(
         np.tile(columns, len(shifts)),
-        np.concatenate([np.broadcast_to(each, compliance.shape) for each in shifts], axis=1),
-        np.concatenate([np.broadcast_to(each, compliance.shape) for each in halves], axis=1),
+        np.concatenate([np.broadcast_to(table, compliance.shape) for table in shifts], axis=1),
+        np.concatenate([np.broadcast_to(table, compliance.shape) for table in halves], axis=1),
         groups=np.concatenate(groups),
-        sign=np.concatenate([np.broadcast_to(each, compliance.shape) for each in signs], axis=1),
+        sign=np.concatenate([np.broadcast_to(table, compliance.shape) for table in signs], axis=1),
         edge=False,
         distribution=UNIFORM if len(axes) == 3 else ARCSINE,
         group_names=dict.fromkeys(range(len(axes)), UNKNOWN_DIRECTION),

@@ -204,7 +204,7 @@ class PoseBlock:
         It drives their offset up. A telescopic drive stands at the base end of its strut.
         """
         names = self.machine.parameters
-        columns = [names.index(f"{self.machine.drives[each].part}.offset") for each in drives]
+        columns = [names.index(f"{self.machine.drives[drive].part}.offset") for drive in drives]
         loads = self.loads(np.array(columns, np.intp), "all")
         of_strut = {int(c): k for k, c in enumerate(self.machine.kernel.length_parameters)}
         for at, column in enumerate(columns):

@@ -173,7 +173,7 @@ class ScrewCoupling:
         axes = np.array([screw.platform_axis for screw in self.screws])
         platform = np.cross(axes @ np.swapaxes(rotations, 1, 2), along)
         ahead = (np.cross(base, platform) * along).sum(axis=-1)
-        sines = np.stack([np.linalg.norm(each, axis=-1) for each in (base, platform)], axis=-1)
+        sines = np.stack([np.linalg.norm(turned, axis=-1) for turned in (base, platform)], axis=-1)
         return np.arctan2(ahead, (base * platform).sum(axis=-1)), sines
 
     def _parallel(

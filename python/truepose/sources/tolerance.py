@@ -47,7 +47,9 @@ _EDGE_ENDINGS = (".length", ".offset")
 _WILDCARDS = frozenset("*?[")
 _RANKS = 3
 
-_WITHOUT_NUMBERS = {each.name: each for each in (UNIFORM, TRIANGULAR, ARCSINE, TWO_POINT)}
+_WITHOUT_NUMBERS = {
+    distribution.name: distribution for distribution in (UNIFORM, TRIANGULAR, ARCSINE, TWO_POINT)
+}
 
 DEVIATION = "deviation"
 """The column of a file of measured deviations."""
@@ -102,16 +104,16 @@ class DimensionalTolerance:
         if _mixed_groups(parts, entries):
             return None
         names = parts.kernel.parameters
-        given = [each.tolerance.group for each in entries]
+        given = [entry.tolerance.group for entry in entries]
         groups = [group for group in dict.fromkeys(given) if group is not None]
         bands = Deviation.of(
             columns,
-            [each.band.shift for each in entries],
-            [each.band.half for each in entries],
+            [entry.band.shift for entry in entries],
+            [entry.band.half for entry in entries],
             groups=[OWN_GROUP if group is None else groups.index(group) for group in given],
-            sign=[each.tolerance.sign for each in entries],
+            sign=[entry.tolerance.sign for entry in entries],
             edge=[names[column].endswith(_EDGE_ENDINGS) for column in columns],
-            distribution=[each.distribution for each in entries],
+            distribution=[entry.distribution for entry in entries],
             group_names=dict(enumerate(groups)),
         )
         # A tolerance that is wrong would be missed here, and told twice.
@@ -131,21 +133,21 @@ def _mixed_groups(parts: SourceBuilder, entries: Iterable[_Stated]) -> bool:
     """Whether a group has two distributions though one variable; a problem, if so."""
     first: dict[str, _Stated] = {}
     refused = set()
-    for each in entries:
-        group = each.tolerance.group
-        if group is None or each.path in refused:
+    for entry in entries:
+        group = entry.tolerance.group
+        if group is None or entry.path in refused:
             continue
-        other = first.setdefault(group, each)
-        if other.distribution != each.distribution:
-            refused.add(each.path)
+        other = first.setdefault(group, entry)
+        if other.distribution != entry.distribution:
+            refused.add(entry.path)
             parts.refuse(
                 Fault(
                     "group-distributions",
                     f"the members of group {group!r} vary together, but have two distributions",
-                    found=f"{each.distribution}, and {other.distribution} of {other.path}",
+                    found=f"{entry.distribution}, and {other.distribution} of {other.path}",
                     expected="one distribution in one group",
                 ),
-                each.path,
+                entry.path,
             )
     return bool(refused)
 
@@ -188,7 +190,7 @@ def _of_table(parts: SourceBuilder, of_struts: Mapping[int, _Stated]) -> dict[in
     entries = {} if table is None else table.model_extra or {}
     names = parts.kernel.parameters
     stated: dict[int, _Stated] = {}
-    taken = {column: each.path for column, each in of_struts.items()}
+    taken = {column: stated_before.path for column, stated_before in of_struts.items()}
     decided: set[int] = set()
     for rank in range(_RANKS):
         for key in entries:
@@ -310,10 +312,10 @@ def _with_band(
         return _Stated(path, tolerance, band, listed.distribution)
     if tolerance.distribution in LISTED:
         return None  # and the problem is recorded
-    found = parts.band(tolerance, nominal, path)
-    if found is None:
+    limits = parts.band(tolerance, nominal, path)
+    if limits is None:
         return None
-    return _Stated(path, tolerance, found, _distribution(tolerance))
+    return _Stated(path, tolerance, limits, _distribution(tolerance))
 
 
 def _distribution(tolerance: file_tolerance.Tolerance) -> Distribution:
@@ -340,7 +342,7 @@ def _listed(parts: SourceBuilder, tolerance: file_tolerance.Tolerance, path: str
             Fault(
                 "bad-distribution",
                 f"these values and probabilities are no distribution: {error}",
-                found=", ".join(f"{each:g}" for each in tolerance.probabilities),
+                found=", ".join(f"{probability:g}" for probability in tolerance.probabilities),
                 expected="a probability from 0 to 1 of each value, their sum 1",
             ),
             path,

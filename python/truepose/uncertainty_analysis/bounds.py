@@ -15,25 +15,20 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from truepose.arrays import Flags, Floats
+from truepose.arrays import Floats
 from truepose.error_budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import DatasetRows, Schema, Variable, assemble, quantity_coords, sizes
-from truepose.runs.displacement import at_shifts
+from truepose.runs.dataset import Schema, Variable, quantity_coords
 from truepose.runs.first_order import ExactError, first_order
 from truepose.runs.poses import (
     OK,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
     of_band,
-    requested_poses,
-    required_sources,
 )
 from truepose.runs.quantities import quantities
-from truepose.runs.variables import Variables, variables_at
+from truepose.runs.run import Run, in_parts
+from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.bounds_over_region import (
     bounds_over_region,
@@ -127,63 +122,47 @@ def _at_poses(
     ends: Ends,
     progress: Progress | None,
 ) -> xr.Dataset:
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, condition)
-    kinds = quantities(machine.components)
-    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
-    walk = PoseRun(machine, table, condition, path=poses is None and is_path(machine))
-    done = 0
-    for block in walk:
-        every = variables_at(machine, block, sources)
-        usable = walk.keep(block.indices, at_shifts(machine, block, every.alone, every.shift))
-        done += int((~usable).sum())
-        block, every = block.select(usable), ends.truncated(every.select(usable))
-        for start in range(0, block.indices.size, POSES):
-            chosen = np.zeros(block.indices.size, np.bool_)
-            chosen[start : start + POSES] = True
-            part = block.select(chosen)
-            moves = every.select(chosen)
-            value, effects, status = first_order(machine, part, moves)
-            usable = walk.keep(part.indices, of_band(status))
+    run = Run(machine, poses, condition)
+    run.begin(SCHEMA)
+    for block, every in run.with_variables():
+        every = ends.truncated(every)
+        for part, variables in in_parts(block, every, POSES):
+            value, effects, status = first_order(machine, part, variables)
+            usable = run.keep(part.indices, of_band(status))
             if usable.any():
-                part, moves = part.select(usable), moves.select(usable)
                 order = (value[usable], effects[usable])
-                rows.append(part, *_bounded(machine, part, moves, order, walk))
-            done += int(chosen.sum())
+                some = part.select(usable)
+                run.fill(some, *_bounded(machine, some, variables.select(usable), order))
             if progress is not None:
-                progress(done, len(table))
-    if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
-    found = assemble(
-        machine, condition, SCHEMA, rows, table, walk.left_out, coords=quantity_coords(machine)
-    )
-    found["status"] = found["status"].astype(str)
-    return found.assign_attrs(ends.attrs)
+                progress(int(part.indices[-1]) + 1, len(run.poses))
+    dataset = run.dataset(coords=quantity_coords(machine))
+    dataset["status"] = dataset["status"].astype(str)
+    return dataset.assign_attrs(ends.attrs)
 
 
 def proven_bounds(
     machine: Machine,
     block: PoseBlock,
-    moves: Variables,
+    variables: Variables,
     most_boxes: int = 1,
     targets: ArrayLike | None = None,
 ) -> dict[str, np.ndarray]:
     """`lower`, `upper`, `magnitude`, `status` (`SCHEMA`) and `boxes` at the n poses of a block.
 
-    `moves` has every single variable in [-1, 1]. The box of variables is divided, into at most
+    `variables` has every single variable in [-1, 1]. The box of variables is divided, into at most
     `most_boxes` parts, where it cannot be proven as a whole, and where a magnitude lies above its
     `targets` (n or 1, n_quantity), m and rad; `boxes` (n,) says how many were looked at.
     """
-    shifted, shift = moves.shift
+    shifted, shift = variables.shift
     lower, upper, magnitude, status, boxes = machine.kernel.bounds_at(
         block.joints,
         block.placements,
         shifted,
         np.ascontiguousarray(shift),
-        moves.columns,
-        moves.variables.tolist(),
-        np.ascontiguousarray(moves.half_width),
-        [members.tolist() for members in moves.directions],
+        variables.columns,
+        variables.variable_of.tolist(),
+        np.ascontiguousarray(variables.half_width),
+        [members.tolist() for members in variables.directions],
         most_boxes,
         targets,
     )
@@ -199,27 +178,30 @@ def proven_bounds(
 def _bounded(
     machine: Machine,
     block: PoseBlock,
-    moves: Variables,
+    variables: Variables,
     order: tuple[Floats, Floats],
-    walk: PoseRun,
-) -> tuple[dict[str, np.ndarray], Flags]:
-    """Every variable over the poses of a block, and which of them are usable."""
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Every variable over the poses of a block, and a reason (n,) of each where it is unusable."""
     value, effects = order
     kinds = list(quantities(machine.components).values())
-    found = worst_corners(ExactError(machine, block, moves), value, effects, moves.domain, kinds)
+    corners = worst_corners(
+        ExactError(machine, block, variables), value, effects, variables.domain, kinds
+    )
     m = len(machine.components)
-    proven = proven_bounds(machine, block, moves)
-    hard = np.asarray((proven["status"] != PROVEN) & (found.status == OK), np.bool_)
+    proven = proven_bounds(machine, block, variables)
+    hard = np.asarray((proven["status"] != PROVEN) & (corners.status == OK), np.bool_)
     if hard.any():
-        asked = CLOSE * found.most[hard, 2 * m :]
-        divided = proven_bounds(machine, block.select(hard), moves.select(hard), MOST_BOXES, asked)
+        asked = CLOSE * corners.most[hard, 2 * m :]
+        divided = proven_bounds(
+            machine, block.select(hard), variables.select(hard), MOST_BOXES, asked
+        )
         for name, found_in_parts in divided.items():
             proven[name][hard] = found_in_parts
     values = {
         **{name: values for name, values in proven.items() if name in SCHEMA},
-        "reached_lower": -found.most[:, m : 2 * m],
-        "reached_upper": found.most[:, :m],
-        "reached_magnitude": found.most[:, 2 * m :],
-        "linear": worst(value, moves.domain.reach(effects)),
+        "reached_lower": -corners.most[:, m : 2 * m],
+        "reached_upper": corners.most[:, :m],
+        "reached_magnitude": corners.most[:, 2 * m :],
+        "linear": worst(value, variables.domain.reach(effects)),
     }
-    return values, walk.keep(block.indices, of_band(found.status))
+    return values, of_band(corners.status)

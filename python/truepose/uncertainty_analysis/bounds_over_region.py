@@ -115,18 +115,18 @@ def bounds_over_region(
         of = _known(machine, condition, source, block)
         (yielding if getattr(source, "over_region", None) == "wrench" else shifts).extend(of)
     every = variables_at(machine, block, sources)
-    moves = ends.truncated(every)
+    variables = ends.truncated(every)
     shifts.extend(_middles(every))
-    found = machine.kernel.bounds_over(
+    proof = machine.kernel.bounds_over(
         sides,
         shifts,
         yielding,
         tuple(float(value) for value in condition.wrench),
         list(
             zip(
-                moves.columns.tolist(),
-                moves.variables.tolist(),
-                moves.half_width[0].tolist(),
+                variables.columns.tolist(),
+                variables.variable_of.tolist(),
+                variables.half_width[0].tolist(),
                 strict=True,
             )
         ),
@@ -134,37 +134,37 @@ def bounds_over_region(
         MOST_BOXES,
         _going_on(progress),
     )
-    status = str(found["status"])
+    status = str(proof["status"])
     if status in STATUS:
-        raise _out_of_reach(machine, np.array(found["where"]), status)
+        raise _out_of_reach(machine, np.array(proof["where"]), status)
     proven = status == "proven"
     count, kinds = len(machine.components), len(quantities(machine.components))
     missing = np.full(len(machine.commanded), np.nan)
     values = {
-        "lower": found["lower"] if proven else np.full(count, np.nan),
-        "upper": found["upper"] if proven else np.full(count, np.nan),
-        "magnitude": found["magnitude"] if proven else np.full(kinds, np.nan),
-        "reached_lower": _finite(found["reached_lower"]),
-        "reached_upper": _finite(found["reached_upper"]),
-        "reached_magnitude": _finite(found["reached_magnitude"]),
-        "where_lower": found["lower_at"],
-        "where": found["upper_at"],
-        "where_magnitude": found["magnitude_at"],
-        "where_unproven": missing if proven else found["where"],
-        "boxes": found["boxes"],
+        "lower": proof["lower"] if proven else np.full(count, np.nan),
+        "upper": proof["upper"] if proven else np.full(count, np.nan),
+        "magnitude": proof["magnitude"] if proven else np.full(kinds, np.nan),
+        "reached_lower": _finite(proof["reached_lower"]),
+        "reached_upper": _finite(proof["reached_upper"]),
+        "reached_magnitude": _finite(proof["reached_magnitude"]),
+        "where_lower": proof["lower_at"],
+        "where": proof["upper_at"],
+        "where_magnitude": proof["magnitude_at"],
+        "where_unproven": missing if proven else proof["where"],
+        "boxes": proof["boxes"],
         "status": status,
     }
     result = region_dataset(machine, condition, SCHEMA, values)
     asked = {name: list(side) for name, side in zip(machine.commanded, sides, strict=True)}
     return result.assign_attrs(
-        ends.attrs | {"gap": gap, "gap_reached": float(found["gap"]), "region": str(asked)}
+        ends.attrs | {"gap": gap, "gap_reached": float(proof["gap"]), "region": str(asked)}
     )
 
 
-def _middles(moves: Variables) -> list[Affine]:
+def _middles(variables: Variables) -> list[Affine]:
     """By how much the middles of bands lie off their shifts, of listed values of no symmetry."""
-    offsets = moves.half_width[0] * moves.domain.middle[moves.variables]
-    columns = zip(moves.columns.tolist(), offsets.tolist(), strict=True)
+    offsets = variables.half_width[0] * variables.domain.middle[variables.variable_of]
+    columns = zip(variables.columns.tolist(), offsets.tolist(), strict=True)
     return [(column, (value, value), 0.0, 0) for column, value in columns if value != 0.0]
 
 

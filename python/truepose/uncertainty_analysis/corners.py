@@ -95,10 +95,10 @@ class WorstCorners:
     status: np.ndarray
     search: str = field(default="every vertex")
 
-    def take(self, poses: Indices, targets: Floats, status: np.ndarray, each: int) -> None:
+    def update(self, poses: Indices, targets: Floats, status: np.ndarray, evaluations: int) -> None:
         """Results at `each` corners for every one of `poses` (r,): targets (r, 2 m + q)."""
         np.maximum.at(self.most, poses, targets)
-        np.add.at(self.evaluated, poses, each)
+        np.add.at(self.evaluated, poses, evaluations)
         failed = status != OK
         self.status[poses[failed]] = status[failed]
 
@@ -118,24 +118,24 @@ def worst_corners(
     """
     targets = Targets(centre.shape[1], quantities)
     n_pose, _, n_variable = effects.shape
-    found = WorstCorners(
+    worst = WorstCorners(
         targets.of(centre), np.zeros(n_pose, np.intp), np.full(n_pose, OK, np.uint8)
     )
     if n_variable == 0:
-        return found
+        return worst
     if n_variable <= EVERY_VERTEX and not domain.directions:
-        _every(evaluate, targets, found, at_ends(domain, corners(n_variable)))
-        return found
-    found.search = "directed"
+        _every(evaluate, targets, worst, at_ends(domain, corners(n_variable)))
+        return worst
+    worst.search = "directed"
     step = max(1, AT_ONCE // (targets.count * len(directions(3))))
     for start in range(0, n_pose, step):
         poses = np.arange(start, min(start + step, n_pose))
         rows, wanted, t, linear = _starts(targets, centre[poses], effects[poses], domain)
-        _climb(evaluate, targets, domain, found, poses[rows], wanted, t)
-        short = np.abs(found.most[poses] - linear) > BENT * np.abs(linear)
+        _climb(evaluate, targets, domain, worst, poses[rows], wanted, t)
+        short = np.abs(worst.most[poses] - linear) > BENT * np.abs(linear)
         rows, wanted, t = _elsewhere(short, domain)
-        _climb(evaluate, targets, domain, found, poses[rows], wanted, t)
-    return found
+        _climb(evaluate, targets, domain, worst, poses[rows], wanted, t)
+    return worst
 
 
 def corners(n_variable: int) -> Floats:
@@ -149,13 +149,13 @@ def at_ends(domain: Domain, t: Floats) -> Floats:
     return np.where(t < 0.0, domain.lower, domain.upper)
 
 
-def _every(evaluate: Evaluate, targets: Targets, found: WorstCorners, t: Floats) -> None:
+def _every(evaluate: Evaluate, targets: Targets, corners: WorstCorners, t: Floats) -> None:
     step = max(1, AT_ONCE // len(t))
-    for start in range(0, len(found.most), step):
-        poses = np.arange(start, min(start + step, len(found.most)))
+    for start in range(0, len(corners.most), step):
+        poses = np.arange(start, min(start + step, len(corners.most)))
         outputs, status = evaluate(np.repeat(poses, len(t)), np.tile(t, (poses.size, 1)))
         reached = targets.of(outputs).reshape(poses.size, len(t), targets.count)
-        found.take(poses, reached.max(axis=1), _first_bad(status, poses.size), len(t))
+        corners.update(poses, reached.max(axis=1), _first_bad(status, poses.size), len(t))
 
 
 def _first_bad(status: np.ndarray, rows: int) -> np.ndarray:
@@ -265,7 +265,7 @@ def _climb(
     evaluate: Evaluate,
     targets: Targets,
     domain: Domain,
-    found: WorstCorners,
+    corners: WorstCorners,
     poses: Indices,
     wanted: Indices,
     t: Floats,
@@ -274,7 +274,7 @@ def _climb(
     step = max(1, AT_ONCE // max(t.shape[1], 2**WEAKEST))
     for start in range(0, len(t), step):
         rows = slice(start, start + step)
-        _climb_some(_Tried(evaluate, targets, domain, found, poses[rows], wanted[rows]), t[rows])
+        _climb_some(_Tried(evaluate, targets, domain, corners, poses[rows], wanted[rows]), t[rows])
 
 
 def _climb_some(tried: _Tried, t: Floats) -> None:
@@ -365,12 +365,14 @@ class _Tried:
 
     def scores(self, t: Floats) -> Floats:
         """(r, p) what the wanted target is at the corners `t` (r, p, v); -inf where it fails."""
-        rows, each, n_variable = t.shape
-        outputs, status = self.evaluate(np.repeat(self.poses, each), t.reshape(-1, n_variable))
-        reached = self.targets.of(outputs).reshape(rows, each, self.targets.count)
-        self.found.take(self.poses, reached.max(axis=1), _first_bad(status, rows), each)
-        found = np.take_along_axis(reached, self.wanted[:, np.newaxis, np.newaxis], axis=2)[..., 0]
-        scores: Floats = np.where(np.isfinite(found), found, -np.inf)
+        rows, count, n_variable = t.shape
+        outputs, status = self.evaluate(np.repeat(self.poses, count), t.reshape(-1, n_variable))
+        reached = self.targets.of(outputs).reshape(rows, count, self.targets.count)
+        self.found.update(self.poses, reached.max(axis=1), _first_bad(status, rows), count)
+        lengths = np.take_along_axis(reached, self.wanted[:, np.newaxis, np.newaxis], axis=2)[
+            ..., 0
+        ]
+        scores: Floats = np.where(np.isfinite(lengths), lengths, -np.inf)
         return scores
 
 

@@ -69,11 +69,11 @@ class OfAll:
                 asked = shares(factor)
             there = (asked >= -ROUNDING) & (asked <= 1.0 + ROUNDING)
             inside = np.where(there, np.clip(asked, 0.0, 1.0), 0.5)
-            found = np.where(there, ask(inside.tolist()), np.nan)
+            quantiles = np.where(there, ask(inside.tolist()), np.nan)
             if whole is None:
-                whole = np.full_like(found, np.nan)
+                whole = np.full_like(quantiles, np.nan)
             of = self._per_result == factor
-            whole[of] = found[of]
+            whole[of] = quantiles[of]
         assert whole is not None
         return whole
 

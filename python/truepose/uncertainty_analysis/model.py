@@ -19,19 +19,15 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Flags, Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import DatasetRows, Schema, assemble, component_units, sizes
-from truepose.runs.displacement import at_shifts, displacement
+from truepose.runs.dataset import Schema, component_units
+from truepose.runs.displacement import displacement
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
     OK,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
-    requested_poses,
-    required_sources,
 )
-from truepose.runs.variables import Variables, variables_at
+from truepose.runs.run import Run
+from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
 from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.functions import derivatives
@@ -84,15 +80,17 @@ class Model(Protocol):
 class MachineModel:
     """The exact error of a machine at one pose of a block, m and rad, base frame."""
 
-    def __init__(self, machine: Machine, block: PoseBlock, moves: Variables, pose: int) -> None:
-        """`moves` of the whole block; `pose`: number of the pose in it."""
+    def __init__(self, machine: Machine, block: PoseBlock, variables: Variables, pose: int) -> None:
+        """`variables` of the whole block; `pose`: number of the pose in it."""
         self.machine, self.block, self.pose = machine, block, pose
-        self.spread = moves.at(pose)
-        self.names, self.sources = moves.names, moves.sources
-        self.distributions, self.correlation = moves.distributions, moves.correlation
-        self.streams, self.numbers = moves.streams, moves.numbers
-        self.directions = moves.directions
-        self.dofs: Floats = np.array([each.degrees for each in moves.distributions], np.float64)
+        self.variables = variables.at(pose)
+        self.names, self.sources = variables.names, variables.sources
+        self.distributions, self.correlation = variables.distributions, variables.correlation
+        self.streams, self.numbers = variables.streams, variables.numbers
+        self.directions = variables.directions
+        self.dofs: Floats = np.array(
+            [distribution.degrees for distribution in variables.distributions], np.float64
+        )
         self.outputs: tuple[str, ...] = machine.components
         self.output_units = tuple(component_units(machine))
 
@@ -116,7 +114,7 @@ class MachineModel:
     def linear(self) -> LinearModel:
         """Value and slopes where all sources are at their shift."""
         only = slice(self.pose, self.pose + 1)
-        value, effects, _ = first_order(self.machine, self.block, self.spread, only)
+        value, effects, _ = first_order(self.machine, self.block, self.variables, only)
         return LinearModel(value[0], effects[0])
 
     def evaluate(self, t: Floats) -> tuple[Floats, Flags]:
@@ -125,7 +123,7 @@ class MachineModel:
         fine = np.empty(len(t), np.bool_)
         for start in range(0, len(t), PART):
             part = slice(start, start + PART)
-            moved = self.spread.parameters_moved(t[part])
+            moved = self.variables.parameters_moved(t[part])
             count = len(moved[1])
             joints = np.repeat(self.joints, count, axis=0)
             placements = np.repeat(self.placement, count, axis=0)
@@ -156,17 +154,17 @@ class FunctionModel:
         _check_arguments(function, self.inputs)
         self.names = tuple(self.inputs)
         self.sources = self.names
-        each = tuple(self.inputs.values())
-        self.distributions = tuple(one.distribution for one in each)
+        given = tuple(self.inputs.values())
+        self.distributions = tuple(one.distribution for one in given)
         self.correlation = correlation_matrix(self.names, correlation)
         self.directions: tuple[Indices, ...] = ()
-        self.streams: Indices = np.zeros(len(each), np.intp)
-        self.numbers: Indices = np.arange(len(each), dtype=np.intp)
+        self.streams: Indices = np.zeros(len(given), np.intp)
+        self.numbers: Indices = np.arange(len(given), dtype=np.intp)
         self.dofs: Floats = np.array(
-            [min(one.dof, one.distribution.degrees) for one in each], np.float64
+            [min(one.dof, one.distribution.degrees) for one in given], np.float64
         )
-        self._centre = np.array([one.centre for one in each], np.float64)
-        self._half = np.array([one.half for one in each], np.float64)
+        self._centre = np.array([one.centre for one in given], np.float64)
+        self._half = np.array([one.half for one in given], np.float64)
         self.outputs, self._value = self._probe()
         self.output_units = ("1",) * len(self.outputs)
 
@@ -325,24 +323,14 @@ class Models:
         progress: Progress | None = None,
     ) -> None:
         self.machine = machine
-        self.condition = machine.condition if condition is None else condition
-        self.table = requested_poses(machine, poses)
-        self.sources = required_sources(machine, self.condition)
-        self._of_file = poses is None
         self._progress = progress
-        self._walk = PoseRun(
-            machine, self.table, self.condition, path=poses is None and is_path(machine)
-        )
+        self._run = Run(machine, poses, condition)
 
     def __iter__(self) -> Iterator[tuple[int, MachineModel]]:
-        total = len(self.table)
-        for block in self._walk:
-            moves = variables_at(self.machine, block, self.sources)
-            shifted = at_shifts(self.machine, block, moves.alone, moves.shift)
-            usable = self._walk.keep(block.indices, shifted)
-            for pose in np.flatnonzero(usable).tolist():
-                number = int(block.indices[pose])
-                yield number, MachineModel(self.machine, block, moves, pose)
+        total = len(self._run.poses)
+        for block, variables in self._run.with_variables():
+            for pose, number in enumerate(block.indices.tolist()):
+                yield number, MachineModel(self.machine, block, variables, pose)
                 if self._progress is not None:
                     self._progress(number + 1, total)
         if self._progress is not None:
@@ -350,41 +338,21 @@ class Models:
 
     def leave_out(self, model: MachineModel, status: int) -> None:
         """Set a pose aside for a reason that turned out, a kernel code or a number of `REASONS`."""
-        self._walk.left_out.add(model.at.indices, np.array([status], np.uint8))
+        self._run.left_out.add(model.at.indices, np.array([status], np.uint8))
 
-    def rows(self, schema: Schema, **others: int) -> DatasetRows:
-        """Room for a result over all poses; `others`: lengths of dims that no machine has."""
-        return DatasetRows(self.machine, schema, sizes(self.machine, len(self.table), **others))
+    def begin(self, schema: Schema, **others: int) -> None:
+        """Make room for a result over all poses; `others`: lengths of dims that no machine has."""
+        self._run.begin(schema, **others)
 
-    def append(
-        self, rows: DatasetRows, model: MachineModel, values: Mapping[str, ArrayLike]
-    ) -> None:
-        """One pose of a result, `values` without their dim pose."""
-        given = {name: np.asarray(value)[np.newaxis] for name, value in values.items()}
-        rows.append(model.at, given, np.ones(1, np.bool_))
-
-    def dataset(
-        self,
-        schema: Schema,
-        rows: DatasetRows,
-        *,
-        over_all: Mapping[str, Any] | None = None,
-        coords: Mapping[str, xr.Variable] | None = None,
-    ) -> xr.Dataset:
-        """The Dataset of the poses appended. Raises `RequestError` (no-pose-left) if none was."""
-        left_out = self._walk.left_out
-        if rows.count == 0:
-            raise no_pose_left(self.machine, self.table, left_out, of_file=self._of_file)
-        return assemble(
-            self.machine,
-            self.condition,
-            schema,
-            rows,
-            self.table,
-            left_out,
-            over_all=over_all,
-            coords=coords,
+    def fill(self, model: MachineModel, values: Mapping[str, ArrayLike]) -> None:
+        """One pose of the result, `values` without their dim pose."""
+        self._run.fill(
+            model.at, {name: np.asarray(value)[np.newaxis] for name, value in values.items()}
         )
+
+    def dataset(self, coords: Mapping[str, xr.Variable]) -> xr.Dataset:
+        """The Dataset of the poses filled. Raises `RequestError` (no-pose-left) if none was."""
+        return self._run.dataset(coords=coords)
 
 
 def models(

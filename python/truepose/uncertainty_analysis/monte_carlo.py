@@ -26,28 +26,20 @@ from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs.dataset import (
-    DatasetRows,
     Schema,
     Variable,
-    assemble,
     label,
     quantity_coords,
-    sizes,
 )
-from truepose.runs.displacement import at_shifts
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
     BAND,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
     reason_unless,
-    requested_poses,
-    required_sources,
 )
 from truepose.runs.quantities import POSITIONS, quantities
-from truepose.runs.variables import Variables, variables_at
+from truepose.runs.run import Run, in_parts
+from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.arguments import (
     required_digits,
@@ -269,49 +261,28 @@ def _of_machine(
     asked: _Options,
     progress: Progress | None,
 ) -> xr.Dataset:
-    given = machine.condition if condition is None else condition
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, given)
-    kinds = quantities(machine.components)
+    run = Run(machine, poses, condition)
     axes = [name for name in machine.components if name in POSITIONS]
     schema = {**SCHEMA, **MACHINE, **(ELLIPSE if axes else {})}
-    lengths = sizes(
-        machine,
-        len(table),
-        other_component=len(machine.components),
-        level=LEVELS.size,
-        quantity=len(kinds),
-        axis=len(axes),
-        other_axis=len(axes),
-    )
-    rows = DatasetRows(machine, schema, lengths)
-    account = _Account(progress, len(table) * (asked.samples or 0))
-    walk = PoseRun(machine, table, given, path=poses is None and is_path(machine))
+    rows = run.begin(schema, level=LEVELS.size, axis=len(axes), other_axis=len(axes))
+    account = _Account(progress, len(run.poses) * (asked.samples or 0))
     interrupted = False
-    for block in walk:
-        every = variables_at(machine, block, sources)
-        usable = walk.keep(block.indices, at_shifts(machine, block, every.alone, every.shift))
-        block, every = block.select(usable), every.select(usable)
+    for block, every in run.with_variables():
         draws = asked.draws(every)
-        for start in range(0, block.indices.size, POSES):
-            chosen = np.zeros(block.indices.size, np.bool_)
-            chosen[start : start + POSES] = True
-            part = block.select(chosen)
-            sampler = _MachineSampler(machine, part, every.select(chosen))
+        for part, variables in in_parts(block, every, POSES):
+            sampler = _MachineSampler(machine, part, variables)
             drawn = sampler.run(draws, asked.stop, account.add)
             interrupted = drawn.interrupted
             if drawn.tallies is not None:
                 values = sampler.values(drawn.tallies, asked.probability)
                 sampled = reason_unless(np.asarray(drawn.tallies.count) > 1, BAND)
-                rows.append(part, values, walk.keep(part.indices, sampled))
+                run.fill(part, values, sampled)
             if interrupted:
                 break
         if interrupted:
             break
     if interrupted and rows.count == 0:
         raise KeyboardInterrupt
-    if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
     names = list(machine.components)
     coords = {
         "other_component": label("other_component", names, "the other component of a covariance"),
@@ -321,18 +292,18 @@ def _of_machine(
     if axes:
         coords["axis"] = label("axis", axes, "component of the position error")
         coords["other_axis"] = label("other_axis", axes, "the other component")
-    found = assemble(machine, given, schema, rows, table, walk.left_out, coords=coords)
-    found.attrs |= {**asked.attrs, "interrupted": int(interrupted)}
-    return found.assign_attrs(
-        not_assembled=lost_text(found["failed"], found["samples"] + found["failed"])
+    dataset = run.dataset(coords=coords)
+    dataset.attrs |= {**asked.attrs, "interrupted": int(interrupted)}
+    return dataset.assign_attrs(
+        not_assembled=lost_text(dataset["failed"], dataset["samples"] + dataset["failed"])
     )
 
 
 class _MachineSampler(Sampler):
     """A machine at some poses; columns of its tallies: components, magnitudes, ellipse distance."""
 
-    def __init__(self, machine: Machine, block: PoseBlock, moves: Variables) -> None:
-        self.machine, self.block, self.spread = machine, block, moves
+    def __init__(self, machine: Machine, block: PoseBlock, variables: Variables) -> None:
+        self.machine, self.block, self.variables = machine, block, variables
         self._study = self._studied(None)
         kinds = quantities(machine.components)
         self._kinds = list(kinds.values())
@@ -341,16 +312,16 @@ class _MachineSampler(Sampler):
         self._unwhitened = (self._origins()[0], self._widths())
 
     def _studied(self, whitening: Floats | None) -> Study:
-        shifted, shift = self.spread.shift
+        shifted, shift = self.variables.shift
         return Study(
             self.machine.kernel,
             self.block.joints,
             self.block.placements,
             shifted,
             np.ascontiguousarray(shift),
-            self.spread.columns,
-            self.spread.variables.tolist(),
-            np.ascontiguousarray(self.spread.half_width),
+            self.variables.columns,
+            self.variables.variable_of.tolist(),
+            np.ascontiguousarray(self.variables.half_width),
             whitening,
         )
 
@@ -361,8 +332,8 @@ class _MachineSampler(Sampler):
 
     def _widths(self) -> Floats:
         """(n, n_column) bins of the order of a hundredth of the first-order spread."""
-        _, effects, _ = first_order(self.machine, self.block, self.spread)
-        sigmas = np.array([each.sigmas for each in self.spread.distributions])
+        _, effects, _ = first_order(self.machine, self.block, self.variables)
+        sigmas = np.array([distribution.sigmas for distribution in self.variables.distributions])
         deviation = np.sqrt(np.square(effects / sigmas).sum(axis=2)) if sigmas.size else 0.0
         deviation = np.nan_to_num(np.broadcast_to(deviation, effects.shape[:2]))
         parts = [np.linalg.norm(deviation[:, kind], axis=1) for kind in self._kinds]
@@ -525,15 +496,17 @@ def _of_function(model: FunctionModel, asked: _Options, progress: Progress | Non
             )
         )
     values = statistics(drawn.tallies, len(model.outputs), asked.probability)
-    found = function_dataset(
+    dataset = function_dataset(
         SCHEMA,
         {name: value[0] for name, value in values.items()},
         model,
         coords={"level": label("level", LEVELS, "share of the samples")},
     )
-    found.attrs |= {**asked.attrs, "interrupted": int(drawn.interrupted)}
-    return found.assign_attrs(
-        not_assembled=lost_text(found["failed"], found["samples"] + found["failed"], plain=True)
+    dataset.attrs |= {**asked.attrs, "interrupted": int(drawn.interrupted)}
+    return dataset.assign_attrs(
+        not_assembled=lost_text(
+            dataset["failed"], dataset["samples"] + dataset["failed"], plain=True
+        )
     )
 
 

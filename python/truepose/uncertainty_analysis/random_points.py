@@ -24,7 +24,7 @@ from truepose.sources.deviation import Distribution
 
 STUDENT = "student-t"
 
-_STREAM = 1 << 40
+_STREAM = 1 << 32
 """Variables that one stream can number."""
 
 SEEDS = 1 << 64
@@ -51,7 +51,9 @@ class Drawing:
         Raises `RequestError` (correlation-out-of-reach).
         """
         self.distributions = tuple(distributions)
-        self.sigmas: Floats = np.array([each.sigmas for each in distributions], np.float64)
+        self.sigmas: Floats = np.array(
+            [distribution.sigmas for distribution in distributions], np.float64
+        )
         self.copula = Copula.of(distributions, correlation, names)
         self.directions = tuple(directions)
         self._seed = seed
@@ -84,9 +86,9 @@ class Drawing:
     @cached_property
     def covariance(self) -> Floats:
         """(n_variable, n_variable) of the coordinates."""
-        found = np.eye(len(self.distributions))
-        found[np.ix_(self.linked, self.linked)] = self.copula.latent
-        return found
+        covariance = np.eye(len(self.distributions))
+        covariance[np.ix_(self.linked, self.linked)] = self.copula.latent
+        return covariance
 
     def points(self, purpose: int) -> Points:
         """An endless row of random points; another `purpose` draws others, independent of them."""
@@ -95,10 +97,10 @@ class Drawing:
 
     def variables(self, coordinates: Floats) -> Floats:
         """(s, n_variable) variables t at the coordinates (s, n_variable)."""
-        found: Floats = coordinates / self.sigmas
+        variables: Floats = coordinates / self.sigmas
         if self.linked.size:
-            found[:, self.linked] = self.copula.variables(coordinates[:, self.linked])
-        return found
+            variables[:, self.linked] = self.copula.variables(coordinates[:, self.linked])
+        return variables
 
 
 class Points:
@@ -111,24 +113,24 @@ class Points:
     def independent(self, count: int) -> Floats:
         """(count, n_variable) as `next`, but with unit normals for correlated ones."""
         drawing = self._drawing
-        found = np.empty((count, len(self._generators)))
+        points = np.empty((count, len(self._generators)))
         of_normals = set(drawing.linked.tolist()).union(*map(np.ndarray.tolist, drawing.directions))
         for column, numbers in enumerate(self._generators):
             if column in of_normals:
-                found[:, column] = numbers.standard_normal(count)
+                points[:, column] = numbers.standard_normal(count)
             else:
-                found[:, column] = _unit(numbers, drawing.distributions[column], count)
+                points[:, column] = _unit(numbers, drawing.distributions[column], count)
         for members in drawing.directions:
-            found[:, members] = unit(found[:, members]) * drawing.sigmas[members]
-        return found
+            points[:, members] = unit(points[:, members]) * drawing.sigmas[members]
+        return points
 
     def next(self, count: int) -> Floats:
         """(count, n_variable) coordinates of the next points."""
-        found = self.independent(count)
+        points = self.independent(count)
         linked = self._drawing.linked
         if linked.size:
-            found[:, linked] = found[:, linked] @ self._drawing.copula.factor
-        return found
+            points[:, linked] = points[:, linked] @ self._drawing.copula.factor
+        return points
 
 
 def generator(seed: int, identity: int, purpose: int) -> np.random.Generator:
@@ -150,5 +152,5 @@ def _unit(numbers: np.random.Generator, distribution: Distribution, count: int) 
         assert dof is not None
         scaled: Floats = numbers.standard_t(dof, count) * math.sqrt((dof - 2.0) / dof)
         return scaled
-    found: Floats = distribution.quantile(numbers.random(count)) * distribution.sigmas
-    return found
+    values: Floats = distribution.quantile(numbers.random(count)) * distribution.sigmas
+    return values

@@ -231,7 +231,7 @@ class Adaptive(StoppingRule):
         """A batch, or 0."""
         return 0 if done >= MOST or self._stable() else self.batch
 
-    def take(self, batch: Tallies, columns: slice) -> None:
+    def update(self, batch: Tallies, columns: slice) -> None:
         """The figures of one batch."""
         m = np.asarray(batch.covariance).shape[1]
         variance = np.diagonal(np.asarray(batch.covariance), axis1=1, axis2=2)
@@ -299,7 +299,7 @@ class Sampler(ABC):
                 batch = self.begin(pilot) if whole is None else whole.blank()
                 self.sample(draws, done, count, batch)
                 if isinstance(enough, Adaptive):
-                    enough.take(batch, self.checked)
+                    enough.update(batch, self.checked)
                 if whole is None:
                     whole = batch
                 else:

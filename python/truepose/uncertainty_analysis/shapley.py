@@ -91,11 +91,11 @@ def shares(
         sums.add(by_cause[good])
     linear_parts = linear_shares(drawing, slopes, seed)
     # The components of a direction are not correlated, so that their linear parts add up.
-    found = sums.means() + np.stack([linear_parts[members].sum(axis=0) for members in causes])
+    shares = sums.means() + np.stack([linear_parts[members].sum(axis=0) for members in causes])
     # Of its own sum, so that the shares add up to one.
-    variance = found.sum(axis=1)
+    variance = shares.sum(axis=1)
     defined = (np.sqrt(np.maximum(variance[0], 0.0)) > floor) & (sums.count >= LEAST)
-    return ShapleyShares(estimate(found, variance, defined, confidence), failed, points)
+    return ShapleyShares(estimate(shares, variance, defined, confidence), failed, points)
 
 
 def linear_shares(drawing: Drawing, slopes: Floats, seed: int) -> Floats:
@@ -103,7 +103,7 @@ def linear_shares(drawing: Drawing, slopes: Floats, seed: int) -> Floats:
 
     Exact for up to `SUBSETS` correlated variables, else over random orders of them.
     """
-    found: Floats = slopes**2
+    squares: Floats = slopes**2
     linked = drawing.linked
     latent = drawing.copula.latent
     for block in _blocks(latent):
@@ -113,8 +113,8 @@ def linear_shares(drawing: Drawing, slopes: Floats, seed: int) -> Floats:
             part = _over_subsets(inside, of_block)
         else:
             part = _over_orders(inside, of_block, generator(seed, 1, ORDER))
-        found[linked[block]] = part
-    return found
+        squares[linked[block]] = part
+    return squares
 
 
 def _over_subsets(latent: Floats, slopes: Floats) -> Floats:
@@ -125,29 +125,29 @@ def _over_subsets(latent: Floats, slopes: Floats) -> Floats:
         given = np.array([bool(subset >> index & 1) for index in range(count)])
         mean = regression(latent, given).T @ slopes
         known[subset] = ((latent @ mean) * slopes).sum(axis=0)
-    found = np.zeros_like(slopes)
+    parts = np.zeros_like(slopes)
     subsets = np.arange(1 << count)
     sizes = np.array([int(subset).bit_count() for subset in subsets])
     weights = np.array([1.0 / (count * math.comb(count - 1, size)) for size in range(count)])
     for index in range(count):
         without = subsets[(subsets >> index & 1) == 0]
         added = known[without | (1 << index)] - known[without]
-        found[index] = weights[sizes[without]] @ added
-    return found
+        parts[index] = weights[sizes[without]] @ added
+    return parts
 
 
 def _over_orders(latent: Floats, slopes: Floats, numbers: np.random.Generator) -> Floats:
     """(k, m) as `_over_subsets`, the mean over `ORDERS` random orders."""
     count = len(slopes)
-    found = np.zeros_like(slopes)
+    parts = np.zeros_like(slopes)
     some = max(1, (1 << 20) // count**2)
     for start in range(0, ORDERS, some):
         orders = _orders(numbers, min(some, ORDERS - start), count)
         # What the j-th of an order adds, given those before it, is the square of b' L in it.
         added = np.einsum("njm,njk->nkm", slopes[orders], factors(latent, orders)) ** 2
         for place in range(count):
-            np.add.at(found, orders[:, place], added[:, place])
-    return found / ORDERS
+            np.add.at(parts, orders[:, place], added[:, place])
+    return parts / ORDERS
 
 
 def _blocks(latent: Floats) -> Iterator[Indices]:
@@ -175,15 +175,15 @@ def factors(latent: Floats, orders: Indices) -> Floats:
     Of a singular one: a coordinate that follows from those before it has a column of zeros.
     """
     left = latent[orders[:, :, np.newaxis], orders[:, np.newaxis, :]]
-    found = np.zeros_like(left)
+    parts = np.zeros_like(left)
     for column in range(orders.shape[1]):
         pivot = left[:, column, column]
         root = np.sqrt(np.where(pivot > RANK, pivot, np.inf))
-        found[:, :, column] = left[:, :, column] / root[:, np.newaxis]
-        found[:, :column, column] = 0.0
-        line = found[:, :, column]
+        parts[:, :, column] = left[:, :, column] / root[:, np.newaxis]
+        parts[:, :column, column] = 0.0
+        line = parts[:, :, column]
         left -= line[:, :, np.newaxis] * line[:, np.newaxis, :]
-    return found
+    return parts
 
 
 def _taken(values: Floats) -> Floats:

@@ -188,11 +188,11 @@ def first_to_tighten(dataset: xr.Dataset) -> tuple[str, float]:
 
     From a Dataset of `shares`; see `over_position`. Raises `RequestError` (nothing-varies).
     """
-    found = over_position(dataset)
-    if bool(found.isnull().all()):
+    totals = over_position(dataset)
+    if bool(totals.isnull().all()):
         raise RequestError(_nothing_varies(str(dataset.attrs.get("machine_file", "")) or None))
-    at = int(np.nanargmax(found.values))
-    return str(found["parameter"].values[at]), float(found.values[at])
+    at = int(np.nanargmax(totals.values))
+    return str(totals["parameter"].values[at]), float(totals.values[at])
 
 
 @dataclass(frozen=True)
@@ -253,26 +253,26 @@ def _at_one_pose(
     count = len(causes)
     together = [np.concatenate([causes[at] for at in of]) for of in of_sources.values()]
     sets = [*causes, *together]
-    each = (model.linear().effects / drawing.sigmas).T
-    found = sobol.indices(
+    slopes = (model.linear().effects / drawing.sigmas).T
+    estimates = sobol.indices(
         model.evaluate,
         drawing,
         sets,
-        each,
+        slopes,
         samples=plan.samples,
         seed=plan.seed,
         confidence=plan.confidence,
         floor=floor,
     )
-    linear = _linear(each, variables.correlation, causes, floor)
+    linear = _linear(slopes, variables.correlation, causes, floor)
     values: dict[str, Any] = {
         "linear": linear,
         "source_linear": np.array([linear[members].sum(axis=0) for members in of_sources.values()]),
-        "standard_deviation": np.sqrt(found.variance),
-        "evaluations": found.points,
-        "failed": found.failed,
+        "standard_deviation": np.sqrt(estimates.variance),
+        "evaluations": estimates.points,
+        "failed": estimates.failed,
     }
-    for name, estimate in (("first", found.first), ("total", found.total)):
+    for name, estimate in (("first", estimates.first), ("total", estimates.total)):
         values[name], values[f"source_{name}"] = np.split(estimate.share, [count])
         halves = np.split(estimate.half_width, [count])
         values[f"{name}_confidence"], values[f"source_{name}_confidence"] = halves
@@ -280,7 +280,7 @@ def _at_one_pose(
         divided = shapley.shares(
             model.evaluate,
             drawing,
-            found.slopes,
+            estimates.slopes,
             samples=plan.samples,
             seed=plan.seed,
             confidence=plan.confidence,
@@ -294,10 +294,10 @@ def _at_one_pose(
 
 
 def _linear(
-    each: Floats, correlation: Floats | None, causes: Sequence[Indices], floor: Floats
+    slopes: Floats, correlation: Floats | None, causes: Sequence[Indices], floor: Floats
 ) -> Floats:
     """(n_cause, m) shares of the linear variance, from standard uncertainties of either sign."""
-    of_variables: Floats = each * (each if correlation is None else correlation @ each)
+    of_variables: Floats = slopes * (slopes if correlation is None else correlation @ slopes)
     parts: Floats = np.stack([of_variables[members].sum(axis=0) for members in causes])
     whole = parts.sum(axis=0)
     varies = np.sqrt(np.maximum(whole, 0.0)) > floor
@@ -306,17 +306,17 @@ def _linear(
     return parts
 
 
-def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
+def _of_machine(run: Models, plan: _Plan) -> xr.Dataset:
     floor = np.array(
         [
-            ROUNDING * (found.machine.characteristic_length if unit == "m" else 1.0)
-            for unit in component_units(found.machine)
+            ROUNDING * (run.machine.characteristic_length if unit == "m" else 1.0)
+            for unit in component_units(run.machine)
         ]
     )
     poses: list[tuple[MachineModel, _Variables, dict[str, np.ndarray]]] = []
     block, variables, interrupted, lost = None, None, 0, False
     try:
-        for _, model in found:
+        for _, model in run:
             if variables is None or model.block is not block:
                 block, variables = model.block, _Variables.of(model, plan.seed)
             if not variables.names:
@@ -325,7 +325,7 @@ def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
             if np.isfinite(values["standard_deviation"]).all():
                 poses.append((model, variables, values))
             else:
-                found.leave_out(model, REASONS.index(BAND))
+                run.leave_out(model, REASONS.index(BAND))
                 lost = True
     except KeyboardInterrupt:
         if not poses:
@@ -334,19 +334,19 @@ def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
     # What varies may differ from block to block: in the one there it has no band.
     sources = {
         name: source
-        for _, each, _ in poses
-        for name, source in zip(each.names, each.sources, strict=True)
+        for _, of_pose, _ in poses
+        for name, source in zip(of_pose.names, of_pose.sources, strict=True)
     }
     if variables is not None and not sources and not lost:
-        raise RequestError(_nothing_varies(found.machine.file))
+        raise RequestError(_nothing_varies(run.machine.file))
     names, groups = list(sources), list(dict.fromkeys(sources.values()))
-    correlated = any(each.drawing.linked.size for _, each, _ in poses)
+    correlated = any(of_pose.drawing.linked.size for _, of_pose, _ in poses)
     schema = {**SCHEMA, **CORRELATED} if correlated else SCHEMA
-    rows = found.rows(schema, parameter=len(names), source=len(groups))
-    for model, each, values in poses:
+    run.begin(schema, parameter=len(names), source=len(groups))
+    for model, of_pose, values in poses:
         at = {
-            "parameter": [names.index(name) for name in each.names],
-            "source": [groups.index(name) for name in each.sets],
+            "parameter": [names.index(name) for name in of_pose.names],
+            "source": [groups.index(name) for name in of_pose.sets],
         }
         lengths = {"parameter": len(names), "source": len(groups)}
         whole = {
@@ -354,9 +354,9 @@ def _of_machine(found: Models, plan: _Plan) -> xr.Dataset:
             name: _whole(variable, values.get(name, values["total"] * np.nan), at, lengths)
             for name, variable in schema.items()
         }
-        found.append(rows, model, whole)
+        run.fill(model, whole)
     coords = _coords(names, list(sources.values()), groups)
-    result = found.dataset(schema, rows, coords=coords)
+    result = run.dataset(coords)
     # Poses that were not come to are neither used nor left out.
     return result.assign_attrs(
         plan.attrs,
@@ -404,7 +404,7 @@ def _coords(
 
 
 def _of_function(model: FunctionModel, plan: _Plan) -> xr.Dataset:
-    if not any(each.half for each in model.inputs.values()):
+    if not any(given.half for given in model.inputs.values()):
         raise RequestError(_nothing_varies(None))
     variables = _Variables.of(model, plan.seed)
     floor = ROUNDING * np.abs(model.linear().value)

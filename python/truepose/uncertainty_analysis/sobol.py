@@ -185,8 +185,8 @@ class Sums:
         times = np.empty((1 + REPLICATES, len(rows)))
         times[0] = 1.0
         times[1:] = self._counts.poisson(1.0, (len(rows), REPLICATES)).T
-        found = times @ rows.reshape(len(rows), rows.shape[1] * rows.shape[2])
-        self._total = found if self._total is None else self._total + found
+        sums = times @ rows.reshape(len(rows), rows.shape[1] * rows.shape[2])
+        self._total = sums if self._total is None else self._total + sums
         self._weight += times.sum(axis=1)
 
     @property
@@ -215,13 +215,13 @@ class Swap:
 
     def variables(self, base: Floats, other: Floats, start: Floats, end: Floats) -> Floats:
         """(s, n_variable) variables t there, from those and the coordinates of A and B."""
-        found = base.copy()
-        found[:, self.single] = other[:, self.single]
+        swapped = base.copy()
+        swapped[:, self.single] = other[:, self.single]
         if self.linked is not None:
             at = self.drawing.linked
             moved = start[:, at] + (end[:, at] - start[:, at]) @ self.linked.T
-            found[:, at] = self.drawing.copula.variables(moved)
-        return found
+            swapped[:, at] = self.drawing.copula.variables(moved)
+        return swapped
 
     def first(self, slopes: Floats, covariance: Floats) -> Floats:
         """The V of u alone (m,) of linear functions: b' G M' b, G the covariance (first-order)."""
@@ -245,11 +245,11 @@ class Swap:
 
 def regression(latent: Floats, given: Flags) -> Floats:
     """(k, k) map to the mean of all coordinates from those `given` (k,), the others' columns 0."""
-    found = np.zeros_like(latent)
+    matrix = np.zeros_like(latent)
     if given.any():
         known = latent[np.ix_(given, given)]
-        found[:, given] = latent[:, given] @ np.linalg.pinv(known, rcond=RANK, hermitian=True)
-    return found
+        matrix[:, given] = latent[:, given] @ np.linalg.pinv(known, rcond=RANK, hermitian=True)
+    return matrix
 
 
 def _swaps(drawing: Drawing, sets: Sequence[Indices]) -> tuple[list[Swap], list[int], list[int]]:
@@ -276,7 +276,7 @@ def _swaps(drawing: Drawing, sets: Sequence[Indices]) -> tuple[list[Swap], list[
             anew = np.eye(linked.size) - regression(latent, ~inside)
             maps = [alone] if np.allclose(alone, anew, atol=RANK) else [alone, anew]
         first_at.append(len(swaps))
-        swaps += [Swap(drawing, single, each) for each in maps]
+        swaps += [Swap(drawing, single, linear_map) for linear_map in maps]
         total_at.append(len(swaps) - 1)
         known[variables.tobytes()] = first_at[-1], total_at[-1]
     return swaps, first_at, total_at

@@ -76,14 +76,16 @@ class Ends:
         cut = AS_STATED if self.sigmas is None else self.sigmas
         return {"truncate": cut if self.endless else NONE, "unbounded": str(self.endless)}
 
-    def truncated(self, moves: Variables) -> Variables:
-        """The spread with every single variable in [-1, 1], also what has no ends."""
-        self.endless.note(moves.names, moves.distributions)
+    def truncated(self, variables: Variables) -> Variables:
+        """The variables with every single variable in [-1, 1], also what has no ends."""
+        self.endless.note(variables.names, variables.distributions)
         if self.sigmas is None:
-            return moves.centred()
-        factor = np.ones(len(moves.names))
-        for at, distribution in enumerate(moves.distributions):
+            return variables.centred()
+        factor = np.ones(len(variables.names))
+        for at, distribution in enumerate(variables.distributions):
             if not distribution.bounded:
                 factor[at] = self.sigmas / distribution.sigmas
-        cut = dataclasses.replace(moves, half_width=moves.half_width * factor[moves.variables])
+        cut = dataclasses.replace(
+            variables, half_width=variables.half_width * factor[variables.variable_of]
+        )
         return cut.centred()

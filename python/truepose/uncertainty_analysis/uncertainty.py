@@ -24,25 +24,18 @@ from truepose.error_budget.evaluate import FEW
 from truepose.error_budget.propagation import combine, coverage_factor
 from truepose.machine import Condition, Machine
 from truepose.runs.dataset import (
-    DatasetRows,
     Schema,
     Variable,
-    assemble,
     component_units,
     label,
-    sizes,
 )
 from truepose.runs.displacement import at_shifts
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import (
     OK,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
-    requested_poses,
-    required_sources,
 )
+from truepose.runs.run import Run
 from truepose.runs.variables import variables_at
 from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.arguments import required_digits, required_probability
@@ -136,12 +129,12 @@ class _Variables:
     @property
     def scales(self) -> Floats:
         """(v,) scale of a Student variable in its standard deviation, else 1."""
-        return np.array([each.scale for each in self.distributions], np.float64)
+        return np.array([distribution.scale for distribution in self.distributions], np.float64)
 
     @property
     def sigmas(self) -> Floats:
         """(v,) half band of each variable in standard deviations."""
-        return np.array([each.sigmas for each in self.distributions], np.float64)
+        return np.array([distribution.sigmas for distribution in self.distributions], np.float64)
 
 
 @overload
@@ -230,20 +223,17 @@ def _of_machine(
     progress: Progress | None,
     asked: _Options,
 ) -> xr.Dataset:
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, condition)
-    lengths = sizes(machine, len(table), other_component=len(machine.components))
-    rows = DatasetRows(machine, asked.schema(), lengths)
+    run = Run(machine, poses, condition, progress)
+    rows = run.begin(asked.schema())
     units = component_units(machine)
     scale = np.array([machine.characteristic_length if unit == "m" else 1.0 for unit in units])
-    walk = PoseRun(machine, table, condition, progress, path=poses is None and is_path(machine))
-    for block in walk:
-        moves = variables_at(machine, block, sources)
+    for block in run:
+        moves = variables_at(machine, block, run.sources)
         variables = _Variables(
             moves.names,
             moves.distributions,
             moves.correlation,
-            np.array([each.degrees for each in moves.distributions], np.float64),
+            np.array([distribution.degrees for distribution in moves.distributions], np.float64),
             machine.components,
             units,
             ROUNDING * scale,
@@ -254,22 +244,14 @@ def _of_machine(
             some = slice(start, start + FEW)
             value, effects, regular = first_order(machine, block, moves, some)
             status[some] = np.where(status[some] == OK, regular, status[some])
-            found = _answer(value, effects, variables, asked)
+            answer = _answer(value, effects, variables, asked)
             if asked.sampled is not None:
                 numbers = asked.sampled.indexes["pose"].get_indexer(block.indices[some])
-                found |= _compared(found, effects, variables, asked, asked.sampled, numbers)
-            for name, values in found.items():
+                answer |= _compared(answer, effects, variables, asked, asked.sampled, numbers)
+            for name, values in answer.items():
                 room[name][some] = values
-        rows.append(block, room, walk.keep(block.indices, status))
-    if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
-    result = assemble(
-        machine,
-        condition,
-        asked.schema(),
-        rows,
-        table,
-        walk.left_out,
+        run.fill(block, room, status)
+    result = run.dataset(
         over_all={"reason": np.array(rows.arrays["reason"], np.str_)} if asked.sampled else {},
         coords={
             "other_component": label(
@@ -292,16 +274,13 @@ def _of_function(model: FunctionModel, asked: _Options) -> xr.Dataset:
         model.output_units,
         ROUNDING * np.abs(law.value),
     )
-    found = _answer(value, effects, variables, asked)
-    found["second_order_uncertainty"] = second_order_uncertainty(model, law)[np.newaxis]
+    answer = _answer(value, effects, variables, asked)
+    answer["second_order_uncertainty"] = second_order_uncertainty(model, law)[np.newaxis]
     if asked.sampled is not None:
         sampled = asked.sampled.expand_dims("pose")
-        found |= _compared(found, effects, variables, asked, sampled, np.zeros(1, np.intp))
-    schema = {
-        name: replace(variable, dims=variable.dims[1:])
-        for name, variable in asked.schema(SECOND_ORDER).items()
-    }
-    result = function_dataset(schema, {name: found[name][0] for name in schema}, model)
+        answer |= _compared(answer, effects, variables, asked, sampled, np.zeros(1, np.intp))
+    schema = asked.schema(SECOND_ORDER)
+    result = function_dataset(schema, {name: answer[name][0] for name in schema}, model)
     return result.assign_attrs(asked.attrs)
 
 
@@ -339,11 +318,13 @@ def _compared(
     A pose that was not sampled has no ends to compare with, and is not valid.
     """
     shape = answer["value"].shape
-    found: dict[str, np.ndarray] = {
-        name: np.full(shape[: len(each.dims)], np.nan if each.dtype is np.float64 else False)
-        for name, each in VALIDATION.items()
+    comparison: dict[str, np.ndarray] = {
+        name: np.full(
+            shape[: len(variable.dims)], np.nan if variable.dtype is np.float64 else False
+        )
+        for name, variable in VALIDATION.items()
     }
-    found["reason"] = np.full(len(numbers), NOT_SAMPLED, object)
+    comparison["reason"] = np.full(len(numbers), NOT_SAMPLED, object)
     columns = {
         name: np.asarray(sampled[name]) for name in ("mean", "standard_deviation", "lower", "upper")
     }
@@ -372,7 +353,10 @@ def _compared(
             digits=asked.digits,
             rounding=variables.rounding,
         )
-        found["sampled_lower"][at], found["sampled_upper"][at] = drawn["lower"], drawn["upper"]
+        comparison["sampled_lower"][at], comparison["sampled_upper"][at] = (
+            drawn["lower"],
+            drawn["upper"],
+        )
         for name in ("difference_lower", "difference_upper", "tolerance", "valid", "reason"):
-            found[name][at] = getattr(compared, name)
-    return found
+            comparison[name][at] = getattr(compared, name)
+    return comparison

@@ -97,7 +97,9 @@ def compare(
     The tolerance is that of the sampled standard uncertainty (8.1.2 b, 8.1.3), and at least
     `rounding` (m,). Where a sample has no result the linear law, which knows of none, is not valid.
     """
-    stated = [numerical_tolerance(float(each), digits) for each in sampled.standard_deviation]
+    stated = [
+        numerical_tolerance(float(deviation), digits) for deviation in sampled.standard_deviation
+    ]
     tolerance = np.maximum(stated, rounding)
     lower, upper = np.abs(linear.lower - sampled.lower), np.abs(linear.upper - sampled.upper)
     valid = (lower <= tolerance) & (upper <= tolerance)
@@ -107,8 +109,8 @@ def compare(
     reasons = []
     for at in np.flatnonzero(~valid).tolist():
         ends = [
-            _end(side, ends[at], found[at], units[at])
-            for side, ends, found, off in (
+            _end(side, ends[at], end[at], units[at])
+            for side, ends, end, off in (
                 ("lower", linear.lower, sampled.lower, lower),
                 ("upper", linear.upper, sampled.upper, upper),
             )

@@ -26,27 +26,19 @@ from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.probability.domain import Domain
 from truepose.runs.dataset import (
-    QUANTITY_UNITS,
-    DatasetRows,
     Schema,
     Variable,
-    assemble,
-    label,
-    sizes,
+    quantity_coords,
 )
 from truepose.runs.displacement import at_shifts
 from truepose.runs.first_order import ExactError, first_order
 from truepose.runs.poses import (
     OK,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
     of_band,
-    requested_poses,
-    required_sources,
 )
 from truepose.runs.quantities import quantities
+from truepose.runs.run import Run
 from truepose.runs.variables import variables_at
 from truepose.uncertainty_analysis.corners import WorstCorners, worst_corners
 from truepose.uncertainty_analysis.functions.dataset import function_dataset
@@ -121,59 +113,42 @@ def worst_case(
 def _of_machine(
     machine: Machine, poses: ArrayLike | None, condition: Condition, progress: Progress | None
 ) -> xr.Dataset:
-    table = requested_poses(machine, poses)
-    sources = required_sources(machine, condition)
-    kinds = quantities(machine.components)
-    rows = DatasetRows(machine, SCHEMA, sizes(machine, len(table), quantity=len(kinds)))
+    run = Run(machine, poses, condition, progress)
+    rows = run.begin(SCHEMA)
+    kinds = list(quantities(machine.components).values())
     endless = Endless()
-    walk = PoseRun(machine, table, condition, progress, path=poses is None and is_path(machine))
-    for block in walk:
-        moves = variables_at(machine, block, sources)
-        value, effects, status = first_order(machine, block, moves)
-        shifted = at_shifts(machine, block, moves.alone, moves.shift)
-        usable = walk.keep(block.indices, shifted, status)
-        found = worst_corners(
-            _only(usable, ExactError(machine, block, moves)),
+    for block in run:
+        variables = variables_at(machine, block, run.sources)
+        value, effects, status = first_order(machine, block, variables)
+        shifted = at_shifts(machine, block, variables.alone, variables.shift)
+        usable = run.keep(block.indices, shifted, status)
+        corners = worst_corners(
+            _only(usable, ExactError(machine, block, variables)),
             value[usable],
             effects[usable],
-            moves.domain,
-            list(kinds.values()),
+            variables.domain,
+            kinds,
         )
-        block = block.select(usable)
-        values = _values(found, value[usable], effects[usable], moves.domain, list(kinds.values()))
-        rows.append(block, values, walk.keep(block.indices, of_band(found.status)))
-        endless.note(moves.names, moves.distributions)
-    if rows.count == 0:
-        raise no_pose_left(machine, table, walk.left_out, of_file=poses is None)
-    coords = {
-        "quantity": label("quantity", list(kinds), "what the norm is taken of"),
-        "quantity_units": label(
-            "quantity", [QUANTITY_UNITS[kind] for kind in kinds], "unit of the quantity"
-        ),
-    }
-    result = assemble(
-        machine,
-        condition,
-        SCHEMA,
-        rows,
-        table,
-        walk.left_out,
+        values = _values(corners, value[usable], effects[usable], variables.domain, kinds)
+        run.fill(block.select(usable), values, of_band(corners.status))
+        endless.note(variables.names, variables.distributions)
+    result = run.dataset(
         over_all={"search": np.array(rows.arrays["search"], np.str_)},
-        coords=coords,
+        coords=quantity_coords(machine, "what the norm is taken of"),
     )
     return result.assign_attrs(unbounded=str(endless))
 
 
 def _only(
-    usable: np.ndarray, mover: Callable[[Indices, Floats], tuple[Floats, np.ndarray]]
+    usable: np.ndarray, exact_error: Callable[[Indices, Floats], tuple[Floats, np.ndarray]]
 ) -> Callable[[Indices, Floats], tuple[Floats, np.ndarray]]:
-    """The mover with poses counted among the usable ones."""
+    """The exact error with poses counted among the usable ones."""
     numbers = np.flatnonzero(usable)
-    return lambda poses, t: mover(numbers[poses], t)
+    return lambda poses, t: exact_error(numbers[poses], t)
 
 
 def _values(
-    found: WorstCorners,
+    corners: WorstCorners,
     value: Floats,
     effects: Floats,
     domain: Domain,
@@ -181,16 +156,16 @@ def _values(
 ) -> dict[str, np.ndarray]:
     """Every variable over n poses, from exact values (n, m) and effects (n, m, v) at the shifts."""
     n_pose, n_output, _ = effects.shape
-    upper, lower = found.most[:, :n_output], -found.most[:, n_output : 2 * n_output]
+    upper, lower = corners.most[:, :n_output], -corners.most[:, n_output : 2 * n_output]
     return {
         "linear": worst(value, domain.reach(effects)),
         "exact": np.maximum(np.abs(lower), np.abs(upper)),
         "exact_lower": lower,
         "exact_upper": upper,
         "magnitude_linear": largest(value, effects, domain, quantities).length,
-        "magnitude_exact": found.most[:, 2 * n_output :],
-        "search": np.full(n_pose, found.search, object),
-        "vertices": found.evaluated,
+        "magnitude_exact": corners.most[:, 2 * n_output :],
+        "search": np.full(n_pose, corners.search, object),
+        "vertices": corners.evaluated,
     }
 
 
@@ -203,22 +178,20 @@ def _of_function(function: Callable[..., Any], inputs: Any) -> xr.Dataset:
         return outputs, np.where(fine, OK, OK + 1).astype(np.uint8)
 
     domain = Domain.of(model.distributions)
-    found = worst_corners(evaluate, law.value[np.newaxis], law.effects[np.newaxis], domain)
-    if found.status[0] != OK:
+    corners = worst_corners(evaluate, law.value[np.newaxis], law.effects[np.newaxis], domain)
+    if corners.status[0] != OK:
         raise RequestError(
             Problem(
                 "not-finite",
                 "the function has no finite value at a corner of the bands",
-                found=f"not finite at some of {found.evaluated[0]} corners",
+                found=f"not finite at some of {corners.evaluated[0]} corners",
                 expected="finite values wherever the inputs can be",
                 hint="narrow the bands, or keep them off where the function is not defined",
             )
         )
-    values = _values(found, law.value[np.newaxis], law.effects[np.newaxis], domain, [])
+    values = _values(corners, law.value[np.newaxis], law.effects[np.newaxis], domain, [])
     schema = {
-        name: Variable(each.dims[1:], each.units, each.long_name, each.dtype)
-        for name, each in SCHEMA.items()
-        if "quantity" not in each.dims
+        name: variable for name, variable in SCHEMA.items() if "quantity" not in variable.dims
     }
     endless = Endless()
     endless.note(model.names, model.distributions)

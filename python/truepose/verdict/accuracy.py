@@ -67,11 +67,11 @@ def accuracy(
     Raises as `truepose.budget`, and `RequestError` (unknown-choice) for another state.
     """
     asked = _required_states(states)
-    population = Population.of(machine, poses, condition, progress)
-    found: list[Answer] = []
+    population = Population(machine, poses, condition, progress)
+    every: list[Answer] = []
     for state in asked:
-        found += answers(population, state)
-    return tuple(found)
+        every += answers(population, state)
+    return tuple(every)
 
 
 def _required_states(states: Sequence[str]) -> tuple[str, ...]:
@@ -83,8 +83,8 @@ def _required_states(states: Sequence[str]) -> tuple[str, ...]:
         Problem(
             "unknown-choice",
             "states: expected states of a machine",
-            found=", ".join(repr(each) for each in unknown) or "none",
-            expected="some of " + ", ".join(f'"{each}"' for each in STATES),
+            found=", ".join(repr(state) for state in unknown) or "none",
+            expected="some of " + ", ".join(f'"{state}"' for state in STATES),
             hint='a single one is a tuple too: states=("before compensation",)',
         )
     )
@@ -110,25 +110,25 @@ def answers(population: Population, state: str) -> list[Answer]:
             )
             for kind, target in zip(kinds, asked, strict=True)
         ]
-    found = survey(population.states(state), list(kinds.values()))
+    surveyed = survey(population.states(state), list(kinds.values()))
     seen: list[Witness] = [
-        _witnessed(population, state, found, at, columns)
+        _witnessed(population, state, surveyed, at, columns)
         for at, columns in enumerate(kinds.values())
     ]
     open_ = [
         target is not None and not _exceeds(witness, target)
         for witness, target in zip(seen, asked, strict=True)
     ]
-    proof = _proved(population, state, found, asked, open_)
+    proof = _proved(population, state, surveyed, asked, open_)
     for at, (columns, target) in enumerate(zip(kinds.values(), asked, strict=True)):
         if open_[at] and target is not None:
             left = np.flatnonzero(proof.bound[:, at] > target)
             # What no proof reaches may be because there is none.
-            worst = left[_largest(found.linear[left, at], OPEN)]
-            numbers = found.numbers[worst]
+            worst = left[_largest(surveyed.linear[left, at], OPEN)]
+            numbers = surveyed.numbers[worst]
             seen[at] = _farthest(population, state, numbers, at, columns, seen[at]) or seen[at]
     return [
-        _answer(population, state, kind, at, asked[at], found, seen[at], proof)
+        _answer(population, state, kind, at, asked[at], surveyed, seen[at], proof)
         for at, kind in enumerate(kinds)
     ]
 
@@ -184,15 +184,15 @@ def _exceeds(witness: Witness, target: float) -> bool:
 
 
 def _witnessed(
-    population: Population, name: str, found: Survey, at: int, columns: Indices
+    population: Population, name: str, surveyed: Survey, at: int, columns: Indices
 ) -> Witness:
     """The farthest machine at the poses where the linear one, or its first witness, is farthest."""
     chosen = [
-        _largest(found.linear[:, at], LOOKED_AT),
-        _largest(found.witness[:, at], 1),
-        _largest(found.bound[:, at], 1),
+        _largest(surveyed.linear[:, at], LOOKED_AT),
+        _largest(surveyed.witness[:, at], 1),
+        _largest(surveyed.bound[:, at], 1),
     ]
-    numbers = found.numbers[np.unique(np.concatenate(chosen))]
+    numbers = surveyed.numbers[np.unique(np.concatenate(chosen))]
     best = _farthest(population, name, numbers, at, columns)
     assert best is not None
     return best
@@ -267,31 +267,31 @@ class _Proof:
 def _proved(
     population: Population,
     name: str,
-    found: Survey,
+    surveyed: Survey,
     asked: Sequence[float | None],
     open_: Sequence[bool],
 ) -> _Proof:
     """The survey's bounds, and the engine's where these do not decide what is open."""
-    bound = found.bound.copy()
+    bound = surveyed.bound.copy()
     limits = np.array([np.inf if target is None else target for target in asked])
     above = np.asarray(open_) & (bound > limits)
     needed = np.flatnonzero(above.any(axis=1))
     share = np.divide(bound, limits, out=np.zeros_like(bound), where=above)
     worst = share.max(axis=1)[needed]
     # Where no remainder is proven the linear maximum says which pose is worst.
-    worst = np.where(np.isfinite(worst), worst, (found.linear / limits).max(axis=1)[needed])
+    worst = np.where(np.isfinite(worst), worst, (surveyed.linear / limits).max(axis=1)[needed])
     in_order = needed[np.argsort(-worst, kind="stable")]
     left, refused = engine.EFFORT, ""
     for start in range(0, in_order.size, engine.AT_ONCE):
         if left <= 0 or refused:
             break
         rows = np.sort(in_order[start : start + engine.AT_ONCE])
-        for state in population.at(name, found.numbers[rows]):
+        for state in population.at(name, surveyed.numbers[rows]):
             refused = engine.refused(state)
-            each = min(engine.EACH, max(1, left // state.block.indices.size))
-            proven, used = engine.bounds(state, asked, each)
+            boxes = min(engine.EACH, max(1, left // state.block.indices.size))
+            proven, used = engine.bounds(state, asked, boxes)
             left -= used
-            at = np.searchsorted(found.numbers, state.block.indices)
+            at = np.searchsorted(surveyed.numbers, state.block.indices)
             bound[at] = np.minimum(bound[at], proven)
     return _Proof(bound, engine.EFFORT - left, refused)
 
@@ -302,12 +302,12 @@ def _answer(
     kind: str,
     at: int,
     target: float | None,
-    found: Survey,
+    surveyed: Survey,
     witness: Witness,
     proof: _Proof,
 ) -> Answer:
-    linear = _number(population, found, found.linear[:, at])
-    bound = _number(population, found, proof.bound[:, at])
+    linear = _number(population, surveyed, surveyed.linear[:, at])
+    bound = _number(population, surveyed, proof.bound[:, at])
     seen = Number(witness.size, witness.number, witness.pose)
     # An enclosure holds what rounding may do; what was found is not above it for that reason.
     answer, rests_on = None, "the linear maximum"
@@ -315,7 +315,7 @@ def _answer(
         if _exceeds(witness, target):
             answer, rests_on = NOT_MET, _of_witness(witness)
         elif bound.value <= target:
-            by_engine = bool((found.bound[:, at] > target).any())
+            by_engine = bool((surveyed.bound[:, at] > target).any())
             answer = MET
             rests_on = f"{REMAINDER}, {ENGINE} ({proof.boxes:,} boxes)" if by_engine else REMAINDER
         else:
@@ -324,15 +324,17 @@ def _answer(
     return Answer(kind, name, target, answer, seen, linear, bound, rests_on, witness)
 
 
-def _ends_taken(spread: Variables) -> str:
+def _ends_taken(variables: Variables) -> str:
     """Where distributions without ends are taken to end; empty where all have ends."""
-    endless = dict.fromkeys(str(each) for each in spread.distributions if not each.bounded)
+    endless = dict.fromkeys(
+        str(distribution) for distribution in variables.distributions if not distribution.bounded
+    )
     return f"; taken to end there: {'; '.join(endless)}" if endless else ""
 
 
-def _number(population: Population, found: Survey, values: Floats) -> Number:
+def _number(population: Population, surveyed: Survey, values: Floats) -> Number:
     row = int(_largest(values, 1)[0])
-    number = int(found.numbers[row])
+    number = int(surveyed.numbers[row])
     return Number(float(values.max()), number, population.table[number])
 
 

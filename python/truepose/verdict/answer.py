@@ -74,8 +74,8 @@ class Answer:
 
 def met(answers: tuple[Answer, ...], state: str) -> bool | None:
     """Whether everything asked is met in one state; None where nothing is asked."""
-    found = [each.met for each in answers if each.state == state and each.met is not None]
-    return all(found) if found else None
+    decided = [answer.met for answer in answers if answer.state == state and answer.met is not None]
+    return all(decided) if decided else None
 
 
 __all__ = [

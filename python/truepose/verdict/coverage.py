@@ -136,20 +136,20 @@ def coverage(
         raise ValueError(f"no {quantity} of this machine's tool")
     screened = Screen(machine, states, kinds[quantity], p, number).candidates(most_poses)
     most = most_draws or (MOST_UNASKED if target is None else MOST)
-    found = _Sampled(screened.poses, p, target, most, progress)
-    found.run()
-    worst = found.worst
+    sampled = _Sampled(screened.poses, p, target, most, progress)
+    sampled.run()
+    worst = sampled.worst
     return CoverageAnswer(
         quantity,
         p,
         target,
-        found.answer,
-        float(found.estimate[worst]),
-        float(found.lower.max()),
-        float(found.upper.max()),
+        sampled.answer,
+        float(sampled.estimate[worst]),
+        float(sampled.lower.max()),
+        float(sampled.upper.max()),
         screened.poses[worst].number,
-        int(found.draws[worst]),
-        int(found.failed[worst]),
+        int(sampled.draws[worst]),
+        int(sampled.failed[worst]),
         number,
         len(screened.poses),
         screened.within,

@@ -33,10 +33,10 @@ def bounds(state: State, targets: Sequence[float | None], boxes: int) -> tuple[F
     if machine.kernel.overconstrained or not len(state.variables.names):
         return nothing, 0
     limits = np.array([[np.inf if target is None else target for target in targets]])
-    found = proven_bounds(machine, block, state.variables.centred(), boxes, limits)
-    proven = found["status"] == PROVEN
-    bound = np.where(proven[:, np.newaxis], found["magnitude"], nothing)
-    return bound, int(found["boxes"].sum())
+    bounds = proven_bounds(machine, block, state.variables.centred(), boxes, limits)
+    proven = bounds["status"] == PROVEN
+    bound = np.where(proven[:, np.newaxis], bounds["magnitude"], nothing)
+    return bound, int(bounds["boxes"].sum())
 
 
 def refused(state: State) -> str:

@@ -22,9 +22,11 @@ from truepose.files.document import ARRAY_TABLES
 from truepose.machine import Machine
 from truepose.machine.shared_keys import EACH
 from truepose.machine.tables.workspace import WAYS
+from truepose.sources import REGISTRY
 from truepose.sources.actuator import Actuator
 from truepose.sources.guideway import Guideway
 from truepose.sources.sensor import Sensor
+from truepose.sources.tolerance import DimensionalTolerance
 
 Row = dict[str, Any]
 Edit = Callable[[str, Row], Row]
@@ -34,7 +36,6 @@ _JOINTS = ("base_joint", "platform_joint")
 _CLEARANCES = ("clearance", "axial_clearance")
 _LEANS = ("squareness", "parallelism")
 _FORCES = ("force", "cutting", "kienzle")
-_DRIVE_SOURCES = ("backlash", "sensor", "actuator", "guideway")
 _LENGTH_TOLERANCE = "length_tolerance"
 _OTHERS = "# what else its parts deviate by at this pose:"
 
@@ -58,18 +59,20 @@ class OneValues:
     def no_sources(self) -> None:
         """Take out every key of an error source, and all that acts: the condition is neutral."""
         self._no_play()
-        for key in _DRIVE_SOURCES:
-            self._rewrite("drive", key, lambda path, row: {})
-        self._rewrite("strut", "screw", lambda path, row: {})
+        for source in REGISTRY:
+            if source is not DimensionalTolerance:  # `tolerances` has its keys, in their order
+                for table, model in source.tables.items():
+                    for key in model.model_fields:
+                        self._take_out(table, key)
         condition = self._text.toml.get("condition", {})
         reference = condition.get("reference_temperature")
         if condition:
             del self._text.toml["condition"]
-        table = tomlkit.table()
+        neutral = tomlkit.table()
         if reference is not None:
-            table["reference_temperature"] = reference
-        table["gravity"] = "0 m/s^2"
-        self._text.append(tomlkit.dumps({"condition": table}))
+            neutral["reference_temperature"] = reference
+        neutral["gravity"] = "0 m/s^2"
+        self._text.append(tomlkit.dumps({"condition": neutral}))
 
     def force(self, force: Floats) -> None:
         """A force (3,), N, base axes, in place of the envelope and of what gave one before."""
@@ -177,10 +180,10 @@ class OneValues:
 
     def _sensor(self, path: str, row: Row) -> Row:
         readings = {
-            each.drive: each
+            reading.drive: reading
             for source in self._machine.sources
             if isinstance(source, Sensor)
-            for each in source.readings
+            for reading in source.readings
         }
         band = readings[path].scale_error
         row = _without(row, ("resolution",))
@@ -190,10 +193,10 @@ class OneValues:
 
     def _actuator(self, path: str, row: Row) -> Row:
         actuations = {
-            each.drive: each
+            actuation.drive: actuation
             for source in self._machine.sources
             if isinstance(source, Actuator)
-            for each in source.actuations
+            for actuation in source.actuations
         }
         of = actuations[path]
         if of.table is not None:
@@ -211,37 +214,48 @@ class OneValues:
 
     def _guideway(self, path: str, row: Row) -> Row:
         rails = {
-            each.drive: each
+            rail.drive: rail
             for source in self._machine.sources
             if isinstance(source, Guideway)
-            for each in source.rails
+            for rail in source.rails
         }
         rail = rails[path]
         named = [key for key in _LEANS if key in row]
         unknown = [key for key, lean in zip(named, rail.leans, strict=True) if lean.band.half > 0.0]
         row = _without(row, unknown)
         shapes = row.get("straightness", [])
-        known = [each for each, shape in zip(shapes, rail.shapes, strict=True) if shape.known]
+        known = [
+            row_of_shape
+            for row_of_shape, shape in zip(shapes, rail.shapes, strict=True)
+            if shape.known
+        ]
         row = _without(row, ("straightness",)) | ({"straightness": known} if known else {})
         stays = ("straightness", "table", *_LEANS)
         return row if any(key in row for key in stays) else {}
 
     def _shared(self, table: str) -> Any:
         """What `[each.*]` says for the rows of a table; empty where it says nothing."""
-        each = self._text.toml.get(EACH, {})
-        return each.get(table, {})
+        shared = self._text.toml.get(EACH, {})
+        return shared.get(table, {})
+
+    def _take_out(self, table: str, key: str) -> None:
+        """Take a key out of a table, or of every row of it."""
+        if table in ARRAY_TABLES:
+            self._rewrite(table, key, lambda path, row: {})
+        elif table in self._text.toml:
+            self._text.toml[table].pop(key, None)
 
     def _rewrite(self, table: str, key: str, edit: Edit) -> None:
         """Edit the table of a key in every row, which may have it from `[each.*]`."""
         if table not in ARRAY_TABLES or table not in self._text.toml:
             return
         shared = self._shared(table)
-        common = _plain(shared[key]) if key in shared else None
+        common = _unwrap(shared[key]) if key in shared else None
         relying: list[tuple[Any, Row]] = []
         for row in self._text.toml[table]:
             path = f"{table}.{row['name']}"
             if key in row:
-                _edit_in_place(row, key, edit(path, _plain(row[key])))
+                _edit_in_place(row, key, edit(path, _unwrap(row[key])))
             elif common is not None:
                 relying.append((row, edit(path, common)))
         if common is None or all(new == common for _, new in relying):
@@ -260,14 +274,14 @@ def _edit_in_place(row: Any, key: str, new: Row) -> None:
     old = row[key]
     if not new:
         del row[key]
-    elif _plain(old) == new:
+    elif _unwrap(old) == new:
         return
     elif isinstance(old, Table):
-        for each in [each for each in old if each not in new]:
-            del old[each]
-        for each, value in new.items():
-            if _plain(old.get(each)) != value:
-                old[each] = _value(value)
+        for name in [name for name in old if name not in new]:
+            del old[name]
+        for name, value in new.items():
+            if _unwrap(old.get(name)) != value:
+                old[name] = _value(value)
     else:
         row[key] = _value(new)
 
@@ -276,7 +290,7 @@ def _without(row: Row, keys: tuple[str, ...] | list[str]) -> Row:
     return {key: value for key, value in row.items() if key not in keys}
 
 
-def _plain(item: Any) -> Any:
+def _unwrap(item: Any) -> Any:
     return item.unwrap() if hasattr(item, "unwrap") else item
 
 
@@ -288,7 +302,7 @@ def _value(value: Any) -> Item:
 def _text_of(value: Any) -> str:
     if isinstance(value, Mapping):
         keys = ", ".join(
-            f"{tomlkit.key(key).as_string()} = {_text_of(each)}" for key, each in value.items()
+            f"{tomlkit.key(key).as_string()} = {_text_of(entry)}" for key, entry in value.items()
         )
         return f"{{ {keys} }}" if keys else "{}"
     if isinstance(value, list):

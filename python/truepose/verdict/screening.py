@@ -68,13 +68,13 @@ class Pose:
     number: int
     part: int
     block: PoseBlock
-    spread: Variables
+    variables: Variables
     draws: Random
     columns: Indices
 
     def sizes(self, t: Floats) -> Floats:
         """(s,) lengths of the exact error where the variables are t (s, v); inf where none."""
-        parameters, moved = self.spread.parameters_moved(t)
+        parameters, moved = self.variables.parameters_moved(t)
         joints = np.repeat(self.block.joints, len(t), axis=0)
         placements = np.repeat(self.block.placements, len(t), axis=0)
         error, status = displacement(self.machine, joints, placements, (parameters, moved))
@@ -100,7 +100,7 @@ class _Part:
 
     number: int
     block: PoseBlock
-    spread: Variables
+    variables: Variables
     draws: Random
     estimate: Floats
     lower: Floats
@@ -111,7 +111,7 @@ class _Part:
         return _Part(
             self.number,
             self.block.select(chosen),
-            _select(self.spread, chosen),
+            _select(self.variables, chosen),
             self.draws,
             self.estimate[chosen],
             self.lower[chosen],
@@ -141,9 +141,9 @@ class Screen:
         chosen, left = self._coarsely(most * REFINED)
         many, largest = self._ranks(1), _Largest(self._sized)
         kept = []
-        for (number, (block, spread)), wanted in zip(self._numbered(), chosen, strict=True):
+        for (number, (block, variables)), wanted in zip(self._numbered(), chosen, strict=True):
             if wanted.any():
-                part = self._part(number, block.select(wanted), _select(spread, wanted), many)
+                part = self._part(number, block.select(wanted), _select(variables, wanted), many)
                 kept.append(part)
                 largest.add(part, part.estimate)
         least = (1.0 - WITHIN) * largest.level(many, sure=False)
@@ -153,26 +153,26 @@ class Screen:
             for part in within
             for at in _largest(part.estimate, most)
         ]
-        poses.sort(key=lambda each: (-each[0], each[1].number))
+        poses.sort(key=lambda ranked: (-ranked[0], ranked[1].number))
         count = left + sum(part.estimate.size for part in within)
-        every = sum(each.size for each in chosen)
+        every = sum(flags.size for flags in chosen)
         return Screened([pose for _, pose in poses[:most]], count, every)
 
     def _coarsely(self, most: int) -> tuple[list[Flags], int]:
         """The poses of each block that few draws leave, at most so many, and how many more."""
         few, largest = self._ranks(0), _Largest(self._sized)
-        found = []
-        for number, (block, spread) in self._numbered():
-            part = self._part(number, block, spread, few)
-            found.append((part.estimate, part.upper))
+        parts = []
+        for number, (block, variables) in self._numbered():
+            part = self._part(number, block, variables, few)
+            parts.append((part.estimate, part.upper))
             largest.add(part, part.lower)
-        if not found:
+        if not parts:
             raise ValueError("no pose")
         least = (1.0 - WITHIN) * largest.level(few, sure=True)
-        likely = np.concatenate([estimate[upper >= least] for estimate, upper in found])
+        likely = np.concatenate([estimate[upper >= least] for estimate, upper in parts])
         enough = np.sort(likely)[-most] if likely.size > most else 0.0
-        chosen = [(upper >= least) & (estimate >= enough) for estimate, upper in found]
-        return chosen, likely.size - sum(int(each.sum()) for each in chosen)
+        chosen = [(upper >= least) & (estimate >= enough) for estimate, upper in parts]
+        return chosen, likely.size - sum(int(flags.sum()) for flags in chosen)
 
     def _numbered(self) -> Iterator[tuple[int, State]]:
         """The states that have a pose."""
@@ -186,27 +186,27 @@ class Screen:
         count = int(min(max(wanted, FEWEST[stage]), MOST[stage]))
         return ranks(count, min(self._probability, 1.0 - TAIL[stage] / count), RISK)
 
-    def _part(self, number: int, block: PoseBlock, spread: Variables, of: Ranks) -> _Part:
-        draws = Random(spread, self._seed)
+    def _part(self, number: int, block: PoseBlock, variables: Variables, of: Ranks) -> _Part:
+        draws = Random(variables, self._seed)
         t = draws.rows(FIRST, of.count)
-        value, effects, status = first_order(self._machine, block, spread)
+        value, effects, status = first_order(self._machine, block, variables)
         value, effects = value[:, self._columns], effects[:, self._columns]
-        found = np.empty((3, len(value)))
+        ranks = np.empty((3, len(value)))
         step = max(1, AT_ONCE // (of.count * self._columns.size))
         for start in range(0, len(value), step):
             rows = slice(start, start + step)
             errors = effects[rows] @ t.T
             errors += value[rows, :, np.newaxis]
-            found[:, rows] = np.sqrt(of.of(np.square(errors, out=errors).sum(axis=1)))
+            ranks[:, rows] = np.sqrt(of.of(np.square(errors, out=errors).sum(axis=1)))
         # Without a first order nothing says that it is not the worst; nor that it is.
-        found[:, status != OK] = np.array([[np.inf], [0.0], [np.inf]])
-        return _Part(number, block, spread, draws, *found)
+        ranks[:, status != OK] = np.array([[np.inf], [0.0], [np.inf]])
+        return _Part(number, block, variables, draws, *ranks)
 
     def _pose(self, part: _Part, at: int) -> Pose:
         one = part.only(_at(part.estimate, at))
         number = int(one.block.indices[0])
         return Pose(
-            self._machine, number, one.number, one.block, one.spread, one.draws, self._columns
+            self._machine, number, one.number, one.block, one.variables, one.draws, self._columns
         )
 
     def _sized(self, part: _Part, at: int, count: int) -> Floats:
@@ -231,8 +231,8 @@ class _Largest:
         finite = np.isfinite(numbers)
         self._linear = max(self._linear, float(numbers.max(initial=0.0, where=finite)))
         few = [part.only(_at(part.estimate, at)) for at in _largest(part.estimate, PILOTS)]
-        self._found += [(float(each.estimate[0]), each) for each in few]
-        self._found = sorted(self._found, key=lambda each: -each[0])[:PILOTS]
+        self._found += [(float(pose.estimate[0]), pose) for pose in few]
+        self._found = sorted(self._found, key=lambda ranked: -ranked[0])[:PILOTS]
 
     def level(self, of: Ranks, *, sure: bool) -> float:
         """What poses are measured against, m or rad; `sure`: the lower end of the exact one."""
@@ -245,8 +245,8 @@ def _largest(values: Floats, most: int) -> Indices:
     return np.asarray(np.argsort(-values, kind="stable")[:most], np.intp)
 
 
-def _select(spread: Variables, chosen: Flags) -> Variables:
-    return spread if chosen.all() else spread.select(chosen)
+def _select(variables: Variables, chosen: Flags) -> Variables:
+    return variables if chosen.all() else variables.select(chosen)
 
 
 def _at(values: Floats, at: int) -> Flags:

@@ -61,9 +61,9 @@ def farthest(state: State, columns: Indices) -> Reached:
         domain.most_along(-u @ slopes),
     ]
     tried = np.concatenate([np.stack(starts), _samples(domain)])
-    found = _tried(state, columns, tried)
-    order = np.argsort(-found.size, kind="stable")[:CLIMBED]
-    best = found.best()
+    tried_best = _tried(state, columns, tried)
+    order = np.argsort(-tried_best.size, kind="stable")[:CLIMBED]
+    best = tried_best.best()
     for row in order:
         if np.isinf(best.size):
             break
@@ -86,8 +86,8 @@ class _Tried:
 
 
 def _tried(state: State, columns: Indices, t: Floats) -> _Tried:
-    mover = ExactError(state.machine, state.block, state.variables)
-    error, status = mover(np.zeros(len(t), np.intp), t.copy())
+    exact_error = ExactError(state.machine, state.block, state.variables)
+    error, status = exact_error(np.zeros(len(t), np.intp), t.copy())
     size = np.sqrt(np.square(error[:, columns]).sum(axis=1))
     return _Tried(t, error, np.where(status == OK, size, np.inf), status)
 
@@ -124,10 +124,10 @@ def _samples(domain: Domain) -> Floats:
     corners = np.where(ends == 1, domain.upper, domain.lower)
     share = random.random((SAMPLES - SAMPLES // 2, count))
     inside = domain.lower + share * (domain.upper - domain.lower)
-    found = np.concatenate([corners, inside])
+    starts = np.concatenate([corners, inside])
     for members in domain.directions:
-        found[:, members] = unit(random.standard_normal((SAMPLES, members.size)))
-    return found
+        starts[:, members] = unit(random.standard_normal((SAMPLES, members.size)))
+    return starts
 
 
 __all__ = ["Reached", "farthest"]

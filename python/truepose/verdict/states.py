@@ -10,26 +10,20 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose.arrays import Flags, Floats, Indices
+from truepose.arrays import Flags, Indices
 from truepose.compensation.corrected import corrected
 from truepose.machine import Condition, Machine
-from truepose.runs.displacement import at_shifts
 from truepose.runs.poses import (
     BLOCK,
     OK,
-    PoseRun,
     Progress,
-    is_path,
-    no_pose_left,
-    requested_poses,
-    required_sources,
 )
-from truepose.runs.variables import Variables, variables_at
+from truepose.runs.run import Run
+from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
 
 BEFORE, AFTER = "before compensation", "after compensation"
@@ -76,39 +70,19 @@ class Population:
     def __init__(
         self,
         machine: Machine,
-        table: Floats,
-        condition: Condition,
-        *,
-        path: bool,
-        of_file: bool,
-        progress: Progress | None = None,
-    ) -> None:
-        """`table` (n, n_commanded): poses asked for, SI; `of_file`: they are the machine file's."""
-        self.machine, self.table, self.condition = machine, table, condition
-        self.sources = required_sources(machine, condition)
-        self._path, self._of_file, self._progress = path, of_file, progress
-        self._kept: dict[str, list[State]] = {}
-
-    @classmethod
-    def of(
-        cls,
-        machine: Machine,
         poses: ArrayLike | None = None,
         condition: Condition | None = None,
         progress: Progress | None = None,
-    ) -> Self:
+    ) -> None:
         """At `poses` (..., n_commanded), SI, default the file's; `condition`, default the file's.
 
-        Raises `RequestError`: bad-poses, no-workspace, no-source.
+        Raises `RequestError`: bad-poses, no-workspace, no-source, unknown-part.
         """
-        return cls(
-            machine,
-            requested_poses(machine, poses),
-            machine.condition if condition is None else condition,
-            path=poses is None and is_path(machine),
-            of_file=poses is None,
-            progress=progress,
-        )
+        run = Run(machine, poses, condition)
+        self.machine, self.table = machine, run.poses
+        self.condition, self.sources = run.condition, run.sources
+        self._poses, self._progress = poses, progress
+        self._kept: dict[str, list[State]] = {}
 
     def states(self, name: str) -> Iterator[State]:
         """The population in one state, in blocks.
@@ -118,14 +92,14 @@ class Population:
         if name in self._kept:
             yield from self._kept[name]
             return
-        found: list[State] = []
-        for block, moves in self._blocks():
-            state = self._state(name, block, moves)
+        walked: list[State] = []
+        for block, variables in self._blocks():
+            state = self._state(name, block, variables)
             if len(self.table) <= BLOCK:
-                found.append(state)
+                walked.append(state)
             yield state
-        if found:
-            self._kept[name] = found
+        if walked:
+            self._kept[name] = walked
 
     def at(self, name: str, numbers: Indices) -> Iterator[State]:
         """The population at the poses numbered so in the run, those in one block together."""
@@ -135,24 +109,20 @@ class Population:
                 yield state.select(np.asarray(chosen, np.bool_))
 
     def _blocks(self) -> Iterator[tuple[PoseBlock, Variables]]:
-        walk = PoseRun(self.machine, self.table, self.condition, self._progress, path=self._path)
+        run = Run(self.machine, self._poses, self.condition, self._progress)
         none = True
-        for block in walk:
-            moves = variables_at(self.machine, block, self.sources)
-            shifted = at_shifts(self.machine, block, moves.alone, moves.shift)
-            usable = walk.keep(block.indices, shifted)
-            if usable.any():
-                none = False
-                yield block.select(usable), moves if usable.all() else moves.select(usable)
+        for block, variables in run.with_variables():
+            none = False
+            yield block, variables
         if none:
-            raise no_pose_left(self.machine, self.table, walk.left_out, of_file=self._of_file)
+            raise run.no_pose_left()
 
-    def _state(self, name: str, block: PoseBlock, moves: Variables) -> State:
+    def _state(self, name: str, block: PoseBlock, variables: Variables) -> State:
         if name == BEFORE:
             fine = np.full(block.indices.size, OK, np.uint8)
-            return State(name, self.machine, block, moves, fine)
-        commanded, moves, status = corrected(self.machine, block, self.sources)
-        return State(name, self.machine, commanded, moves, status)
+            return State(name, self.machine, block, variables, fine)
+        commanded, variables, status = corrected(self.machine, block, self.sources)
+        return State(name, self.machine, commanded, variables, status)
 
 
 @dataclass(frozen=True)

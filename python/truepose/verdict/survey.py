@@ -90,12 +90,12 @@ def _surveyed(state: State, quantities: Sequence[Indices]) -> Survey:
 
 def _reached(state: State, far: Largest, effects: Floats, quantities: Sequence[Indices]) -> Floats:
     """(n, q) sizes of the machines that lie farthest along the directions; inf where none."""
-    mover = ExactError(state.machine, state.block, state.variables)
+    exact_error = ExactError(state.machine, state.block, state.variables)
     maximisers = far.maximiser(effects, state.variables.domain, quantities)
     sizes = np.empty(far.length.shape)
     every = np.arange(len(sizes))
     for at, columns in enumerate(quantities):
-        reached, failed = mover(every, maximisers[:, at].copy())
+        reached, failed = exact_error(every, maximisers[:, at].copy())
         size = np.sqrt(np.square(reached[:, columns]).sum(axis=1))
         sizes[:, at] = np.where(failed == OK, size, np.inf)
     return sizes

@@ -101,13 +101,14 @@ class Witness:
     def by_source(self) -> Mapping[str, Floats]:
         """(n_parameter,) deviation from each source alone; their sum is all of it."""
         names = [source.name for source in acting(self.machine, self.machine.condition)]
-        found = {name: np.zeros(len(self.machine.parameters)) for name in names}
+        by_source = {name: np.zeros(len(self.machine.parameters)) for name in names}
         for name, (parameters, shift) in zip(names, self.spread.alone, strict=True):
-            np.add.at(found[name], parameters, shift[0])
-        moves = self.spread.half_width[0] * self.t[self.spread.variables]
-        for column, variable in enumerate(self.spread.variables):
-            found[self.spread.sources[variable]][self.spread.columns[column]] += moves[column]
-        return found
+            np.add.at(by_source[name], parameters, shift[0])
+        variables = self.spread
+        deviations = variables.half_width[0] * self.t[variables.variable_of]
+        for column, variable in enumerate(variables.variable_of):
+            by_source[variables.sources[variable]][variables.columns[column]] += deviations[column]
+        return by_source
 
     @property
     def force(self) -> Floats | None:
@@ -145,7 +146,7 @@ class Witness:
         known = self.error is not None and self.size > 0.0
         directed = [int(v) for members in self.spread.directions for v in members]
         shares = self._parts / self.size if known else np.full(len(self._parts), math.nan)
-        found = [
+        causes = [
             (float(abs(self._parts[v])), self._cause(v, float(shares[v])))
             for v in range(len(self.spread.names))
             if v not in directed
@@ -156,37 +157,40 @@ class Witness:
             part = float(self._parts[directed].sum())
             share = part / self.size if known else math.nan
             x, y, z = force.tolist()
-            found.append((abs(part), Cause("loads", "", 0, "", 0.0, "N", 0.0, share, (x, y, z))))
-        return [cause for _, cause in sorted(found, key=lambda each: -each[0])]
+            causes.append((abs(part), Cause("loads", "", 0, "", 0.0, "N", 0.0, share, (x, y, z))))
+        return [cause for _, cause in sorted(causes, key=lambda ranked: -ranked[0])]
 
     def _cause(self, variable: int, share: float) -> Cause:
-        spread, machine = self.spread, self.machine
-        columns = np.flatnonzero(spread.variables == variable)
-        source, swing = spread.sources[variable], float(spread.half_width[0, columns[0]])
-        parameter = int(spread.columns[columns[0]])
+        variables, machine = self.spread, self.machine
+        columns = np.flatnonzero(variables.variable_of == variable)
+        source, half_width = variables.sources[variable], float(variables.half_width[0, columns[0]])
+        parameter = int(variables.columns[columns[0]])
         value = float(self.t[variable])
         same = [
             column
-            for column in np.flatnonzero(spread.columns == parameter)
-            if spread.sources[spread.variables[column]] == source
+            for column in np.flatnonzero(variables.columns == parameter)
+            if variables.sources[variables.variable_of[column]] == source
         ]
         # Where a source has several bands on a parameter its middle is none of theirs alone.
-        deviation = swing * value
+        deviation = half_width * value
         if len(same) == 1:
             deviation = float(self.by_source[source][parameter])
-        distribution = spread.distributions[variable]
-        lower, upper = float(spread.domain.lower[variable]), float(spread.domain.upper[variable])
+        distribution = variables.distributions[variable]
+        lower, upper = (
+            float(variables.domain.lower[variable]),
+            float(variables.domain.upper[variable]),
+        )
         room = AT_END * (upper - lower)
         end = 1.0 if value >= upper - room else -1.0 if value <= lower + room else 0.0
-        end *= math.copysign(1.0, swing)
+        end *= math.copysign(1.0, half_width)
         return Cause(
             source,
             machine.parameters[parameter],
-            len({int(spread.columns[column]) for column in columns}) - 1,
+            len({int(variables.columns[column]) for column in columns}) - 1,
             {1.0: "upper", -1.0: "lower"}.get(end, ""),
             deviation,
             machine.units[parameter],
-            0.0 if distribution.bounded else value * math.copysign(distribution.sigmas, swing),
+            0.0 if distribution.bounded else value * math.copysign(distribution.sigmas, half_width),
             share,
         )
 

@@ -166,29 +166,29 @@ class _Writing:
         """Whether the file says the condition of the run, its force of unknown direction known."""
         given, force = self._machine.condition, self._witness.force
         wanted = np.array(given.force) + (0.0 if force is None else force)
-        found = draft.condition
-        off = np.abs(np.array(found.force) - wanted).max()
+        condition = draft.condition
+        off = np.abs(np.array(condition.force) - wanted).max()
         return bool(
             off <= ROUNDING * np.abs(wanted).max()
-            and _same_log(given.temperature_log, found.temperature_log)
-            and replace(given, force=found.force, temperature_log=None, envelope=None)
-            == replace(found, temperature_log=None)
+            and _same_log(given.temperature_log, condition.temperature_log)
+            and replace(given, force=condition.force, temperature_log=None, envelope=None)
+            == replace(condition, temperature_log=None)
         )
 
     def _wanting(self, draft: Machine) -> dict[str, float]:
         """What the draft lacks to be the witness, SI, by parameter; where bands were, zeros too."""
-        wanted, found = self._deviations(self._witness.by_source), self._deviations(_known(draft))
+        wanted, present = self._deviations(self._witness.by_source), self._deviations(_known(draft))
         total, parts = np.zeros((2, len(draft.parameters)))
         units = np.array(draft.units)
-        for name in dict.fromkeys([*wanted, *found]):
+        for name in dict.fromkeys([*wanted, *present]):
             nothing = np.zeros(len(total))
-            one, other = wanted.get(name, nothing), found.get(name, nothing)
+            one, other = wanted.get(name, nothing), present.get(name, nothing)
             difference = one - other
             for unit in BY_UNIT:
                 of_unit = units == unit
                 largest = np.maximum(np.abs(one), np.abs(other))[of_unit].max(initial=0.0)
                 small = of_unit & (np.abs(difference) <= NO_DIFFERENCE * largest)
-                if name in found:
+                if name in present:
                     difference[small] = 0.0
             total += difference
             parts += np.abs(difference)
@@ -197,7 +197,7 @@ class _Writing:
         bands = {
             int(column)
             for column, variable in zip(
-                self._witness.spread.columns, self._witness.spread.variables, strict=True
+                self._witness.spread.columns, self._witness.spread.variable_of, strict=True
             )
             if self._witness.spread.sources[variable] == "tolerance"
         }
@@ -208,11 +208,11 @@ class _Writing:
 
     def _deviations(self, by_source: Mapping[str, Floats]) -> dict[str, Floats]:
         """The same with sources together between which causes pass."""
-        found: dict[str, Floats] = {}
+        wanting: dict[str, Floats] = {}
         for name, values in by_source.items():
             key = _ONE_CAUSE.get(name, name) if self._causes_stay else _ANY
-            found[key] = found.get(key, 0.0) + values
-        return found
+            wanting[key] = wanting.get(key, 0.0) + values
+        return wanting
 
     def _difference(self, written: Machine) -> str:
         """Empty where a budget of the file is the witness; else what is not."""
@@ -229,7 +229,7 @@ class _Writing:
             ]
             if banded:
                 return f"{', '.join(banded)} still has a band"
-            alone = [(each.parameters, each.shift) for each in deviations]
+            alone = [(deviation.parameters, deviation.shift) for deviation in deviations]
             status = STATUS[at_shifts(written, block, alone, sum_deviations(alone))[0]]
             error, _ = displacement(written, block.joints, block.placements, sum_deviations(alone))
         if not status:
@@ -289,12 +289,12 @@ def _same_log(one: TemperatureLog | None, other: TemperatureLog | None) -> bool:
 def _known(draft: Machine) -> dict[str, Floats]:
     """(n_parameter,) deviations of a file at its one pose by source, at their shifts."""
     sources = acting(draft, draft.condition)
-    found = {source.name: np.zeros(len(draft.parameters)) for source in sources}
+    by_source = {source.name: np.zeros(len(draft.parameters)) for source in sources}
     for block in PoseRun(draft, draft.poses(), draft.condition):
         for source in sources:
             deviation = source.deviation(draft, draft.condition, block)
-            np.add.at(found[source.name], deviation.parameters, deviation.shift[0])
-    return found
+            np.add.at(by_source[source.name], deviation.parameters, deviation.shift[0])
+    return by_source
 
 
 def _changed(original: Path, machine: Machine) -> RequestError:

@@ -79,7 +79,7 @@ def test_the_tool_stands_where_its_own_shifts_take_it(path: Path) -> None:
     assert (status == OK).all()
     assert measured(machine, reached, poses) > 1e-5
     for pose, there in zip(poses, reached, strict=True):
-        known = commands.ActualMachine(machine, condition).known(there[np.newaxis])
+        known = commands.ActualMachine(machine, condition).deviations_at(there[np.newaxis])
         columns, values = known.moved
         actual = machine.replace(
             {

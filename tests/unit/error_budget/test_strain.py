@@ -142,7 +142,7 @@ class Made:
 
 
 def strained_by(made: Deviation, monkeypatch: pytest.MonkeyPatch) -> Any:
-    import truepose.error_budget.strain as module
+    import truepose.runs.run as module
 
     monkeypatch.setattr(module, "required_sources", lambda *_: (Made(made),))
     return strain(machine(), POSES).sel(source="made")

@@ -27,7 +27,7 @@ def generator() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize("name", ["machine_file.md", "machine_file.schema.json"])
+@pytest.mark.parametrize("name", generator().pages())
 def test_the_pages_are_fresh(name: str) -> None:
     written = (DOCS / name).read_text(encoding="utf-8")
     assert written == generator().pages()[name], "run: python docs/generate_machine_file.py"

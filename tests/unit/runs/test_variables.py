@@ -12,17 +12,19 @@ import truepose as tp
 from machine_texts import PLANAR, edited, load_text
 from made_source import MadeSource, with_sources
 from truepose.machine import Machine
+from truepose.machine.loader import load
 from truepose.runs.poses import PoseRun, required_sources
-from truepose.runs.variables import Variables, variables_at
+from truepose.runs.variables import Variables, stream_of, variables_at
 from truepose.sources import (
     OWN_GROUP,
     REGISTRY,
     TRIANGULAR,
     UNIFORM,
     Deviation,
-    DimensionalTolerance,
     PoseBlock,
 )
+from truepose.uncertainty_analysis.random_points import Drawing
+from truepose.uncertainty_analysis.sampler import Random
 
 MACHINE = tp.load(Path(__file__).parents[3] / "machines" / "planar_two_slider.toml")
 
@@ -65,7 +67,7 @@ def test_variables_are_those_that_have_a_band(tmp_path: Path) -> None:
     assert found.names == (f"first: {one}", two, f"second: {one}")
     assert found.sources == ("first", "first", "second")
     assert found.columns.tolist() == [1, 2, 1]
-    assert found.variables.tolist() == [0, 1, 2]
+    assert found.variable_of.tolist() == [0, 1, 2]
     assert found.numbers.tolist() == [1, 2, 1]
     assert found.distributions == (UNIFORM, UNIFORM, TRIANGULAR)
     assert found.correlation is None
@@ -101,8 +103,7 @@ def test_the_machine_s_own_sources(tmp_path: Path) -> None:
     assert len(set(found.names)) == len(found.names)
     assert "one set-up" in found.names
     assert "tolerance: drive.d1.offset" in found.names
-    order = [kind.name for kind in REGISTRY]
-    assert [order[stream] for stream in found.streams] == list(found.sources)
+    assert found.streams.tolist() == list(map(stream_of, found.sources))
     assert found.correlation is not None
     linked = [found.names.index(name) for name in ("one set-up", "tool.x", "tool.y")]
     off = found.correlation - np.eye(len(found.names))
@@ -133,7 +134,7 @@ def test_identities_do_not_hang_on_what_else_acts(tmp_path: Path) -> None:
 
 def _firsts(found: Variables) -> list[int]:
     """The first column of each variable."""
-    return [found.variables.tolist().index(number) for number in range(len(found.names))]
+    return [found.variable_of.tolist().index(number) for number in range(len(found.names))]
 
 
 def test_a_pose_of_it_moves_the_parameters_as_the_deviations_say(tmp_path: Path) -> None:
@@ -181,6 +182,49 @@ def test_nothing_that_varies_is_no_variable() -> None:
     assert empty.names == ()
 
 
-def test_the_source_of_the_file_comes_first(tmp_path: Path) -> None:
-    assert REGISTRY[0] is DimensionalTolerance
-    assert made(Deviation.of([0], half=1.0)).streams.tolist() == [len(REGISTRY)]
+def test_each_registered_source_has_a_stream_of_its_own() -> None:
+    # 0 is that of a plain function's arguments.
+    assert len({0, *(stream_of(kind.name) for kind in REGISTRY)}) == 1 + len(REGISTRY)
+    assert stream_of("tolerance") == 0x41E1E73D
+
+
+def test_a_source_in_the_middle_of_the_registry_leaves_all_other_samples(tmp_path: Path) -> None:
+    class Added(MadeSource):
+        """Built for every machine."""
+
+        name = "added"
+
+        @classmethod
+        def build(cls, parts: object) -> MadeSource:
+            return MadeSource("added", Deviation.of([2, 3], half=1e-4))
+
+    with_all_sources(tmp_path)
+    registry = (*REGISTRY[:3], Added, *REGISTRY[3:])
+    models = []
+    for sources in (REGISTRY, registry):
+        machine = load(tmp_path / "machine.toml", registry=sources)
+        models.append(
+            variables_at(machine, block_of(machine), required_sources(machine, machine.condition))
+        )
+    before, after = models
+    assert "added" in after.sources
+    assert after.sources[-1] != "added"
+    samples = [Random(model, seed=5).rows(0, 100) for model in models]
+    others = np.array([source != "added" for source in after.sources])
+    assert np.array_equal(samples[0], samples[1][:, others])
+    points = [
+        Drawing(
+            model.distributions,
+            model.correlation,
+            model.streams,
+            model.numbers,
+            model.names,
+            5,
+            model.directions,
+        )
+        .points(0)
+        .next(100)
+        for model in models
+    ]
+    assert np.array_equal(points[0], points[1][:, others])
+    assert before.streams.tolist() == after.streams[others].tolist()

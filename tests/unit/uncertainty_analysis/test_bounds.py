@@ -78,7 +78,7 @@ class Boxed:
             shifted,
             shift,
             self.moves.columns,
-            self.moves.variables.tolist(),
+            self.moves.variable_of.tolist(),
             self.moves.half_width,
         )
         m = len(self.machine.components)
@@ -122,7 +122,7 @@ class Boxed:
         values[:, parameters] = shift
         for column, parameter in enumerate(self.moves.columns):
             swing = self.moves.half_width[:, column]
-            values[:, parameter] += swing * signs[:, self.moves.variables[column]]
+            values[:, parameter] += swing * signs[:, self.moves.variable_of[column]]
         return every, values
 
     def worst_vertex(self, direction: Array) -> Array:
@@ -139,7 +139,7 @@ class Boxed:
             )
             along = np.einsum("c,nck->nk", direction, slopes) * self.moves.half_width
             effects = np.zeros_like(signs)
-            for column, variable in enumerate(self.moves.variables):
+            for column, variable in enumerate(self.moves.variable_of):
                 effects[:, variable] += along[:, column]
             signs = np.where(effects >= 0.0, 1.0, -1.0)
         return self.at_vertex(signs)

@@ -76,7 +76,7 @@ def bounds_at(machine: Machine, poses: Array, **asked: Any) -> tuple[Array, Arra
         moves.shift[0],
         np.ascontiguousarray(moves.shift[1]),
         moves.columns,
-        moves.variables.tolist(),
+        moves.variable_of.tolist(),
         np.ascontiguousarray(moves.half_width),
         [members.tolist() for members in moves.directions],
         **asked,

@@ -66,7 +66,7 @@ def assert_encloses(found: xr.Dataset, machine: Machine, poses: Array, samples: 
         shifted,
         shift,
         moves.columns,
-        moves.variables.tolist(),
+        moves.variable_of.tolist(),
         moves.half_width,
     )
     m, kinds = len(machine.components), found.sizes["quantity"]

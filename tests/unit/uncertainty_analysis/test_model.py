@@ -102,11 +102,11 @@ def test_poses_that_cannot_be_used_are_set_aside_and_counted() -> None:
     done: list[tuple[int, int]] = []
     each = models(machine, poses, progress=lambda at, total: done.append((at, total)))
     schema = {"value": Variable(("pose", "component"), "component", "error")}
-    rows = each.rows(schema)
+    each.begin(schema)
     for _, model in each:
-        each.append(rows, model, {"value": model.linear().value})
+        each.fill(model, {"value": model.linear().value})
     assert done == [(1, 3), (3, 3), (3, 3)]
-    found = each.dataset(schema, rows)
+    found = each.dataset({})
     assert found.pose.values.tolist() == [0, 2]
     assert found.left_out_index.values.tolist() == [1]
     budget = tp.budget(machine, poses)
@@ -117,11 +117,11 @@ def test_a_pose_that_is_left_out_later(tmp_path: Path) -> None:
     machine = tp.load(PLANAR_FILE)
     each = models(machine, [[0.3, 0.2]])
     schema = {"value": Variable(("pose", "component"), "component", "error")}
-    rows = each.rows(schema)
+    each.begin(schema)
     for _, model in each:
         each.leave_out(model, 3)
     with pytest.raises(RequestError, match="no-pose-left"):
-        each.dataset(schema, rows)
+        each.dataset({})
 
 
 def test_a_machine_without_sources(tmp_path: Path) -> None:

@@ -303,7 +303,7 @@ class Studied:
             shifted,
             shift,
             self.moves.columns,
-            self.moves.variables.tolist(),
+            self.moves.variable_of.tolist(),
             self.moves.half_width,
             whitening,
         )
@@ -477,8 +477,8 @@ LOOSE = edited(
 
 def test_samples_without_a_result_are_counted_and_not_averaged(tmp_path: Path) -> None:
     of = Studied.of(load_text(tmp_path, LOOSE), np.array([[0.3, 0.2], [0.4, 0.2], [0.12, 0.2]]))
-    errors, fine = of.errors(0, 2000)
-    found = of.sampled(0, 2000)
+    errors, fine = of.errors(0, 20_000)
+    found = of.sampled(0, 20_000)
     assert (found.failed > 0).any()
     assert np.array_equal(found.count, fine.sum(axis=1))
     assert np.array_equal(found.failed, (~fine).sum(axis=1))

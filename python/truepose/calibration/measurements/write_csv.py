@@ -238,6 +238,7 @@ def _lost(machine: Machine, condition: Condition) -> str | None:
         != of_machine.reference_temperature,
         "another gravity": condition.gravity != of_machine.gravity,
         "another acceleration": condition.acceleration != of_machine.acceleration,
+        "other keys of error sources": condition.source_keys != of_machine.source_keys,
     }
     return next((phrase for phrase, there in lost.items() if there), None)
 

@@ -38,7 +38,15 @@ from truepose.calibration.planning.readings import planned, whitened
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import one_of
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import commanded_units, joint_units, label, provenance, quantity_coords
+from truepose.runs.dataset import (
+    Variable,
+    commanded_units,
+    data_variable,
+    joint_units,
+    label,
+    provenance,
+    quantity_coords,
+)
 from truepose.runs.quantities import POSITIONS
 
 DOMINATED = 0.5
@@ -388,13 +396,7 @@ def _dataset(plan: Plan) -> xr.Dataset:
     }
 
     def variable(dims: tuple[str, ...], values: ArrayLike, unit: str, meaning: str) -> xr.Variable:
-        if unit not in units:
-            return xr.Variable(dims, values, {"units": unit, "long_name": meaning})
-        named = ", ".join(dict.fromkeys(units[unit]))
-        attrs = {"units": named, "long_name": meaning}
-        if "," in named:
-            attrs["units_by"] = f"{unit}_units"
-        return xr.Variable(dims, values, attrs)
+        return data_variable(Variable(dims, unit, meaning), values, units)
 
     data = {
         "joint": variable(("pose", "joint"), plan.joints, "joint", "commanded joints"),

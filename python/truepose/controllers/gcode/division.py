@@ -184,7 +184,7 @@ class Division:
         Raises `CannotCorrect` (of move 0) where the machine cannot be there.
         """
         asked = self.axes.poses(point[np.newaxis])
-        known = self.actual.known(asked)
+        known = self.actual.deviations_at(asked)
         status = known.status
         if known.block.indices.size:
             command = self.actual.command(known)
@@ -282,7 +282,7 @@ class _Batch:
         joints = np.empty((len(asked), len(self.actual.machine.joints)))
         commands = np.empty_like(asked)
         for rows in blocks(len(asked)):
-            known = self.actual.known(asked[rows])
+            known = self.actual.deviations_at(asked[rows])
             self._require(known, move[rows], share[rows], asked[rows])
             command = self.actual.command(known)
             failed = np.flatnonzero(command.status != OK)
@@ -362,7 +362,7 @@ class _Batch:
         share = from_share + t * (nodes.share[end] - from_share)
         poses = self.axes.poses(self.moves.points(move, share))
         between = self._between(begin, end) if len(number) == len(inside) else None
-        known = self.actual.known(poses, between)
+        known = self.actual.deviations_at(poses, between)
         self._require(known, move, share, poses)
 
         step = t[:, np.newaxis]

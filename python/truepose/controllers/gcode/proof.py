@@ -181,7 +181,9 @@ class Proving:
         lines: np.ndarray,
     ) -> None:
         measure, division = self._measure, self._division
-        known = division.actual.known(points.poses) if points.known is None else points.known
+        known = (
+            division.actual.deviations_at(points.poses) if points.known is None else points.known
+        )
         piece = points.piece
         before = measure.at_joints(known, known.block.joints)
         if points.at_ends:

@@ -98,7 +98,7 @@ def error_before(division: Division, batches: Iterable[Moves]) -> tuple[float, .
     poses = _some_poses(division, batches)
     if not len(poses):
         return ()
-    known = division.actual.known(poses)
+    known = division.actual.deviations_at(poses)
     if not known.block.indices.size:
         return ()
     measure: Measure = division.measure

@@ -51,7 +51,7 @@ def _largest(description: Description, condition: Condition) -> float:
     poses = machine.poses()
     most = 0.0
     for rows in blocks(len(poses)):
-        known = actual.known(poses[rows])
+        known = actual.deviations_at(poses[rows])
         command = actual.command(known)
         added = np.abs(command.joints - known.block.joints) * description.arms
         most = max(most, float(added[status_ok(command.status)].max(initial=0.0)))

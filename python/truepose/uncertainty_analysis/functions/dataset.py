@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from truepose.runs.dataset import Schema, label
+from truepose.runs.dataset import Schema, data_variable, label
 from truepose.version import version
 
 if TYPE_CHECKING:
@@ -27,14 +28,13 @@ def function_dataset(
 
     A variable of `schema` that has a dim pose has it not here.
     """
+    # One text for all outputs: no coordinate has the unit of each.
+    of_outputs = [", ".join(dict.fromkeys(model.output_units))]
+    units = dict.fromkeys(("component", "covariance"), of_outputs)
     data = {}
     for name, variable in schema.items():
-        dims = tuple(dim for dim in variable.dims if dim != "pose")
-        units = variable.units
-        if units in ("component", "covariance"):
-            units = ", ".join(dict.fromkeys(model.output_units))
-        attrs = {"units": units, "long_name": variable.long_name}
-        data[name] = xr.Variable(dims, values[name], attrs)
+        at_no_pose = replace(variable, dims=tuple(dim for dim in variable.dims if dim != "pose"))
+        data[name] = data_variable(at_no_pose, values[name], units)
     used = {dim for variable in data.values() for dim in variable.dims}
     labels = {
         dim: label(dim, list(model.outputs), meaning)

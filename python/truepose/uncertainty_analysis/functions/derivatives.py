@@ -54,16 +54,16 @@ def slopes(function: Function, at: Floats, scale: Floats) -> Floats:
     """(m, n) derivatives at `at` (n,), inputs of no scale left out as 0."""
     moved = np.flatnonzero(scale)
     difference, doubt = _differences(function, at, scale, moved)
-    found = difference
+    slope = difference
     exact = _complex_step(function, at, scale, moved)
     if exact is not None and exact.shape == difference.shape:
         size = np.maximum(np.abs(exact), np.abs(difference))
         with np.errstate(invalid="ignore"):
             agrees = np.abs(exact - difference) <= 10.0 * doubt + _AGREE * size
         # A function without a finite neighbourhood has the complex step only.
-        found = np.where(agrees | ~np.isfinite(difference), exact, difference)
-    result = np.zeros((found.shape[0], at.size))
-    result[:, moved] = found
+        slope = np.where(agrees | ~np.isfinite(difference), exact, difference)
+    result = np.zeros((slope.shape[0], at.size))
+    result[:, moved] = slope
     return result
 
 

@@ -27,7 +27,7 @@ NOISE = 64.0
 
 def second_order_uncertainty(model: FunctionModel, law: LinearModel) -> Floats:
     """(m,) standard uncertainty with the terms of next order; NaN where they are not finite."""
-    sigmas = np.array([each.sigmas for each in model.distributions])
+    sigmas = np.array([distribution.sigmas for distribution in model.distributions])
     mix = np.eye(sigmas.size)
     if model.correlation is not None:
         values, vectors = np.linalg.eigh(model.correlation)
@@ -49,11 +49,11 @@ def _derivatives(at: Function, n: int) -> tuple[Floats, Floats]:
     """f_ij and f_ijj, both (n, n, m), at 0: central differences of two steps, extrapolated."""
     coarse, fine = (_differences(at, n, step) for step in (STEP, 0.5 * STEP))
     size = fine[2] * NOISE * np.finfo(np.float64).eps
-    found = []
+    terms = []
     for order, (longer, shorter) in enumerate(zip(coarse[:2], fine[:2], strict=True), start=2):
         value = (4.0 * shorter - longer) / 3.0
-        found.append(np.where(np.abs(value) <= size / (0.5 * STEP) ** order, 0.0, value))
-    return found[0], found[1]
+        terms.append(np.where(np.abs(value) <= size / (0.5 * STEP) ** order, 0.0, value))
+    return terms[0], terms[1]
 
 
 def _differences(at: Function, n: int, step: float) -> tuple[Floats, Floats, Floats]:

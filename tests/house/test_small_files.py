@@ -12,8 +12,6 @@ import csv
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-import pytest
-
 from house.source_tree import ROOT, Module, modules
 
 LIST = Path(__file__).with_name("small_files.csv")
@@ -78,7 +76,6 @@ def test_every_small_file_has_a_reason() -> None:
     assert [path for path, reason in listed.items() if not reason.strip()] == []
 
 
-@pytest.mark.xfail(strict=True, reason="some small files are still to be merged")
 def test_no_small_file_waits_to_be_merged() -> None:
     waiting = {path: why for path, why in reasons().items() if why.startswith(TO_MERGE)}
     assert waiting == {}

@@ -16,21 +16,23 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field
 
 from truepose.arrays import Floats
 from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import quantity
-from truepose.sources._directions import of_base_side
 from truepose.sources._play import pressed
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
+from truepose.spatial import rotate_about
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from truepose.machine import Condition, Machine, SourceBuilder
+    from truepose._kernel import Machine as KernelMachine
+    from truepose.machine import Condition, Drive, Machine, SourceBuilder
     from truepose.machine.parts import Joint
 
 _ENDS = ("base_joint", "platform_joint")
@@ -124,8 +126,29 @@ def _reach(machine: Machine, block: PoseBlock, at: JointOfStrut) -> Floats | flo
         axis = block.rotations @ np.array(joint.axis)
     else:
         drive = next((drive for drive in machine.drives if drive.name == strut.drive), None)
-        axis = of_base_side(machine.kernel, drive, block.joints, joint.axis)
+        axis = _in_base_axes(machine.kernel, drive, block.joints, joint.axis)
     direction = block.directions[:, at.strut]
     along = np.abs((axis * direction).sum(axis=1))
     across = np.linalg.norm(np.cross(axis, direction), axis=1)
     return np.asarray(0.5 * (joint.clearance * across + joint.axial_clearance * along))
+
+
+def _in_base_axes(
+    kernel: KernelMachine,
+    drive: Drive | None,
+    joints: Floats,
+    direction: ArrayLike,
+) -> Floats:
+    """(n or 1, 3) unit `direction` (3,) in the axes of what carries a strut's base joint.
+
+    A frame (`drive` None, or a telescopic one) and a carriage have base axes. An arm has base axes
+    at angle 0 and turns about its drive's axis by scale q + offset, `joints` q (n, n_joint), rad.
+    """
+    given = np.asarray(direction, np.float64)
+    if drive is None or drive.coordinate != "angle":
+        return given[np.newaxis, :]
+    nominal = dict(zip(kernel.parameters, kernel.nominal.tolist(), strict=True))
+    scale, offset = nominal[f"{drive.part}.scale"], nominal[f"{drive.part}.offset"]
+    angle = scale * joints[:, [kernel.joints.index(drive.name)]] + offset
+    axis = np.asarray(drive.fields["axis"], np.float64)
+    return rotate_about(given, axis, angle)

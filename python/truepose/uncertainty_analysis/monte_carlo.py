@@ -50,15 +50,8 @@ from truepose.uncertainty_analysis.arguments import (
 from truepose.uncertainty_analysis.failed_samples import OfAll, lost_text
 from truepose.uncertainty_analysis.functions.dataset import function_dataset
 from truepose.uncertainty_analysis.model import FunctionModel
-from truepose.uncertainty_analysis.sampler import (
-    Adaptive,
-    Draws,
-    FixedNumber,
-    Random,
-    Sampler,
-    StoppingRule,
-    sobol,
-)
+from truepose.uncertainty_analysis.sampler import Draws, Random, Sampler, sobol
+from truepose.uncertainty_analysis.stopping_rule import Adaptive, FixedNumber, StoppingRule
 
 if TYPE_CHECKING:
     from truepose.uncertainty_analysis.functions.inputs import Correlation, Input

@@ -20,7 +20,7 @@ from truepose.machine import Machine
 from truepose.runs.first_order import ExactError
 from truepose.runs.poses import PoseRun, required_sources
 from truepose.runs.variables import variables_at
-from truepose.uncertainty_analysis import monte_carlo, sampler
+from truepose.uncertainty_analysis import monte_carlo, stopping_rule
 from truepose.uncertainty_analysis.functions.inputs import Input
 from truepose.uncertainty_analysis.model import FunctionModel
 from truepose.uncertainty_analysis.sampler import Random
@@ -270,7 +270,7 @@ def test_what_does_not_vary_does_not_keep_it_going() -> None:
 
 
 def test_it_ends_where_nothing_becomes_stable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sampler, "MOST", 50_000)
+    monkeypatch.setattr(stopping_rule, "MOST", 50_000)
     heavy = {"x": Input.student_t(0.0, 1.0, 2.05)}
     assert int(tp.monte_carlo(lambda x: x**3, heavy, digits=4).samples) == 50_000
 
@@ -336,7 +336,7 @@ class Stop:
 @pytest.fixture
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Batches of 10 000 samples, whatever the poses."""
-    monkeypatch.setattr(sampler, "SLICE", 1)
+    monkeypatch.setattr(stopping_rule, "SLICE", 1)
 
 
 @pytest.mark.usefixtures("short")

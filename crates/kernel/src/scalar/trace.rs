@@ -51,7 +51,7 @@ impl Operation {
 #[derive(Default)]
 struct Recorded {
     operations: Vec<Operation>,
-    places: HashMap<Operation, usize>,
+    number_of: HashMap<Operation, usize>,
     /// How each argument is written in C.
     inputs: Vec<String>,
 }
@@ -93,7 +93,7 @@ impl Tape {
     fn record(&self, operation: Operation) -> Trace<'_> {
         let mut recorded = self.recorded.borrow_mut();
         let next = recorded.operations.len();
-        let place = *recorded.places.entry(operation).or_insert(next);
+        let place = *recorded.number_of.entry(operation).or_insert(next);
         if place == next {
             recorded.operations.push(operation);
         }

@@ -234,9 +234,9 @@ def _arm_angles(values: Floats, poses: Floats) -> Floats:
     between = outward**2 + upward**2 + upper**2 - values[LOWER] ** 2 + beside**2
     size = np.hypot(outward, upward)
     with np.errstate(invalid="ignore", divide="ignore"):  # out of reach is NaN
-        swing = np.arccos(between / (2.0 * upper * size))
+        half_angle = np.arccos(between / (2.0 * upper * size))
     middle = np.arctan2(upward, outward)
-    one, other = middle + swing, middle - swing
+    one, other = middle + half_angle, middle - swing
     angle: Floats = np.where(np.cos(one) >= np.cos(other), one, other)
     return wrapped(angle)
 

@@ -236,7 +236,7 @@ def _arm_angles(values: Floats, poses: Floats) -> Floats:
     with np.errstate(invalid="ignore", divide="ignore"):  # out of reach is NaN
         half_angle = np.arccos(between / (2.0 * upper * size))
     middle = np.arctan2(upward, outward)
-    one, other = middle + half_angle, middle - swing
+    one, other = middle + half_angle, middle - half_angle
     angle: Floats = np.where(np.cos(one) >= np.cos(other), one, other)
     return wrapped(angle)
 

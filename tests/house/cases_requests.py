@@ -6,25 +6,10 @@ import math
 from collections.abc import Iterator
 
 from house.recorded_cases import EXAMPLES, INPUTS, Case, Files, Step, changed, machine_text
+from truepose import cli
 
 PLANAR = "planar_two_slider"
-COMMANDS = (
-    "init",
-    "check",
-    "plan",
-    "calibrate",
-    "compare",
-    "budget",
-    "compensate",
-    "montecarlo",
-    "bounds",
-    "shares",
-    "over-time",
-    "strain",
-    "report",
-    "gcode",
-    "export",
-)
+COMMANDS = tuple(cli.COMMANDS)
 QUICK = ("--set", "workspace.grid.x=[200, 400, 2]", "--set", "workspace.grid.y=[100, 300, 2]")
 OUT_OF_REACH = ("--set", "workspace.grid.x=[-900, 700, 5]")
 NOWHERE = ("--set", "workspace.grid.x=[5000, 6000, 3]")

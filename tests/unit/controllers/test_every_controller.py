@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -41,9 +42,9 @@ def test_it_says_what_it_is(name: str) -> None:
 
 @pytest.mark.parametrize("name", REGISTRY)
 def test_it_has_a_page(name: str) -> None:
-    pages = [page.name for page in PAGES.glob("*.md") if name in page.read_text("utf-8")]
+    said = re.compile(rf"`(?:truepose )?(?:export )?{re.escape(name)}[` ]")
+    pages = [page.name for page in PAGES.glob("*.md") if said.search(page.read_text("utf-8"))]
     assert "README.md" in pages
-    assert len(pages) > 1
 
 
 @pytest.mark.parametrize("name", REGISTRY)

@@ -31,7 +31,8 @@ from truepose.cli._options import (
         "--gap",
         type=float,
         metavar="SHARE",
-        help="Of a region: how far the bound may be above what is reached.  [default: 0.05]",
+        help="Over a region: by which share the bound may exceed an error that is "
+        "reached.  [default: 0.05]",
     ),
     click.option(
         "--truncate",

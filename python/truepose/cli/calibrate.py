@@ -110,8 +110,8 @@ def command(**options: Any) -> int:
 
     May the result be used? Exit code 0: yes. Exit code 1: no, with the reasons and the cheapest
     measurement that would help; no machine file is written then. Tolerances are what is known
-    beforehand. All that is found comes with its uncertainty, how much of it the measurements say,
-    and what it is worth at the tool over the whole workspace.
+    beforehand. Every parameter found comes with its uncertainty, the share of it that the
+    measurements determine, and what it leaves uncertain at the tool over the whole workspace.
     """
     asked = _Options(options)
     asked.check()

@@ -43,7 +43,7 @@ from truepose.cli._options import (
         metavar="P",
         default=0.95,
         show_default=True,
-        help="Of the coverage intervals.",
+        help="Coverage probability of the intervals.",
     ),
     seed_option,
     click.option(
@@ -62,7 +62,7 @@ from truepose.cli._options import (
 def command(
     samples: int | None, digits: int, probability: float, seed: int, sampling: str, **options: Any
 ) -> int:
-    """Sample the error of machines as they may be made.
+    """Sample the error of machines within their tolerances.
 
     Draws what is not known of the machine from its distributions and solves each machine
     exactly: mean, standard deviation and coverage interval of the error at every pose of the

@@ -35,7 +35,7 @@ from truepose.cli._options import (
     strict_option,
 )
 def command(samples: int | None, seed: int, **options: Any) -> int:
-    """Say whose fault it is: shares of the variance.
+    """Say which parameters and sources the spread comes from.
 
     First-order and total Sobol indices of every parameter and source that is not known exactly,
     with their confidence, the linear shares beside them, and Shapley shares where parameters are

@@ -20,7 +20,7 @@ from truepose.cli._options import (
 @click.command("strain")
 @takes(machine_argument, set_option, format_option, output_option, strict_option)
 def command(**options: Any) -> int:
-    """Find which errors force an over-constrained machine.
+    """Find the internal forces of an over-constrained machine.
 
     With more closures than freedoms not every error moves the platform: what does not fit is
     taken up by the joints' clearances, or strains the parts. Shows the internal forces from each

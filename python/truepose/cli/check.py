@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     witness_option,
 )
 def command(**options: Any) -> int:
-    """Describe a machine file, and say if the machine is accurate enough.
+    """Describe a machine, and say if it is accurate enough.
 
     Exit code 1 unless it is certain that the machine, commanded as it is, keeps the accuracy
     asked; what compensation would leave is shown beside it.

@@ -22,8 +22,8 @@ from truepose.cli._options import (
 def command(**options: Any) -> int:
     """Follow the error through a temperature log.
 
-    The machine file names the log (`[condition] temperature_log`). Shows the tool's error at the home pose
-    at some moments; `--format csv` and `--output` have a row for every moment of the log.
+    The machine file names the log (`[condition] temperature_log`). Shows the tool's error at the
+    home pose at some moments; `--format csv` and `--output` have a row for every moment.
     """
     from truepose.cli import _steps
     from truepose.reporting import tables

@@ -425,13 +425,13 @@ def test_what_is_known_in_the_middle_of_short_moves(monkeypatch: pytest.MonkeyPa
     moves = lines(points_of(machine, at))
     actual = ActualMachine(machine)
     asked = []
-    known = actual.known
+    known = actual.deviations_at
 
     def counted(poses: np.ndarray, moved: object = None) -> object:
         asked.append(moved is None)
         return known(poses, moved)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(actual, "known", counted)
+    monkeypatch.setattr(actual, "deviations_at", counted)
     whole = Division(actual, Axes(machine), Limits(TOLERANCE, LEAST, "either"))
     found = whole.divide(moves, whole.at_start(moves.start[0]))
     assert asked == [True, True, False]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,7 +15,8 @@ SCRIPT = Path(__file__).parents[1] / "house" / "public_names.py"
 def test_public_names(tmp_path: Path, golden: Callable[[str, str], str]) -> None:
     """To change one on purpose: `pytest tests/golden/test_public_names.py --update-golden`."""
     written = tmp_path / "public_names.txt"
-    subprocess.run([sys.executable, SCRIPT, written], check=True)
+    environment = {**os.environ, "PYTHONPATH": str(SCRIPT.parents[1])}
+    subprocess.run([sys.executable, SCRIPT, written], check=True, env=environment)
     found = written.read_text(encoding="utf-8")
     expected = golden("public_names.txt", found)
     changes = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pytest
 from house.comparison import compare_records
 
 RECORDER = Path(__file__).parent / "recorder.py"
+TESTS = str(Path(__file__).parents[1])
 CASE = "over-time/planar"
 
 
@@ -26,6 +28,7 @@ def records(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
             [sys.executable, RECORDER, "record", record, "--only", CASE, "--jobs", "1"],
             check=True,
             capture_output=True,
+            env={**os.environ, "PYTHONPATH": TESTS},
         )
     return both
 

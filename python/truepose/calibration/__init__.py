@@ -1,4 +1,4 @@
-"""Fitting parameters to what was observed, or to what a controller's model can take."""
+"""From measurements to a machine that may be used, or a reason why not; and least squares."""
 
 from __future__ import annotations
 

@@ -9,9 +9,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from sweeps import sweep
+
 SCRIPT = Path(__file__).parents[1] / "house" / "public_names.py"
 
 
+@sweep
 def test_public_names(tmp_path: Path, golden: Callable[[str, str], str]) -> None:
     """To change one on purpose: `pytest tests/golden/test_public_names.py --update-golden`."""
     written = tmp_path / "public_names.txt"

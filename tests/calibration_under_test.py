@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from made_measurements import made_measurements, poses_within
-from truepose.calibration.identification.fit import Equations, place_instruments, whitened
+from truepose.calibration.identification.equations import Equations, whitened
+from truepose.calibration.identification.placement import place_instruments
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.calibration.instruments import REGISTRY
@@ -72,7 +73,8 @@ class CalibrationUnderTest:
     @cached_property
     def problem(self) -> IdentificationProblem:
         """The measurements with their frames where they begin."""
-        return place_instruments(self.machine, self.measurements, self.unknowns)[0]
+        standing = place_instruments(self.machine, self.measurements).measurements
+        return IdentificationProblem(self.machine, standing, self.unknowns)
 
     def equations(self, *, use_prior: bool) -> Equations:
         """At the values where the search starts."""

@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from made_measurements import made_measurements, poses_within
-from truepose.calibration.data_checks.nominal import Geometry, Placement, nominal_readings
+from made_measurements import made_measurements, nominal_values, poses_within, rotation_matrix
+from truepose.calibration.instruments import Instrument
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Machine
 from truepose.sources.tolerance import DimensionalTolerance
-from truepose.spatial import vector_to_matrix
+from truepose.spatial import matrix_to_quaternion, vector_to_matrix
 
 Floats = NDArray[np.float64]
 
@@ -34,15 +34,37 @@ def shown(
     nominal: Machine,
     actual: Machine,
     measurements: Measurements,
-    setups: list[Placement] | None = None,
+    instrument: Instrument | None = None,
 ) -> Floats:
-    """(n_observation,) what an actual machine shows at the commanded joints, without noise."""
+    """(n_observation,) what an actual machine shows at the commanded joints, without noise.
+
+    `instrument`: the one that measured, where it is not as declared.
+    """
     start = nominal.kernel.pose_of(measurements.placements)
     poses, status = actual.kernel.forward(measurements.joints, start, status=True)
     assert (status <= 1).all()
     placements = actual.kernel.placement_of(poses)
-    geometry = Geometry.of(actual.kernel, measurements.joints, placements)
-    return nominal_readings(nominal, measurements, setups, geometry)
+    there = dataclasses.replace(measurements, placements=placements)
+    if instrument is not None:
+        there = dataclasses.replace(there, instruments=(instrument,))
+    return nominal_values(actual, there)
+
+
+def elsewhere(
+    instrument: Instrument, origin: ArrayLike, rotation: ArrayLike, target: ArrayLike | None = None
+) -> Instrument:
+    """The instrument with its frame moved by `origin`, m, and turned by a vector, rad."""
+    frame = instrument.frame
+    matrix = vector_to_matrix(np.asarray(rotation, float)) @ rotation_matrix(frame.rotation)
+    return dataclasses.replace(
+        instrument,
+        frame=dataclasses.replace(
+            frame,
+            origin=tuple(np.add(frame.origin, origin).tolist()),
+            rotation=matrix_to_quaternion(matrix),
+        ),
+        target=instrument.target if target is None else tuple(np.asarray(target).tolist()),
+    )
 
 
 def with_noise(measurements: Measurements, value: Floats, seed: int) -> Measurements:
@@ -57,18 +79,13 @@ def good(
     made = made_measurements(
         machine, kind, poses_within(machine, count, seed), frame=frame, values="nominal"
     )
-    setups = None
+    true = made.instruments[0]
     if frame == "unknown":
         random = np.random.default_rng(seed + 7)
-        unknown = np.array(made.instruments[0].frame.unknown, float)
+        unknown = np.array(true.frame.unknown, float)
         far = unknown * np.r_[random.uniform(-1.0, 1.0, 3), random.uniform(-0.3, 0.3, 3)]
-        stated = Placement.stated(made.instruments[0])
-        setups = [
-            Placement(
-                stated.origin + far[:3], vector_to_matrix(far[3:]) @ stated.rotation, stated.target
-            )
-        ]
-    return with_noise(made, shown(machine, drawn(machine, seed), made, setups), seed)
+        true = elsewhere(true, far[:3], far[3:])
+    return with_noise(made, shown(machine, drawn(machine, seed), made, true), seed)
 
 
 def column(measurements: Measurements, name: str, strut: int = -1) -> NDArray[np.intp]:

@@ -18,14 +18,15 @@ from truepose.calibration.identification.consider_covariance import (
     consider_covariance,
     with_considered,
 )
-from truepose.calibration.identification.fit import Fit, fit, place_instruments
+from truepose.calibration.identification.fit import Fit, fit
+from truepose.calibration.identification.placement import Placements, place_instruments
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
     candidates,
     tool_effects,
     workspace_poses,
 )
-from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
+from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.identification.validate import Validation, validate
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.measurements import Measurements
@@ -125,10 +126,18 @@ def calibrate(
         raise _nothing_to_fit(whole)
     table, joints, placements = workspace_poses(machine, poses)
     unknowns = unknowns_of(machine, whole, identify)
-    suspected = _suspected(machine, whole, unknowns)
+    standing = _placed(machine, whole)
+    suspected = suspicions(machine, whole, standing)
     used = whole.select(~whole.held_out) if whole.held_out.any() else whole
     try:
-        fitted = fit(machine, used, unknowns, use_prior=use_prior, robust=robust)
+        fitted = fit(
+            machine,
+            used,
+            unknowns,
+            use_prior=use_prior,
+            robust=robust,
+            placements=standing if used is whole else None,
+        )
     except RequestError as failure:
         raise _with_suspicions(failure, suspected) from failure
     checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
@@ -150,25 +159,12 @@ def calibrate(
     )
 
 
-def _suspected(machine: Machine, whole: Measurements, unknowns: Unknowns) -> tuple[Suspicion, ...]:
-    """What is suspected, with unknown frames first set where they fit best.
-
-    A mistake in the data may put the frames in a wrong place: what then stays unexplained is
-    checked with the frames as declared too.
-    """
+def _placed(machine: Machine, whole: Measurements) -> Placements | None:
+    """Where the instruments stand; None where from no start the readings can be followed."""
     try:
-        standing = place_instruments(machine, whole, unknowns)[0].measurements
+        return place_instruments(machine, whole)
     except RequestError:
-        return suspicions(machine, whole)
-    as_placed = suspicions(machine, standing)
-    if standing.instruments == whole.instruments or all(
-        suspicion.code != "far-off" for suspicion in as_placed
-    ):
-        return as_placed
-    as_declared = suspicions(machine, whole)
-    return (
-        as_placed if any(suspicion.code == "far-off" for suspicion in as_declared) else as_declared
-    )
+        return None
 
 
 def _nothing_to_fit(whole: Measurements) -> RequestError:

@@ -14,7 +14,7 @@ import xarray as xr
 
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.identification.fit import Equations
+from truepose.calibration.identification.equations import Equations
 from truepose.calibration.identification.problem import Prior
 from truepose.calibration.observables import UNITS, column_name
 from truepose.machine import Machine

@@ -12,6 +12,7 @@ import truepose as tp
 from build_machine import MACHINES
 from made_blunders import (
     column,
+    elsewhere,
     exchanged,
     good,
     recommanded,
@@ -19,19 +20,13 @@ from made_blunders import (
     shown,
     with_noise,
 )
-from made_measurements import made_measurements, nominal_values, poses_within
+from made_measurements import made_measurements, poses_within
 from sweeps import thinned
-from truepose.calibration.data_checks import (
-    CODES,
-    Placement,
-    Suspicion,
-    nominal_readings,
-    suspicions,
-)
+from truepose.calibration.data_checks import CODES, Suspicion, suspicions
 from truepose.calibration.data_checks.too_few import last_digit
 from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.unknowns import unknowns_of
-from truepose.calibration.instruments import REGISTRY, Frame
+from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.measurements import Measurements
 from truepose.machine import Machine
 from truepose.spatial import vector_to_matrix
@@ -63,21 +58,6 @@ def readable(name: str) -> list[tuple[str, str]]:
             continue  # a contact needs joints that touch one point: below
         kinds += [(kind, "base")] + ([(kind, "unknown")] if entry.frame else [])
     return kinds
-
-
-@pytest.mark.parametrize("name", thinned(ALL, SOME))
-def test_readings_are_those_of_the_other_road(name: str) -> None:
-    far = Frame((0.1, -0.2, 0.3), (0.8, 0.2, 0.4, 0.4))
-    for kind, _ in readable(name):
-        made = made_measurements(
-            machine(name),
-            kind,
-            poses_within(machine(name), 5),
-            frame=far,
-            target=(0.01, 0.02, 0.03),
-        )
-        expected = nominal_values(machine(name), made)
-        assert np.abs(nominal_readings(machine(name), made) - expected).max() < 1e-12
 
 
 @pytest.mark.parametrize("name", thinned(ALL, SOME))
@@ -276,8 +256,8 @@ def test_another_frame_than_stated(name: str) -> None:
     m = machine(name)
     made = made_measurements(m, "position", poses_within(m, COUNT), values="nominal")
     turn = np.array([0.0, 0.0, 0.3]) if len(m.dof) < 6 and "z" not in m.dof else [0.2, -0.1, 0.3]
-    setup = Placement(np.array([0.3, -0.2, 0.0]), vector_to_matrix(np.asarray(turn)), np.zeros(3))
-    found = first(name, with_noise(made, shown(m, m, made, [setup]), 3))
+    there = elsewhere(made.instruments[0], [0.3, -0.2, 0.0], turn)
+    found = first(name, with_noise(made, shown(m, m, made, there), 3))
     assert found.code == "other-frame"
     assert "another frame" in found.sentence
 
@@ -286,8 +266,8 @@ def test_another_frame_than_stated(name: str) -> None:
 def test_forgotten_target(name: str) -> None:
     m = machine(name)
     made = made_measurements(m, "position", poses_within(m, 40), values="nominal")
-    setup = Placement(np.zeros(3), np.eye(3), np.array([0.01, -0.02, 0.08]))
-    found = first(name, with_noise(made, shown(m, m, made, [setup]), 3))
+    there = elsewhere(made.instruments[0], np.zeros(3), np.zeros(3), [0.01, -0.02, 0.08])
+    found = first(name, with_noise(made, shown(m, m, made, there), 3))
     assert found.code == "target-offset"
 
 

@@ -13,9 +13,8 @@ from build_machine import MACHINES
 from made_measurements import made_measurements, nominal_values, poses_within
 from sweeps import thinned
 from truepose.calibration.calibrate import calibrate
-from truepose.calibration.identification.fit import place_instruments
 from truepose.calibration.identification.frames import rotated_starts
-from truepose.calibration.identification.unknowns import unknowns_of
+from truepose.calibration.identification.placement import place_instruments
 from truepose.calibration.instruments import REGISTRY, Frame
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.arrays import joined
@@ -52,8 +51,9 @@ def standing(of: str, kind: str, degrees: float, **others: object) -> Measuremen
 
 def left(name: str, data: Measurements) -> float:
     """Root mean square of the residuals, in uncertainties, of the machine as filed."""
-    problem, values = place_instruments(machine(name), data, unknowns_of(machine(name), data))
-    return float(np.sqrt(np.mean(problem.residual(values) ** 2)))
+    placements = place_instruments(machine(name), data).of.values()
+    residual = np.concatenate([placement.residual for placement in placements])
+    return float(np.sqrt(np.mean(residual**2)))
 
 
 @pytest.mark.parametrize("degrees", thinned(ANGLES, ANGLES[-1:]))
@@ -82,12 +82,10 @@ def test_two_turned_sensors_are_both_found() -> None:
 
 
 def test_a_frame_with_a_closed_form_is_not_turned_further() -> None:
-    assert not rotated_starts(machine("3rrr"), standing("3rrr", "position", 90.0), 0)
-    assert not rotated_starts(machine("hexapod"), standing("hexapod", "orientation", 90.0), 0)
-    assert len(rotated_starts(machine("3rrr"), standing("3rrr", "orientation", 90.0), 0)) == 7
-    assert (
-        len(rotated_starts(machine("hexapod"), standing("hexapod", "joint-angle", 90.0), 0)) == 23
-    )
+    assert not rotated_starts(machine("3rrr"), standing("3rrr", "position", 90.0))
+    assert not rotated_starts(machine("hexapod"), standing("hexapod", "orientation", 90.0))
+    assert len(rotated_starts(machine("3rrr"), standing("3rrr", "orientation", 90.0))) == 7
+    assert len(rotated_starts(machine("hexapod"), standing("hexapod", "joint-angle", 90.0))) == 23
 
 
 @pytest.mark.parametrize("name", ["hexapod", "hexaglide"])

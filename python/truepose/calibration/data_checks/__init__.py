@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.calibration.data_checks import (
     constant_column,
     frame,
@@ -32,13 +33,14 @@ from truepose.calibration.data_checks._base import (
     Hypothesis,
     HypothesisKind,
     InspectionKind,
+    Readings,
     Suspicion,
     View,
 )
 from truepose.calibration.data_checks.expected_residual import expected_residual
-from truepose.calibration.data_checks.nominal import Geometry, Placement, nominal_readings
-from truepose.calibration.data_checks.placement import Readings
+from truepose.calibration.identification.placement import Placements, place_instruments
 from truepose.calibration.measurements import Measurements
+from truepose.errors import RequestError
 from truepose.machine import Machine
 
 HYPOTHESES: tuple[HypothesisKind, ...] = (
@@ -75,34 +77,67 @@ _SAME = 1.02
 """Within this factor two of them explain the same, and the earlier in the registry goes first."""
 
 
-def suspicions(machine: Machine, measurements: Measurements) -> tuple[Suspicion, ...]:
+def suspicions(
+    machine: Machine, measurements: Measurements, placements: Placements | None = None
+) -> tuple[Suspicion, ...]:
     """Suspicions about the measurements of a machine, the likeliest of each instrument first.
 
-    Empty for data of a machine that is within its tolerances. Raises nothing of its own, and
+    `placements`: where the instruments stand, if they have been placed by these rows already. Empty
+    for data of a machine that is within its tolerances. Raises nothing of its own, and
     `TrueposeError` where a row's condition asks an error source for what the machine does not say.
     """
-    geometry = Geometry.of(machine.kernel, measurements.joints, measurements.placements)
-    allowed = expected_residual(machine, measurements, geometry)
-    instrument_of = measurements.instrument[measurements.row]
+    if placements is None:
+        try:
+            placements = place_instruments(machine, measurements)
+        except RequestError:  # from no start can the readings be followed
+            placements = Placements(measurements, {})
+    allowed = expected_residual(machine, placements.measurements)
+    declared = Placements(measurements, {})
     suspected: list[Suspicion] = []
-    for index, instrument in enumerate(measurements.instruments):
-        observations = np.flatnonzero(instrument_of == index)
-        if not observations.size:
+    for number in np.unique(measurements.instrument).tolist():
+        view = _view(machine, placements, number, allowed)
+        otherwise = _view(machine, declared, number, allowed)
+        try:
+            suspected += _of_instrument(view, otherwise)
+        except RequestError:  # a pose of the machine as filed cannot be solved: the fit says so
             continue
-        readings = Readings(
-            measurements.row[observations],
-            measurements.observable[observations],
-            measurements.strut[observations],
-            measurements.value[observations],
-            allowed[observations],
-        )
-        view = View(machine, measurements, instrument, observations, geometry, readings)
-        inspected = [suspicion for kind in INSPECTIONS for suspicion in kind.inspect(view)]
-        # What else is off follows from a constant column.
-        if all(suspicion.code != "constant-column" for suspicion in inspected):
-            suspected += _explained(view)
-        suspected += inspected
     return tuple(suspected)
+
+
+def _of_instrument(view: View, declared: View) -> list[Suspicion]:
+    inspected = [suspicion for kind in INSPECTIONS for suspicion in kind.inspect(view)]
+    # What else is off follows from a constant column.
+    if any(suspicion.code == "constant-column" for suspicion in inspected):
+        return inspected
+    return [*_explained_somewhere(view, declared), *inspected]
+
+
+def _view(machine: Machine, placements: Placements, number: int, allowed: Floats) -> View:
+    measurements = placements.measurements
+    own, observations = measurements.of_instrument(number)
+    readings = Readings(
+        measurements.row[observations],
+        own.observable,
+        own.strut,
+        own.value,
+        allowed[observations],
+    )
+    return View(machine, measurements, own, observations, readings, placements.of.get(number))
+
+
+def _explained_somewhere(view: View, declared: View) -> list[Suspicion]:
+    """What explains the data, with the frame where it fits best or else where it is declared.
+
+    A mistake in the data may put an unknown frame in a wrong place.
+    """
+    suspected = _explained(view)
+    if all(suspicion.code != "far-off" for suspicion in suspected):
+        return suspected
+    if declared.instrument == view.instrument:
+        return suspected
+    otherwise = _explained(declared)
+    far = any(suspicion.code == "far-off" for suspicion in otherwise)
+    return suspected if far else otherwise
 
 
 def _explained(view: View) -> list[Suspicion]:
@@ -195,8 +230,6 @@ __all__ = [
     "CODES",
     "HYPOTHESES",
     "INSPECTIONS",
-    "Placement",
     "Suspicion",
-    "nominal_readings",
     "suspicions",
 ]

@@ -15,14 +15,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.calibration.data_checks.nominal import Geometry, Placement
-from truepose.calibration.data_checks.placement import Free, Readings, fit_instrument
-from truepose.calibration.instruments._base import Instrument
+from truepose.calibration.identification.placement import Placement, place_instrument
+from truepose.calibration.identification.problem import row_shifts
+from truepose.calibration.identification.unknowns import unknowns_of_instruments
+from truepose.calibration.instruments import Instrument
 from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.errors import RequestError
 
 if TYPE_CHECKING:
     from truepose.calibration.measurements import Measurements
     from truepose.machine import Machine
+    from truepose.runs.displacement import ParameterDeviation
 
 
 ALLOWED = 3.0
@@ -72,8 +75,9 @@ class Suspicion:
 class Misfit:
     """How far readings are from a machine.
 
-    `residual` (k,) SI; `quotients` (k,) residual over what is allowed; `column` (k,) number of the
-    column of each; `reach`: by how much the readings vary as the machine moves, in what is allowed.
+    `residual` (k,) read less predicted, SI; `quotients` (k,) residual over what is allowed;
+    `column` (k,) number of the column of each; `reach`: by how much the readings vary as the
+    machine moves, in what is allowed.
     """
 
     residual: Floats
@@ -137,23 +141,50 @@ class MeasuredColumn:
 
 
 @dataclass(frozen=True, eq=False)
+class Readings:
+    """What one instrument read: (k,) each.
+
+    `row` counts in all measurements; `scale` is what tolerances and noise allow.
+    """
+
+    row: Indices
+    observable: Indices
+    strut: Indices
+    value: Floats
+    scale: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class View:
     """One instrument's part of the measurements, against the nominal machine.
 
-    `observations` (k,): its own among the measurements'; `geometry`: of all rows; `readings`: what
-    it read, with `scale` (k,) what tolerances and noise allow.
+    `own`: its rows alone, of which `observations` (k,) are the numbers among all `measurements`.
+    `placement`: where it stands, None where no place was found.
     """
 
     machine: Machine
     measurements: Measurements
-    instrument: Instrument
+    own: Measurements
     observations: Indices
-    geometry: Geometry
     readings: Readings
+    placement: Placement | None
+
+    @property
+    def instrument(self) -> Instrument:
+        """The one whose part it is."""
+        return self.own.instruments[0]
 
     @cached_property
     def as_given(self) -> Misfit:
-        """The misfit of the data as they are."""
+        """The misfit of the data as they are.
+
+        With the instrument where it was placed; where that leaves more than is allowed, where the
+        allowed residuals rather than the noise would have put it.
+        """
+        if self.placement is not None:
+            misfit = self._misfit(self.own, self.readings.scale, self.placement)
+            if not max(misfit.size(), misfit.size(trimmed=False)) > ALLOWED:
+                return misfit
         return self.assess()
 
     @cached_property
@@ -204,29 +235,59 @@ class View:
     def assess(
         self,
         value: Floats | None = None,
-        geometry: Geometry | None = None,
+        commanded: Measurements | None = None,
         kept: Indices | None = None,
-        free: Free | None = None,
+        instrument: Instrument | None = None,
     ) -> Misfit:
-        """The misfit of other values, other poses, a part of the data or a freer instrument."""
-        readings = self.readings
+        """The misfit of other values, other commands, a part of the data or a freer instrument."""
+        rows = self.own if commanded is None else commanded
+        scale = self.readings.scale
+        if instrument is not None:
+            rows = replace(rows, instruments=(instrument,))
         if value is not None:
-            readings = replace(readings, value=value)
+            rows = replace(rows, value=value)
         if kept is not None:
-            readings = readings.kept(kept)
-        placement, residual, fitted = fit_instrument(
-            self.geometry if geometry is None else geometry,
-            self.instrument,
-            readings,
-            free or Free.stated(self.instrument),
-            roughly=value is not None or geometry is not None,
+            scale = scale[kept]
+            rows = replace(
+                rows,
+                row=rows.row[kept],
+                observable=rows.observable[kept],
+                strut=rows.strut[kept],
+                value=rows.value[kept],
+                uncertainty=rows.uncertainty[kept],
+            )
+        placement = place_instrument(
+            self.machine,
+            rows,
+            weights=(rows.uncertainty / scale) ** 2,
+            shifts=self._shifts,
+            # Most hypotheses are wrong: of these the size of the residuals is enough.
+            roughly=value is not None or commanded is not None,
         )
-        column = readings.observable * 100_000 + readings.strut
-        predicted = (readings.value - residual) / readings.scale
+        return self._misfit(rows, scale, placement)
+
+    @cached_property
+    def as_displayed(self) -> Misfit:
+        """The misfit against poses that a controller displays: no row is warm, none loaded."""
+        none = np.empty(0, np.intp), np.zeros((1, 0))
+        if not self._shifts[0].size:
+            return self.as_given
+        placement = place_instrument(self.machine, self.own, shifts=none, roughly=True)
+        return self._misfit(self.own, self.readings.scale, placement)
+
+    def _misfit(self, rows: Measurements, scale: Floats, placement: Placement) -> Misfit:
+        residual = -placement.residual * rows.uncertainty
+        column = rows.observable * 100_000 + rows.strut
+        predicted = (rows.value - residual) / scale
         variances = [float(np.var(predicted[column == number])) for number in np.unique(column)]
         reach = math.sqrt(sum(variances))
-        redundancy = residual.size - fitted
-        return Misfit(residual, residual / readings.scale, column, reach, placement, redundancy)
+        redundancy = residual.size - placement.unknowns.count
+        return Misfit(residual, residual / scale, column, reach, placement, redundancy)
+
+    @cached_property
+    def _shifts(self) -> ParameterDeviation:
+        """What is known to move the machine's parameters from row to row."""
+        return row_shifts(self.machine, self.own, unknowns_of_instruments(self.machine, self.own))
 
     def negated(self, columns: Sequence[MeasuredColumn], words: str) -> Hypothesis:
         """That some columns are of the other sign."""
@@ -236,11 +297,16 @@ class View:
         return Hypothesis(words, tuple(column.name for column in columns), self.assess(value))
 
     def other_command(
-        self, geometry: Geometry | None, words: str, where: tuple[str, ...]
+        self, commanded: Measurements | None, words: str, where: tuple[str, ...]
     ) -> Iterator[Hypothesis]:
-        """That the machine was commanded to another geometry; nothing where it cannot be there."""
-        if geometry is not None:
-            yield Hypothesis(words, where, self.assess(geometry=geometry), of_command=True)
+        """That the machine was commanded otherwise; nothing where it cannot be there."""
+        if commanded is None:
+            return
+        try:
+            misfit = self.assess(commanded=commanded)
+        except RequestError:  # it is singular there
+            return
+        yield Hypothesis(words, where, misfit, of_command=True)
 
     def rms(self, misfit: Misfit, hypothesis: Hypothesis, unit: str) -> float:
         """Of the residuals of one SI unit, of those observations that a hypothesis keeps."""
@@ -253,26 +319,26 @@ class View:
         of_unit = residual[np.array(UNITS)[observable] == unit]
         return _rms(of_unit, hypothesis.trimmed) if of_unit.size else 0.0
 
-    def geometry_at_joints(self, joints: Floats) -> Geometry | None:
-        """The nominal machine at other joints (n_row, n_joint); None: it has no pose there."""
+    def at_joints(self, joints: Floats) -> Measurements | None:
+        """Its rows at other joints (n, n_joint); None: the machine has no pose there."""
         kernel = self.machine.kernel
-        poses, _ = kernel.forward(joints, status=True)
-        if not np.isfinite(poses).all():
-            return None
-        return Geometry.of(kernel, joints, kernel.placement_of(poses))
-
-    def geometry_at_poses(self, poses: Floats) -> Geometry | None:
-        """The nominal machine at other poses (n_row, n_commanded); None: it does not reach them."""
-        joints, placements, status = self.machine.kernel.place(poses)
+        poses, status = kernel.forward(joints, status=True)
         if (status > 1).any():  # out of travel there is still a pose
             return None
-        return Geometry.of(self.machine.kernel, joints, placements)
+        return replace(self.own, joints=joints, placements=kernel.placement_of(poses))
+
+    def at_poses(self, poses: Floats) -> Measurements | None:
+        """Its rows at other poses (n, n_commanded); None: the machine does not reach them."""
+        joints, placements, status = self.machine.kernel.place(poses)
+        if (status > 1).any():
+            return None
+        return replace(self.own, joints=joints, placements=placements)
 
     @cached_property
     def poses(self) -> Floats:
-        """(n_row, n_commanded) the commanded poses, as the nominal machine has them."""
+        """(n, n_commanded) the commanded poses, as the nominal machine has them."""
         columns = [self.machine.dof.index(freedom) for freedom in self.machine.commanded]
-        poses: Floats = self.machine.kernel.pose_of(self.measurements.placements)[:, columns]
+        poses: Floats = self.machine.kernel.pose_of(self.own.placements)[:, columns]
         return poses
 
     def lines(self, rows: Iterable[int]) -> tuple[int, ...]:

@@ -51,7 +51,7 @@ def inspect_command(view: View) -> Iterator[Suspicion]:
         return  # any readings agree with an instrument that is put where they fit
     exact = []
     for column in view.columns:
-        gap = np.abs(view.as_given.residual[column.observations])
+        gap = np.abs(view.as_displayed.residual[column.observations])
         noise = view.measurements.uncertainty[view.observations[column.observations]]
         spread = float(view.readings.value[column.observations].std())
         near = EQUAL * np.minimum(noise, EQUAL * spread)
@@ -66,7 +66,7 @@ def inspect_command(view: View) -> Iterator[Suspicion]:
             "not a measurement",
             view.instrument.name,
             names,
-            before=float(np.abs(view.as_given.residual[exact[0].observations]).max()),
+            before=float(np.abs(view.as_displayed.residual[exact[0].observations]).max()),
             unit=exact[0].unit,
         )
 

@@ -5,19 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.calibration.data_checks.nominal import (
-    DIRECTION,
-    LENGTH,
-    A,
-    Geometry,
-    nominal_readings,
-)
-from truepose.calibration.data_checks.placement import difference
+from truepose.calibration.identification.problem import IdentificationProblem
+from truepose.calibration.identification.unknowns import Unknowns, bands_of
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import UNITS
+from truepose.calibration.observables import OBSERVABLES, UNITS
 from truepose.machine import Machine
 from truepose.sources import Deviation, PoseBlock, acting
 from truepose.sources.tolerance import DimensionalTolerance
+
+A, LENGTH, DIRECTION = (OBSERVABLES.index(name) for name in ("a", "length", "direction.x"))
 
 MACHINES = 24
 """Machines that are drawn, each tolerance at one of its ends: the spread is known to a seventh."""
@@ -26,17 +22,17 @@ ASSUMED = 5e-3
 """Where a file states no tolerance: this share of the machine's size, and this angle in rad."""
 
 
-def expected_residual(machine: Machine, measurements: Measurements, geometry: Geometry) -> Floats:
+def expected_residual(machine: Machine, measurements: Measurements) -> Floats:
     """(n_observation,) SI: root of the sum of squares of what each cause may do to a reading.
 
     Tolerances by machines drawn at the ends of their bands and solved, so that a reading of a strut
     counts with its own length. Coordinates of one row share one number, and so do angles and
     directions, because an unknown frame may turn one into another.
     """
-    by_tolerance = _by_tolerance(machine, measurements, geometry)
+    size = _size(machine, measurements)
+    by_tolerance = _by_tolerance(machine, measurements, size)
     linear, angular, own = _by_others(machine, measurements)
     row, observable = measurements.row, measurements.observable
-    size = _size(machine, geometry)
     others = np.select(
         [observable == LENGTH, np.array([unit == "m" for unit in UNITS])[observable]],
         [np.hypot(linear, own)[row], linear[row]],
@@ -46,48 +42,56 @@ def expected_residual(machine: Machine, measurements: Measurements, geometry: Ge
     return allowed
 
 
-def _size(machine: Machine, geometry: Geometry) -> float:
+def _size(machine: Machine, measurements: Measurements) -> float:
     """Of the machine, m: its longest strut and the reach of its tool, whichever is more."""
-    along = geometry.centres[:, :, 1] - geometry.centres[:, :, 0]
-    reach = np.ptp(geometry.points, axis=0)
+    centres = machine.kernel.joint_centres(measurements.joints, measurements.placements)
+    along = centres[:, :, 1] - centres[:, :, 0]
+    reach = np.ptp(measurements.placements[:, :3], axis=0)
     return float(max(np.linalg.norm(along, axis=2).max(), np.linalg.norm(reach)))
 
 
-def _bands(machine: Machine) -> Deviation | None:
-    bands = (s.bands for s in machine.sources if isinstance(s, DimensionalTolerance))
-    return next(bands, None)
-
-
-def _by_tolerance(machine: Machine, measurements: Measurements, geometry: Geometry) -> Floats:
-    bands = _bands(machine)
+def _by_tolerance(machine: Machine, measurements: Measurements, size: float) -> Floats:
     unit = np.array(UNITS)[measurements.observable]
-    assumed = np.where(unit == "m", ASSUMED * _size(machine, geometry), ASSUMED)
+    assumed = np.where(unit == "m", ASSUMED * size, ASSUMED)
+    bands = bands_of(machine)
     if bands is None:
         return assumed
-    nominal = nominal_readings(machine, measurements, geometry=geometry)
+    problem = IdentificationProblem(machine, measurements, _in_half_bands(bands))
     ends = np.random.default_rng(0).choice([-1.0, 1.0], (MACHINES, bands.n_variable))
-    start = machine.kernel.pose_of(measurements.placements)
-    squares = []
-    for signs in ends:
-        change = np.zeros(len(machine.parameters))
-        np.add.at(
-            change, bands.parameters, (bands.shift + bands.signed_half * signs[bands.variables])[0]
-        )
-        columns = np.unique(bands.parameters)
-        values = machine.nominal + change
-        kernel = machine.kernel.replace(
-            {machine.parameters[column]: float(values[column]) for column in columns}
-        )
-        poses, _ = kernel.forward(measurements.joints, start, status=True)
-        placements = kernel.placement_of(poses)
-        drawn = Geometry.of(kernel, measurements.joints, placements)
-        readings = nominal_readings(machine, measurements, geometry=drawn)
-        squares.append(difference(measurements.observable, readings, nominal) ** 2)
-    table = np.stack(squares)
+    nominal = problem.residual(np.zeros(bands.n_variable + 1))
+    gaps = [problem.residual(np.append(signs, 1.0)) - nominal for signs in ends]
+    # Of angles, the nearest way round.
+    turn = 2.0 * np.pi / measurements.uncertainty
+    table = np.where(unit == "rad", gaps - turn * np.round(gaps / turn), gaps)
+    table = (table * measurements.uncertainty) ** 2
     solved = np.isfinite(table)
     # Where no drawn machine could be solved, as near a singularity: as if no tolerance were given.
     mean = np.where(solved, table, 0.0).sum(axis=0) / np.maximum(solved.sum(axis=0), 1)
     return _shared(measurements, np.where(solved.any(axis=0), mean, assumed**2))
+
+
+def _in_half_bands(bands: Deviation) -> Unknowns:
+    """The variables of the tolerances, each in its half bands, and after them the bands' middles.
+
+    A reading is predicted of them as of any unknowns.
+    """
+    columns, places = np.unique(bands.parameters, return_inverse=True)
+    count = bands.n_variable + 1
+    effects = np.zeros((columns.size, count))
+    np.add.at(effects, (places, bands.variables), bands.signed_half[0])
+    np.add.at(effects[:, -1], places, bands.shift[0])
+    none = ("",) * count
+    return Unknowns(
+        none,
+        none,
+        none,
+        count,
+        columns.astype(np.intp),
+        effects,
+        np.zeros(count),
+        np.eye(count),
+        np.ones(count),
+    )
 
 
 def _shared(measurements: Measurements, squares: Floats) -> Floats:

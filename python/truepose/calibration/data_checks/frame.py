@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from truepose.calibration.data_checks._base import Hypothesis, HypothesisKind, View
-from truepose.calibration.data_checks.nominal import Placement
-from truepose.calibration.data_checks.placement import Free
-from truepose.spatial import rotation_angle
+from truepose.spatial import quaternion_to_matrix, rotation_angle
 
 
 def propose_target(view: View) -> Iterator[Hypothesis]:
@@ -17,8 +16,7 @@ def propose_target(view: View) -> Iterator[Hypothesis]:
     instrument = view.instrument
     if instrument.target_unknown or not _sees_point(view):
         return
-    free = Free(tuple(instrument.frame.unknown), True, instrument.bias_unknown)
-    misfit = view.assess(free=free)
+    misfit = view.assess(instrument=replace(instrument, target_unknown=True))
     off = misfit.placement.target - np.array(instrument.target)
     offset = ", ".join(view.format(float(component), "m") for component in off)
     words = f"the target stands ({offset}) off the stated point, in the platform's axes"
@@ -33,11 +31,15 @@ def propose_frame(view: View) -> Iterator[Hypothesis]:
     # Of a planar machine nothing tells a frame's height, nor its tilt.
     spatial = "z" in view.machine.components
     unknown = (True, True, spatial, spatial, spatial, True)
-    free = Free(unknown, instrument.target_unknown, instrument.bias_unknown)
-    misfit = view.assess(free=free)
-    stated, fitted = Placement.stated(instrument), misfit.placement
-    off = float(np.linalg.norm(fitted.origin - stated.origin))
-    turn = float(rotation_angle(fitted.rotation @ stated.rotation.T))
+    stated = instrument.frame
+    misfit = view.assess(instrument=replace(instrument, frame=replace(stated, unknown=unknown)))
+    fitted = misfit.placement.frame
+    off = float(np.linalg.norm(np.subtract(fitted.origin, stated.origin)))
+    turn = float(
+        rotation_angle(
+            quaternion_to_matrix(fitted.rotation) @ quaternion_to_matrix(stated.rotation).T
+        )
+    )
     words = (
         f"the readings are in another frame than stated: its origin {view.format(off, 'm')} away, "
         f"turned by {view.format(turn, 'rad')}"

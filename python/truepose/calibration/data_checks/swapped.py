@@ -58,11 +58,11 @@ def _exchanged(
 def _joints(view: View) -> Iterator[Hypothesis]:
     names = view.machine.joints
     for i, j in combinations(range(len(names)), 2):
-        joints = view.measurements.joints.copy()
+        joints = view.own.joints.copy()
         joints[:, [i, j]] = joints[:, [j, i]]
         where = (f"joint.{names[i]}", f"joint.{names[j]}")
         words = f"the joints {names[i]} and {names[j]} stand in each other's place"
-        yield from view.other_command(view.geometry_at_joints(joints), words, where)
+        yield from view.other_command(view.at_joints(joints), words, where)
 
 
 def _commands(view: View) -> Iterator[Hypothesis]:
@@ -74,7 +74,7 @@ def _commands(view: View) -> Iterator[Hypothesis]:
         poses[:, [i, j]] = poses[:, [j, i]]
         where = (f"command.{freedoms[i]}", f"command.{freedoms[j]}")
         words = f"the commands {freedoms[i]} and {freedoms[j]} stand in each other's place"
-        yield from view.other_command(view.geometry_at_poses(poses), words, where)
+        yield from view.other_command(view.at_poses(poses), words, where)
 
 
 KIND = HypothesisKind(

@@ -69,7 +69,7 @@ def _unwrapped(view: View, observations: Indices, factor: float) -> Floats:
 
 
 def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> Iterator[Hypothesis]:
-    machine, joints = view.machine, view.measurements.joints
+    machine, joints = view.machine, view.own.joints
     parameters = machine.parameters
     # A drive's coordinate has the unit of its offset.
     of_unit = [
@@ -83,15 +83,15 @@ def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> I
             scaled = joints.copy()
             scaled[:, of_unit] /= factor
             where = tuple(f"joint.{machine.joints[k]}" for k in of_unit)
-            geometry = view.geometry_at_joints(scaled)
-            yield from view.other_command(geometry, f"the joints are {word}", where)
+            commanded = view.at_joints(scaled)
+            yield from view.other_command(commanded, f"the joints are {word}", where)
         if freedoms:
             poses = view.poses.copy()
             poses[:, freedoms] /= factor
             names = [machine.commanded[k] for k in freedoms]
             where = tuple(f"command.{name}" for name in names)
             words = f"the commands {listed(names)} are {word}"
-            yield from view.other_command(view.geometry_at_poses(poses), words, where)
+            yield from view.other_command(view.at_poses(poses), words, where)
 
 
 LENGTH = HypothesisKind("wrong-unit", "lengths in another unit than declared", propose_length)

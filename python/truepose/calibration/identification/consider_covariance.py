@@ -29,7 +29,8 @@ from truepose.calibration.acceptance.observability import (
     row_covariance,
 )
 from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty, tool_components
-from truepose.calibration.identification.fit import Fit, whitened
+from truepose.calibration.identification.equations import whitened
+from truepose.calibration.identification.fit import Fit
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of

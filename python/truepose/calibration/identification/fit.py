@@ -15,36 +15,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.calibration.identification.frames import (
-    FAR,
-    TURNED,
-    frame_starts,
-    rebase_frame,
-    rotated_starts,
+from truepose.calibration.identification.equations import (
+    EXACT,
+    SETTLED,
+    Equations,
+    no_fit,
+    whitened,
+    whitened_jacobian,
 )
+from truepose.calibration.identification.placement import Placements, place_instruments
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.robust import LOSS_ROUNDS, noise_of, weights_of
 from truepose.calibration.identification.unknowns import Unknowns
-from truepose.calibration.least_squares import singular_decomposition
 from truepose.calibration.measurements import Measurements
 from truepose.errors import Problem as Refused
 from truepose.errors import RequestError
 from truepose.machine import Machine
-
-RANK = 1e-9
-"""Singular values of the scaled equations below this share of the largest determine nothing."""
-
-ROUNDING = 1e-13
-"""Columns of the equations shorter than this share of the longest are rounding."""
-
-HELD = 1e-3
-"""Weight of the rows that hold an undetermined direction, in shares of the largest singular value;
-no other equation acts on it."""
-
-SETTLED = ("cost", "step", "gradient")
-
-EXACT = 1e-6
-"""Residuals, in uncertainties, that are taken for rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,87 +93,6 @@ class Fit:
         return np.where(open_, np.inf, deviations)
 
 
-@dataclass(frozen=True, eq=False)
-class Equations:
-    """Whitened equations (r, n), of readings and prior, in values over `scale` (n,), decomposed."""
-
-    scale: Floats
-    singular: Floats
-    directions: Floats
-    """(n, n): rows are right singular vectors, in the order of `singular`."""
-
-    @classmethod
-    def of(
-        cls,
-        jacobian: Floats,
-        prior: Prior,
-        unknowns: Unknowns,
-        left_out: Floats | None = None,
-    ) -> Equations:
-        """Scaled by the tolerances' standard deviations, else by their columns.
-
-        Along `left_out` (k, n), in the unknowns' own units, nothing counts as determined.
-        """
-        equations = np.vstack([jacobian, prior.rows])
-        norms = np.linalg.norm(equations, axis=0)
-        # A column of rounding is none: scaled by its length it would seem well determined.
-        nothing = norms <= ROUNDING * norms.max(initial=0.0)
-        norms[nothing], equations[:, nothing] = 0.0, 0.0
-        variances = np.diagonal(unknowns.prior_covariance)
-        has_prior = np.isfinite(variances)
-        scale = np.where(norms > 0.0, 1.0 / np.where(norms > 0.0, norms, 1.0), 1.0)
-        scale[has_prior] = np.sqrt(variances[has_prior])
-        scaled = equations * scale
-        if left_out is not None and len(left_out):
-            basis = np.linalg.qr((left_out / scale).T)[0].T
-            scaled = scaled - scaled @ basis.T @ basis
-        return cls(scale, *singular_decomposition(np.asarray(np.linalg.qr(scaled, mode="r"))))
-
-    @property
-    def seen(self) -> np.ndarray:
-        """(n,) which directions are determined."""
-        flags: np.ndarray = self.singular > RANK * max(
-            float(self.singular.max(initial=0.0)), 1e-300
-        )
-        return flags
-
-    @property
-    def null_space(self) -> Floats:
-        """(k, n) unit directions that are not, in values over `scale`."""
-        rows: Floats = self.directions[~self.seen]
-        return rows
-
-    @property
-    def covariance(self) -> Floats:
-        """(n, n) over what is determined, in the unknowns' own units."""
-        rows = self.directions[self.seen] / self.singular[self.seen, np.newaxis] * self.scale
-        covariance: Floats = rows.T @ rows
-        return covariance
-
-    def gauge_rows(self) -> Floats:
-        """(k, n) rows that hold what is not determined."""
-        firmness = HELD * float(self.singular.max(initial=1.0))
-        rows: Floats = firmness * self.null_space / self.scale
-        return rows
-
-
-def whitened(problem: IdentificationProblem, values: Floats) -> Floats:
-    """(m, n) derivatives of the readings over their uncertainties.
-
-    Raises `RequestError` (no-fit) where a pose of the machine with these values cannot be solved.
-    """
-    return _whitened(problem, values, problem.jacobian(values))
-
-
-def _whitened(problem: IdentificationProblem, values: Floats, jacobian: Floats) -> Floats:
-    if not np.isfinite(jacobian).all():
-        status = problem.status(values)
-        rows = np.flatnonzero(status)
-        raise _no_fit(problem, "a pose of it cannot be solved or is singular", rows)
-    slope: Floats = jacobian / problem.measurements.uncertainty[:, np.newaxis]
-    return slope
-
-
 def fit(
     machine: Machine,
     measurements: Measurements,
@@ -195,14 +100,19 @@ def fit(
     *,
     use_prior: bool = True,
     robust: bool = True,
+    placements: Placements | None = None,
 ) -> Fit:
     """Fit the unknowns to all rows of the measurements.
+
+    `placements`: where the instruments stand for the machine as filed, if that is known already.
 
     Raises `RequestError` (too-few-measurements) where there are fewer equations than unknowns, and
     (no-fit) where the search does not settle.
     """
     require_enough(measurements, unknowns, use_prior)
-    problem, as_filed = place_instruments(machine, measurements, unknowns)
+    standing = place_instruments(machine, measurements) if placements is None else placements
+    problem = IdentificationProblem(machine, standing.measurements, unknowns)
+    as_filed = standing.as_filed(unknowns)
     known = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
     prior = Prior(known.rows, unknowns.prior_mean)  # without tolerances, where the gauge holds
     values = unknowns.prior_mean
@@ -227,10 +137,10 @@ def fit(
             equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
             continue
         if not settled:
-            raise _no_fit(problem, f"it ended as {solved.ending[0]}", np.empty(0, np.intp))
+            raise no_fit(problem, f"it ended as {solved.ending[0]}", np.empty(0, np.intp))
         values = solved.values[0]
         residual = problem.residual(values)
-        slope = _whitened(problem, values, jacobian)
+        slope = whitened_jacobian(problem, values, jacobian)
         freed = equations.null_space * equations.scale
         factor = np.sqrt(weights) / scale
         equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
@@ -264,72 +174,6 @@ def fit(
     )
 
 
-def place_instruments(
-    machine: Machine, measurements: Measurements, unknowns: Unknowns
-) -> tuple[IdentificationProblem, Floats]:
-    """The problem, its instruments where the machine as filed has them, and values (n,) of that.
-
-    Of several starts of the frames the one that fits best is taken, one that settles before one
-    that does not; frames that are still far from fitting are then tried in other rotations.
-
-    Raises `RequestError` (no-fit) where from no start the readings can be followed.
-    """
-    best: tuple[bool, float, IdentificationProblem, Floats] | None = None
-    refused: RequestError | None = None
-    of = measurements.instrument[measurements.row]
-    for number in [None, *unknowns.frames]:
-        if number is None:
-            starts = frame_starts(machine, measurements)
-        elif best is None:
-            starts = rotated_starts(machine, measurements, number)
-        else:
-            # Each instrument on its own: on a machine as filed none depends on another.
-            residual = best[2].residual(best[3])[of == number]
-            near = not best[0] and float(np.sum(residual**2)) <= FAR**2 * residual.size
-            starts = [] if near else rotated_starts(machine, best[2].measurements, number)
-        for start in starts:
-            try:
-                placed = _fit_instruments(machine, start, unknowns.of_instruments)
-            except RequestError as failure:
-                refused = failure
-                continue
-            if best is None or placed[:2] < best[:2]:
-                best = placed
-    if best is None:
-        assert refused is not None
-        raise refused
-    alone, values = best[2].unknowns, best[3]
-    standing = best[2].measurements
-    turns = [at for own in alone.frames.values() for at in own[3:6] if at is not None]
-    if np.abs(values[turns]).max(initial=0.0) > TURNED:
-        standing = rebase_frame(standing, alone, values)
-        values = _fit_instruments(machine, standing, alone)[3]
-    of_all = np.concatenate([np.zeros(unknowns.n_machine), values])
-    return IdentificationProblem(machine, standing, unknowns), of_all
-
-
-def _fit_instruments(
-    machine: Machine, measurements: Measurements, alone: Unknowns
-) -> tuple[bool, float, IdentificationProblem, Floats]:
-    """(whether unsettled, cost, problem, values) of the instruments' unknowns alone.
-
-    They fit the machine as filed; an infinite cost where a reading is not finite.
-    """
-    problem = IdentificationProblem(machine, measurements, alone)
-    values = np.zeros(alone.count)
-    unsettled = False
-    if alone.count:
-        none = Prior.none(alone.count)
-        held = none.with_rows(Equations.of(whitened(problem, values), none, alone).gauge_rows())
-        solved = problem.solve(prior=held, start=values)
-        values = solved.values[0]
-        unsettled = solved.ending[0] not in SETTLED
-    cost = float(np.sum(problem.residual(values) ** 2))
-    if not np.isfinite(cost):
-        return True, np.inf, problem, values
-    return unsettled and cost > EXACT**2 * measurements.n_observation, cost, problem, values
-
-
 def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bool) -> None:
     """Refuse fewer equations than unknowns, saying how many readings are lacking."""
     free = unknowns.count
@@ -352,22 +196,6 @@ def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bo
             hint=None
             if use_prior
             else "the tolerances are equations too: leave them in, or identify fewer parameters",
-        )
-    )
-
-
-def _no_fit(problem: IdentificationProblem, reason: str, rows: np.ndarray) -> RequestError:
-    measurements = problem.measurements
-    line = int(measurements.lines[rows[0]]) if rows.size and measurements.lines[rows[0]] else None
-    return RequestError(
-        Refused(
-            "no-fit",
-            f"no machine was found that explains the measurements: {reason}",
-            measurements.file or None,
-            line,
-            found=f"{rows.size} such rows" if rows.size else "a search that does not settle",
-            expected="measurements of this machine, near its nominal geometry",
-            hint="look at the suspicions, at the units and at the frame of the instrument",
         )
     )
 

@@ -3,7 +3,8 @@
 The search for an unknown frame is not linear in its rotation, so it starts from the rigid motion
 that fits the nominal points best (B. K. P. Horn, Closed-form solution of absolute orientation using
 unit quaternions, J. Opt. Soc. Am. A 4 (1987) 629-642), and from trilateration for distances. Where
-there is no closed form it starts from the declared frame, and from that turned about.
+there is no closed form it starts from the declared frame, and from that turned about. All
+measurements here are those of one instrument.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ import itertools
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.instruments._base import Frame
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
@@ -42,58 +42,42 @@ _ALONG = 1.0 - 1e-6
 """Cosine from which two axes are one."""
 
 
-def frame_starts(machine: Machine, measurements: Measurements) -> list[Measurements]:
-    """The measurements with unknown frames set to where the nominal machine says they are.
+def frame_starts(machine: Machine, measurements: Measurements) -> list[Frame]:
+    """Where the nominal machine says that the frame of the one instrument is.
 
-    Usually one; where distances leave two sides of a plane open, one for each. Frames that no
-    closed form finds start where they are declared; see `rotated_starts`.
+    Usually one; where distances leave two sides of a plane open, both. A frame that no closed form
+    finds starts where it is declared; see `rotated_starts`.
     """
-    alternatives = [measurements]
-    for number, instrument in enumerate(measurements.instruments):
-        starts = _closed_forms(machine, measurements, number) or [instrument.frame]
-        alternatives = [
-            _with_frame(alternative, number, start)
-            for alternative in alternatives
-            for start in starts
-        ]
-    return alternatives
+    return _closed_forms(machine, measurements) or [measurements.instruments[0].frame]
 
 
-def rotated_starts(machine: Machine, measurements: Measurements, number: int) -> list[Measurements]:
-    """The measurements with one frame turned about what is unknown of its rotation; further starts.
+def rotated_starts(machine: Machine, measurements: Measurements) -> list[Frame]:
+    """The frame of the one instrument, turned about what is unknown of its rotation.
 
     About one axis by eighths of a turn, about two by thirds of a half turn in eight directions,
     about three by the rotations of a cube; its origin where the readings then put it. None where
     nothing of the rotation is unknown, or a closed form finds it.
     """
-    frame = measurements.instruments[number].frame
+    frame = measurements.instruments[0].frame
     axes = np.flatnonzero(frame.unknown[_ROTATION])
-    if not axes.size or _closed_forms(machine, measurements, number):
+    if not axes.size or _closed_forms(machine, measurements):
         return []
-    points, _ = _target_points(measurements, number)
-    read = _table(measurements, number)
+    points, _ = _target_points(measurements)
+    read = _table(measurements)
     rotation = quaternion_to_matrix(frame.rotation)
-    return [
-        _with_frame(measurements, number, _with_origin(frame, turn @ rotation, points, read))
-        for turn in _start_rotations(axes)
-    ]
+    return [_with_origin(frame, turn @ rotation, points, read) for turn in _start_rotations(axes)]
 
 
-def rebase_frame(measurements: Measurements, unknowns: Unknowns, values: Floats) -> Measurements:
-    """The measurements with unknown frames moved by the values (n,) that were found for them."""
-    for number, own in unknowns.frames.items():
-        change = np.array([0.0 if at is None else values[at] for at in own[:6]])
-        frame = measurements.instruments[number].frame
-        # The kernel's rotation unknowns: the quaternion (1, turn / 2), not of length 1.
-        quaternion = np.concatenate([[1.0], 0.5 * change[_ROTATION]])
-        turn = quaternion_to_matrix(quaternion / np.linalg.norm(quaternion))
-        frame = dataclasses.replace(
-            frame,
-            origin=tuple((np.array(frame.origin) + change[_ORIGIN]).tolist()),
-            rotation=matrix_to_quaternion(turn @ quaternion_to_matrix(frame.rotation)),
-        )
-        measurements = _with_frame(measurements, number, frame)
-    return measurements
+def moved_frame(frame: Frame, change: Floats) -> Frame:
+    """The frame moved by the values (6,) that were found for its origin and rotation."""
+    # The kernel's rotation unknowns: the quaternion (1, turn / 2), not of length 1.
+    quaternion = np.concatenate([[1.0], 0.5 * change[_ROTATION]])
+    turn = quaternion_to_matrix(quaternion / np.linalg.norm(quaternion))
+    return dataclasses.replace(
+        frame,
+        origin=tuple((np.array(frame.origin) + change[_ORIGIN]).tolist()),
+        rotation=matrix_to_quaternion(turn @ quaternion_to_matrix(frame.rotation)),
+    )
 
 
 def _start_rotations(axes: np.ndarray) -> list[Floats]:
@@ -117,34 +101,27 @@ def _start_rotations(axes: np.ndarray) -> list[Floats]:
     ]
 
 
-def _with_frame(measurements: Measurements, number: int, frame: Frame) -> Measurements:
-    instruments = list(measurements.instruments)
-    instruments[number] = dataclasses.replace(instruments[number], frame=frame)
-    return dataclasses.replace(measurements, instruments=tuple(instruments))
+def _target_points(measurements: Measurements) -> tuple[Floats, Floats]:
+    """Target points (n_row, 3) in the base frame and rotations (n_row, 3, 3) of the platform."""
+    rotations = quaternion_to_matrix(measurements.placements[:, 3:])
+    arm = rotations @ np.array(measurements.instruments[0].target)
+    return measurements.placements[:, :3] + arm, rotations
 
 
-def _target_points(measurements: Measurements, number: int) -> tuple[Floats, Floats]:
-    """Target points (n, 3) in the base frame and rotations (n, 3, 3) of an instrument's rows."""
-    rows = np.flatnonzero(measurements.instrument == number)
-    rotations = quaternion_to_matrix(measurements.placements[rows, 3:])
-    arm = rotations @ np.array(measurements.instruments[number].target)
-    return measurements.placements[rows, :3] + arm, rotations
-
-
-def _closed_forms(machine: Machine, measurements: Measurements, number: int) -> list[Frame]:
+def _closed_forms(machine: Machine, measurements: Measurements) -> list[Frame]:
     """Frames that fit the nominal machine best; empty where no closed form finds them."""
-    frame = measurements.instruments[number].frame
+    frame = measurements.instruments[0].frame
     unknown = np.array(frame.unknown)
     if not unknown.any():
         return [frame]
-    read = _table(measurements, number)
-    points, rotations = _target_points(measurements, number)
+    read = _table(measurements)
+    points, rotations = _target_points(measurements)
     if "distance" in read and unknown[_ORIGIN].any():
         return _trilaterate(frame, points, read["distance"])
     if not unknown[_ROTATION].any():
         return [_with_origin(frame, quaternion_to_matrix(frame.rotation), points, read)]
     if any(f"direction.{axis}" in read for axis in "xyz"):
-        product = _direction_product(machine, measurements, number)
+        product = _direction_product(machine, measurements)
     elif all(angle in read for angle in "abc"):
         product = _angle_product(rotations, read)
     else:
@@ -181,16 +158,13 @@ def _with_origin(frame: Frame, rotation: Floats, points: Floats, read: dict[str,
     )
 
 
-def _table(measurements: Measurements, number: int) -> dict[str, Floats]:
-    """What an instrument read of the platform by row, NaN where it did not; by observable."""
-    own = measurements.instrument[measurements.row] == number
-    rows = np.flatnonzero(measurements.instrument == number)
-    place = np.searchsorted(rows, measurements.row[own])
+def _table(measurements: Measurements) -> dict[str, Floats]:
+    """What the instrument read of the platform by row, NaN where it did not; by observable."""
     table: dict[str, Floats] = {}
-    for code in np.unique(measurements.observable[own]).tolist():
-        of_code = measurements.observable[own] == code
-        values = np.full(rows.size, np.nan)
-        values[place[of_code]] = measurements.value[own][of_code]
+    for code in np.unique(measurements.observable).tolist():
+        of_code = measurements.observable == code
+        values = np.full(measurements.n_row, np.nan)
+        values[measurements.row[of_code]] = measurements.value[of_code]
         table[OBSERVABLES[code]] = values
     return table
 
@@ -271,14 +245,13 @@ def _trilaterate(frame: Frame, points: Floats, distances: Floats) -> list[Frame]
     return frames
 
 
-def _direction_product(machine: Machine, measurements: Measurements, number: int) -> Floats | None:
+def _direction_product(machine: Machine, measurements: Measurements) -> Floats | None:
     """(3, 3) sum of the directions that nominal struts have times those that a camera read."""
-    own = np.flatnonzero(measurements.instrument[measurements.row] == number)
     centres = machine.kernel.joint_centres(measurements.joints, measurements.placements)
     along = centres[:, :, 1] - centres[:, :, 0]
     along /= np.linalg.norm(along, axis=2, keepdims=True)
     read: dict[tuple[int, int], dict[int, float]] = {}
-    for observation in own.tolist():
+    for observation in range(measurements.n_observation):
         axis = int(measurements.observable[observation]) - _NUMBER["direction.x"]
         key = int(measurements.row[observation]), int(measurements.strut[observation])
         if 0 <= axis < 3:

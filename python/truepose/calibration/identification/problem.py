@@ -73,9 +73,19 @@ class Solved:
 class IdentificationProblem:
     """What instruments read of a machine, as a function of the unknowns."""
 
-    def __init__(self, machine: Machine, measurements: Measurements, unknowns: Unknowns) -> None:
-        """Raises `TrueposeError` where a row's condition asks for what the machine does not say."""
+    def __init__(
+        self,
+        machine: Machine,
+        measurements: Measurements,
+        unknowns: Unknowns,
+        shifts: ParameterDeviation | None = None,
+    ) -> None:
+        """`shifts`: what `row_shifts` says, where that is known already.
+
+        Raises `TrueposeError` where a row's condition asks for what the machine does not say.
+        """
         self.machine, self.measurements, self.unknowns = machine, measurements, unknowns
+        self.shifts = row_shifts(machine, measurements, unknowns) if shifts is None else shifts
         self._kernel = Identification(machine.kernel, self._description())
 
     def predict(self, values: ArrayLike) -> Floats:
@@ -111,12 +121,14 @@ class IdentificationProblem:
         prior: Prior | None = None,
         weights: ArrayLike | None = None,
         start: ArrayLike | None = None,
+        tolerances: tuple[float, float, float] = TOLERANCES,
     ) -> Solved:
         """Values that explain the readings best.
 
         `measured` (n_observation,) or (n_set, n_observation), default the measurements' own; every
         set is fitted alone, from `start` (n,), default the prior's mean. `weights` (n_observation,)
         multiply squared residuals. `prior`: default the unknowns' own where they have one.
+        `tolerances`: when the search has settled.
         """
         known = Prior.of(self.unknowns) if prior is None else prior
         read = np.atleast_2d(self.measurements.value if measured is None else measured)
@@ -129,14 +141,14 @@ class IdentificationProblem:
             known.rows,
             known.mean,
             known.mean if start is None else start,
-            TOLERANCES,
+            tolerances,
             MOST_EVALUATIONS,
         )
         return Solved(values, cost, tuple(ending), tuple(evaluations))
 
     def _description(self) -> dict[str, object]:
         measurements, unknowns = self.measurements, self.unknowns
-        columns, shifts = row_shifts(self.machine, measurements, unknowns)
+        columns, shifts = self.shifts
         terms, coefficients = self._terms(columns, shifts)
         order = np.argsort(measurements.row, kind="stable")
         if not np.array_equal(order, np.arange(order.size)):

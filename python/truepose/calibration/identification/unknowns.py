@@ -94,31 +94,6 @@ class Unknowns:
                 sizes[number] = nominal[0]
         return sizes
 
-    @property
-    def of_instruments(self) -> Unknowns:
-        """The instruments' alone; the machine stays as its file has it."""
-        kept = slice(self.n_machine, None)
-        less = self.n_machine
-
-        def renumbered(number: int | None) -> int | None:
-            return None if number is None else number - less
-
-        return Unknowns(
-            self.names[kept],
-            self.units[kept],
-            self.labels[kept],
-            0,
-            np.empty(0, np.intp),
-            np.empty((0, self.count - less)),
-            self.prior_mean[kept],
-            self.prior_covariance[kept, kept],
-            self.half[kept],
-            {},
-            {key: tuple(map(renumbered, own)) for key, own in self.frames.items()},
-            {key: number - less for key, number in self.biases.items()},
-            self.shown,
-        )
-
 
 @dataclass(frozen=True)
 class _MachineUnknown:
@@ -188,6 +163,26 @@ def unknowns_of(
         instruments.frames,
         instruments.biases,
         machine.shown,
+    )
+
+
+def unknowns_of_instruments(machine: Machine, measurements: Measurements) -> Unknowns:
+    """Those of the instruments alone; the machine stays as its file has it."""
+    own = _instrument_unknowns(machine, measurements, 0)
+    count = len(own.names)
+    return Unknowns(
+        tuple(own.names),
+        tuple(own.units),
+        tuple(own.labels),
+        0,
+        np.empty(0, np.intp),
+        np.empty((0, count)),
+        np.zeros(count),
+        np.diag(np.full(count, np.inf)),
+        np.full(count, np.inf),
+        frames=own.frames,
+        biases=own.biases,
+        shown=machine.shown,
     )
 
 

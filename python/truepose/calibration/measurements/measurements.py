@@ -109,6 +109,17 @@ class Measurements:
             uncertainty=self.uncertainty[kept],
         )
 
+    def of_instrument(self, instrument: int) -> tuple[Measurements, Indices]:
+        """The rows of one instrument, which is then the only one, and its observations (k,)."""
+        own = self.instrument == instrument
+        observations = np.flatnonzero(own[self.row])
+        rows = self.select(own)
+        return dataclasses.replace(
+            rows,
+            instruments=(self.instruments[instrument],),
+            instrument=np.zeros(rows.n_row, np.intp),
+        ), observations
+
     def with_values(self, value: ArrayLike, uncertainty: ArrayLike | None = None) -> Measurements:
         """The same with other values (n_observation,), and standard uncertainties where given.
 

@@ -153,7 +153,10 @@ def _explained(view: View) -> list[Suspicion]:
             if kind.free != free:
                 continue
             for hypothesis in kind.propose(view):
-                misfit = hypothesis.misfit
+                try:
+                    misfit = hypothesis.misfit
+                except RequestError:  # a machine commanded so is singular somewhere
+                    continue
                 size = misfit.size(hypothesis.trimmed)
                 before = _size_before(view, hypothesis)
                 if misfit.redundancy < REDUNDANT:
@@ -195,7 +198,7 @@ def _size_before(view: View, hypothesis: Hypothesis) -> float:
     """How far off the data are as they stand, over the observations that the hypothesis keeps."""
     if hypothesis.kept is None:
         return view.as_given.size(hypothesis.trimmed)
-    return view.assess(kept=hypothesis.kept).size(hypothesis.trimmed)
+    return view.suppose(kept=hypothesis.kept).misfit.size(hypothesis.trimmed)
 
 
 def _suspicion(view: View, code: str, hypotheses: list[Hypothesis]) -> Suspicion:

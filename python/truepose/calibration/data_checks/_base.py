@@ -20,7 +20,6 @@ from truepose.calibration.identification.problem import row_shifts
 from truepose.calibration.identification.unknowns import unknowns_of_instruments
 from truepose.calibration.instruments import Instrument
 from truepose.calibration.observables import OBSERVABLES, UNITS
-from truepose.errors import RequestError
 
 if TYPE_CHECKING:
     from truepose.calibration.measurements import Measurements
@@ -108,8 +107,51 @@ def _rms(values: Floats, trimmed: bool) -> float:
 
 
 @dataclass(frozen=True, eq=False)
+class Supposed:
+    """One instrument's `rows` as they would be, `scale` (k,) of what is allowed of each reading.
+
+    `shifts`: what is known to move the machine's parameters from row to row. `roughly`: whether
+    only the size of the misfit is asked, as it is of most hypotheses, which are wrong anyway.
+    """
+
+    machine: Machine
+    rows: Measurements
+    scale: Floats
+    shifts: ParameterDeviation
+    roughly: bool = False
+
+    @cached_property
+    def misfit(self) -> Misfit:
+        """How far they are from the machine as filed.
+
+        Raises `RequestError` (no-fit) where a pose of it cannot be solved.
+        """
+        weights = (self.rows.uncertainty / self.scale) ** 2
+        return self.misfit_at(
+            place_instrument(
+                self.machine,
+                self.rows,
+                weights=weights,
+                shifts=self.shifts,
+                roughly=self.roughly,
+            )
+        )
+
+    def misfit_at(self, placement: Placement) -> Misfit:
+        """The same with the instrument there."""
+        rows = self.rows
+        residual = -placement.residual * rows.uncertainty
+        column = rows.observable * 100_000 + rows.strut
+        predicted = (rows.value - residual) / self.scale
+        variances = [float(np.var(predicted[column == number])) for number in np.unique(column)]
+        reach = math.sqrt(sum(variances))
+        redundancy = residual.size - placement.unknowns.count
+        return Misfit(residual, residual / self.scale, column, reach, placement, redundancy)
+
+
+@dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """What may be wrong, and how far the data are off if it is.
+    """What may be wrong, and the data as they would be then.
 
     `words`: what is assumed, "the readings x and y are exchanged"; `where`: the columns;
     `kept`: the observations that take part, None: all; `trimmed`: whether outliers are left out;
@@ -118,11 +160,16 @@ class Hypothesis:
 
     words: str
     where: tuple[str, ...]
-    misfit: Misfit
+    supposed: Supposed
     kept: Indices | None = None
     trimmed: bool = True
     rows: tuple[int, ...] = ()
     of_command: bool = False
+
+    @property
+    def misfit(self) -> Misfit:
+        """How far the data are off if it is so."""
+        return self.supposed.misfit
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,11 +228,12 @@ class View:
         With the instrument where it was placed; where that leaves more than is allowed, where the
         allowed residuals rather than the noise would have put it.
         """
+        supposed = self.suppose()
         if self.placement is not None:
-            misfit = self._misfit(self.own, self.readings.scale, self.placement)
+            misfit = supposed.misfit_at(self.placement)
             if not max(misfit.size(), misfit.size(trimmed=False)) > ALLOWED:
                 return misfit
-        return self.assess()
+        return supposed.misfit
 
     @cached_property
     def columns(self) -> tuple[MeasuredColumn, ...]:
@@ -232,14 +280,14 @@ class View:
         ordered = [c.observations[np.argsort(row[c.observations])] for c in columns]
         return np.stack(ordered, axis=1)
 
-    def assess(
+    def suppose(
         self,
         value: Floats | None = None,
         commanded: Measurements | None = None,
         kept: Indices | None = None,
         instrument: Instrument | None = None,
-    ) -> Misfit:
-        """The misfit of other values, other commands, a part of the data or a freer instrument."""
+    ) -> Supposed:
+        """Other values, other commands, a part of the data or a freer instrument."""
         rows = self.own if commanded is None else commanded
         scale = self.readings.scale
         if instrument is not None:
@@ -256,15 +304,8 @@ class View:
                 value=rows.value[kept],
                 uncertainty=rows.uncertainty[kept],
             )
-        placement = place_instrument(
-            self.machine,
-            rows,
-            weights=(rows.uncertainty / scale) ** 2,
-            shifts=self._shifts,
-            # Most hypotheses are wrong: of these the size of the residuals is enough.
-            roughly=value is not None or commanded is not None,
-        )
-        return self._misfit(rows, scale, placement)
+        roughly = value is not None or commanded is not None
+        return Supposed(self.machine, rows, scale, self._shifts, roughly)
 
     @cached_property
     def as_displayed(self) -> Misfit:
@@ -272,17 +313,7 @@ class View:
         none = np.empty(0, np.intp), np.zeros((1, 0))
         if not self._shifts[0].size:
             return self.as_given
-        placement = place_instrument(self.machine, self.own, shifts=none, roughly=True)
-        return self._misfit(self.own, self.readings.scale, placement)
-
-    def _misfit(self, rows: Measurements, scale: Floats, placement: Placement) -> Misfit:
-        residual = -placement.residual * rows.uncertainty
-        column = rows.observable * 100_000 + rows.strut
-        predicted = (rows.value - residual) / scale
-        variances = [float(np.var(predicted[column == number])) for number in np.unique(column)]
-        reach = math.sqrt(sum(variances))
-        redundancy = residual.size - placement.unknowns.count
-        return Misfit(residual, residual / scale, column, reach, placement, redundancy)
+        return Supposed(self.machine, self.own, self.readings.scale, none, True).misfit
 
     @cached_property
     def _shifts(self) -> ParameterDeviation:
@@ -294,19 +325,14 @@ class View:
         value = self.readings.value.copy()
         for column in columns:
             value[column.observations] *= -1.0
-        return Hypothesis(words, tuple(column.name for column in columns), self.assess(value))
+        return Hypothesis(words, tuple(column.name for column in columns), self.suppose(value))
 
     def other_command(
         self, commanded: Measurements | None, words: str, where: tuple[str, ...]
     ) -> Iterator[Hypothesis]:
         """That the machine was commanded otherwise; nothing where it cannot be there."""
-        if commanded is None:
-            return
-        try:
-            misfit = self.assess(commanded=commanded)
-        except RequestError:  # it is singular there
-            return
-        yield Hypothesis(words, where, misfit, of_command=True)
+        if commanded is not None:
+            yield Hypothesis(words, where, self.suppose(commanded=commanded), of_command=True)
 
     def rms(self, misfit: Misfit, hypothesis: Hypothesis, unit: str) -> float:
         """Of the residuals of one SI unit, of those observations that a hypothesis keeps."""

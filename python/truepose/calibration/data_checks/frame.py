@@ -16,11 +16,11 @@ def propose_target(view: View) -> Iterator[Hypothesis]:
     instrument = view.instrument
     if instrument.target_unknown or not _sees_point(view):
         return
-    misfit = view.assess(instrument=replace(instrument, target_unknown=True))
-    off = misfit.placement.target - np.array(instrument.target)
+    supposed = view.suppose(instrument=replace(instrument, target_unknown=True))
+    off = supposed.misfit.placement.target - np.array(instrument.target)
     offset = ", ".join(view.format(float(component), "m") for component in off)
     words = f"the target stands ({offset}) off the stated point, in the platform's axes"
-    yield Hypothesis(words, view.column_names, misfit)
+    yield Hypothesis(words, view.column_names, supposed)
 
 
 def propose_frame(view: View) -> Iterator[Hypothesis]:
@@ -32,8 +32,8 @@ def propose_frame(view: View) -> Iterator[Hypothesis]:
     spatial = "z" in view.machine.components
     unknown = (True, True, spatial, spatial, spatial, True)
     stated = instrument.frame
-    misfit = view.assess(instrument=replace(instrument, frame=replace(stated, unknown=unknown)))
-    fitted = misfit.placement.frame
+    supposed = view.suppose(instrument=replace(instrument, frame=replace(stated, unknown=unknown)))
+    fitted = supposed.misfit.placement.frame
     off = float(np.linalg.norm(np.subtract(fitted.origin, stated.origin)))
     turn = float(
         rotation_angle(
@@ -44,7 +44,7 @@ def propose_frame(view: View) -> Iterator[Hypothesis]:
         f"the readings are in another frame than stated: its origin {view.format(off, 'm')} away, "
         f"turned by {view.format(turn, 'rad')}"
     )
-    yield Hypothesis(words, view.column_names, misfit)
+    yield Hypothesis(words, view.column_names, supposed)
 
 
 def _sees_point(view: View) -> bool:

@@ -25,7 +25,7 @@ def propose_sign(view: View) -> Iterator[Hypothesis]:
             np.swapaxes(euler_to_matrix_in_order(view.readings.value[table], OURS), 1, 2)
         )
         words = "a, b and c are of the inverse rotation (base in the platform's axes)"
-        yield Hypothesis(words, names, view.assess(turned))
+        yield Hypothesis(words, names, view.suppose(turned))
         yield view.negated(columns, "a, b and c are turned the other way")
     for column in columns:
         yield view.negated([column], f"{column.name} is turned the other way")
@@ -45,7 +45,7 @@ def propose_order(view: View) -> Iterator[Hypothesis]:
         value[table] = matrix_to_euler(euler_to_matrix_in_order(view.readings.value[table], word))
         product = " ".join(f"R{axis}({'abc'['xyz'.index(axis)]})" for axis in word)
         words = f"a, b and c are of R = {product} instead of R = Rz(c) Ry(b) Rx(a)"
-        yield Hypothesis(words, ("a", "b", "c"), view.assess(value))
+        yield Hypothesis(words, ("a", "b", "c"), view.suppose(value))
 
 
 def _angles(view: View) -> list[MeasuredColumn]:

@@ -21,7 +21,7 @@ def propose_shifted(view: View) -> Iterator[Hypothesis]:
         value[into] = view.readings.value[out]
         kept = np.sort(into.ravel())
         shifted = f"the readings stand {words} beside what was commanded"
-        yield Hypothesis(shifted, view.column_names, view.assess(value, kept=kept), kept)
+        yield Hypothesis(shifted, view.column_names, view.suppose(value, kept=kept), kept)
 
 
 def propose_exchanged(view: View) -> Iterator[Hypothesis]:
@@ -43,8 +43,8 @@ def propose_exchanged(view: View) -> Iterator[Hypothesis]:
     reordered[table] = value[nearest]
     rows = tuple(view.rows[exchanged].tolist())
     words = f"the readings of {view.named_rows(rows)} stand in each other's place"
-    misfit = view.assess(reordered)
-    yield Hypothesis(words, view.column_names, misfit, trimmed=False, rows=rows)
+    supposed = view.suppose(reordered)
+    yield Hypothesis(words, view.column_names, supposed, trimmed=False, rows=rows)
 
 
 SHIFTED = HypothesisKind(

@@ -52,7 +52,7 @@ def _exchanged(
         value[target] = view.readings.value[source]
     names = tuple(column.name for column, _ in pairs)
     words = f"the readings {listed(names)} stand in each other's place"
-    yield Hypothesis(words, names, view.assess(value))
+    yield Hypothesis(words, names, view.suppose(value))
 
 
 def _joints(view: View) -> Iterator[Hypothesis]:

@@ -53,7 +53,7 @@ def _measured(
                 value[observations] = _unwrapped(view, observations, factor)
             value[observations] /= factor
             are = "are" if len(names) > 1 else "is"
-            yield Hypothesis(f"{listed(names)} {are} {word}", names, view.assess(value))
+            yield Hypothesis(f"{listed(names)} {are} {word}", names, view.suppose(value))
 
 
 def _unwrapped(view: View, observations: Indices, factor: float) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,14 +11,27 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, assess
-from truepose.calibration.acceptance.tool_uncertainty import tool_components
-from truepose.calibration.data_checks import Suspicion, suspicions
+from truepose.calibration.acceptance.decision import (
+    CONTRADICTED,
+    MARGIN,
+    Gate,
+    HeldOut,
+    assess,
+)
+from truepose.calibration.acceptance.tool_uncertainty import Tool, tool_components
+from truepose.calibration.data_checks import (
+    HYPOTHESES,
+    Refit,
+    Suspicion,
+    alternatives,
+    explained_otherwise,
+    suspicions,
+)
 from truepose.calibration.identification.consider_covariance import (
     consider_covariance,
     with_considered,
 )
-from truepose.calibration.identification.fit import Fit, fit
+from truepose.calibration.identification.fit import Fit, fit, unfitted
 from truepose.calibration.identification.placement import Placements, place_instruments
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
@@ -45,7 +58,9 @@ class Calibration:
     `gate.accepted` is the answer, `gate.words` says why. `suspicions`: mistakes that the data look
     like; `outliers` readings that do not fit; `validation` None where there was too little to
     hold anything back. `poses` (n, n_commanded): where the tool was looked at, those that are
-    `usable` (n,): the calibrated machine reaches them too. `seed`: of the folds.
+    `usable` (n,): the calibrated machine reaches them too. `seed`: of the folds. `failure`: why no
+    machine was found that explains the measurements, where something is wrong with these; the
+    machine then stays as filed.
     """
 
     machine: Machine
@@ -58,11 +73,12 @@ class Calibration:
     poses: Floats
     usable: Flags
     seed: int = 0
+    failure: Problem | None = None
 
     @property
     def accepted(self) -> bool:
         """Whether the calibrated machine may be used."""
-        return self.gate.accepted and not any(suspicion.refuses for suspicion in self.suspicions)
+        return self.failure is None and self.gate.accepted and not _refuse(self.suspicions)
 
     def calibrated(self) -> Machine:
         """The machine with the values found for its parameters; its bands are the file's still."""
@@ -118,7 +134,8 @@ def calibrate(
     uncertainty must be less than this share.
 
     Raises `MachineFileError` for a file of measurements that cannot be read, `RequestError`
-    (unknown-parameter, no-unknowns, bad-band, too-few-measurements, no-fit, no-workspace),
+    (unknown-parameter, no-unknowns, bad-band, too-few-measurements, no-workspace; no-fit where no
+    machine explains the measurements, and no known blunder says why),
     `TrueposeError` where a row's temperatures or loads ask for what the machine does not say.
     """
     whole = data if isinstance(data, Measurements) else read_measurements(data, machine)
@@ -126,9 +143,11 @@ def calibrate(
         raise _nothing_to_fit(whole)
     table, joints, placements = workspace_poses(machine, poses)
     unknowns = unknowns_of(machine, whole, identify)
+    used = whole.select(~whole.held_out) if whole.held_out.any() else whole
     standing = _placed(machine, whole)
     suspected = suspicions(machine, whole, standing)
-    used = whole.select(~whole.held_out) if whole.held_out.any() else whole
+    refit = Refit(machine, used, unknowns, use_prior)
+    failure, checked = None, None
     try:
         fitted = fit(
             machine,
@@ -138,13 +157,25 @@ def calibrate(
             robust=robust,
             placements=standing if used is whole else None,
         )
-    except RequestError as failure:
-        raise _with_suspicions(failure, suspected) from failure
-    checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
+    except RequestError as refused:
+        (failure, *_) = refused.problems
+        if not _refuse(suspected) and failure.code == "no-fit":
+            suspected += explained_otherwise(refit, None, HYPOTHESES)
+        if failure.code != "no-fit" or not _refuse(suspected):
+            raise
+        fitted = unfitted(used, unknowns, place_instruments(machine, used), use_prior=use_prior)
+    else:
+        checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
     gate = _assessed(machine, fitted, checked, effects, placements[usable, :3], margin)
     rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
     gate = with_considered(gate, rest, (machine.accuracy.target, machine.accuracy.angle_target))
+    if failure is None and not _refuse(suspected):
+        if fitted.noise > CONTRADICTED:
+            suspected += explained_otherwise(refit, fitted, HYPOTHESES)
+        else:
+            tool = Tool.of(effects, tool_components(machine), placements[usable, :3])
+            suspected += alternatives(refit, fitted, tool, gate.after, table[usable], HYPOTHESES)
     return Calibration(
         machine,
         whole,
@@ -156,7 +187,12 @@ def calibrate(
         table,
         usable,
         seed,
+        failure,
     )
+
+
+def _refuse(suspected: Sequence[Suspicion]) -> bool:
+    return any(suspicion.refuses for suspicion in suspected)
 
 
 def _placed(machine: Machine, whole: Measurements) -> Placements | None:
@@ -177,14 +213,6 @@ def _nothing_to_fit(whole: Measurements) -> RequestError:
             expected="rows to fit, and some to check with",
         )
     )
-
-
-def _with_suspicions(failure: RequestError, suspected: Sequence[Suspicion]) -> RequestError:
-    """What stopped the fit, its hint being the suspicions that refuse the measurements."""
-    sentences = "; ".join(suspicion.sentence for suspicion in suspected if suspicion.refuses)
-    if not sentences or any(problem.code != "no-fit" for problem in failure.problems):
-        return failure
-    return RequestError(*(replace(problem, hint=sentences) for problem in failure.problems))
 
 
 def _assessed(

@@ -154,6 +154,8 @@ def verdict_of(calibration: Calibration) -> str:
         return gate.words
     # They begin with the instrument's name, which stays as it is written.
     verdict = f"No: the measurements look wrong. {'. '.join(refusing)}."
+    if calibration.failure is not None:
+        return f"{verdict} As they are, {calibration.failure.message}."
     if gate.accepted:
         return verdict
     reasons = "; ".join(reason.sentence for reason in gate.reasons)

@@ -146,6 +146,10 @@ class Tool:
         """Largest displacement (m) over the workspace that a direction (n,) makes."""
         return float(self._size(self.effects @ direction, POSITION).max(initial=0.0))
 
+    def sizes(self, moved: Floats) -> tuple[Floats, Floats]:
+        """(n_pose,) position and rotation of displacements (n_pose, n_component), m and rad."""
+        return self._size(moved, POSITION), self._size(moved, ROTATION)
+
     def moves(self, direction: Floats, lengths: Floats) -> bool:
         """Whether a direction (n,) does more than a slight part of what unknowns do.
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.arrays import Floats
 from truepose.calibration.data_checks import (
     constant_column,
     frame,
@@ -33,11 +32,15 @@ from truepose.calibration.data_checks._base import (
     Hypothesis,
     HypothesisKind,
     InspectionKind,
-    Readings,
     Suspicion,
     View,
 )
 from truepose.calibration.data_checks.expected_residual import expected_residual
+from truepose.calibration.data_checks.refit import (
+    Refit,
+    alternatives,
+    explained_otherwise,
+)
 from truepose.calibration.identification.placement import Placements, place_instruments
 from truepose.calibration.measurements import Measurements
 from truepose.errors import RequestError
@@ -66,6 +69,7 @@ INSPECTIONS: tuple[InspectionKind, ...] = (
 CODES: dict[str, str] = {
     **{hypothesis.code: hypothesis.doc for hypothesis in HYPOTHESES},
     **{inspection.code: inspection.doc for inspection in INSPECTIONS},
+    "open-choice": "the readings are explained as well under another supposition",
     "far-off": "further from the nominal machine than tolerances allow, and nothing explains it",
 }
 """Every kind of suspicion and what it says."""
@@ -90,15 +94,15 @@ def suspicions(
         try:
             placements = place_instruments(machine, measurements)
         except RequestError:  # from no start can the readings be followed
-            placements = Placements(measurements, {})
+            placements = Placements(machine, measurements, {})
     allowed = expected_residual(machine, placements.measurements)
-    declared = Placements(measurements, {})
     suspected: list[Suspicion] = []
     for number in np.unique(measurements.instrument).tolist():
-        view = _view(machine, placements, number, allowed)
-        otherwise = _view(machine, declared, number, allowed)
+        standing = placements.of.get(number)
+        view = View.of(machine, placements.measurements, number, allowed, standing)
+        declared = View.of(machine, measurements, number, allowed)
         try:
-            suspected += _of_instrument(view, otherwise)
+            suspected += _of_instrument(view, declared)
         except RequestError:  # a pose of the machine as filed cannot be solved: the fit says so
             continue
     return tuple(suspected)
@@ -110,19 +114,6 @@ def _of_instrument(view: View, declared: View) -> list[Suspicion]:
     if any(suspicion.code == "constant-column" for suspicion in inspected):
         return inspected
     return [*_explained_somewhere(view, declared), *inspected]
-
-
-def _view(machine: Machine, placements: Placements, number: int, allowed: Floats) -> View:
-    measurements = placements.measurements
-    own, observations = measurements.of_instrument(number)
-    readings = Readings(
-        measurements.row[observations],
-        own.observable,
-        own.strut,
-        own.value,
-        allowed[observations],
-    )
-    return View(machine, measurements, own, observations, readings, placements.of.get(number))
 
 
 def _explained_somewhere(view: View, declared: View) -> list[Suspicion]:
@@ -233,6 +224,9 @@ __all__ = [
     "CODES",
     "HYPOTHESES",
     "INSPECTIONS",
+    "Refit",
     "Suspicion",
+    "alternatives",
+    "explained_otherwise",
     "suspicions",
 ]

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -155,7 +155,9 @@ class Hypothesis:
 
     `words`: what is assumed, "the readings x and y are exchanged"; `where`: the columns;
     `kept`: the observations that take part, None: all; `trimmed`: whether outliers are left out;
-    `of_command`: whether it is what was commanded that would be wrong.
+    `of_command`: whether it is what was commanded that would be wrong; `partial`: whether one of
+    several columns that are alike would be otherwise than the rest, which nobody supposes of data
+    that fit as they are.
     """
 
     words: str
@@ -165,6 +167,7 @@ class Hypothesis:
     trimmed: bool = True
     rows: tuple[int, ...] = ()
     of_command: bool = False
+    partial: bool = False
 
     @property
     def misfit(self) -> Misfit:
@@ -206,7 +209,8 @@ class View:
     """One instrument's part of the measurements, against the nominal machine.
 
     `own`: its rows alone, of which `observations` (k,) are the numbers among all `measurements`.
-    `placement`: where it stands, None where no place was found.
+    `placement`: where it stands, None where no place was found. `readings_only`: whether what was
+    commanded is beyond doubt.
     """
 
     machine: Machine
@@ -215,6 +219,27 @@ class View:
     observations: Indices
     readings: Readings
     placement: Placement | None
+    readings_only: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        machine: Machine,
+        measurements: Measurements,
+        number: int,
+        allowed: Floats,
+        placement: Placement | None = None,
+    ) -> View:
+        """Of the instrument of that number; `allowed` (n_observation,) of all readings, SI."""
+        own, observations = measurements.of_instrument(number)
+        readings = Readings(
+            measurements.row[observations],
+            own.observable,
+            own.strut,
+            own.value,
+            allowed[observations],
+        )
+        return cls(machine, measurements, own, observations, readings, placement)
 
     @property
     def instrument(self) -> Instrument:
@@ -286,14 +311,20 @@ class View:
         commanded: Measurements | None = None,
         kept: Indices | None = None,
         instrument: Instrument | None = None,
+        uncertainty: Floats | None = None,
     ) -> Supposed:
-        """Other values, other commands, a part of the data or a freer instrument."""
+        """Other values, other commands, a part of the data or a freer instrument.
+
+        `uncertainty` (k,): of the other values, where it is another one too.
+        """
         rows = self.own if commanded is None else commanded
         scale = self.readings.scale
         if instrument is not None:
             rows = replace(rows, instruments=(instrument,))
         if value is not None:
             rows = replace(rows, value=value)
+        if uncertainty is not None:
+            rows = replace(rows, uncertainty=uncertainty)
         if kept is not None:
             scale = scale[kept]
             rows = replace(
@@ -400,13 +431,16 @@ class HypothesisKind:
     """A registry's line: a kind of blunder that a hypothesis shows.
 
     `propose(view)` yields what to try; `free`: it has numbers of its own to fit, and is asked only
-    where none of those without explains the data.
+    where none of those without explains the data. `of_readings`: whether it takes "numbers" that
+    were read for others, or their "columns", so that data of little variety may be explained either
+    way.
     """
 
     code: str
     doc: str
     propose: Callable[[View], Iterator[Hypothesis]]
     free: bool = False
+    of_readings: Literal["numbers", "columns"] | None = None
 
 
 @dataclass(frozen=True)

@@ -54,5 +54,9 @@ def _angles(view: View) -> list[MeasuredColumn]:
     return columns if len(sizes) == 1 else []
 
 
-SIGN = HypothesisKind("rotation-sign", "angles turned the other way", propose_sign)
-ORDER = HypothesisKind("axis-order", "angles about the axes in another order", propose_order)
+SIGN = HypothesisKind(
+    "rotation-sign", "angles turned the other way", propose_sign, of_readings="numbers"
+)
+ORDER = HypothesisKind(
+    "axis-order", "angles about the axes in another order", propose_order, of_readings="numbers"
+)

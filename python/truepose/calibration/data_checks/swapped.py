@@ -30,8 +30,9 @@ def propose(view: View) -> Iterator[Hypothesis]:
             count = len(one)
             order = [*range(count, 2 * count), *range(count)]
             yield from _exchanged(view, [*one, *other], order)
-    yield from _joints(view)
-    yield from _commands(view)
+    if not view.readings_only:
+        yield from _joints(view)
+        yield from _commands(view)
 
 
 def _reordered(view: View, columns: Sequence[MeasuredColumn]) -> Iterator[Hypothesis]:
@@ -78,5 +79,8 @@ def _commands(view: View) -> Iterator[Hypothesis]:
 
 
 KIND = HypothesisKind(
-    "swapped-columns", "two or three columns stand in each other's place", propose
+    "swapped-columns",
+    "two or three columns stand in each other's place",
+    propose,
+    of_readings="columns",
 )

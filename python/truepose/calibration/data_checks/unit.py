@@ -23,13 +23,15 @@ ANGLES = ((180.0 / math.pi, "180/pi"),)
 def propose_length(view: View) -> Iterator[Hypothesis]:
     """All lengths, or one column, too large or too small by a factor; so the commands."""
     yield from _measured(view, [c for c in view.columns if c.unit == "m"], LENGTHS)
-    yield from _commanded(view, "m", LENGTHS)
+    if not view.readings_only:
+        yield from _commanded(view, "m", LENGTHS)
 
 
 def propose_angle(view: View) -> Iterator[Hypothesis]:
     """Degrees declared as radians, or radians as degrees, in angles read or commanded."""
     yield from _measured(view, [c for c in view.columns if c.unit == "rad"], ANGLES)
-    yield from _commanded(view, "rad", ANGLES)
+    if not view.readings_only:
+        yield from _commanded(view, "rad", ANGLES)
 
 
 def _factors(factors: Sequence[tuple[float, str]]) -> Iterator[tuple[float, str]]:
@@ -52,8 +54,15 @@ def _measured(
             if factor > 1.0 and chosen[0].unit == "rad":
                 value[observations] = _unwrapped(view, observations, factor)
             value[observations] /= factor
+            uncertainty = view.own.uncertainty.copy()
+            uncertainty[observations] /= factor
             are = "are" if len(names) > 1 else "is"
-            yield Hypothesis(f"{listed(names)} {are} {word}", names, view.suppose(value))
+            yield Hypothesis(
+                f"{listed(names)} {are} {word}",
+                names,
+                view.suppose(value, uncertainty=uncertainty),
+                partial=len(chosen) < len(columns),
+            )
 
 
 def _unwrapped(view: View, observations: Indices, factor: float) -> Floats:
@@ -94,5 +103,9 @@ def _commanded(view: View, unit: str, factors: Sequence[tuple[float, str]]) -> I
             yield from view.other_command(view.at_poses(poses), words, where)
 
 
-LENGTH = HypothesisKind("wrong-unit", "lengths in another unit than declared", propose_length)
-ANGLE = HypothesisKind("degrees-radians", "degrees for radians, or the reverse", propose_angle)
+LENGTH = HypothesisKind(
+    "wrong-unit", "lengths in another unit than declared", propose_length, of_readings="numbers"
+)
+ANGLE = HypothesisKind(
+    "degrees-radians", "degrees for radians, or the reverse", propose_angle, of_readings="numbers"
+)

@@ -174,6 +174,38 @@ def fit(
     )
 
 
+def unfitted(
+    measurements: Measurements, unknowns: Unknowns, placements: Placements, *, use_prior: bool
+) -> Fit:
+    """The machine as filed in the place of a fit, from readings of which none is used.
+
+    Raises `RequestError` (no-fit) where a pose of it cannot be solved.
+    """
+    problem = IdentificationProblem(placements.machine, placements.measurements, unknowns)
+    as_filed = placements.as_filed(unknowns)
+    residual = problem.residual(as_filed)
+    nothing = np.zeros(measurements.n_observation)
+    slope = whitened(problem, as_filed)
+    known = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
+    equations = Equations.of(np.zeros_like(slope), known, unknowns)
+    return Fit(
+        unknowns,
+        problem.measurements,
+        as_filed,
+        equations.covariance,
+        slope,
+        residual,
+        residual,
+        nothing,
+        use_prior,
+        equations.null_space,
+        equations.scale,
+        nothing,
+        as_filed,
+        problem,
+    )
+
+
 def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bool) -> None:
     """Refuse fewer equations than unknowns, saying how many readings are lacking."""
     free = unknowns.count

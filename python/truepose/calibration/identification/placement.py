@@ -78,11 +78,12 @@ class Placement:
 
 @dataclass(frozen=True, eq=False)
 class Placements:
-    """Where all instruments stand: `measurements` with their frames there.
+    """Where all instruments stand: `measurements` of a `machine` with their frames there.
 
     `of`: by the number of each instrument that measured anything.
     """
 
+    machine: Machine
     measurements: Measurements
     of: dict[int, Placement]
 
@@ -107,7 +108,8 @@ def place_instruments(machine: Machine, measurements: Measurements) -> Placement
         placement = place_instrument(machine, measurements.of_instrument(number)[0])
         placements[number] = placement
         instruments[number] = placement.instrument
-    return Placements(dataclasses.replace(measurements, instruments=tuple(instruments)), placements)
+    standing = dataclasses.replace(measurements, instruments=tuple(instruments))
+    return Placements(machine, standing, placements)
 
 
 def place_instrument(

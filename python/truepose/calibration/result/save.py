@@ -41,6 +41,8 @@ def save(
 
     Raises `RequestError` (calibration-refused, and what `write_calibrated` raises).
     """
+    if calibration.failure is not None:
+        raise RequestError(calibration.failure)
     verdict = verdict_of(calibration)
     if not (calibration.accepted or force):
         raise RequestError(

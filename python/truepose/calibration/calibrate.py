@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, assess
-from truepose.calibration.acceptance.tool_uncertainty import tool_components
+from truepose.calibration.acceptance import Gate, HeldOut, assess
+from truepose.calibration.acceptance.decision import MARGIN
+from truepose.calibration.acceptance.tool_uncertainty import Considered, tool_components
 from truepose.calibration.data_checks import Suspicion, suspicions
-from truepose.calibration.identification.consider_covariance import (
-    consider_covariance,
-    with_considered,
-)
+from truepose.calibration.identification.consider_covariance import consider_covariance
 from truepose.calibration.identification.fit import Fit, fit, place_instruments
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
@@ -61,7 +59,7 @@ class Calibration:
     @property
     def accepted(self) -> bool:
         """Whether the calibrated machine may be used."""
-        return self.gate.accepted and not any(suspicion.refuses for suspicion in self.suspicions)
+        return self.gate.accepted
 
     def calibrated(self) -> Machine:
         """The machine with the values found for its parameters; its bands are the file's still."""
@@ -133,9 +131,10 @@ def calibrate(
         raise _with_suspicions(failure, suspected) from failure
     checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
-    gate = _assessed(machine, fitted, checked, effects, placements[usable, :3], margin)
     rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
-    gate = with_considered(gate, rest, (machine.accuracy.target, machine.accuracy.angle_target))
+    gate = _assessed(
+        machine, fitted, checked, effects, placements[usable, :3], margin, rest, suspected
+    )
     return Calibration(
         machine,
         whole,
@@ -198,6 +197,8 @@ def _assessed(
     effects: Floats,
     positions: Floats,
     margin: float,
+    considered: Considered | None,
+    suspected: Sequence[Suspicion],
 ) -> Gate:
     unknowns = fitted.unknowns
     accuracy = machine.accuracy
@@ -219,6 +220,8 @@ def _assessed(
         candidates=candidates(machine, fitted),
         margin=margin,
         noise=(fitted.noise, fitted.freedom),
+        considered=considered,
+        suspicions=suspected,
     )
 
 

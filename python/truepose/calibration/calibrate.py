@@ -11,14 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.acceptance.decision import (
-    CONTRADICTED,
-    MARGIN,
-    Gate,
-    HeldOut,
-    assess,
-)
-from truepose.calibration.acceptance.tool_uncertainty import Tool, tool_components
+from truepose.calibration.acceptance import Gate, HeldOut, assess
+from truepose.calibration.acceptance.decision import CONTRADICTED, MARGIN
+from truepose.calibration.acceptance.tool_uncertainty import Considered, Tool, tool_components
 from truepose.calibration.data_checks import (
     HYPOTHESES,
     Refit,
@@ -27,10 +22,7 @@ from truepose.calibration.data_checks import (
     explained_otherwise,
     suspicions,
 )
-from truepose.calibration.identification.consider_covariance import (
-    consider_covariance,
-    with_considered,
-)
+from truepose.calibration.identification.consider_covariance import consider_covariance
 from truepose.calibration.identification.fit import Fit, fit, unfitted
 from truepose.calibration.identification.placement import Placements, place_instruments
 from truepose.calibration.identification.robust import Outlier, outliers
@@ -78,7 +70,7 @@ class Calibration:
     @property
     def accepted(self) -> bool:
         """Whether the calibrated machine may be used."""
-        return self.failure is None and self.gate.accepted and not _refuse(self.suspicions)
+        return self.gate.accepted
 
     def calibrated(self) -> Machine:
         """The machine with the values found for its parameters; its bands are the file's still."""
@@ -167,15 +159,24 @@ def calibrate(
     else:
         checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
-    gate = _assessed(machine, fitted, checked, effects, placements[usable, :3], margin)
     rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
-    gate = with_considered(gate, rest, (machine.accuracy.target, machine.accuracy.angle_target))
     if failure is None and not _refuse(suspected):
         if fitted.noise > CONTRADICTED:
             suspected += explained_otherwise(refit, fitted, HYPOTHESES)
         else:
             tool = Tool.of(effects, tool_components(machine), placements[usable, :3])
-            suspected += alternatives(refit, fitted, tool, gate.after, table[usable], HYPOTHESES)
+            suspected += alternatives(refit, fitted, tool, table[usable], HYPOTHESES)
+    gate = _assessed(
+        machine,
+        fitted,
+        checked,
+        effects,
+        placements[usable, :3],
+        margin,
+        rest,
+        suspected,
+        failure,
+    )
     return Calibration(
         machine,
         whole,
@@ -222,6 +223,9 @@ def _assessed(
     effects: Floats,
     positions: Floats,
     margin: float,
+    considered: Considered | None,
+    suspected: Sequence[Suspicion],
+    failure: Problem | None,
 ) -> Gate:
     unknowns = fitted.unknowns
     accuracy = machine.accuracy
@@ -243,6 +247,9 @@ def _assessed(
         candidates=candidates(machine, fitted),
         margin=margin,
         noise=(fitted.noise, fitted.freedom),
+        considered=considered,
+        suspicions=suspected,
+        failure=None if failure is None else failure.message,
     )
 
 

@@ -13,7 +13,6 @@ import numpy as np
 import xarray as xr
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.acceptance import sentences
 from truepose.calibration.identification.equations import Equations
 from truepose.calibration.identification.problem import Prior
 from truepose.calibration.observables import UNITS, column_name
@@ -30,6 +29,7 @@ from truepose.runs.dataset import (
 from truepose.runs.quantities import POSITIONS, quantities
 
 if TYPE_CHECKING:
+    from truepose.calibration.acceptance import Reason
     from truepose.calibration.acceptance.tool_uncertainty import ToolUncertainty
     from truepose.calibration.calibrate import Calibration
     from truepose.calibration.measurements import Measurements
@@ -147,31 +147,13 @@ def dataset_of(calibration: Calibration) -> xr.Dataset:
 
 
 def verdict_of(calibration: Calibration) -> str:
-    """Yes or no with its reasons: first the suspicions that refuse, then the gate's reasons."""
-    gate = calibration.gate
-    refusing = [suspicion.sentence for suspicion in calibration.suspicions if suspicion.refuses]
-    if not refusing:
-        return gate.words
-    # They begin with the instrument's name, which stays as it is written.
-    verdict = f"No: the measurements look wrong. {'. '.join(refusing)}."
-    if calibration.failure is not None:
-        return f"{verdict} As they are, {calibration.failure.message}."
-    if gate.accepted:
-        return verdict
-    reasons = "; ".join(reason.sentence for reason in gate.reasons)
-    return f"{verdict} As they are: {reasons}."
+    """Yes or no with its reasons, the remedy and the warnings."""
+    return calibration.gate.words
 
 
 def answer_of(calibration: Calibration) -> str:
     """The verdict without its warnings and the remedy, which are shown elsewhere."""
-    gate, answer = calibration.gate, verdict_of(calibration)
-    if answer != gate.words:
-        return answer
-    for warning in reversed(gate.warnings):
-        answer = answer.removesuffix(f" {sentences.sentence(warning.sentence)}.")
-    if gate.remedy is not None:
-        answer = answer.removesuffix(f" {sentences.sentence(gate.remedy.sentence)}.")
-    return answer
+    return calibration.gate.answer
 
 
 # --- values --------------------------------------------------------------------------------------
@@ -392,8 +374,8 @@ def _attrs(calibration: Calibration) -> dict[str, str | int | float]:
         "verdict": verdict_of(calibration),
         "answer": answer_of(calibration),
         "accepted": int(calibration.accepted),
-        "reasons": _json([asdict(reason) for reason in gate.reasons]),
-        "warnings": _json([asdict(warning) for warning in gate.warnings]),
+        "reasons": _json([_said(reason) for reason in gate.reasons]),
+        "warnings": _json([_said(warning) for warning in gate.warnings]),
         "undetermined": _json(list(gate.sentences)),
         "suspicions": _json([_finite(asdict(suspicion)) for suspicion in calibration.suspicions]),
         "outliers": _json(
@@ -419,6 +401,10 @@ def _attrs(calibration: Calibration) -> dict[str, str | int | float]:
         attrs["rms_held_out_before"] = checked.rms_before
         attrs["rms_held_out_after"] = checked.rms_after
     return attrs
+
+
+def _said(reason: Reason) -> dict[str, str]:
+    return {"code": reason.code, "sentence": reason.sentence}
 
 
 def _json(value: object) -> str:

@@ -113,6 +113,8 @@ def test_in_an_unknown_frame(walking: Machine, use_prior: bool) -> None:
     data = made_measurements(
         walking, "position", poses_within(walking, 40, share=0.5), frame="unknown", values="nominal"
     )
+    noise = np.random.default_rng(4).standard_normal(data.n_observation)
+    data = data.with_values(data.value + data.uncertainty * noise)
     found = calibrate(walking, data, identify=LENGTHS, use_prior=use_prior)
     assert found.gate.relative
     assert found.gate.accepted

@@ -16,10 +16,11 @@ import truepose as tp
 from build_machine import MACHINES
 from made_measurements import made_measurements, poses_within
 from truepose.calibration.calibrate import Calibration, calibrate
-from truepose.calibration.data_checks import Suspicion
 from truepose.calibration.dataset import SCHEMA, answer_of, covariance_of, dataset_of, verdict_of
 from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.unknowns import unknowns_of
+from truepose.calibration.measurements.read_csv import read_measurements
+from truepose.calibration.observables import OBSERVABLES
 from truepose.calibration.result.save import save
 from truepose.errors import RequestError
 
@@ -59,6 +60,20 @@ def delta(name: str, use_prior: bool = True) -> Calibration:
     """The delta printer of the examples."""
     machine = tp.load(DATA / "delta_printer.toml")
     return calibrate(machine, DATA / f"delta_{name}.csv", use_prior=use_prior)
+
+
+def swapped() -> Calibration:
+    """The same printer, two columns of its measurements under each other's name."""
+    machine = tp.load(DATA / "delta_printer.toml")
+    data = read_measurements(DATA / "delta_positions.csv", machine)
+    x, y = (OBSERVABLES.index(name) for name in "xy")
+    exchanged = {x: y, y: x}
+    columns = np.array([exchanged.get(int(each), int(each)) for each in data.observable])
+    order = np.lexsort((columns, data.row))
+    return calibrate(
+        machine,
+        replace(data, observable=columns[order], value=data.value[order]),
+    )
 
 
 EVERY = [hexapod, lambda: hexapod(True), lambda: delta("positions"), lambda: delta("heights")]
@@ -186,16 +201,19 @@ def test_the_verdict_and_its_parts() -> None:
     assert "no-gain" in codes
 
 
-def test_a_suspicion_that_refuses_goes_before_a_gate_that_accepts() -> None:
-    wrong = Suspicion("swapped-columns", "camera: it looks as if x and y were exchanged")
-    found = replace(delta("positions"), suspicions=(wrong,))
+def test_measurements_that_look_wrong_are_the_first_reason() -> None:
+    found = swapped()
+    (suspicion,) = [each for each in found.suspicions if each.refuses]
     assert not found.accepted
-    assert verdict_of(found) == (
-        "No: the measurements look wrong. camera: it looks as if x and y were exchanged."
-    )
-    assert dataset_of(found).attrs["accepted"] == 0
-    both = replace(delta("heights", use_prior=False), suspicions=(wrong,))
-    assert "As they are: " in verdict_of(both)
+    assert not found.gate.accepted
+    assert verdict_of(found).startswith(f"No: the measurements look wrong. {suspicion.sentence}.")
+    assert answer_of(found) == verdict_of(found)
+    shown = dataset_of(found).attrs
+    assert shown["accepted"] == 0
+    assert json.loads(shown["reasons"])[0] == {
+        "code": "data-look-wrong",
+        "sentence": f"the measurements look wrong. {suspicion.sentence}",
+    }
 
 
 def test_saving_is_refused_where_the_answer_is_no(tmp_path: Path) -> None:

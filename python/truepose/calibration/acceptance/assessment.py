@@ -1,8 +1,8 @@
-"""What measurements determine: the part of the verdict that changes when some are added."""
+"""What measurements determine: the evidence that changes when some are added."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
@@ -24,7 +24,8 @@ from truepose.calibration.acceptance.observability import (
     stacked,
     weighted,
 )
-from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
+from truepose.calibration.acceptance.reasons import Reason, ToolSize, at_worst_pose
+from truepose.calibration.acceptance.tool_uncertainty import Considered, Tool, ToolUncertainty
 from truepose.calibration.least_squares import singular_decomposition
 
 if TYPE_CHECKING:
@@ -33,20 +34,8 @@ if TYPE_CHECKING:
 
 POOR = 1e-3
 """Of the largest singular value: below it a direction is weak, where there is no tolerance."""
-NOTHING = 100.0
-"""Half bands of a tolerance: a larger uncertainty is said in words, not as a number."""
-ROUNDING = 1e-6
-"""Relative: an uncertainty that is larger by no more than this is not larger."""
 
 Kind = Literal["unseen", "weak", "gauge", "harmless"]
-
-
-@dataclass(frozen=True)
-class Reason:
-    """A reason against the calibration, or a warning: code, and sentence without its full stop."""
-
-    code: str
-    sentence: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,16 +54,44 @@ class Direction:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What the measured rows lead to: (a), (b) and (e) of the verdict."""
+    """What the measured rows lead to: what they determine, and what the tool is then known to.
+
+    `moving` (k, n): directions that neither data nor prior determine and that move the tool, for
+    people; `unseen` and `weak` (k, n): such that the data do not see, or hardly, for people too,
+    the latter against the tolerances where `within`. `still` (k, n): standard uncertainties along
+    those weak ones that do nothing at the tool. `before` and `after` count the tolerances that were
+    `considered`, too.
+    """
 
     data: RowCovariance
     used: RowCovariance
     directions: tuple[Direction, ...]
-    sentences: tuple[str, ...]
+    moving: Floats
+    unseen: Floats
+    weak: Floats
+    within: bool
+    still: Floats
     before: ToolUncertainty | None
     after: ToolUncertainty
     relative: bool
-    reasons: tuple[Reason, ...]
+    considered: Considered | None = None
+
+    @property
+    def open(self) -> tuple[tuple[Floats, bool], ...]:
+        """The directions that the data leave open, each with whether within the tolerances."""
+        return (self.unseen, False), (self.weak, self.within)
+
+    def with_considered(self, considered: Considered | None) -> Outcome:
+        """With the tolerances that were not identified, which matter where nothing is open."""
+        if considered is None or len(self.moving):
+            return self
+        return replace(
+            self,
+            before=considered.before,
+            after=considered.after,
+            relative=self.relative or considered.relative,
+            considered=considered,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,23 +236,18 @@ class Case:
             for kind, group in groups
             for direction in group
         )
-        not_seen = sentences.undetermined(unseen, self.labels, self.by)
-        within = seen.scaling == "prior"
-        hardly = sentences.undetermined(weak, self.labels, self.by, within_tolerances=within)
-        reasons = []
-        if len(moving):
-            text = "; ".join(sentences.undetermined(_sparse(moving / unit), self.labels, self.by))
-            reasons.append(Reason("not-determined", text))
-        if hardly and not self.use_prior:
-            reasons.append(Reason("not-told-apart", "; ".join(hardly)))
-        if not self.use_prior:
-            reasons += self._too_loose(data, still)
-        if not len(moving):
-            reasons += self._no_gain(before, after)
         return Outcome(
-            data, used, directions, (*not_seen, *hardly), before, after,
-            len(of_data.gauge) > 0, tuple(reasons),
+            data, used, directions, _sparse(moving / unit), unseen, weak, seen.scaling == "prior",
+            still, before, after, len(of_data.gauge) > 0,
         )  # fmt: skip
+
+    def reason(self, code: str, **values: object) -> Reason:
+        """A reason in the machine's units."""
+        return Reason(code, values, self.unknowns.shown)
+
+    def open(self, *groups: tuple[Floats, bool]) -> dict[str, object]:
+        """Values of a reason: directions (k, n) left open, and whether within tolerances."""
+        return {"open": groups, "labels": self.labels, "by": self.by}
 
     def _weak(
         self, seen: Observability, rows: WhitenedRows, tool: Tool, before: ToolUncertainty | None
@@ -266,95 +278,27 @@ class Case:
             return right[moving], steps
         return sentences.clustered(right[moving], with_noise[moving]), steps
 
-    def _too_loose(self, data: RowCovariance, still: Floats) -> list[Reason]:
-        """(e): what is found is less certain than what was known of it before."""
-        # Without the parts in null directions, of which those that matter are a reason of their
-        # own, and without those that do nothing at the tool.
-        variance = np.einsum("ij,ij->i", data.root, data.root)
-        left = np.maximum(variance - (still**2).sum(axis=0), 0.0)
-        own: Floats = np.sqrt(np.where(left > ROUNDING * variance, left, 0.0))
-        with np.errstate(invalid="ignore"):
-            ratio = np.where(np.isfinite(self.sigma), own / self.sigma, 0.0)
-        loose = [int(i) for i in np.argsort(-ratio, kind="stable") if ratio[i] > 1.0]
-        if not loose:
-            return []
-        at, unit, units = loose[0], self.unknowns.units[loose[0]], self.unknowns.shown
-        half, sigma = float(self.half[at]), float(self.sigma[at])
-        if np.isfinite(half) and own[at] > half:
-            known = f"its tolerance is {sentences.stated(half, unit, units)}"
-        else:
-            known = f"its tolerance already to {sentences.quantity(sigma, unit, units=units)}"
-        uncertainty = sentences.quantity(own[at], unit, units=units)
-        text = f"the measurements determine {self.labels[at]} only to {uncertainty}, {known}"
-        if np.isfinite(half) and own[at] > NOTHING * half:
-            tolerance = sentences.stated(half, unit, units)
-            text = (
-                f"the measurements say almost nothing about {self.labels[at]}, "
-                f"its tolerance is {tolerance}"
-            )
-        if len(loose) > 1:
-            others = "one more unknown is" if len(loose) == 2 else f"{len(loose) - 1} more are"
-            text += f" ({others} less certain than the tolerance, too)"
-        return [Reason("less-than-tolerance", text)]
-
     def reference(self, before: ToolUncertainty | None) -> tuple[float | None, float | None]:
         """What the tool is known to before, position and rotation, at the worst pose."""
         return self.measured if before is None else before.worst
 
-    def _no_gain(self, before: ToolUncertainty | None, after: ToolUncertainty) -> list[Reason]:
-        """(b): the tool is not known better than before."""
-        compared = [
-            (name, unit, size, was)
-            for (name, unit, size, _), was in zip(
-                at_worst_pose(after, None), self.reference(before), strict=True
-            )
-            if was is not None and (was > 0.0 or size > 0.0)
+    def sizes(self, outcome: Outcome) -> list[ToolSize]:
+        """The tool at the worst pose, of which something is known before."""
+        return [
+            size
+            for size in at_worst_pose(outcome.after, self.reference(outcome.before))
+            if size.before is not None and (size.before > 0.0 or size.after > 0.0)
         ]
-        worse = [row for row in compared if row[2] > (1.0 + ROUNDING) * row[3]]
-        gained = any(size <= self.margin * was for _, _, size, was in compared)
-        if not compared or (gained and not worse):
-            return []
-        shown, units = worse or compared, self.unknowns.shown
-        whose = "of the machine as filed" if before is not None else "measured before"
-        texts = [
-            f"{name} by {sentences.quantity(size, unit, units=units)}, against "
-            f"{sentences.quantity(was, unit, units=units)} {whose}"
-            for name, unit, size, was in shown
+
+    def keeps_target(self, outcome: Outcome) -> bool:
+        """Whether something is asked, and the machine as filed is known to keep it."""
+        asked = [
+            (most, size)
+            for most, size in zip(self.target, self.reference(outcome.before), strict=True)
+            if most is not None
         ]
-        texts[0] = texts[0].replace(" by ", " would be uncertain by ", 1)
-        text = f"at the worst pose of the workspace {', and '.join(texts)}"
-        if self.keeps_target(before):
-            text += "; but the machine as filed already keeps the accuracy that is asked"
-        return [Reason("no-gain", text)]
-
-    def keeps_target(self, before: ToolUncertainty | None) -> bool:
-        """Whether the machine as filed keeps the accuracy that is asked of it."""
-        return is_kept(self.target, self.reference(before))
-
-    def lacks_only_gain(self, outcome: Outcome) -> bool:
-        """Whether the only reason is a missing gain that nobody asked for."""
-        only = {reason.code for reason in outcome.reasons} == {"no-gain"}
-        return only and self.keeps_target(outcome.before)
+        return bool(asked) and all(size is not None and size <= most for most, size in asked)
 
 
 def _sparse(directions: Floats) -> Floats:
     return sentences.sparse(directions) if len(directions) else directions
-
-
-def is_kept(
-    target: tuple[float | None, float | None], sizes: tuple[float | None, float | None]
-) -> bool:
-    """Whether something is asked of position or rotation, and the sizes are known to keep it."""
-    pairs = [(asked, size) for asked, size in zip(target, sizes, strict=True) if asked is not None]
-    return bool(pairs) and all(size is not None and size <= asked for asked, size in pairs)
-
-
-def at_worst_pose(
-    after: ToolUncertainty, before: ToolUncertainty | None
-) -> list[tuple[str, str, float, float | None]]:
-    """(name, unit, after, before) of position and rotation at the worst pose."""
-    was = (None, None) if before is None else before.worst
-    return [
-        ("the tool's position", "m", after.position_max, was[0]),
-        ("the tool's rotation", "rad", after.rotation_max, was[1]),
-    ]

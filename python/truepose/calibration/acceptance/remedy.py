@@ -13,6 +13,7 @@ import numpy as np
 from truepose.arrays import Floats
 from truepose.calibration.acceptance import sentences
 from truepose.calibration.acceptance.assessment import Case, Outcome
+from truepose.calibration.acceptance.decision import lacking
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
@@ -106,7 +107,8 @@ def cheapest_remedy(case: Case, candidates: Sequence[Candidate]) -> Remedy:
     if not candidates:
         return Remedy((), 0.0, "no further measurement was tried")
     outcomes = [case.outcome(candidate.rows) for candidate in candidates]
-    sufficient = [i for i, outcome in enumerate(outcomes) if not outcome.reasons]
+    missing = [len(lacking(case, outcome)) for outcome in outcomes]
+    sufficient = [i for i, count in enumerate(missing) if not count]
     if sufficient:
         sufficient.sort(key=lambda i: (candidates[i].cost, outcomes[i].after.position_max, i))
         best = sufficient[0]
@@ -115,14 +117,15 @@ def cheapest_remedy(case: Case, candidates: Sequence[Candidate]) -> Remedy:
         if of_other_sort:
             sentence += f", or {_named(case, candidates, sufficient, of_other_sort[0])}"
         return _remedy((candidates[best],), outcomes[best], sentence)
-    helpful = sorted(range(len(candidates)), key=lambda i: (*_open(outcomes[i]), i))[:MOST_PAIRED]
+    left = [outcome.after.position_max + outcome.after.rotation_max for outcome in outcomes]
+    helpful = sorted(range(len(candidates)), key=lambda i: (missing[i], left[i], i))[:MOST_PAIRED]
     pairs = sorted(
         combinations(sorted(helpful), 2), key=lambda pair: sum(candidates[i].cost for i in pair)
     )
     for pair in pairs:
         parts = tuple(candidates[i] for i in pair)
         outcome = case.outcome(np.vstack([part.rows for part in parts]))
-        if not outcome.reasons:
+        if not lacking(case, outcome):
             return _remedy(parts, outcome, f"{parts[0].sentence} and {parts[1].sentence}")
     return Remedy((), 0.0, "none of the further measurements that were tried helps")
 
@@ -147,8 +150,3 @@ def _named(case: Case, candidates: Sequence[Candidate], sufficient: Sequence[int
     if len(relatives) > 1 and helping.issuperset(relatives):
         return best.sentence.replace(best.name, sentences.some(best.name, case.labels, "one"), 1)
     return best.sentence
-
-
-def _open(outcome: Outcome) -> tuple[int, float]:
-    """How much is still open: the reasons against it, and the uncertainty at the tool."""
-    return len(outcome.reasons), outcome.after.position_max + outcome.after.rotation_max

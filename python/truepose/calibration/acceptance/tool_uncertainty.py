@@ -67,6 +67,25 @@ class ToolUncertainty:
 
 
 @dataclass(frozen=True, eq=False)
+class Considered:
+    """The tool with all tolerances, those that were identified and those that were not.
+
+    `labels` of the latter, and `every` tolerance. `before` is None where something that moves the
+    tool has no tolerance; `alone` is `after` if those not identified were exact, `part` is what
+    they contribute to it.
+    `relative`: without what moves the whole machine in an instrument's unknown frame.
+    """
+
+    labels: tuple[str, ...]
+    every: tuple[str, ...]
+    before: ToolUncertainty | None
+    after: ToolUncertainty
+    alone: ToolUncertainty
+    part: ToolUncertainty
+    relative: bool
+
+
+@dataclass(frozen=True, eq=False)
 class SortedDirections:
     """Directions (k, n) that rows do not see, by what they do at the tool.
 

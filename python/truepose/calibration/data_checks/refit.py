@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from truepose.arrays import Floats, Indices
+from truepose.calibration.acceptance.observability import covariance_root
 from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
 from truepose.calibration.data_checks._base import (
     ALLOWED,
@@ -119,7 +120,6 @@ def alternatives(
     refit: Refit,
     fitted: Fit,
     tool: Tool,
-    after: ToolUncertainty,
     poses: Floats,
     kinds: Sequence[HypothesisKind],
 ) -> tuple[Suspicion, ...]:
@@ -127,9 +127,10 @@ def alternatives(
 
     Where the data themselves, whatever is known of the machine, fit one of them better, it is that.
 
-    `tool`: effects of the machine's unknowns at the tool, and `after`: its uncertainty, both at
-    `poses` (n, n_commanded). `kinds`: the registry, of which those of readings are tried.
+    `tool`: effects of the machine's unknowns at the tool at `poses` (n, n_commanded). `kinds`: the registry, of which those of readings are tried.
     """
+    n = fitted.unknowns.n_machine
+    after = tool.uncertainty(covariance_root(fitted.covariance[:n, :n]), np.zeros((0, n)))
     least = _cost(fitted, fitted.birge) + AS_WELL
     loss = _loss(fitted, fitted.birge) - AS_WELL
     better: dict[int, list[tuple[float, _Supposition]]] = {}

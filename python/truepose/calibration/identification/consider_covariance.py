@@ -15,57 +15,23 @@ beforehand, C the covariance of the fit and W its weights:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.assessment import ROUNDING, Reason, at_worst_pose, is_kept
-from truepose.calibration.acceptance.decision import Gate
 from truepose.calibration.acceptance.observability import (
     covariance_root,
     project_out_instruments,
     row_covariance,
 )
-from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty, tool_components
+from truepose.calibration.acceptance.tool_uncertainty import Considered, Tool, tool_components
 from truepose.calibration.identification.equations import whitened
 from truepose.calibration.identification.fit import Fit
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.errors import RequestError
-from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.machine import Machine
-
-SLIGHT = 1.05
-"""If the considered tolerances raise an uncertainty by less than this, there is no warning."""
-
-SOURCE = 0.5
-"""Share of the uncertainty from which tolerances are named as its cause."""
-
-_OF_GAIN = ("not-determined", "not-told-apart", "less-than-tolerance", "no-gain", "not-identified")
-"""Codes of the reasons that a remedy is for."""
-
-
-@dataclass(frozen=True, eq=False)
-class Considered:
-    """The tool with all tolerances, those that were identified and those that were not.
-
-    `labels` of the latter, and `every` tolerance. `before` is None where something that moves the
-    tool has no tolerance; `alone` is `after` if those not identified were exact, `part` is what
-    they contribute to it.
-    `relative`: without what moves the whole machine in an instrument's unknown frame.
-    """
-
-    labels: tuple[str, ...]
-    every: tuple[str, ...]
-    before: ToolUncertainty | None
-    after: ToolUncertainty
-    alone: ToolUncertainty
-    part: ToolUncertainty
-    relative: bool
-    shown: ShownUnits = METRIC
 
 
 def consider_covariance(
@@ -110,7 +76,6 @@ def consider_covariance(
         tool.uncertainty(exact, none),
         tool.uncertainty(part, none),
         relative,
-        machine.shown,
     )
 
 
@@ -161,132 +126,4 @@ def _roots(
     return np.hstack([of_prior, of_data]), part
 
 
-def with_considered(
-    gate: Gate, considered: Considered | None, target: tuple[float | None, float | None]
-) -> Gate:
-    """The gate with the uncertainty that all tolerances leave, and its answer by that.
-
-    `target`: what is asked of the tool, m and rad.
-    """
-    if considered is None or any(reason.code == "not-determined" for reason in gate.reasons):
-        return gate
-    reasons = [reason for reason in gate.reasons if reason.code != "no-gain"]
-    within = _keeps_target(considered, target)
-    reasons += _no_gain(considered, gate.margin, within=within)
-    codes = {reason.code for reason in reasons}
-    warnings = [
-        warning for warning in gate.warnings if warning.code not in ("one-sided", "not-needed")
-    ]
-    if within and codes not in ({"no-gain"}, {"not-identified"}):
-        text = (
-            "the machine as filed already keeps the accuracy that is asked: "
-            "calibration is not needed"
-        )
-        warnings.append(Reason("not-needed", text))
-    if not codes & set(_OF_GAIN):
-        warnings += _one_sided(considered, gate.margin)
-    if "not-identified" not in codes:
-        warnings += _unidentified_warning(considered)
-    remedy = gate.remedy if codes & (set(_OF_GAIN) - {"not-identified"}) else None
-    return replace(
-        gate,
-        accepted=not reasons,
-        reasons=tuple(reasons),
-        warnings=tuple(warnings),
-        remedy=remedy,
-        before=considered.before,
-        after=considered.after,
-        relative=gate.relative or considered.relative,
-    )
-
-
-def _pairs(considered: Considered) -> list[tuple[str, str, float, float]]:
-    """(name, unit, after, before) of what had an uncertainty."""
-    return [
-        (name, unit, size, was)
-        for name, unit, size, was in at_worst_pose(considered.after, considered.before)
-        if was is not None and (was > 0.0 or size > 0.0)
-    ]
-
-
-def _no_gain(considered: Considered, margin: float, *, within: bool) -> list[Reason]:
-    """The tool is not known better than before: the gate's rule, applied to all tolerances."""
-    pairs = _pairs(considered)
-    worse = [pair for pair in pairs if pair[2] > (1.0 + ROUNDING) * pair[3]]
-    gained = any(size <= margin * was for _, _, size, was in pairs)
-    if not pairs or (gained and not worse):
-        return []
-    texts = [
-        f"{name} uncertain by {sentences.quantity(size, unit, units=considered.shown)}, against "
-        f"{sentences.quantity(was, unit, units=considered.shown)} of the machine as filed"
-        for name, unit, size, was in worse or pairs
-    ]
-    ending = "; but the machine as filed already keeps the accuracy that is asked" if within else ""
-    if not _is_source(considered):
-        texts[0] = texts[0].replace(" uncertain", " would be uncertain", 1)
-        text = f"at the worst pose of the workspace {', and '.join(texts)}{ending}"
-        return [Reason("no-gain", text)]
-    text = (
-        f"the tolerances that were not identified ({_named(considered)}) leave "
-        f"{', and '.join(texts)}, at the worst pose of the workspace: identify them too{ending}"
-    )
-    return [Reason("not-identified", text)]
-
-
-def _is_source(considered: Considered) -> bool:
-    """Whether the tolerances that were not identified are what makes the tool uncertain."""
-    pairs = zip(
-        at_worst_pose(considered.part, None),
-        at_worst_pose(considered.after, None),
-        strict=True,
-    )
-    return any(size > 0.0 and part >= SOURCE * size for (*_, part, _), (*_, size, _) in pairs)
-
-
-def _one_sided(considered: Considered, margin: float) -> list[Reason]:
-    sizes = (
-        (name, sentences.quantity(size, unit, units=considered.shown))
-        for name, unit, size, was in _pairs(considered)
-        if was > 0.0 and size > margin * was
-    )
-    return [
-        Reason("one-sided", f"{name} is not known better than before, {size}")
-        for name, size in sizes
-    ]
-
-
-def _unidentified_warning(considered: Considered) -> list[Reason]:
-    """What the tolerances that were not identified add, where it is more than slight."""
-    pairs = list(
-        zip(
-            at_worst_pose(considered.after, None),
-            at_worst_pose(considered.alone, None),
-            strict=True,
-        )
-    )
-    more = [
-        f"{name} would be known to {sentences.quantity(less, unit, units=considered.shown)} "
-        f"instead of {sentences.quantity(size, unit, units=considered.shown)}"
-        for (name, unit, size, _), (*_, less, _) in pairs
-        if size > SLIGHT * less
-    ]
-    if not more:
-        return []
-    text = (
-        f"{_named(considered)} were not identified and count with their tolerances: "
-        f"if they were exact, {' and '.join(more)}; identify them too if this is too uncertain"
-    )
-    return [Reason("not-identified", text)]
-
-
-def _named(considered: Considered) -> str:
-    return sentences.listed(sentences.collapsed(considered.labels, considered.every))
-
-
-def _keeps_target(considered: Considered, target: tuple[float | None, float | None]) -> bool:
-    """Whether the machine as filed keeps what is asked."""
-    before = considered.before
-    return is_kept(target, (None, None) if before is None else before.worst)
-
-
-__all__ = ["Considered", "consider_covariance", "with_considered"]
+__all__ = ["consider_covariance"]

@@ -127,7 +127,8 @@ def alternatives(
 
     Where the data themselves, whatever is known of the machine, fit one of them better, it is that.
 
-    `tool`: effects of the machine's unknowns at the tool at `poses` (n, n_commanded). `kinds`: the registry, of which those of readings are tried.
+    `tool`: effects of the machine's unknowns at the tool at `poses` (n, n_commanded). `kinds`: the
+    registry, of which those of readings are tried.
     """
     n = fitted.unknowns.n_machine
     after = tool.uncertainty(covariance_root(fitted.covariance[:n, :n]), np.zeros((0, n)))

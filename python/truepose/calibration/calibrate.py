@@ -32,13 +32,14 @@ from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
+from truepose.representation import Facts, Represented
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-@dataclass(frozen=True, eq=False)
-class Calibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Represented):
     """What measurements say of a machine, and whether it may be used.
 
     `gate.accepted` is the answer, `gate.words` says why. `suspicions`: mistakes that the data look
@@ -57,6 +58,18 @@ class Calibration:
     poses: Floats
     usable: Flags
     seed: int = 0
+
+    def _facts(self) -> Facts:
+        from truepose.calibration.dataset import verdict_of
+
+        yield "machine", self.machine.name
+        yield "accepted", self.accepted
+        yield "unknowns", self.fit.unknowns.count
+        yield "rows", self.measurements.n_row
+        yield "readings", self.measurements.n_observation
+        yield "readings that do not fit", len(self.outliers)
+        yield "suspicions", [suspicion.code for suspicion in self.suspicions]
+        yield "verdict", verdict_of(self)
 
     @property
     def accepted(self) -> bool:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.probability.quantiles import normal_quantile, student_quantile
+from truepose.representation import Represented
 
 _NORMAL = "normal"
 _STUDENT = "student-t"
@@ -31,8 +32,8 @@ _PROBABILITY_SLACK = 1e-9
 """By which probabilities may miss a sum of one, as decimal fractions do."""
 
 
-@dataclass(frozen=True)
-class Distribution:
+@dataclass(frozen=True, repr=False)
+class Distribution(Represented):
     """How a deviation spreads inside its band.
 
     `sigmas` is the half band in standard deviations: sqrt(3) for a uniform one, k for a normal or

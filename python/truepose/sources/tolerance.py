@@ -35,6 +35,7 @@ from truepose.probability.distributions import (
     normal,
     student_t,
 )
+from truepose.representation import Represented
 from truepose.sources._correlation import CorrelationTable, read_correlation
 from truepose.sources.deviation import OWN_GROUP, Deviation
 from truepose.sources.pose_block import PoseBlock
@@ -79,8 +80,8 @@ class _Stated:
     distribution: Distribution
 
 
-@dataclass(frozen=True)
-class DimensionalTolerance:
+@dataclass(frozen=True, repr=False)
+class DimensionalTolerance(Represented):
     """Bands of any parameters, the same at every pose; members of a group vary together."""
 
     name: ClassVar[str] = "tolerance"

@@ -26,6 +26,7 @@ from truepose.calibration.acceptance.observability import (
 )
 from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
 from truepose.calibration.least_squares import singular_decomposition
+from truepose.representation import Represented
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
@@ -49,8 +50,8 @@ class Reason:
     sentence: str
 
 
-@dataclass(frozen=True, eq=False)
-class Direction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Direction(Represented):
     """A direction (n_machine,) over the machine's unknowns that the data leave open.
 
     `kind`: "unseen" and it moves the tool; "weak", the data say less than the tolerances do;

@@ -77,12 +77,17 @@ class Calibration(Represented):
         return self.gate.accepted and not any(suspicion.refuses for suspicion in self.suspicions)
 
     def calibrated(self) -> Machine:
-        """The machine with the values found for its parameters; its bands are the file's still."""
-        unknowns = self.fit.unknowns
-        change = unknowns.parameter_change(self.fit.values)
-        nominal = self.machine.nominal[unknowns.columns] + change
-        names = [self.machine.parameters[column] for column in unknowns.columns]
-        return self.machine.replace(dict(zip(names, nominal.tolist(), strict=True)))
+        """The machine with the nominal geometry, the bands and the correlations that were found.
+
+        What its file says, read again, but for the accuracy's words. Raises `RequestError`
+        (calibration-undetermined) where something has no finite uncertainty.
+        """
+        from truepose.calibration.result.calibrated_machine import calibrated_machine
+        from truepose.calibration.result.save import covariance_to_write
+
+        return calibrated_machine(
+            self.machine, self.fit.unknowns, self.fit.values, covariance_to_write(self)
+        )
 
     def save(
         self,

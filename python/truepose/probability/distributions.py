@@ -148,6 +148,15 @@ def student_t(dof: float, sigmas: float = 3.0) -> Distribution:
     return Distribution(_STUDENT, _checked(sigmas), dof=float(dof))
 
 
+def student_deviation(scale: float, dof: float) -> float:
+    """Standard deviation of Student's distribution of a scale, as JCGM 101:2008, 6.4.9 states it.
+
+    Its scale is that of x in (x - value) / scale = t, s / sqrt(n) of the mean of n readings. `dof`
+    above 2.
+    """
+    return scale * math.sqrt(dof / (dof - 2.0))
+
+
 def _checked(sigmas: float) -> float:
     if not (math.isfinite(sigmas) and sigmas > 0.0):
         raise ValueError(f"a band of {sigmas} standard deviations is no band")

@@ -38,13 +38,14 @@ from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
+from truepose.representation import Facts, Represented
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-@dataclass(frozen=True, eq=False)
-class Calibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Represented):
     """What measurements say of a machine, and whether it may be used.
 
     `gate.accepted` is the answer, `gate.words` says why. `suspicions`: mistakes that the data look
@@ -67,18 +68,35 @@ class Calibration:
     seed: int = 0
     failure: Problem | None = None
 
+    def _facts(self) -> Facts:
+        from truepose.calibration.dataset import verdict_of
+
+        yield "machine", self.machine.name
+        yield "accepted", self.accepted
+        yield "unknowns", self.fit.unknowns.count
+        yield "rows", self.measurements.n_row
+        yield "readings", self.measurements.n_observation
+        yield "readings that do not fit", len(self.outliers)
+        yield "suspicions", [suspicion.code for suspicion in self.suspicions]
+        yield "verdict", verdict_of(self)
+
     @property
     def accepted(self) -> bool:
         """Whether the calibrated machine may be used."""
         return self.gate.accepted
 
     def calibrated(self) -> Machine:
-        """The machine with the values found for its parameters; its bands are the file's still."""
-        unknowns = self.fit.unknowns
-        change = unknowns.parameter_change(self.fit.values)
-        nominal = self.machine.nominal[unknowns.columns] + change
-        names = [self.machine.parameters[column] for column in unknowns.columns]
-        return self.machine.replace(dict(zip(names, nominal.tolist(), strict=True)))
+        """The machine with the nominal geometry, the bands and the correlations that were found.
+
+        What its file says, read again, but for the accuracy's words. Raises `RequestError`
+        (calibration-undetermined) where something has no finite uncertainty.
+        """
+        from truepose.calibration.result.calibrated_machine import calibrated_machine
+        from truepose.calibration.result.save import covariance_to_write
+
+        return calibrated_machine(
+            self.machine, self.fit.unknowns, self.fit.values, covariance_to_write(self)
+        )
 
     def save(
         self,

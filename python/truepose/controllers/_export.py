@@ -15,6 +15,7 @@ from truepose.errors import Problem, ReadingError, RequestError
 from truepose.files.units import UnitSystem
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
+from truepose.representation import Facts, Represented
 
 
 @dataclass(frozen=True)
@@ -31,8 +32,8 @@ class Option:
     choices: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Export:
+@dataclass(frozen=True, repr=False)
+class Export(Represented):
     """What an adapter gives.
 
     `files`: name -> whole text, to be written into one folder. `statement`: what the user must
@@ -41,6 +42,11 @@ class Export:
 
     files: Mapping[str, str]
     statement: tuple[str, ...] = field(default=())
+
+    def _facts(self) -> Facts:
+        yield "files", ", ".join(self.files)
+        yield "characters", sum(map(len, self.files.values()))
+        yield "statement", " ".join(self.statement)
 
 
 class Controller(Protocol):

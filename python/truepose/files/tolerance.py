@@ -16,6 +16,7 @@ from truepose.files import tolerance_standards
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.units import QuantityError, UnitSystem, shown_value, type_phrase
 from truepose.files.wording import did_you_mean, one_of
+from truepose.probability.distributions import student_deviation
 
 Value = TypeVar("Value")
 Read = Callable[[object], float]
@@ -48,6 +49,7 @@ DEFAULT_SIGMAS = 3.0
 TABLE_KEYS = {
     "band": "the limits, one half band, or a class",
     "standard_deviation": "in place of band: a normal or student-t distribution about nominal",
+    "scale": "in place of band: the scale of a student-t distribution, as JCGM 101 has it",
     "values": "in place of band: list of the deviations that there are, or that were measured",
     "data": "in place of values: CSV file of measured deviations, in a column `deviation`",
     "distribution": one_of(DISTRIBUTIONS).removeprefix("one of "),
@@ -59,8 +61,11 @@ TABLE_KEYS = {
 }
 """Keys of a tolerance that is written as a table."""
 
-_BANDS = ("band", "standard_deviation", "values", "data")
+_BANDS = ("band", "standard_deviation", "scale", "values", "data")
 """Keys of a table that say how wide a tolerance is, of which it has one."""
+
+_USUAL = {"standard_deviation": "normal", "scale": "student-t"}
+"""Distribution of a tolerance that has the key and does not name one."""
 
 _PLUS_MINUS = re.compile(r"\s*(?:±|\+/?-)\s*(?=[\d.])")
 _CLASS = re.compile(r"\s*[A-Za-z]")
@@ -196,24 +201,28 @@ def _from_table(table: Mapping[str, Any], dimension: str, units: UnitSystem) -> 
     if len(given) != 1:
         raise QuantityError(
             "excluding-keys" if given else "missing-key",
-            "a tolerance is given by a band, by a standard deviation or by its values",
+            "a tolerance is given by a band, by a standard deviation, by a scale or by its values",
             found=" and ".join(given) or shown_value(dict(table)),
             expected=one_of(_BANDS),
         )
     distribution = _distribution(table)
-    sigmas = _sigmas(table, distribution)
+    sigmas, dof = _sigmas(table, distribution), _dof(table, distribution)
     group, sign = _group(table)
     stated = Tolerance(dimension)
     if "band" in table:
         stated = _read_key("band", lambda: _read_band(table["band"], dimension, units))
     elif "standard_deviation" in table:
-        deviation = _read_key("standard_deviation", lambda: _standard(table, dimension, units))
+        deviation = _read_width(table, "standard_deviation", dimension, units)
+        stated = Tolerance(dimension, outright=Band(-sigmas * deviation, sigmas * deviation))
+    elif "scale" in table:
+        assert dof is not None  # a scale goes with student-t alone, and that with dof
+        deviation = student_deviation(_read_width(table, "scale", dimension, units), dof)
         stated = Tolerance(dimension, outright=Band(-sigmas * deviation, sigmas * deviation))
     return replace(
         stated,
         distribution=distribution,
         sigmas=sigmas,
-        dof=_dof(table, distribution),
+        dof=dof,
         values=_read_key("values", lambda: _values(table, dimension, units)),
         probabilities=_probabilities(table, distribution),
         data=_data(table),
@@ -231,17 +240,18 @@ def _read_key(key: str, read: Callable[[], Value]) -> Value:
         raise
 
 
-def _standard(table: Mapping[str, Any], dimension: str, units: UnitSystem) -> float:
-    value = table["standard_deviation"]
-    deviation = units.read(value, dimension)
-    if deviation < 0.0:
+def _read_width(table: Mapping[str, Any], key: str, dimension: str, units: UnitSystem) -> float:
+    """A standard deviation, or a scale."""
+    value, phrase = table[key], key.replace("_", " ")
+    width = _read_key(key, lambda: units.read(value, dimension))
+    if width < 0.0:
         raise QuantityError(
             "negative",
-            "a standard deviation is zero or more",
+            f"{key}: a {phrase} is zero or more",
             found=shown_value(value),
-            expected="a standard deviation of zero or more",
+            expected=f"a {phrase} of zero or more",
         )
-    return deviation
+    return width
 
 
 def _distribution(table: Mapping[str, Any]) -> str:
@@ -250,7 +260,7 @@ def _distribution(table: Mapping[str, Any]) -> str:
     if listed:
         usual = "discrete" if "probabilities" in table else "empirical"
     else:
-        usual = "normal" if "standard_deviation" in table else DISTRIBUTIONS[0]
+        usual = next((word for key, word in _USUAL.items() if key in table), DISTRIBUTIONS[0])
     word = table.get("distribution", usual)
     if word not in DISTRIBUTIONS:
         raise QuantityError(
@@ -266,6 +276,13 @@ def _distribution(table: Mapping[str, Any]) -> str:
             "a standard deviation is that of a normal or student-t distribution",
             found=f'standard_deviation and distribution = "{word}"',
             expected='band, or distribution = "normal"',
+        )
+    if "scale" in table and word != _USUAL["scale"]:
+        raise QuantityError(
+            "excluding-keys",
+            "a scale is that of a student-t distribution",
+            found=f'scale and distribution = "{word}"',
+            expected='scale and dof, or standard_deviation and distribution = "normal"',
         )
     if listed != (word in LISTED):
         raise QuantityError(

@@ -23,6 +23,7 @@ from truepose.machine.condition import DEFAULT_PART, Condition
 from truepose.machine.parts import BODIES, Body, Drive, Guide, Strut, Vector
 from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.workspace import Accuracy, Workspace
+from truepose.representation import Facts, Represented
 
 if TYPE_CHECKING:
     from truepose.machine.source_builder import ErrorSource
@@ -47,8 +48,8 @@ _POSITIVE = (".length", ".scale")
 """Endings of the parameters that make sense above zero only."""
 
 
-@dataclass(frozen=True, eq=False)
-class Machine:
+@dataclass(frozen=True, eq=False, repr=False)
+class Machine(Represented):
     """A machine as its file describes it. Immutable; SI, radians and kelvin throughout.
 
     Poses are (..., n_commanded) or, where all freedoms are meant, (..., n_dof), in the order of
@@ -107,8 +108,15 @@ class Machine:
         for name in _HANDED_THROUGH:
             object.__setattr__(self, name, getattr(self.kernel, name))
 
-    def __repr__(self) -> str:
-        return f"<Machine {self.name!r}: {' '.join(self.dof)}, {len(self.struts)} struts>"
+    def _facts(self) -> Facts:
+        yield "name", self.name
+        yield "description", self.description or None
+        yield "file", self.file or None
+        yield "freedoms", self.dof
+        yield "struts", len(self.struts)
+        yield "parameters", len(self.parameters)
+        yield "error sources", self.sources
+        yield "calibrated", None if self.calibration is None else self.calibration.date
 
     def __reduce__(self) -> tuple[Callable[..., Machine], tuple[dict[str, Any]]]:
         state = {

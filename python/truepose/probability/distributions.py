@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.probability.quantiles import normal_quantile, student_quantile
+from truepose.representation import Represented
 
 _NORMAL = "normal"
 _STUDENT = "student-t"
@@ -31,8 +32,8 @@ _PROBABILITY_SLACK = 1e-9
 """By which probabilities may miss a sum of one, as decimal fractions do."""
 
 
-@dataclass(frozen=True)
-class Distribution:
+@dataclass(frozen=True, repr=False)
+class Distribution(Represented):
     """How a deviation spreads inside its band.
 
     `sigmas` is the half band in standard deviations: sqrt(3) for a uniform one, k for a normal or
@@ -145,6 +146,15 @@ def student_t(dof: float, sigmas: float = 3.0) -> Distribution:
     if not (math.isfinite(dof) and dof > LEAST_DOF):
         raise ValueError(f"no standard deviation with {dof} degrees of freedom")
     return Distribution(_STUDENT, _checked(sigmas), dof=float(dof))
+
+
+def student_deviation(scale: float, dof: float) -> float:
+    """Standard deviation of Student's distribution of a scale, as JCGM 101:2008, 6.4.9 states it.
+
+    Its scale is that of x in (x - value) / scale = t, s / sqrt(n) of the mean of n readings. `dof`
+    above 2.
+    """
+    return scale * math.sqrt(dof / (dof - 2.0))
 
 
 def _checked(sigmas: float) -> float:

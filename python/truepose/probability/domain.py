@@ -21,10 +21,11 @@ import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.probability.distributions import Distribution
+from truepose.representation import Represented
 
 
-@dataclass(frozen=True, eq=False)
-class Domain:
+@dataclass(frozen=True, eq=False, repr=False)
+class Domain(Represented):
     """`lower`, `upper` (v,): ends of each variable; `directions`: variables that are a unit vector.
 
     The variables of one of `directions` have the ends -1 and 1.

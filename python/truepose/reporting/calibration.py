@@ -6,7 +6,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +29,8 @@ BAR = 10
 """Characters of a full bar."""
 FEW = 0.1
 """Share of the readings up to which those that do not fit are odd ones."""
+FOLDED = 0.05
+"""Below this share of the measurements in a value it is told with all its like in one row."""
 RESTS = 0.5
 """Below this share of the measurements in a value it rests on its tolerance."""
 _FLAGS = {
@@ -140,7 +142,8 @@ def unknowns(result: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> 
         )
     }  # fmt: skip
     units = [str(unit) for unit in result["unknown_units"].values]
-    shown = _shown(result)
+    folded = _folded(result)
+    shown = _shown(result, folded)
     rows = []
     for at in shown:
         unit = units[at]
@@ -157,7 +160,11 @@ def unknowns(result: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> 
                 f"{bar(share)} {100.0 * share:4.0f}" if bars else f"{100.0 * share:.0f}",
             )
         )
-    more = result.sizes["unknown"] - len(rows)
+    more = result.sizes["unknown"] - len(rows) - len(folded)
+    if folded:
+        few = f"less than {100.0 * FOLDED:.0f}"
+        label = f"{len(folded)} {'others' if rows else 'unknowns'} rest on their tolerances"
+        rows.append((label, "", "", "", "", "", "", few))
     note = (
         "±: standard uncertainty. From the data: how much of the value the "
         "measurements say; the rest is its tolerance."
@@ -179,12 +186,24 @@ def unknowns(result: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> 
     )  # fmt: skip
 
 
-def _shown(result: xr.Dataset) -> list[int]:
-    count = result.sizes["unknown"]
-    if count <= MOST_UNKNOWNS:
-        return list(range(count))
-    order = np.argsort(-result["data_share"].values, kind="stable")[:MOST_UNKNOWNS]
-    return sorted(order.tolist())
+def _folded(result: xr.Dataset) -> list[int]:
+    """Unknowns told in one row: of what was measured next to nothing is in them.
+
+    None that is open, less certain than its tolerance or off it, and one alone is told as it is.
+    """
+    rest = [
+        at
+        for at, share in enumerate(result["data_share"].values.tolist())
+        if share < FOLDED and _flag(result, at) == "mostly tolerance"
+    ]
+    return rest if len(rest) > 1 else []
+
+
+def _shown(result: xr.Dataset, folded: Sequence[int]) -> list[int]:
+    """Unknowns with a row of their own, in their order."""
+    own = np.setdiff1d(np.arange(result.sizes["unknown"]), np.asarray(folded, np.intp))
+    order = np.argsort(-result["data_share"].values[own], kind="stable")[:MOST_UNKNOWNS]
+    return sorted(own[order].tolist())
 
 
 def _flag(result: xr.Dataset, at: int) -> str:

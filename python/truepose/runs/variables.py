@@ -21,6 +21,7 @@ import numpy as np
 from truepose.arrays import Flags, Floats, Indices
 from truepose.machine import Machine
 from truepose.probability.domain import Domain
+from truepose.representation import Represented
 from truepose.runs.displacement import ParameterDeviation, sum_deviations
 from truepose.sources import Deviation, PoseBlock, Source
 from truepose.sources.deviation import Distribution
@@ -32,8 +33,8 @@ ROUNDING = 1e-14
 """By which a band is made wider where its middle and its half are rounded, so that none is lost."""
 
 
-@dataclass(frozen=True, eq=False)
-class Variables:
+@dataclass(frozen=True, eq=False, repr=False)
+class Variables(Represented):
     """The variables of all sources at the n poses of a block, and what they move.
 
     `shift`: parameters, each once, and their values (n or 1, k0) where all variables are 0;

@@ -28,6 +28,7 @@ from truepose.probability.distributions import (
     normal,
 )
 from truepose.probability.domain import Domain
+from truepose.representation import Represented
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -40,8 +41,8 @@ OWN_GROUP = -1
 """Group of a column that moves by itself, correlated with no other."""
 
 
-@dataclass(frozen=True)
-class Deviation:
+@dataclass(frozen=True, repr=False)
+class Deviation(Represented):
     """What one source does to the k columns of parameters it touches, for n poses.
 
     `parameters` (k,): kernel parameter of each column. A parameter may stand in several columns

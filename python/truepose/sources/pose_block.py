@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from truepose.arrays import Codes, Flags, Floats, Indices
+from truepose.representation import Represented
 from truepose.spatial import quaternion_to_matrix
 
 if TYPE_CHECKING:
@@ -21,8 +22,8 @@ Cause = Literal["tool", "own", "all"]
 """What loads come from: the wrench on the tool, weight and inertia of the machine, or both."""
 
 
-@dataclass(frozen=True, eq=False)
-class PoseBlock:
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseBlock(Represented):
     """Some usable poses of a run, at nominal parameters: where a source looks.
 
     `requested` (n_requested, n_commanded): all poses of the run, m or rad, usable or not, and

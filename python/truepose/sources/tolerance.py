@@ -35,6 +35,7 @@ from truepose.probability.distributions import (
     normal,
     student_t,
 )
+from truepose.representation import Represented
 from truepose.sources._correlation import CorrelationTable, read_correlation
 from truepose.sources.deviation import OWN_GROUP, Deviation
 from truepose.sources.pose_block import PoseBlock
@@ -43,7 +44,9 @@ if TYPE_CHECKING:
     from truepose.files import tolerance as file_tolerance
     from truepose.machine import Condition, Machine, SourceBuilder
 
-_EDGE_ENDINGS = (".length", ".offset")
+EDGE_ENDINGS = (".length", ".offset")
+"""Of parameters that the overall error's minimum and maximum move to the ends of their bands."""
+
 _WILDCARDS = frozenset("*?[")
 _RANKS = 3
 
@@ -79,8 +82,8 @@ class _Stated:
     distribution: Distribution
 
 
-@dataclass(frozen=True)
-class DimensionalTolerance:
+@dataclass(frozen=True, repr=False)
+class DimensionalTolerance(Represented):
     """Bands of any parameters, the same at every pose; members of a group vary together."""
 
     name: ClassVar[str] = "tolerance"
@@ -112,7 +115,7 @@ class DimensionalTolerance:
             [entry.band.half for entry in entries],
             groups=[OWN_GROUP if group is None else groups.index(group) for group in given],
             sign=[entry.tolerance.sign for entry in entries],
-            edge=[names[column].endswith(_EDGE_ENDINGS) for column in columns],
+            edge=[names[column].endswith(EDGE_ENDINGS) for column in columns],
             distribution=[entry.distribution for entry in entries],
             group_names=dict(enumerate(groups)),
         )

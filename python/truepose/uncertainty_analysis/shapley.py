@@ -144,7 +144,7 @@ def _over_orders(latent: Floats, slopes: Floats, numbers: np.random.Generator) -
     for start in range(0, ORDERS, some):
         orders = _orders(numbers, min(some, ORDERS - start), count)
         # What the j-th of an order adds, given those before it, is the square of b' L in it.
-        added = np.einsum("njm,njk->nkm", slopes[orders], factors(latent, orders)) ** 2
+        added = np.matmul(factors(latent, orders).swapaxes(1, 2), slopes[orders]) ** 2
         for place in range(count):
             np.add.at(parts, orders[:, place], added[:, place])
     return parts / ORDERS
@@ -174,15 +174,15 @@ def factors(latent: Floats, orders: Indices) -> Floats:
 
     Of a singular one: a coordinate that follows from those before it has a column of zeros.
     """
-    left = latent[orders[:, :, np.newaxis], orders[:, np.newaxis, :]]
-    parts = np.zeros_like(left)
-    for column in range(orders.shape[1]):
-        pivot = left[:, column, column]
+    ordered = latent[orders[:, :, np.newaxis], orders[:, np.newaxis, :]]
+    parts = np.zeros_like(ordered)
+    # Column by column from those before it: what is left of the matrix is never written back.
+    for at in range(orders.shape[1]):
+        before = np.matmul(parts[:, at:, :at], parts[:, at, :at, np.newaxis])[..., 0]
+        line = ordered[:, at:, at] - before
+        pivot = line[:, 0]
         root = np.sqrt(np.where(pivot > RANK, pivot, np.inf))
-        parts[:, :, column] = left[:, :, column] / root[:, np.newaxis]
-        parts[:, :column, column] = 0.0
-        line = parts[:, :, column]
-        left -= line[:, :, np.newaxis] * line[:, np.newaxis, :]
+        parts[:, at:, at] = line / root[:, np.newaxis]
     return parts
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from truepose.arrays import Floats
+from truepose.representation import Facts, Represented
 from truepose.verdict.states import AFTER, BEFORE, STATES
 
 if TYPE_CHECKING:
@@ -28,8 +29,8 @@ class Number:
     pose: Floats
 
 
-@dataclass(frozen=True)
-class Answer:
+@dataclass(frozen=True, repr=False)
+class Answer(Represented):
     """One quantity in one state against what was asked of it.
 
     `answer`: `MET`, `NOT_MET` or `UNDECIDED`; None where nothing is `asked` (m or rad).
@@ -50,6 +51,16 @@ class Answer:
     rests_on: str
     example: Witness | None = None
     coverage: CoverageAnswer | None = None
+
+    def _facts(self) -> Facts:
+        yield "quantity", self.quantity
+        yield "state", self.state
+        yield "answer", self.answer
+        yield "asked", self.asked
+        yield "witness", self.witness.value
+        yield "linear maximum", self.linear.value
+        yield "proven bound", self.bound.value
+        yield "rests on", self.rests_on
 
     @property
     def met(self) -> bool | None:

@@ -24,6 +24,7 @@ import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.machine import Machine
+from truepose.representation import Represented
 from truepose.runs.poses import Progress
 from truepose.runs.quantities import quantities
 from truepose.uncertainty_analysis.arguments import required_probability, required_seed
@@ -57,8 +58,8 @@ ROUNDING = 1e-9
 Answer = Literal["met", "NOT met", "undecided"]
 
 
-@dataclass(frozen=True)
-class CoverageAnswer:
+@dataclass(frozen=True, repr=False)
+class CoverageAnswer(Represented):
     """What a share `probability` of all machines keeps at the worst pose, m or rad.
 
     `estimate` is the quantile of the draws at pose number `pose`, where it is largest, infinite

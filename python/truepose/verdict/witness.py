@@ -20,6 +20,7 @@ from truepose.arrays import Floats, Indices
 from truepose.files.dimensions import BY_UNIT, FREEDOMS
 from truepose.files.shown_units import Shown
 from truepose.machine import Machine
+from truepose.representation import Represented
 from truepose.runs.displacement import ParameterDeviation
 from truepose.runs.first_order import first_order
 from truepose.runs.poses import pose_in_words
@@ -61,8 +62,8 @@ class Cause:
     force: tuple[float, float, float] | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Witness:
+@dataclass(frozen=True, eq=False, repr=False)
+class Witness(Represented):
     """One machine inside the set at one pose, in a state: `BEFORE` or `AFTER` compensation.
 
     `machine` is the nominal one in the condition of the run; `pose` (n_commanded,), m or rad, and

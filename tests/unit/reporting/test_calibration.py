@@ -20,6 +20,7 @@ from truepose.reporting.figures import (
     calibration_tool,
     calibration_unknowns,
 )
+from truepose.reporting.result import Result
 from truepose.reporting.study import Study
 from truepose.reporting.tables import Table
 
@@ -87,6 +88,44 @@ def test_unknowns_say_what_they_rest_on(study: Study) -> None:
     assert (tilt[2], tilt[3]) == ("–", "–")
     assert expansion[6] == "open"
     assert expansion[7] == "░░░░░░░░░░    0"
+
+
+def test_unknowns_that_rest_on_their_tolerances_are_one_row(study: Study) -> None:
+    found = study.calibrated.copy(deep=True)
+    found["value"].values[0] = 0.0  # within its tolerance, as the second and third
+    found["data_share"].values[:] = [0.049, 0.05, 0.001, 0.0]
+    for table in (
+        told.unknowns(found, MADE_UNITS),
+        told.unknowns(found, MADE_UNITS, bars=False),
+    ):
+        labels = [row[0] for row in table.rows]
+        # The last is open, which is worse than resting on a tolerance; the second has 5 %.
+        assert labels == [
+            "length of strut 2",
+            "expansion of strut 1",
+            "2 others rest on their tolerances",
+        ]
+        assert table.rows[-1][-1] == "less than 5"
+        assert "more are in the files" not in table.note
+    (text,) = told.csv_text(Result("calibrate", study.machine, found))
+    assert all(name in text for name in UNKNOWNS)
+
+
+def test_what_is_off_its_tolerance_or_alone_is_not_folded(study: Study) -> None:
+    found = study.calibrated.copy(deep=True)
+    found["data_share"].values[:] = 0.01
+    rows = told.unknowns(found, MADE_UNITS).rows
+    # The first is off its tolerance, the last open: a row each. The other two are folded.
+    assert [row[1] for row in rows] == ["off tolerance", "open", ""]
+    found["data_share"].values[1] = 0.5
+    assert len(told.unknowns(found, MADE_UNITS).rows) == len(UNKNOWNS)
+
+
+def test_where_nothing_was_learnt_there_is_the_one_row(study: Study) -> None:
+    found = study.calibrated.isel(unknown=[1, 2])
+    found["data_share"].values[:] = 0.0
+    rows = told.unknowns(found, MADE_UNITS).rows
+    assert [row[0] for row in rows] == ["2 unknowns rest on their tolerances"]
 
 
 def test_what_is_less_certain_than_its_tolerance_is_told(study: Study) -> None:

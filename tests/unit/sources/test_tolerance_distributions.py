@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.stats
 
 import truepose as tp
 from machine_texts import HEXAPOD, PLANAR, edited, line_of, load_text
@@ -50,6 +51,15 @@ def one(machine: Machine, name: str) -> tuple[float, float, Distribution]:
         (
             '{ standard_deviation = "10 um", distribution = "student-t", dof = 4.5, sigmas = 2 }',
             0.0, 0.02, student_t(4.5, 2),
+        ),
+        # Of 10 readings with s = 4 um: the mean has a scale of 4 um / sqrt(10); std = scipy's.
+        (
+            '{ scale = "1.264911064067352 um", dof = 9 }',
+            0.0, 3.0 * scipy.stats.t(9, scale=4e-3 / 10**0.5).std(), student_t(9),
+        ),
+        (
+            '{ scale = 0.2, distribution = "student-t", dof = 2.5, sigmas = 2 }',
+            0.0, 2.0 * scipy.stats.t(2.5, scale=0.2).std(), student_t(2.5, 2),
         ),
         (
             '{ values = [0, "100 um", 0.5], probabilities = [0.5, 0.3, 0.2] }',
@@ -106,6 +116,16 @@ def test_the_uncertainty_is_that_of_the_values(tmp_path: Path) -> None:
         ('band = 1, distribution = "student-t"', "missing-key", "no dof"),
         ("band = 1, dof = 4", "excluding-keys", "uniform"),
         ('band = 1, distribution = "student-t", dof = 2', "too-few-degrees-of-freedom", "above 2"),
+        ("scale = 1, dof = 2", "too-few-degrees-of-freedom", "above 2"),
+        ("scale = 1", "missing-key", "no dof"),
+        ("scale = -1, dof = 4", "negative", "scale: a scale is zero or more"),
+        ("scale = [-1, 1], dof = 4", "wrong-type", "scale: "),
+        ('scale = "1 N", dof = 4', "wrong-dimension", "scale: expected a length"),
+        ('scale = 1, distribution = "normal"', "excluding-keys", 'distribution = "normal"'),
+        ("scale = 1, standard_deviation = 1, dof = 4", "excluding-keys",
+         "standard_deviation and scale"),
+        ("scale = 1, band = 1, dof = 4", "excluding-keys", "band and scale"),
+        ("scale = 1, values = [1]", "excluding-keys", "scale and values"),
         ('band = 1, distribution = "student-t", dof = inf', "not-finite", "dof"),
         ('band = 1, distribution = "student-t", dof = "4"', "wrong-type", "a plain number"),
         ('band = 1, distribution = "arcsine", sigmas = 2', "excluding-keys", "student-t"),

@@ -17,6 +17,7 @@ from truepose.machine import Machine
 from truepose.runs.poses import Progress
 from truepose.sources import OWN_GROUP, Deviation, PoseBlock, normal
 from truepose.uncertainty_analysis.functions.inputs import Input
+from truepose.uncertainty_analysis.shapley import factors
 from truepose.uncertainty_analysis.shares import (
     CORRELATED,
     SCHEMA,
@@ -340,3 +341,22 @@ def test_shares_are_written_and_read_again(tmp_path: Any) -> None:
     found.to_netcdf(tmp_path / "shares.nc", engine="h5netcdf")
     with xr.open_dataset(tmp_path / "shares.nc", engine="h5netcdf") as read:
         assert first_to_tighten(read) == first_to_tighten(found)
+
+
+@pytest.mark.parametrize("rank", [7, 4])
+def test_cholesky_factors_are_those_of_the_matrix_in_every_order(rank: int) -> None:
+    """Also of a singular matrix: L L' is the matrix, and what follows from others adds nothing."""
+    random = np.random.default_rng(rank)
+    rows = random.normal(size=(7, rank))
+    rows /= np.linalg.norm(rows, axis=1)[:, np.newaxis]
+    latent = rows @ rows.T
+    orders = np.argsort(random.random((50, 7)), axis=1)
+    for order, lower in zip(orders, factors(latent, orders), strict=True):
+        ordered = latent[np.ix_(order, order)]
+        np.testing.assert_allclose(lower @ lower.T, ordered, rtol=0.0, atol=1e-12)
+        assert not np.triu(lower, 1).any()
+        assert (np.diagonal(lower) >= 0.0).all()
+        # The columns that are there: as many as the rank, and NumPy's where there are all.
+        assert int(lower.any(axis=0).sum()) == rank
+        if rank == 7:
+            np.testing.assert_allclose(lower, np.linalg.cholesky(ordered), rtol=0.0, atol=1e-12)

@@ -361,6 +361,32 @@ def test_a_student_input_has_its_own_coverage() -> None:
     assert float(drawn.upper.squeeze()) == pytest.approx(2.0 * factor, rel=0.01)
 
 
+@pytest.mark.parametrize("dof", [2.5, 4.0, 9.0])
+def test_the_scale_of_jcgm_101_is_the_standard_deviation_of_the_mean(dof: float) -> None:
+    """Its interval is the classical one of a mean, s / sqrt(n) times Student's quantile."""
+    scale = 0.3
+    by_scale = Input.student_t(1.0, scale=scale, dof=dof)
+    by_deviation = Input.student_t(1.0, scale * math.sqrt(dof / (dof - 2.0)), dof)
+    assert by_scale.standard_uncertainty == pytest.approx(
+        by_deviation.standard_uncertainty, rel=1e-14
+    )
+    assert by_scale.distribution == by_deviation.distribution
+    found = tp.uncertainty(lambda x: x, {"x": by_scale})
+    wanted = stats.t(dof, 1.0, scale)
+    assert float(found.standard_uncertainty.squeeze()) == pytest.approx(wanted.std(), rel=1e-9)
+    assert float(found.upper.squeeze()) == pytest.approx(wanted.ppf(0.975), rel=1e-9)
+
+
+def test_a_tolerance_by_its_scale_is_the_one_by_its_standard_deviation(tmp_path: Path) -> None:
+    found = []
+    for key, size in (("scale", 0.1), ("standard_deviation", 0.1 * math.sqrt(5.0 / 3.0))):
+        band = f'{{ {key} = {size!r}, distribution = "student-t", dof = 5 }}'
+        text = PLANAR.replace("length_tolerance = [-0.3, 0.3]", f"length_tolerance = {band}")
+        found.append(tp.uncertainty(load_text(tmp_path, text)))
+    for name in ("standard_uncertainty", "upper"):
+        assert np.allclose(found[0][name], found[1][name], rtol=1e-12, atol=0.0)
+
+
 def test_a_tolerance_of_students_distribution_widens_the_machines_interval(tmp_path: Path) -> None:
     band = '{ standard_deviation = 0.1, distribution = "student-t", dof = 5 }'
     text = PLANAR.replace("length_tolerance = [-0.3, 0.3]", f"length_tolerance = {band}")

@@ -27,6 +27,7 @@ from truepose.calibration.acceptance.observability import (
 from truepose.calibration.acceptance.reasons import Reason, ToolSize, at_worst_pose
 from truepose.calibration.acceptance.tool_uncertainty import Considered, Tool, ToolUncertainty
 from truepose.calibration.least_squares import singular_decomposition
+from truepose.representation import Represented
 
 if TYPE_CHECKING:
     from truepose.calibration.identification.unknowns import Unknowns
@@ -38,8 +39,8 @@ POOR = 1e-3
 Kind = Literal["unseen", "weak", "gauge", "harmless"]
 
 
-@dataclass(frozen=True, eq=False)
-class Direction:
+@dataclass(frozen=True, eq=False, repr=False)
+class Direction(Represented):
     """A direction (n_machine,) over the machine's unknowns that the data leave open.
 
     `kind`: "unseen" and it moves the tool; "weak", the data say less than the tolerances do;

@@ -46,14 +46,15 @@ from truepose.calibration.acceptance.remedy import (
 )
 from truepose.calibration.acceptance.tool_uncertainty import Considered, Tool, ToolUncertainty
 from truepose.files.shown_units import METRIC, ShownUnits
+from truepose.representation import Facts, Represented
 
 if TYPE_CHECKING:
     from truepose.calibration.data_checks import Suspicion
     from truepose.calibration.identification.unknowns import Unknowns
 
 
-@dataclass(frozen=True, eq=False)
-class Gate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Gate(Represented):
     """The verdict with its evidence. Arrays of unknowns (n_machine,) are of the machine's.
 
     `standard_data`: from the data alone, inf where they leave an unknown open; `standard`: with
@@ -87,6 +88,14 @@ class Gate:
     degrees_of_freedom: float
     held_out: tuple[HeldOut, ...] = ()
     shown: ShownUnits = METRIC
+
+    def _facts(self) -> Facts:
+        yield "accepted", self.accepted
+        yield "unknowns", len(self.names)
+        yield "determined by the data", self.rank
+        yield "reasons", [reason.code for reason in self.reasons]
+        yield "warnings", [warning.code for warning in self.warnings]
+        yield "verdict", self.words
 
     @property
     def rank(self) -> int:

@@ -20,6 +20,7 @@ from truepose.calibration.least_squares import (
     column_norms,
     singular_decomposition,
 )
+from truepose.representation import Represented
 
 RANK_TOLERANCE = 1e-9
 """Of the largest singular value of the columns scaled to length one, or of one if that is larger:
@@ -71,8 +72,8 @@ class RowCovariance:
         return np.where(touched, np.inf, deviations)
 
 
-@dataclass(frozen=True)
-class Observability:
+@dataclass(frozen=True, repr=False)
+class Observability(Represented):
     """Rank, singular values and the five indices over what is seen.
 
     `singular` (n,): of the Jacobian with its columns multiplied by the prior standard deviations

@@ -17,6 +17,7 @@ from truepose.calibration.least_squares import (
     singular_decomposition,
 )
 from truepose.machine import Machine
+from truepose.representation import Represented
 
 POSITION = "xyz"
 ROTATION = "abc"
@@ -32,8 +33,8 @@ def tool_components(machine: Machine) -> list[str]:
 _ROTATIONS = {"rx": "a", "ry": "b", "rz": "c"}
 
 
-@dataclass(frozen=True, eq=False)
-class ToolUncertainty:
+@dataclass(frozen=True, eq=False, repr=False)
+class ToolUncertainty(Represented):
     """Standard uncertainty of the tool, base frame, m and rad, inf where it is not determined.
 
     `standard` (n_pose, n_component); `position` and `rotation` (n_pose,): square roots of the sums

@@ -31,10 +31,11 @@ from truepose.calibration.measurements import Measurements
 from truepose.errors import Problem as Refused
 from truepose.errors import RequestError
 from truepose.machine import Machine
+from truepose.representation import Facts, Represented
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Represented):
     """Unknowns found from measurements, n of them from m observations.
 
     `values` (n,), `covariance` (n, n) over what is determined. `jacobian` (m, n): derivatives of
@@ -63,6 +64,15 @@ class Fit:
     evaluations: int = 0
     noise: float = float("nan")
     """Residuals in stated uncertainties, robust, over their freedom; NaN where there is none."""
+
+    def _facts(self) -> Facts:
+        yield "unknowns", self.unknowns.count
+        yield "directions not determined", len(self.null_space)
+        yield "rows", self.measurements.n_row
+        yield "readings", self.measurements.n_observation
+        yield "of less weight", int((self.weights < 1.0).sum())
+        yield "residuals over their uncertainties", self.noise
+        yield "tolerances used", self.use_prior
 
     @property
     def standardised(self) -> Floats:

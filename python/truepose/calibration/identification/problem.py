@@ -19,6 +19,7 @@ from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine import Condition, Machine
+from truepose.representation import Facts, Represented
 from truepose.runs.displacement import ParameterDeviation, sum_deviations
 from truepose.sources import PoseBlock, acting
 from truepose.sources.tolerance import DimensionalTolerance
@@ -70,7 +71,7 @@ class Solved:
     evaluations: tuple[int, ...]
 
 
-class IdentificationProblem:
+class IdentificationProblem(Represented):
     """What instruments read of a machine, as a function of the unknowns."""
 
     def __init__(
@@ -87,6 +88,12 @@ class IdentificationProblem:
         self.machine, self.measurements, self.unknowns = machine, measurements, unknowns
         self.shifts = row_shifts(machine, measurements, unknowns) if shifts is None else shifts
         self._kernel = Identification(machine.kernel, self._description())
+
+    def _facts(self) -> Facts:
+        yield "machine", self.machine
+        yield "rows", self.measurements.n_row
+        yield "readings", self.measurements.n_observation
+        yield "unknowns", self.unknowns.count
 
     def predict(self, values: ArrayLike) -> Floats:
         """(n_observation,) what would be read, SI; NaN where a pose cannot be solved."""

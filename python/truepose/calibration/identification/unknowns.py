@@ -26,6 +26,7 @@ from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.files.units import QuantityError, UnitSystem
 from truepose.files.wording import did_you_mean
 from truepose.machine import Machine
+from truepose.representation import Facts, Represented
 from truepose.sources import Deviation
 from truepose.sources.tolerance import DimensionalTolerance
 
@@ -33,8 +34,8 @@ SCREEN = 1e-9
 """Middles of a group's bands may be this far, of its half band, from moving together."""
 
 
-@dataclass(frozen=True, eq=False)
-class Unknowns:
+@dataclass(frozen=True, eq=False, repr=False)
+class Unknowns(Represented):
     """What is to be found, n numbers in SI; the first `n_machine` are the machine's.
 
     `names`, `units` and `labels` (for people). `columns` (k,): parameters that machine unknowns
@@ -61,6 +62,12 @@ class Unknowns:
     """(instrument, observable, strut) -> the unknown that is added to the reading."""
     shown: ShownUnits = METRIC
     """The units in which people are told of them."""
+
+    def _facts(self) -> Facts:
+        yield "unknowns", self.count
+        yield "of the machine", self.n_machine
+        yield "with a tolerance", int(self.has_prior.sum())
+        yield "names", ", ".join(self.names)
 
     @property
     def count(self) -> int:

@@ -22,6 +22,7 @@ from truepose.calibration.identification.robust import OUTLIER
 from truepose.calibration.measurements import Measurements
 from truepose.errors import RequestError
 from truepose.machine import Machine
+from truepose.representation import Represented
 
 FEW = 0.1
 """Share of the readings up to which those that do not fit are left out of what is counted."""
@@ -38,8 +39,8 @@ OPEN = 1e-6
 STATED, FOLDS = "stated set", "folds"
 
 
-@dataclass(frozen=True, eq=False)
-class Validation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Validation(Represented):
     """Residuals of rows that were not used for the fit that predicts them.
 
     `kind`: "folds" or "stated set"; `folds` how many. `used` (m,): which observations were

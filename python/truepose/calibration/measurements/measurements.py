@@ -18,6 +18,7 @@ from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.observables import OBSERVABLES
 from truepose.machine.condition import Condition
+from truepose.representation import Facts, Represented
 
 
 def unloaded_at_reference(condition: Condition) -> Condition:
@@ -35,8 +36,8 @@ def unloaded_at_reference(condition: Condition) -> Condition:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Measurements:
+@dataclass(frozen=True, eq=False, repr=False)
+class Measurements(Represented):
     """What instruments read of a machine; SI, radians and kelvin.
 
     Rows: `joints` (n_row, n_joint) commanded; `placements` (n_row, 7) where the nominal machine
@@ -62,6 +63,13 @@ class Measurements:
     lines: Indices
     file: str = ""
     file_hash: str = ""
+
+    def _facts(self) -> Facts:
+        yield "file", self.file or None
+        yield "instruments", self.instruments
+        yield "rows", self.n_row
+        yield "kept from the fit", int(self.held_out.sum())
+        yield "readings", self.n_observation
 
     @property
     def n_row(self) -> int:

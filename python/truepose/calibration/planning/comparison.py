@@ -18,6 +18,7 @@ from truepose.calibration.planning.exchange import Candidates, Progress
 from truepose.calibration.planning.plan import Field, counted_poses
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.representation import Facts, Represented
 
 FEW = 30
 """Up to so many readings a start matters; beyond, the greedy one serves."""
@@ -29,8 +30,8 @@ STARTS = 2
 """Random starts of each number that is tried; without excursions, for there are many numbers."""
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Represented):
     """What the first of some instruments reaches, and how many readings the others need for it.
 
     `names` and `counts` (n,): poses at which each reads; None where no number of poses up to
@@ -43,6 +44,11 @@ class Comparison:
     rms: Floats
     before: Floats
     most: int
+
+    def _facts(self) -> Facts:
+        yield "instruments", self.names
+        yield "readings", self.counts
+        yield "sentences", "; ".join(self.sentences)
 
     @property
     def sentences(self) -> tuple[str, ...]:

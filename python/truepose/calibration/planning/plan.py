@@ -38,6 +38,7 @@ from truepose.calibration.planning.readings import planned, whitened
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import one_of
 from truepose.machine import Condition, Machine
+from truepose.representation import Facts, Represented
 from truepose.runs.dataset import (
     Variable,
     commanded_units,
@@ -66,8 +67,8 @@ MOST_POSES = 1000
 """A plan is for people who carry an instrument round a machine."""
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Represented):
     """Poses to measure, in an order that makes a short way, and what they buy; SI.
 
     `poses` (n, n_commanded), `joints` (n, n_joint). `rank` (n,): each pose's place, from 1, in the
@@ -99,6 +100,17 @@ class Plan:
     repeated: bool
     relative: bool
     seed: int
+
+    def _facts(self) -> Facts:
+        yield "machine", self.machine
+        yield "instruments", self.instruments
+        yield "poses", len(self.poses)
+        yield "of candidates", self.n_candidate
+        yield "left out", self.left_out
+        yield "unknowns", self.unknowns.count
+        yield "criterion", self.criterion
+        yield "tool known to (rms, m and rad)", self.rms[-1].tolist()
+        yield "before", self.rms[0].tolist()
 
     @property
     def from_data(self) -> Floats:

@@ -70,7 +70,9 @@ def banded(columns: Indices, effects: Floats, covariance: Floats, names: tuple[s
     moves several. Where unknowns share parameters, which a machine file cannot say, each of these
     parameters has a variable of its own, and the covariance is the same.
     """
-    effects = np.where(np.abs(effects) > _ROUNDING * np.abs(effects).max(axis=0), effects, 0.0)
+    effects = np.where(
+        np.abs(effects) > _ROUNDING * np.abs(effects).max(axis=0, initial=0.0), effects, 0.0
+    )
     effects = effects * (np.diagonal(covariance) > 0.0)
     moved = np.flatnonzero(effects.any(axis=1))
     rows: list[Floats] = []

@@ -144,8 +144,8 @@ def write_calibrated(
     require_writable(path, [ENDING], [original])
     own_values = np.asarray(values, np.float64)[: unknowns.n_machine]
     own_covariance = np.asarray(covariance, np.float64)[: unknowns.n_machine, : unknowns.n_machine]
-    _require_determined(path, unknowns, own_values, own_covariance)
-    result = _Result.of(machine, unknowns, own_values, own_covariance, as_shifts)
+    require_determined(path, unknowns, own_values, own_covariance)
+    result = Result.of(machine, unknowns, own_values, own_covariance, as_shifts)
     text = MachineText(original, machine, _changed(original, machine))
     _write_values(text, machine, result)
     for edit in property_edits(machine, unknowns, own_values):
@@ -186,7 +186,7 @@ def property_edits(
 
 
 @dataclass(frozen=True)
-class _Result:
+class Result:
     """What the file is to say: nominal values and axes, shifts of all parameters, bands.
 
     `nominal` (n_parameter,) has 0 for the tilts of the directions that `axes` gives anew; `moved`
@@ -208,7 +208,10 @@ class _Result:
         values: Floats,
         covariance: Floats,
         as_shifts: bool,
-    ) -> _Result:
+        *,
+        new_axes: bool = True,
+    ) -> Result:
+        """`new_axes`: whether directions are told by new axes, as in a file, or by their tilts."""
         count = len(machine.parameters)
         effects = np.zeros((count, unknowns.n_machine))
         np.add.at(effects, np.asarray(unknowns.columns), unknowns.effects[:, : unknowns.n_machine])
@@ -216,7 +219,7 @@ class _Result:
         deviation = effects @ values
         nominal = np.array(machine.nominal) + (0.0 if as_shifts else deviation)
         axes = []
-        for direction in directions(machine):
+        for direction in directions(machine) if new_axes else ():
             at = list(direction.columns)
             if not nominal[at].any():
                 continue
@@ -234,7 +237,7 @@ class _Result:
         return cls(nominal, tuple(axes), shift, bands, columns, bands_of(machine))
 
 
-def _write_values(text: MachineText, machine: Machine, result: _Result) -> None:
+def _write_values(text: MachineText, machine: Machine, result: Result) -> None:
     """Nominal values and directions that differ from those of the file."""
     turned_columns = {column for direction, _ in result.axes for column in direction.columns}
     filed = np.array(machine.nominal)
@@ -248,10 +251,10 @@ def _write_values(text: MachineText, machine: Machine, result: _Result) -> None:
         text.set_direction(direction.table, direction.part, direction.key, axis)
 
 
-def _write_bands(text: MachineText, machine: Machine, result: _Result, coverage: float) -> None:
+def _write_bands(text: MachineText, machine: Machine, result: Result, coverage: float) -> None:
     """The bands of what was identified, in place of those of the file, and their correlations."""
     names, bands, old = machine.parameters, result.bands, result.forgotten
-    variables = _variable_names(machine, bands)
+    variables = variable_names(machine, bands)
     member = {
         int(column): int(np.flatnonzero(row)[0])
         for column, row in zip(bands.columns, bands.effects, strict=True)
@@ -293,7 +296,7 @@ def _normal(shift: float, effect: float, coverage: float, group: str | None) -> 
     return stated
 
 
-def _variable_names(machine: Machine, bands: Banded) -> list[str]:
+def variable_names(machine: Machine, bands: Banded) -> list[str]:
     """What each variable is called: its parameter, or its group, which is called as no other is."""
     columns = [int(np.flatnonzero(bands.effects[:, v])[0]) for v in range(len(bands.names))]
     names = []
@@ -304,7 +307,7 @@ def _variable_names(machine: Machine, bands: Banded) -> list[str]:
     return names
 
 
-def _forget_correlations(text: MachineText, machine: Machine, result: _Result) -> None:
+def _forget_correlations(text: MachineText, machine: Machine, result: Result) -> None:
     """Take what was identified out of the correlations that the file has already."""
     old = result.forgotten
     if old is None or old.correlation is None:
@@ -351,7 +354,7 @@ def _write_provenance(
 
 
 def _require_same(
-    path: Path, filed: Machine, result: _Result, asked: Accuracy, written: Machine
+    path: Path, filed: Machine, result: Result, asked: Accuracy, written: Machine
 ) -> None:
     """Refuse a file that, read again, is not the machine that was to be written.
 
@@ -375,7 +378,7 @@ def _require_same(
         raise _not_written(path, "the data files differ")
 
 
-def _require_same_bands(path: Path, machine: Machine, result: _Result, written: Machine) -> None:
+def _require_same_bands(path: Path, machine: Machine, result: Result, written: Machine) -> None:
     read_back, filed, moved, bands = (
         tolerance_covariance(written),
         tolerance_covariance(machine),
@@ -413,8 +416,8 @@ def _first(machine: Machine, columns: Indices, flagged: np.ndarray) -> str:
     return machine.parameters[int(columns[np.flatnonzero(flagged)[0]])]
 
 
-def _require_determined(
-    path: Path, unknowns: MachineUnknowns, values: Floats, covariance: Floats
+def require_determined(
+    path: str | Path, unknowns: MachineUnknowns, values: Floats, covariance: Floats
 ) -> None:
     """Refuse what has no finite value or covariance: no machine file can say it."""
     fine = np.isfinite(values) & np.isfinite(covariance).all(axis=1)

@@ -68,7 +68,7 @@ def save(
         if checked is None or not np.isfinite(checked.rms_after)
         else checked.rms_after,
     )
-    covariance = _covariance(calibration)
+    covariance = covariance_to_write(calibration)
     return write_calibrated(
         path,
         calibration.machine,
@@ -86,7 +86,7 @@ def save(
     )
 
 
-def _covariance(calibration: Calibration) -> Floats:
+def covariance_to_write(calibration: Calibration) -> Floats:
     """(n_machine, n_machine) for the file: along what nothing determines, the tolerances' own.
 
     So it is by itself where they were used; without them the fit leaves such directions as filed.

@@ -22,6 +22,7 @@ from truepose.arrays import Floats
 from truepose.controllers.gcode._measure import Measure
 from truepose.controllers.gcode.division import Divided, Division, Moves, PathPoints
 from truepose.controllers.gcode.tolerance import UNFELT, PathTolerance
+from truepose.representation import Represented
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,8 @@ class Errors:
     orientation_rms: float | None
 
 
-@dataclass(frozen=True)
-class Proof:
+@dataclass(frozen=True, repr=False)
+class Proof(Represented):
     """What a corrected program is worth.
 
     `before`, `after`: errors of the program as it was, and as it was written, in the actual

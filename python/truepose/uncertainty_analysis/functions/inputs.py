@@ -72,12 +72,29 @@ class Input:
         return cls(_finite("value", value), sigmas * _not_negative("u", u), spread, _degrees(dof))
 
     @classmethod
-    def student_t(cls, value: float, u: float, dof: float, *, sigmas: float = 3.0) -> Input:
-        """Student's distribution of `dof` degrees of freedom, scaled to the standard deviation `u`.
+    def student_t(
+        cls,
+        value: float,
+        u: float | None = None,
+        dof: float | None = None,
+        *,
+        scale: float | None = None,
+        sigmas: float = 3.0,
+    ) -> Input:
+        """Student's distribution of `dof` degrees of freedom, of standard deviation `u` or `scale`.
 
-        The distribution is what JCGM 101:2008, 6.4.9 makes of a few readings; `u` is then
-        sqrt(dof / (dof - 2)) times the standard deviation of their mean, and it is known outright.
+        It is what JCGM 101:2008, 6.4.9 makes of a few readings, and states by its scale: that of
+        n readings with the standard deviation s is s / sqrt(n), the standard deviation of their
+        mean, and `dof` n - 1. `u` is sqrt(dof / (dof - 2)) times the scale; it is known outright.
+        One of `u` and `scale` is given (missing-key, excluding-keys), and `dof` (missing-key).
         """
+        if dof is None:
+            raise _refused(
+                "missing-key",
+                "Student's distribution has degrees of freedom",
+                found="no dof",
+                expected="dof, n - 1 of n readings",
+            )
         if not (_finite("dof", dof) > LEAST_DOF):
             raise _refused(
                 "too-few-degrees-of-freedom",
@@ -85,8 +102,9 @@ class Input:
                 found=f"dof = {dof:g}",
                 expected=f"more than {LEAST_DOF:g}",
             )
+        deviation = _student_deviation(u, scale, dof)
         spread = distributions.student_t(dof, _positive("sigmas", sigmas))
-        return cls(_finite("value", value), sigmas * _not_negative("u", u), spread)
+        return cls(_finite("value", value), sigmas * deviation, spread)
 
     @classmethod
     def uniform(cls, lower: float, upper: float, dof: float = math.inf) -> Input:
@@ -175,6 +193,20 @@ def _not_negative(name: str, value: float) -> float:
             expected="zero or more",
         )
     return number
+
+
+def _student_deviation(u: float | None, scale: float | None, dof: float) -> float:
+    """The standard deviation of Student's distribution, given itself or by the scale."""
+    if u is not None and scale is None:
+        return _not_negative("u", u)
+    if scale is not None and u is None:
+        return distributions.student_deviation(_not_negative("scale", scale), dof)
+    raise _refused(
+        "missing-key" if scale is None else "excluding-keys",
+        "Student's distribution is given by its standard deviation or by its scale",
+        found="neither u nor scale" if scale is None else f"u = {u!r} and scale = {scale!r}",
+        expected="u (the standard deviation), or scale (s / sqrt(n) of n readings)",
+    )
 
 
 def _degrees(dof: float) -> float:

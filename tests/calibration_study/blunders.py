@@ -43,7 +43,8 @@ class Spoilt:
     """Readings with a blunder, and `mended`, as they should have been.
 
     `rows` that it is in where only some are; `size`, SI, of a graded one, `factor` times what is
-    detected in 99 %, nan where nothing detects it.
+    detected in 99 %, nan where nothing detects it. `again`: the same blunder in rows that are
+    measured later: who has a sign wrong once has it wrong again.
     """
 
     table: Table
@@ -51,6 +52,7 @@ class Spoilt:
     rows: tuple[int, ...] = ()
     size: float = float("nan")
     factor: float = float("nan")
+    again: Callable[[Table], Table] = lambda table: table
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,15 +104,16 @@ class Measured:
         """The sum of changes (n, n_column), each of its own size, made to the readings."""
         low, high = self.factors
         factor = float(np.exp(random.uniform(np.log(low), np.log(high))))
-        values, size = self.table.values, 0.0
+        values, size, capped = self.table.values, 0.0, False
         for change in changes:
             own = factor * self.detected(change)
             if own > MOST[kind]:
                 own = MOST[kind] * float(random.uniform(0.3, 1.0))
-                factor = float("nan")
+                capped = True
             size = max(size, own)
             values = values + own * change
-        return Spoilt(self.table.with_values(values), self.table, rows, size, factor)
+        known = float("nan") if capped else factor
+        return Spoilt(self.table.with_values(values), self.table, rows, size, known)
 
 
 Maker = Callable[[Measured, Random], "Spoilt | None"]
@@ -137,21 +140,32 @@ class Kind:
         return not spoilt.rows and bool(self.words) and bool(re.search(self.words, told, re.I))
 
 
+def _always(table: Table, spoil: Callable[[Table], Table]) -> Spoilt:
+    """What is wrong in every row, whenever it was measured."""
+    return Spoilt(spoil(table), table, again=spoil)
+
+
+def _exchanged(count: int, one: int, other: int) -> list[int]:
+    order = list(range(count))
+    order[one], order[other] = other, one
+    return order
+
+
 def _none(measured: Measured, random: Random) -> Spoilt:
     return Spoilt(measured.table, measured.table)
 
 
 def _sign(measured: Measured, random: Random) -> Spoilt:
     """One column of the other sign; of heights all there is, of a known frame any."""
-    values = measured.table.values.copy()
-    values[:, int(random.integers(values.shape[1]))] *= -1.0
-    return Spoilt(measured.table.with_values(values), measured.table)
+    sign = np.ones(measured.table.values.shape[1])
+    sign[int(random.integers(sign.size))] = -1.0
+    return _always(measured.table, lambda table: table.with_values(sign * table.values))
 
 
 def _mirror(measured: Measured, random: Random) -> Spoilt:
     """A left-handed frame: two axes change places."""
     order = [1, 0, *range(2, measured.table.values.shape[1])]
-    return Spoilt(measured.table.with_values(measured.table.values[:, order]), measured.table)
+    return _always(measured.table, lambda table: table.with_values(table.values[:, order]))
 
 
 def _swap(measured: Measured, random: Random) -> Spoilt | None:
@@ -167,23 +181,21 @@ def _swap(measured: Measured, random: Random) -> Spoilt | None:
     if table.instrument.known and random.uniform() < 0.5:
         pairs = [(i, j) for i in range(table.values.shape[1]) for j in range(i)]
         one, other = pairs[int(random.integers(len(pairs)))]
-        values = table.values.copy()
-        values[:, [one, other]] = values[:, [other, one]]
-        return Spoilt(table.with_values(values), table)
+        order = _exchanged(table.values.shape[1], one, other)
+        return _always(table, lambda own: own.with_values(own.values[:, order]))
     one, other = of_one_unit[int(random.integers(len(of_one_unit)))]
-    poses = table.poses.copy()
-    poses[:, [one, other]] = poses[:, [other, one]]
-    if twin.loaded.kernel.place(poses)[2].any():
+    order = _exchanged(len(commanded), one, other)
+    if twin.loaded.kernel.place(table.poses[:, order])[2].any():
         return None  # it would be refused for being out of reach
-    return Spoilt(replace(table, poses=poses), table)
+    return _always(table, lambda own: replace(own, poses=own.poses[:, order]))
 
 
 def _unit(measured: Measured, random: Random) -> Spoilt:
     """All lengths in another unit than the file says."""
     factor = float(random.choice([1000.0, 25.4, 10.0, 1 / 25.4, 1 / 10.0, 1 / 1000.0]))
     lengths = measured.table.instrument.deviations() == measured.table.instrument.sigma["m"]
-    values = np.where(lengths, factor * measured.table.values, measured.table.values)
-    return Spoilt(measured.table.with_values(values), measured.table)
+    factors = np.where(lengths, factor, 1.0)
+    return _always(measured.table, lambda table: table.with_values(factors * table.values))
 
 
 def _shifted(measured: Measured, random: Random) -> Spoilt:
@@ -209,22 +221,30 @@ def _bumped(measured: Measured, random: Random) -> Spoilt:
     count = measured.table.count
     first = int(random.integers(count // 4, count - count // 4))
     step = (np.arange(count) >= first)[:, np.newaxis] * _way(measured, random)
-    return measured.graded("bumped", [step], random)
+    return _staying(measured.graded("bumped", [step], random))
 
 
 def _drift(measured: Measured, random: Random) -> Spoilt:
     """It wanders, as far at the end as the size says, evenly with the rows."""
     count = measured.table.count
     trend = (np.arange(count) / (count - 1.0))[:, np.newaxis] * _way(measured, random)
-    return measured.graded("drift", [trend], random)
+    return _staying(measured.graded("drift", [trend], random))
+
+
+def _staying(made: Spoilt) -> Spoilt:
+    """Rows that are measured later are as far off as the last one."""
+    last = made.table.values[-1] - made.mended.values[-1]
+    return replace(made, again=lambda table: table.with_values(table.values + last))
 
 
 def _scale(measured: Measured, random: Random) -> Spoilt:
     """Lengths are read too large, by a share."""
     table = measured.table
     lengths = table.instrument.deviations() == table.instrument.sigma["m"]
-    change = np.where(lengths, table.values, 0.0) * float(random.choice([-1.0, 1.0]))
-    return measured.graded("scale", [change], random)
+    sign = float(random.choice([-1.0, 1.0]))
+    made = measured.graded("scale", [sign * np.where(lengths, table.values, 0.0)], random)
+    factors = np.where(lengths, 1.0 + sign * made.size, 1.0)
+    return replace(made, again=lambda own: own.with_values(factors * own.values))
 
 
 def _outliers(measured: Measured, random: Random) -> Spoilt:

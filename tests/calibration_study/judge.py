@@ -103,12 +103,19 @@ class Tool:
 
 def tools(twin: Twin, found: Calibration) -> list[Tool]:
     """Of commanded freedoms, at all poses that the calibrated machine reaches."""
-    errors = tool_errors(twin, found)
+    return tools_of(twin, found, tool_errors(twin, found))
+
+
+def tools_of(twin: Twin, found: Calibration, errors: Floats | None) -> list[Tool]:
+    """Errors (n_pose, 6) against what is stated; None is as far off as can be."""
     stated = stated_95(found, commanded_of(twin))
-    if errors is None:
-        return [Tool(quantity, np.full(1, np.inf), each[:1]) for quantity, each in stated.items()]
     return [
-        Tool(quantity, _size(twin, errors, quantity), each) for quantity, each in stated.items()
+        Tool(
+            quantity,
+            np.full(each.shape, np.inf) if errors is None else _size(twin, errors, quantity),
+            each,
+        )
+        for quantity, each in stated.items()
     ]
 
 
@@ -136,13 +143,28 @@ def stated_95(found: Calibration, commanded: list[str]) -> dict[str, Floats]:
 def tool_errors(twin: Twin, found: Calibration) -> Floats | None:
     """(n_pose, 6) where the built machine is, less where the calibrated one says, m and rad.
 
-    Both are driven with the joints that the calibrated machine has for the pose. Where the answer
-    leaves out where the machine stands in the room, what moves it there is taken out as well.
+    Both are driven with the joints that the calibrated machine has for the pose.
     None where the machine cannot be there.
     """
+    joints, _ = said_by(found)
+    return errors_at(twin, found, joints)
+
+
+def said_by(found: Calibration) -> tuple[Floats, Floats]:
+    """Joints (n_pose, n_drive) and placements (n_pose, 7) of the calibrated machine."""
     joints, placements, _ = found.calibrated().kernel.place(found.poses[found.usable])
+    return joints, placements
+
+
+def errors_at(twin: Twin, found: Calibration, joints: Floats) -> Floats | None:
+    """(n_pose, 6) the built machine's tool at joints (n_pose, n_drive), less where it should be.
+
+    Freedoms that follow from the others should be where the calibrated machine has them. Where the
+    answer leaves out where the machine stands in the room, what moves it there is taken out as
+    well. None where the machine cannot be there.
+    """
     errors, places = [], []
-    for at, said in zip(joints, placements, strict=True):
+    for at, said in zip(joints, said_by(found)[1], strict=True):
         near = (said[:3], rotation_of_quaternion(said[3:]))
         try:
             point, rotation = twin.reached(at, near)

@@ -67,6 +67,11 @@ class Result:
         return max(both) if both else math.nan
 
     @property
+    def demanded(self) -> bool:
+        """Whether a law asks for it: of a graded blunder, only where it can be detected."""
+        return not KINDS[self.kind].graded or self.factor >= 1.0
+
+    @property
     def moved(self) -> bool:
         """Whether the tool is farther off than stated, or cannot be told at all."""
         return not self.found or self.ratio > 1.0
@@ -177,7 +182,10 @@ def judged(drawn: DrawnSet, answer: Answer, seconds: float) -> Result:
 
 @dataclass(frozen=True)
 class Rates:
-    """Of the sets of one kind: how many, and shares. Empty ones are nan."""
+    """Of the sets of one kind that are demanded: how many, and shares. Empty ones are nan.
+
+    `excess`: of those that are accepted but not demanded, how many have their tool beyond.
+    """
 
     kind: str
     count: int
@@ -188,6 +196,7 @@ class Rates:
     named_of_moved: float
     named: float
     no_answer: float
+    excess: float
 
 
 def share(flags: Iterable[bool]) -> float:
@@ -198,7 +207,8 @@ def share(flags: Iterable[bool]) -> float:
 
 def rates(kind: str, every: Iterable[Result]) -> Rates:
     """Of one kind. `allowed`: 5 % of the accepted, and three standard errors for chance."""
-    own = [each for each in every if each.kind == kind]
+    mine = [each for each in every if each.kind == kind]
+    own = [each for each in mine if each.demanded]
     accepted = [each for each in own if each.accepted]
     moved = [each for each in own if each.moved]
     chance = CHANCE * math.sqrt(0.05 * 0.95 / len(accepted)) if accepted else math.nan
@@ -217,6 +227,7 @@ def rates(kind: str, every: Iterable[Result]) -> Rates:
         share(each.named for each in moved),
         share(each.named for each in own),
         share(not each.found for each in own),
+        share(each.moved for each in mine if each.accepted and not each.demanded),
     )
 
 

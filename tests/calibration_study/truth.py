@@ -139,7 +139,8 @@ class Instrument:
     """Something that reads: `kind` as in a file of measurements, and where it really stands.
 
     `origin` (3,) and `rotation` (3, 3): of its frame; `target` (3,): in the platform's axes, from
-    the tool point; `known`: the file says where it stands. `sigma`: by SI unit. `bias`: of struts.
+    the tool point; `known`: the file says where it stands; `unknown`: what of it the file says is
+    to be found, all where nothing is named. `sigma`: by SI unit.
     """
 
     name: str
@@ -150,6 +151,7 @@ class Instrument:
     rotation: Floats = field(default_factory=lambda: np.eye(3))
     target: Floats = field(default_factory=lambda: np.zeros(3))
     known: bool = False
+    unknown: tuple[str, ...] = ()
 
     def read(self, placed: Placed, machine: Reference, joints: Floats) -> Floats:
         """(n_column,) what it shows, without noise, SI."""
@@ -168,6 +170,9 @@ class Instrument:
         lines = [f"[instrument.{self.name}]", f'kind = "{self.kind}"']
         if self.kind != "strut-length":
             frame = '"base"' if self.known else '"unknown"'
+            if self.unknown:
+                named = ", ".join(f'"{name}"' for name in self.unknown)
+                frame = f"{{ unknown = [{named}] }}"
             if self.kind == "distance":
                 start = ", ".join(f'"{MM * at:.0f} mm"' for at in self.origin)
                 frame = f'{{ origin = [{start}], unknown = ["x", "y", "z"] }}'
@@ -207,6 +212,11 @@ class Table:
 
     def with_values(self, values: Floats) -> Table:
         return replace(self, values=values)
+
+    def and_rows(self, more: Table) -> Table:
+        """With further rows of the same instrument."""
+        poses, values = np.vstack([self.poses, more.poses]), np.vstack([self.values, more.values])
+        return replace(self, poses=poses, values=values)
 
 
 def observed(

@@ -6,6 +6,7 @@ is given three standard errors of each share.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -13,7 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from calibration_study.advice import GOOD_ENDS, follow, parameters_called
 from calibration_study.blunders import KINDS
+from calibration_study.in_use import used_of
 from calibration_study.judge import answer_of, tools
 from calibration_study.study import CHANCE, INFORMATIVE, Result, drawn_set, rates, result_of, share
 from calibration_study.truth import (
@@ -24,7 +27,7 @@ from calibration_study.truth import (
     observed,
     random_of,
 )
-from sweeps import sweep, thinned
+from sweeps import sweep
 
 EACH = 10
 NOISE = 1e-7
@@ -88,12 +91,19 @@ def test_an_accepted_tool_is_where_it_is_said_to_be(kind: str, count: int, folde
     found = rates(kind, every)
     accepted = [each for each in every if each.accepted]
     told = [(each.seed, each.family, round(each.ratio, 2), each.first) for each in accepted]
-    assert not accepted or found.beyond_of_accepted <= found.allowed, told
+    # Nothing is asked where a graded blunder is too small to be seen.
+    assert (
+        not accepted
+        or math.isnan(found.beyond_of_accepted)
+        or found.beyond_of_accepted <= found.allowed
+    ), told
 
 
-@pytest.mark.parametrize("kind", thinned([name for name in KINDS if name != "none"], ("mirror",)))
+@sweep
+@pytest.mark.parametrize("kind", [name for name in KINDS if name != "none"])
 def test_what_moves_the_tool_is_the_first_that_is_said(kind: str, folder: Path) -> None:
-    moved = [each for each in (studied(kind, seed, folder) for seed in range(EACH)) if each.moved]
+    every = [studied(kind, seed, folder) for seed in range(EACH)]
+    moved = [each for each in every if each.moved and each.demanded]
     if not moved:
         return  # none of ten moves the tool: nothing is asked
     least = 0.8 - CHANCE * np.sqrt(0.8 * 0.2 / len(moved))
@@ -109,3 +119,39 @@ def test_good_data_are_accepted(folder: Path) -> None:
     least = 0.95 - CHANCE * np.sqrt(0.95 * 0.05 / len(good))
     told = [(each.seed, each.first) for each in good if not each.accepted]
     assert share(each.accepted for each in good) >= least, told
+
+
+@sweep
+@pytest.mark.parametrize("kind", KINDS)
+def test_who_follows_the_advice_ends_well(kind: str, folder: Path) -> None:
+    """With a yes, or with a no that is better founded (`advice.GOOD_ENDS`)."""
+    found = [follow(drawn_set(kind, seed, folder)) for seed in range(EACH)]
+    refused = [each for each in found if each is not None]
+    if not refused:
+        return
+    least = 0.9 - CHANCE * np.sqrt(0.9 * 0.1 / len(refused))
+    told = [(each.end, each.steps) for each in refused if each.end not in GOOD_ENDS]
+    assert share(each.end in GOOD_ENDS for each in refused) >= least, told
+
+
+@pytest.mark.parametrize("seeds", [range(1), pytest.param(range(2 * EACH), marks=sweep)], ids=str)
+def test_the_corrected_machine_is_within_the_headline(seeds: range, folder: Path) -> None:
+    """Commanded with the compensation, the program and the pose map of the file that is written."""
+    every = [each for seed in seeds for each in used_of(drawn_set("none", seed, folder))]
+    assert every
+    for way in {each.way for each in every}:
+        own = [each for each in every if each.way == way]
+        least = 0.95 - CHANCE * np.sqrt(0.95 * 0.05 / len(own))
+        assert share(each.ratio <= 1.0 for each in own) >= least, own
+
+
+def test_parts_are_found_by_the_words_for_them(tmp_path: Path) -> None:
+    """The reader of advice understands what the gate calls a parameter, and a family of them."""
+    drawn = drawn_set("none", 2, tmp_path)
+    answer = answer_of(drawn.twin, drawn.write(), drawn.judged)
+    assert not answer.accepted
+    assert parameters_called("base joint x of strut a2", answer) == ["strut.a2.base.x"]
+    every = parameters_called("the length of every strut", answer)
+    struts = {f"strut.{strut['name']}.length" for strut in drawn.twin.nominal.struts}
+    assert set(every) == struts or set(parameters_called("every rod length", answer)) == struts
+    assert parameters_called("the length of the moon", answer) == []

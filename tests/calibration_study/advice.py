@@ -16,9 +16,9 @@ import numpy as np
 from calibration_study.judge import Answer, answer_of, commanded_of, stated_95
 from calibration_study.study import DrawnSet
 from calibration_study.truth import (
-    DEG,
     MM,
     Floats,
+    Instrument,
     Random,
     Table,
     Twin,
@@ -29,6 +29,7 @@ from calibration_study.truth import (
 )
 from machine_file import file_at, rows_of, text_of
 from truepose.calibration.acceptance import sentences
+from truepose.calibration.instruments import REGISTRY
 
 MOST = 3
 """Times that somebody goes back to the machine."""
@@ -128,7 +129,7 @@ class Follower:
             return None
         sigma = float(match[2]) * (1e-3 if match[3] == "mm" else 1e-6)
         names = parameters_called(match[1], answer)
-        return replace(state, twin=self.measured_parts(state.twin, names, sigma)) if names else None
+        return self.measured_parts(state, names, sigma) if names else None
 
     def _calibrated(self, state: State) -> Answer:
         path = self.drawn.folder / f"{self.drawn.kind.name.replace(' ', '-')}-followed.csv"
@@ -186,22 +187,22 @@ class Follower:
         more = observed(self.drawn.twin, device, state.tables[0].poses, self.random)
         return replace(state, tables=(*state.tables, more))
 
-    def measured_parts(self, twin: Twin, names: Sequence[str], sigma: float) -> Twin:
-        """Parts in the hand, to a standard uncertainty: what is known of them is in the file."""
-        file = file_at(twin.path)
-        table = file.setdefault("tolerance", {})
-        units = dict(zip(twin.loaded.parameters, twin.loaded.units, strict=True))
-        for name in names:
-            factor = MM if units[name] == "m" else DEG
-            read = twin.deviation.get(name, 0.0) + sigma * float(self.random.standard_normal())
-            band = [factor * (read - 2.0 * sigma), factor * (read + 2.0 * sigma)]
-            table[name] = {"band": band, "distribution": "normal", "sigmas": 2}
-            for strut in rows_of(file, "strut"):
-                if name == f"strut.{strut['name']}.length":
-                    strut.pop("length_tolerance", None)
-        path = twin.path.with_name(f"{twin.path.stem}-measured.toml")
-        path.write_text(text_of(file), encoding="utf-8")
-        return Twin(path, twin.description, twin.deviation)
+    def measured_parts(self, state: State, names: Sequence[str], sigma: float) -> State:
+        """Parts in the hand, to a standard uncertainty."""
+        nominal = dict(zip(state.twin.loaded.parameters, state.twin.loaded.nominal, strict=True))
+        off = np.array([state.twin.deviation.get(name, 0.0) for name in names])
+        off += sigma * self.random.standard_normal(off.size)
+        if "parameter" not in REGISTRY:
+            return replace(state, twin=_with_bands(state.twin, names, off, sigma))
+        device = Instrument(
+            f"calliper{len(state.tables)}",
+            "parameter",
+            tuple(f"parameter.{name}" for name in names),
+            {"m": sigma},
+        )
+        values = np.array([[nominal[name] for name in names]]) + off
+        nowhere = np.full((1, state.tables[0].poses.shape[1]), np.nan)
+        return replace(state, tables=(*state.tables, Table(device, nowhere, values)))
 
     def _added(self, state: State, number: int, poses: Floats) -> State:
         table = state.tables[number]
@@ -230,6 +231,21 @@ STEPS: dict[str, Step] = {
     r"as a laser tracker does": Follower.tracker,
 }
 """What sentences ask for, and who does it."""
+
+
+def _with_bands(twin: Twin, names: Sequence[str], off: Floats, sigma: float) -> Twin:
+    """Where no file of measurements can say it: the bands of the machine file do."""
+    file = file_at(twin.path)
+    table = file.setdefault("tolerance", {})
+    for name, read in zip(names, off, strict=True):
+        band = [MM * (read - 2.0 * sigma), MM * (read + 2.0 * sigma)]
+        table[name] = {"band": band, "distribution": "normal", "sigmas": 2}
+        for strut in rows_of(file, "strut"):
+            if name == f"strut.{strut['name']}.length":
+                strut.pop("length_tolerance", None)
+    path = twin.path.with_name(f"{twin.path.stem}-measured.toml")
+    path.write_text(text_of(file), encoding="utf-8")
+    return Twin(path, twin.description, twin.deviation)
 
 
 def advised(answer: Answer) -> list[str]:

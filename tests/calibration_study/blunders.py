@@ -288,15 +288,17 @@ KINDS = {
         Kind("none", "", ANY, _none),
         Kind(
             "sign",
-            r"flipped|sign|negat|mirror|left-handed|upside",
+            r"flipped|\bsign|negat|mirror|left-handed|upside",
             ("known tracker", "heights"),
             _sign,
         ),
-        Kind("mirror", r"flipped|sign|mirror|left-handed|swapped|exchanged", ("tracker",), _mirror),
+        Kind(
+            "mirror", r"flipped|\bsign|mirror|left-handed|swapped|exchanged", ("tracker",), _mirror
+        ),
         Kind("swap", r"swapped|exchanged|each other's place|flipped|mirror", POINTS[:2], _swap),
-        Kind("unit", r"unit|mm|inch|times too", ("tracker", "pose", "bar"), _unit),
-        Kind("shifted rows", r"shifted|one row", (*POINTS, "bar"), _shifted),
-        Kind("bumped", r"bump|step|moved from|stands elsewhere", POINTS, _bumped, True),
+        Kind("unit", r"wrong-unit|\bunit of|by a factor|\binch", ("tracker", "pose", "bar"), _unit),
+        Kind("shifted rows", r"shifted|one row too", (*POINTS, "bar"), _shifted),
+        Kind("bumped", r"bump|\bstep|moved from|stands elsewhere", POINTS, _bumped, True),
         Kind("drift", r"drift|trend|wander", POINTS, _drift, True),
         Kind("scale", r"scale|ppm", (*POINTS, "bar"), _scale, True),
         Kind("outliers", r"outlier", ANY, _outliers, True),

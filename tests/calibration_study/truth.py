@@ -34,7 +34,8 @@ SPATIAL_POSITION = ("linear_delta", "rotary_delta", "hexapod")
 """Families whose bed can be probed: x, y and z are commanded."""
 
 LENGTHS = ("x", "y", "z", "distance")
-"""Columns that are lengths; those of struts are, too."""
+"""Columns that are lengths; those of struts are, too, and what is measured of parts."""
+WITHOUT_FRAME = ("strut-length", "parameter")
 
 MM, DEG = 1e3, 180.0 / np.pi
 
@@ -168,7 +169,7 @@ class Instrument:
     def declared(self) -> list[str]:
         """Its lines in the head of a file of measurements."""
         lines = [f"[instrument.{self.name}]", f'kind = "{self.kind}"']
-        if self.kind != "strut-length":
+        if self.kind not in WITHOUT_FRAME:
             frame = '"base"' if self.known else '"unknown"'
             if self.unknown:
                 named = ", ".join(f'"{name}"' for name in self.unknown)
@@ -243,14 +244,18 @@ def csv_of(twin: Twin, *tables: Table) -> str:
     for table in tables:
         for pose, values in zip(table.poses, table.values, strict=True):
             own = dict(zip(table.instrument.columns, values, strict=True))
-            cells = [f"{v * _factor(n):.9f}" for n, v in zip(commanded, pose, strict=True)]
+            # What is measured in the hand has no pose.
+            cells = [
+                "" if np.isnan(v) else f"{v * _factor(n):.9f}"
+                for n, v in zip(commanded, pose, strict=True)
+            ]
             cells += [f"{own[c] * _factor(c):.6f}" if c in own else "" for c in columns]
             lines.append(", ".join([table.instrument.name, *cells]))
     return "\n".join([*head, *lines, ""])
 
 
 def _is_length(column: str) -> bool:
-    return column in LENGTHS or column.endswith(".length")
+    return column in LENGTHS or column.endswith(".length") or column.startswith("parameter.")
 
 
 def _unit(column: str) -> str:

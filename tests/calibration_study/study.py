@@ -1,0 +1,245 @@
+"""One set after another: drawn, spoilt, calibrated, judged."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from calibration_study.blunders import FACTORS, KINDS, Kind, Measured, Spoilt
+from calibration_study.judge import Answer, answer_of, tools
+from calibration_study.kinematics import NoRootError
+from calibration_study.truth import (
+    FAMILIES,
+    SPATIAL_POSITION,
+    Floats,
+    Random,
+    Table,
+    Twin,
+    csv_of,
+    drawn_twin,
+    instrument_of,
+    observed,
+    random_of,
+)
+
+JUDGED = 12
+"""Poses of the workspace at which the tool is looked at."""
+ROWS = (14, 36)
+TRIES = 20
+INFORMATIVE = ("tracker", "known tracker", "pose")
+"""Instruments that see enough for a yes; of the others good data may be refused for good reason."""
+CHANCE = 3.0
+"""Standard errors of a share that are given to chance."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A set, and what became of it.
+
+    `position`, `rotation`: how far the tool is off over the stated 95 %, at the headline's pose;
+    nan where there is no such freedom, or nothing was found. `ratio`: the worse of both.
+    """
+
+    kind: str
+    seed: int
+    family: str
+    instrument: str
+    rows: int
+    factor: float
+    size: float
+    accepted: bool
+    found: bool
+    first: str
+    named: bool
+    mentioned: bool
+    position: float
+    rotation: float
+    beyond: float
+    seconds: float
+
+    @property
+    def ratio(self) -> float:
+        both = [r for r in (self.position, self.rotation) if not math.isnan(r)]
+        return max(both) if both else math.nan
+
+    @property
+    def demanded(self) -> bool:
+        """Whether a law asks for it: of a graded blunder, only where it can be detected."""
+        return not KINDS[self.kind].graded or self.factor >= 1.0
+
+    @property
+    def moved(self) -> bool:
+        """Whether the tool is farther off than stated, or cannot be told at all."""
+        return not self.found or self.ratio > 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnSet:
+    """A machine, good readings of it, and the same spoilt."""
+
+    kind: Kind
+    seed: int
+    twin: Twin
+    instrument: str
+    spoilt: Spoilt
+    judged: Floats
+    folder: Path
+
+    def write(self, *tables: Table) -> Path:
+        path = self.folder / f"{self.kind.name.replace(' ', '-')}-{self.seed}.csv"
+        path.write_text(csv_of(self.twin, *(tables or (self.spoilt.table,))), encoding="utf-8")
+        return path
+
+
+def drawn_set(
+    name: str, seed: int, folder: Path, factors: tuple[float, float] = FACTORS
+) -> DrawnSet:
+    """The set of a kind and a seed: what is drawn and cannot be made is drawn again."""
+    kind = KINDS[name]
+    for attempt in range(TRIES):
+        random = random_of("set", name, seed, attempt)
+        found = _attempt(kind, seed, random, folder, factors)
+        if found is not None:
+            return found
+    raise ValueError(f"{name} {seed}: no set in {TRIES} draws")
+
+
+def _attempt(
+    kind: Kind, seed: int, random: Random, folder: Path, factors: tuple[float, float]
+) -> DrawnSet | None:
+    instrument = str(random.choice(kind.instruments))
+    families = FAMILIES
+    if instrument == "heights":
+        families = SPATIAL_POSITION
+    if instrument == "scales":
+        families = ("hexapod", "3rpr")
+    family = str(random.choice(families))
+    try:
+        twin = drawn_twin(family, int(random.integers(100_000)), folder)
+    except ValueError:
+        return None
+    if instrument == "pose" and not {"a", "b", "c"} & set(twin.description["dof"]):
+        instrument = "tracker"
+    count = int(random.integers(*ROWS))
+    device = instrument_of(instrument, twin, random)
+    poses = twin.poses(count, random)
+    if instrument == "heights" and random.uniform() < 0.5:
+        poses[:, twin.description["commanded"].index("z")] = poses[0, 2]
+    try:
+        table = observed(twin, device, poses, random)
+        path = folder / f"{kind.name.replace(' ', '-')}-{seed}-good.csv"
+
+        def written(good: Table) -> Path:
+            path.write_text(csv_of(twin, good), encoding="utf-8")
+            return path
+
+        spoilt = kind.make(Measured(twin, table, written, factors), random)
+    except NoRootError:
+        return None
+    if spoilt is None:
+        return None
+    judged = twin.poses(JUDGED, random)
+    return DrawnSet(kind, seed, twin, instrument, spoilt, judged, folder)
+
+
+def result_of(drawn: DrawnSet) -> Result:
+    """Calibrate and judge."""
+    start = time.perf_counter()
+    answer = answer_of(drawn.twin, drawn.write(), drawn.judged)
+    seconds = time.perf_counter() - start
+    return judged(drawn, answer, seconds)
+
+
+def judged(drawn: DrawnSet, answer: Answer, seconds: float) -> Result:
+    kind, spoilt = drawn.kind, drawn.spoilt
+    off = {} if answer.found is None else {t.quantity: t for t in tools(drawn.twin, answer.found)}
+    rows = answer.named_rows()
+    none = math.nan
+    return Result(
+        kind=kind.name,
+        seed=drawn.seed,
+        family=drawn.twin.family,
+        instrument=drawn.instrument,
+        rows=spoilt.table.count,
+        factor=spoilt.factor,
+        size=spoilt.size,
+        accepted=answer.accepted,
+        found=answer.found is not None,
+        first=answer.first[:240],
+        named=kind.is_named(answer.first, rows, spoilt),
+        mentioned=kind.is_named(answer.first, rows, spoilt)
+        or (bool(kind.words) and answer.mentions(kind.words)),
+        position=off["position"].ratio if "position" in off else none,
+        rotation=off["rotation"].ratio if "rotation" in off else none,
+        beyond=max((each.share_beyond for each in off.values()), default=none),
+        seconds=seconds,
+    )
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Of the sets of one kind that are demanded: how many, and shares. Empty ones are nan.
+
+    `excess`: of those that are accepted but not demanded, how many have their tool beyond.
+    """
+
+    kind: str
+    count: int
+    accepted: float
+    beyond_of_accepted: float
+    allowed: float
+    moved: int
+    named_of_moved: float
+    named: float
+    no_answer: float
+    excess: float
+
+
+def share(flags: Iterable[bool]) -> float:
+    """Of them that are true; nan of none."""
+    every = list(flags)
+    return sum(every) / len(every) if every else math.nan
+
+
+def rates(kind: str, every: Iterable[Result]) -> Rates:
+    """Of one kind. `allowed`: 5 % of the accepted, and three standard errors for chance."""
+    mine = [each for each in every if each.kind == kind]
+    own = [each for each in mine if each.demanded]
+    accepted = [each for each in own if each.accepted]
+    moved = [each for each in own if each.moved]
+    chance = CHANCE * math.sqrt(0.05 * 0.95 / len(accepted)) if accepted else math.nan
+    worst = [
+        share(r > 1.0 for r in ratios if not math.isnan(r))
+        for ratios in ([e.position for e in accepted], [e.rotation for e in accepted])
+    ]
+    known = [w for w in worst if not math.isnan(w)]
+    return Rates(
+        kind,
+        len(own),
+        share(each.accepted for each in own),
+        max(known) if known else math.nan,
+        0.05 + chance,
+        len(moved),
+        share(each.named for each in moved),
+        share(each.named for each in own),
+        share(not each.found for each in own),
+        share(each.moved for each in mine if each.accepted and not each.demanded),
+    )
+
+
+def as_row(result: Result) -> dict[str, object]:
+    """For a line of JSON."""
+    return {
+        name: str(value) if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in asdict(result).items()
+    }
+
+
+def of_row(row: dict[str, Any]) -> Result:
+    """Back again."""
+    numbers = {"factor", "size", "position", "rotation", "beyond", "seconds"}
+    return Result(**{name: float(v) if name in numbers else v for name, v in row.items()})

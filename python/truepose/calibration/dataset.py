@@ -329,6 +329,7 @@ def _texts(values: Any) -> np.ndarray:
 def _row_coords(machine: Machine, data: Measurements) -> dict[str, xr.Variable]:
     names = [instrument.name for instrument in data.instruments]
     poses = machine.kernel.pose_of(data.placements)
+    poses[~data.posed] = np.nan
     coords = {
         "row": label("row", np.arange(data.n_row), "number of the row, from 0"),
         "row_line": label("row", data.lines, "line of the file, 0 where there is none"),

@@ -268,6 +268,7 @@ def rows_of_kinds() -> list[str]:
     for kind in REGISTRY.values():
         dots = "strut.N." if kind.of_struts else ""
         columns = " ".join(f"`{dots}{word}`" for word in kind.reads) or "none"
+        columns = columns if kind.poses else "`parameter.NAME`"
         unknown = "no frame"
         if kind.frame is not None:
             flags = kind.frame(kind.observed(SPACE), SPACE)

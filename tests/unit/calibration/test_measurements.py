@@ -16,7 +16,7 @@ from truepose.calibration import Frame, Instrument, Measurements, joined, measur
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.instruments._base import of_readings
 from truepose.calibration.measurements.rows import within_a_turn
-from truepose.calibration.observables import OBSERVABLES
+from truepose.calibration.observables import OBSERVABLES, column_name
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
 
@@ -148,7 +148,7 @@ def columns_of(machine: Machine, made: Measurements) -> dict[str, np.ndarray]:
         word = words.get(OBSERVABLES[code])
         if word is None:
             continue
-        name = word if strut < 0 else f"strut.{machine.struts[strut].name}.{word}"
+        name = word if strut < 0 else column_name(machine, int(code), int(strut))
         columns.setdefault(name, np.full(made.n_row, math.nan))[row] = value
     return columns
 
@@ -161,13 +161,12 @@ def test_arrays_of_every_kind(machine: Machine, kind: str) -> None:
     )
     if kind == "contact":
         made = made.with_values(np.zeros(made.n_observation))
-    found = measurements_of(
-        machine, made.instruments[0], poses=poses, values=columns_of(machine, made)
-    )
+    commanded = {"poses": poses} if REGISTRY[kind].poses else {}
+    values = columns_of(machine, made)
+    found = measurements_of(machine, made.instruments[0], values=values, **commanded)
     same(found, made)
-    again = measurements_of(
-        machine, made.instruments[0], joints=made.joints, values=columns_of(machine, made)
-    )
+    commanded = {"joints": made.joints} if REGISTRY[kind].poses else {}
+    again = measurements_of(machine, made.instruments[0], values=values, **commanded)
     same(again, made)
 
 
@@ -316,7 +315,7 @@ def test_every_kind_of_every_machine(path: Path) -> None:
         made = made_measurements(machine, name, poses, values="nominal")
         if name == "contact":
             made = made.with_values(np.zeros(made.n_observation))
-        found = measurements_of(
-            machine, made.instruments[0], poses=poses, values=columns_of(machine, made)
-        )
+        commanded = {"poses": poses} if kind.poses else {}
+        values = columns_of(machine, made)
+        found = measurements_of(machine, made.instruments[0], values=values, **commanded)
         same(found, made)

@@ -18,7 +18,7 @@ from truepose.arrays import Floats, Indices
 from truepose.calibration.data_checks.nominal import Geometry, Placement
 from truepose.calibration.data_checks.placement import Free, Readings, fit_instrument
 from truepose.calibration.instruments._base import Instrument
-from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.calibration.observables import UNITS, column_name
 
 if TYPE_CHECKING:
     from truepose.calibration.measurements import Measurements
@@ -170,8 +170,7 @@ class View:
         return tuple(columns)
 
     def _name(self, observable: int, strut: int) -> str:
-        name = OBSERVABLES[observable]
-        return name if strut < 0 else f"strut.{self.machine.struts[strut].name}.{name}"
+        return column_name(self.machine, observable, strut)
 
     def column(self, observable: str) -> MeasuredColumn | None:
         """The column of an observable that is of no strut."""

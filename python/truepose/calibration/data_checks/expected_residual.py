@@ -14,7 +14,7 @@ from truepose.calibration.data_checks.nominal import (
 )
 from truepose.calibration.data_checks.placement import difference
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import UNITS
+from truepose.calibration.observables import UNITS, is_parameter
 from truepose.machine import Machine
 from truepose.sources import Deviation, PoseBlock, acting
 from truepose.sources.tolerance import DimensionalTolerance
@@ -38,8 +38,12 @@ def expected_residual(machine: Machine, measurements: Measurements, geometry: Ge
     row, observable = measurements.row, measurements.observable
     size = _size(machine, geometry)
     others = np.select(
-        [observable == LENGTH, np.array([unit == "m" for unit in UNITS])[observable]],
-        [np.hypot(linear, own)[row], linear[row]],
+        [
+            is_parameter(observable),  # measured cold and without loads
+            observable == LENGTH,
+            np.array([unit == "m" for unit in UNITS])[observable],
+        ],
+        [np.zeros(row.size), np.hypot(linear, own)[row], linear[row]],
         np.hypot(angular, linear / size)[row],
     )
     allowed: Floats = np.sqrt(by_tolerance**2 + others**2 + measurements.uncertainty**2)

@@ -20,7 +20,7 @@ from truepose._kernel import Machine as KernelMachine
 from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments._base import Frame, Instrument
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import OBSERVABLES
+from truepose.calibration.observables import OBSERVABLES, is_parameter
 from truepose.machine import Machine
 from truepose.spatial import matrix_to_euler, quaternion_to_matrix
 
@@ -34,22 +34,26 @@ class Geometry:
     """Where platform and struts are, row by row, base frame.
 
     `points` (n, 3) tool point, m; `rotations` (n, 3, 3) platform axes to base axes; `centres`
-    (n, n_strut, 2, 3) base-side and platform-side joint centres, m.
+    (n, n_strut, 2, 3) base-side and platform-side joint centres, m; `parameters` (n_parameter,).
     """
 
     points: Floats
     rotations: Floats
     centres: Floats
+    parameters: Floats
 
     @classmethod
     def of(cls, kernel: KernelMachine, joints: Floats, placements: Floats) -> Geometry:
         """Of joints (n, n_joint) and the placements (n, 7) that they lead to."""
         centres = kernel.joint_centres(joints, placements)
-        return cls(placements[:, :3], quaternion_to_matrix(placements[:, 3:]), centres)
+        rotations = quaternion_to_matrix(placements[:, 3:])
+        return cls(placements[:, :3], rotations, centres, np.asarray(kernel.nominal))
 
     def rows(self, rows: Indices) -> Geometry:
         """These rows only."""
-        return Geometry(self.points[rows], self.rotations[rows], self.centres[rows])
+        return Geometry(
+            self.points[rows], self.rotations[rows], self.centres[rows], self.parameters
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +94,9 @@ def read(
     if of_angle.any():
         angles = matrix_to_euler(placement.rotation.T @ turned)
         value[of_angle] = angles[row[of_angle], observable[of_angle] - A]
-    of_strut = observable >= LENGTH
+    of_parameter = is_parameter(observable)
+    value[of_parameter] = geometry.parameters[strut[of_parameter]]
+    of_strut = (observable >= LENGTH) & (observable <= ANGLE)
     if of_strut.any():
         value[of_strut] = _of_struts(
             geometry, instrument, placement, row[of_strut], observable[of_strut], strut[of_strut]

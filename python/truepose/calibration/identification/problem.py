@@ -143,7 +143,7 @@ class IdentificationProblem:
             raise ValueError("observations are not in the order of their rows")
         by = measurements.instrument[measurements.row]
         observations = [
-            (int(row), int(number), int(what), max(int(strut), 0), bias)
+            (int(row), None, int(number), int(what), max(int(strut), 0), bias)
             for row, number, what, strut, bias in zip(
                 measurements.row,
                 by,
@@ -207,7 +207,8 @@ def row_shifts(
     """Parameters (k,) and how far every row's condition is known to move them (n_row, k).
 
     By every source but the tolerances, whose middles are where unknowns start. A strut whose
-    expansion is to be found need not have one in the file.
+    expansion is to be found need not have one in the file. Parts that were measured by themselves
+    were cold and without loads.
     """
     known = machine
     for identified in unknowns.properties.values():
@@ -222,6 +223,7 @@ def row_shifts(
     for rows, (own, values) in parts:
         place = np.searchsorted(columns, own)
         shifts[np.ix_(rows, place)] = np.broadcast_to(values, (rows.size, own.size))
+    shifts[~measurements.posed] = 0.0
     used = shifts.any(axis=0)
     return columns[used], np.ascontiguousarray(shifts[:, used])
 

@@ -118,6 +118,8 @@ def candidates(machine: Machine, fit: Fit) -> list[Candidate]:
                 Candidate(f"{instrument.name}: {what}", len(rows), f"probe in {what} too", rows)
             )
     for number, instrument in enumerate(data.instruments):
+        if not data.posed[data.instrument == number].all():
+            continue
         for count in FURTHER:
             more = _more_poses(machine, fit, number, count)
             if more is not None:
@@ -127,7 +129,8 @@ def candidates(machine: Machine, fit: Fit) -> list[Candidate]:
                 name = f"{instrument.name}: {count} poses"
                 additions.append(Candidate(name, len(more), sentence, more))
     axes = [axis for axis in "xyz" if axis in machine.components]
-    if not any(set(axes) <= set(data.observables(at)) for at in range(len(data.instruments))):
+    tracked = any(set(axes) <= set(data.observables(at)) for at in range(len(data.instruments)))
+    if not tracked and data.posed.any():
         rows = _tracker_rows(machine, fit, axes)
         sentence = f"measure {', '.join(axes)} of the tool at these poses, as a laser tracker does"
         additions.append(Candidate("tracker", 2 * len(rows), sentence, rows))
@@ -209,5 +212,5 @@ def _tracker_rows(machine: Machine, fit: Fit, axes: list[str]) -> Floats:
     data = fit.measurements
     tracker = Instrument("tracker", "position", Frame())
     wide = dataclasses.replace(data, instruments=(*data.instruments, tracker))
-    rows = np.arange(data.n_row)
+    rows = np.flatnonzero(data.posed)
     return _rows(machine, fit, _observing(wide, rows, axes, 10e-6, len(data.instruments)))

@@ -20,14 +20,14 @@ from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property, properties_of
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import UNITS, column_name
+from truepose.calibration.observables import UNITS, column_name, is_parameter
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.files.units import QuantityError, UnitSystem
 from truepose.files.wording import did_you_mean
 from truepose.machine import Machine
 from truepose.sources import Deviation
-from truepose.sources.tolerance import DimensionalTolerance
+from truepose.sources.tolerance import bands_of
 
 SCREEN = 1e-9
 """Middles of a group's bands may be this far, of its half band, from moving together."""
@@ -143,13 +143,15 @@ def unknowns_of(
     `identify`: names, groups or patterns (`strut.*.length`), each with a half band of its own where
     one is given (`strut.*.expansion=2e-6 1/K`, `strut.1.length=0.5 mm`); nothing: everything that
     has a tolerance. What is named without having a tolerance, and without a band, is found from the
-    measurements alone.
+    measurements alone. Parameters that were measured by themselves are always among them.
 
     Raises `RequestError` (unknown-parameter, no-unknowns, bad-band, no-stiffness, bad-prior).
     """
     bands = bands_of(machine)
     tolerated = _tolerance_unknowns(machine, bands)
-    wanted = _chosen_unknowns(machine, tolerated, identify)
+    wanted = _with_measured(
+        machine, measurements, tolerated, _chosen_unknowns(machine, tolerated, identify)
+    )
     if not wanted:
         raise RequestError(
             Problem(
@@ -189,14 +191,6 @@ def unknowns_of(
         instruments.biases,
         machine.shown,
     )
-
-
-def bands_of(machine: Machine) -> Deviation | None:
-    """The bands of the machine's tolerances; None where its file has none."""
-    of_tolerances = (
-        source.bands for source in machine.sources if isinstance(source, DimensionalTolerance)
-    )
-    return next(of_tolerances, None)
 
 
 def _tolerance_unknowns(machine: Machine, bands: Deviation | None) -> list[_MachineUnknown]:
@@ -299,6 +293,27 @@ def _chosen_unknowns(
         name: at for at, name in enumerate([unknown.name for unknown in tolerated] + list(known))
     }
     return sorted(chosen.values(), key=lambda unknown: order[unknown.name])
+
+
+def _with_measured(
+    machine: Machine,
+    measurements: Measurements,
+    tolerated: Sequence[_MachineUnknown],
+    chosen: list[_MachineUnknown],
+) -> list[_MachineUnknown]:
+    """And the parameters that were measured by themselves, or the groups that they are of."""
+    fitted = ~measurements.held_out[measurements.row]
+    measured = np.unique(measurements.strut[is_parameter(measurements.observable) & fitted])
+    moved = {column for unknown in chosen for column in unknown.effects}
+    for column in measured.tolist():
+        if column in moved:
+            continue
+        name, unit = machine.parameters[column], machine.units[column]
+        alone = _MachineUnknown(name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf)
+        unknown = next((one for one in tolerated if column in one.effects), alone)
+        moved.update(unknown.effects)
+        chosen = [*chosen, unknown]
+    return chosen
 
 
 _DIMENSION_OF_UNIT = {"m": "length", "rad": "angle", "1/K": "expansion", "1": "ratio"}

@@ -15,6 +15,7 @@ from truepose.calibration.instruments import (
     distance,
     joint_angle,
     orientation,
+    parameter,
     plane,
     pose,
     position,
@@ -43,6 +44,7 @@ REGISTRY: Mapping[str, Kind] = MappingProxyType(
             strut_direction,
             joint_angle,
             contact,
+            parameter,
         )
     }
 )

@@ -86,7 +86,8 @@ class Kind:
     moves in. `fixed`: observables that are 0 in every row, without a column. `optional`: a column
     that may be missing or blank and then is 0. `frame`: which of a frame's freedoms are identified
     where the file says `frame = "unknown"`; None: what it reads has no frame. `has_target`:
-    whether what it reads depends on a target point. `keys`: of `axis`, `zero`, `end` those that it
+    whether what it reads depends on a target point. `poses`: at how many commanded poses each of
+    its rows is. `keys`: of `axis`, `zero`, `end` those that it
     takes.
     """
 
@@ -100,6 +101,7 @@ class Kind:
     optional: bool = False
     frame: FrameRule | None = None
     has_target: bool = True
+    poses: int = 1
     keys: tuple[str, ...] = ()
     phrases: Callable[[Sequence[str]], str] | None = None
 

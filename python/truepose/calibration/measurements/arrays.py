@@ -50,7 +50,8 @@ def measurements_of(
             uncertainty=10e-6, frame_unknown=True,
         )
 
-    Commanded `poses` (n_row, n_commanded), or `joints` (n_row, n_joint). `values`: (n_row,) by the
+    Commanded `poses` (n_row, n_commanded), or `joints` (n_row, n_joint), neither of a kind that
+    needs no pose. `values`: (n_row,) by the
     columns of a file ("x", "strut.1.length"), NaN where nothing was read; none of a contact.
     `uncertainty`: standard, one for all, or by column one or (n_row,); default the instrument's.
     `condition`: of all rows or of each; default at reference temperature, no load on the tool.
@@ -63,9 +64,9 @@ def measurements_of(
     arguments = _Arguments(machine, instrument, problems)
     columns = arguments.columns(values or {})
     commanded = arguments.commanded(poses, joints)
-    if problems or commanded is None:
+    if problems:
         raise RequestError(*problems)
-    n = len(commanded)
+    n = arguments.n_row(values or {}) if commanded is None else len(commanded)
     table = {name: arguments.of_rows(name, column, n) for name, column in columns.items()}
     stated = arguments.uncertainties(uncertainty, table, n)
     flags = np.zeros(n, np.bool_) if held_out is None else np.array(held_out, np.bool_)
@@ -81,7 +82,7 @@ def measurements_of(
         held_out=flags,
         lines=np.zeros(n, np.intp),
         commands=commanded if poses is not None else None,
-        joints=commanded if poses is None else None,
+        joints=commanded if joints is not None else None,
         whole=frozenset({instrument.name} if frame_unknown else ()),
     )
     measurements = measurements_in(machine, (instrument,), rows, _Report(problems, rows))
@@ -215,7 +216,15 @@ class _Arguments:
         return {name: column for name, column in values.items() if name in self.known}
 
     def commanded(self, poses: ArrayLike | None, joints: ArrayLike | None) -> Floats | None:
-        """(n_row, n_commanded) poses or (n_row, n_joint) joints, whichever is given."""
+        """(n_row, n_commanded) poses or (n_row, n_joint) joints, whichever is given.
+
+        None where that is wrong, and of a kind that needs no pose.
+        """
+        if self.instrument.kind in REGISTRY and not REGISTRY[self.instrument.kind].poses:
+            if poses is not None or joints is not None:
+                found = "poses" if joints is None else "joints"
+                self.refuse("poses", found, f"none, of kind {self.instrument.kind}")
+            return None
         if (poses is None) == (joints is None):
             found = "neither" if poses is None else "both"
             self.refuse("poses", found, "either poses or joints, as they were commanded")
@@ -234,6 +243,10 @@ class _Arguments:
             self.refuse(path, f"a number that is not finite, in row {row}", expected)
             return None
         return table
+
+    def n_row(self, values: Mapping[str, ArrayLike]) -> int:
+        """How many rows values without poses are: as many as the longest has, at least one."""
+        return max((np.size(column) for column in values.values()), default=1)
 
     def of_rows(self, name: str, values: ArrayLike, n: int, what: str = "values") -> Floats:
         """(n_row,) of one column; one number stands for all rows."""
@@ -282,6 +295,10 @@ class _Arguments:
     ) -> tuple[Condition, ...] | None:
         """(n_row,) conditions, of parts that the machine has; None: the default."""
         if condition is None:
+            return None
+        if self.instrument.kind in REGISTRY and not REGISTRY[self.instrument.kind].poses:
+            expected = "none: a part is measured at the reference temperature, without loads"
+            self.refuse("condition", "a condition", expected)
             return None
         every = (condition,) * n if isinstance(condition, Condition) else tuple(condition)
         if len(every) != n:

@@ -239,6 +239,8 @@ class _Reader:
         )
 
     def _keys(self, kind: Kind) -> tuple[str, ...]:
+        if kind.poses == 0:  # a constant of its own for each parameter would leave nothing
+            return ("kind", "uncertainty")
         return (*COMMON_KEYS, "frame", *(("target",) if kind.has_target else ()), *kind.keys)
 
     def _kind(self, key: Key, table: dict[str, Any]) -> Kind | None:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments._base import Instrument
-from truepose.calibration.observables import OBSERVABLES
+from truepose.calibration.observables import OBSERVABLES, is_parameter
 from truepose.machine.condition import Condition
 
 
@@ -40,12 +40,12 @@ class Measurements:
     """What instruments read of a machine; SI, radians and kelvin.
 
     Rows: `joints` (n_row, n_joint) commanded; `placements` (n_row, 7) where the nominal machine
-    then is, tool point and quaternion; `instrument` (n_row,) which of `instruments` measured;
-    `conditions` (n_row,), equal ones the same object; `held_out` (n_row,): kept from the fit;
-    `lines` (n_row,) of the file, 0 where there is none.
+    then is, tool point and quaternion, at its home where a row needs no pose; `instrument`
+    (n_row,) which of `instruments` measured; `conditions` (n_row,), equal ones the same object;
+    `held_out` (n_row,): kept from the fit; `lines` (n_row,) of the file, 0 where there is none.
 
     Observations: `row` (n_observation,) of each, `observable`: its index in `OBSERVABLES`, `strut`:
-    which, or -1; `value` and standard `uncertainty`, above zero.
+    which, of a parameter which parameter, or -1; `value` and standard `uncertainty`, above zero.
     """
 
     instruments: tuple[Instrument, ...]
@@ -72,6 +72,13 @@ class Measurements:
     def n_observation(self) -> int:
         """How many numbers were measured."""
         return len(self.value)
+
+    @property
+    def posed(self) -> Flags:
+        """(n_row,) whether the row was measured at a pose; a part's own dimensions are not."""
+        flags = np.ones(self.n_row, np.bool_)
+        flags[self.row[is_parameter(self.observable)]] = False
+        return flags
 
     def observables(self, instrument: int) -> tuple[str, ...]:
         """Names of what an instrument, by its index, read in any row, in the order of the table."""

@@ -35,6 +35,7 @@ from truepose.calibration.measurements.rows import (
     measurements_in,
     reading_columns,
 )
+from truepose.calibration.observables import parameter_column
 from truepose.errors import Fault, MachineFileError, Problem, RequestError
 from truepose.files.data_file import Column, DataTable, ReadTable, cut_short, read_table
 from truepose.files.dimensions import FREEDOMS
@@ -42,6 +43,7 @@ from truepose.files.text_file import FileKind, read_text
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
 from truepose.machine.condition import DEFAULT_PART
+from truepose.sources.tolerance import bands_of
 
 INSTRUMENT, SET, ID = "instrument", "set", "id"
 FIT, CHECK = "fit", "check"
@@ -54,6 +56,8 @@ _OF_MACHINE = {
     "strut.": "struts",
 }
 """Beginnings of columns that name something of the machine, and what."""
+
+_PARAMETER = parameter_column("")
 
 
 def read_measurements(path: str | Path, machine: Machine) -> Measurements:
@@ -90,11 +94,12 @@ def _columns(machine: Machine) -> list[Column]:
 
     columns = [Column(INSTRUMENT, None, required=False)]
     columns += [
-        Column(f"command.{freedom}", FREEDOMS[freedom], required=False)
+        Column(f"command.{freedom}", FREEDOMS[freedom], required=False, blank=True)
         for freedom in machine.commanded
     ]
     columns += [
-        Column(f"joint.{drive.name}", drive.coordinate, required=False) for drive in machine.drives
+        Column(f"joint.{drive.name}", drive.coordinate, required=False, blank=True)
+        for drive in machine.drives
     ]
     for name, reading in reading_columns(machine).items():
         columns += [may(name, reading.dimension), may(name + UNCERTAINTY, reading.dimension)]
@@ -152,7 +157,9 @@ class _Reading:
             unreadable=self.read.unreadable,
             whole=self.header.whole,
         )
-        misnamed = not codes.isdisjoint(("unknown-column", "doubled-column", "other-machine"))
+        misnamed = not codes.isdisjoint(
+            ("unknown-column", "unknown-parameter", "doubled-column", "other-machine")
+        )
         report = _Report(table, self.problems, misnamed)
         return measurements_in(self.machine, self.header.instruments, rows, report)
 
@@ -166,6 +173,8 @@ class _Reading:
                 yield problem
             elif beginning is not None and not self._knows(word):
                 strange.setdefault(beginning, []).append(problem)
+            elif word.startswith(_PARAMETER):
+                yield self._no_parameter(problem, word.removeprefix(_PARAMETER))
             elif word.startswith("temperature."):
                 part = word.removeprefix("temperature.")
                 yield replace(
@@ -193,6 +202,36 @@ class _Reading:
                 hint=near if len(names) == 1 else None,
             )
 
+    def _no_parameter(self, problem: Problem, name: str) -> Problem:
+        """A column `parameter.NAME` of what is none, or of a group that has no value."""
+        known = [
+            column.removeprefix(_PARAMETER)
+            for column in reading_columns(self.machine)
+            if column.startswith(_PARAMETER)
+        ]
+        bands = bands_of(self.machine)
+        for number, group in ({} if bands is None else bands.group_names).items():
+            if group != name:
+                continue
+            assert bands is not None
+            own = bands.parameters[bands.groups == number].tolist()
+            members = [_PARAMETER + self.machine.parameters[at] for at in own]
+            return replace(
+                problem,
+                code="unknown-parameter",
+                message=f"{_PARAMETER}{name}: the parameters of this group are not of one size, so "
+                "that it has no value of its own",
+                expected=f"the value of one of them: {one_of(members, limit=8)}",
+                hint=None,
+            )
+        return replace(
+            problem,
+            code="unknown-parameter",
+            message=f"{_PARAMETER}{name}: the machine has no parameter {name}",
+            expected=one_of((_PARAMETER + each for each in known), limit=8),
+            hint=did_you_mean(name, known),
+        )
+
     def _own(self, beginning: str) -> tuple[str, ...]:
         if beginning == "joint.":
             return self.machine.joints
@@ -213,12 +252,21 @@ class _Reading:
             name = next(
                 (s.name for s in self.machine.struts if column.startswith(f"strut.{s.name}.")), "1"
             )
-            return [known for known in reading_columns(self.machine) if f".{name}." in known]
+            return [
+                known
+                for known in reading_columns(self.machine)
+                if known.startswith(f"strut.{name}.")
+            ]
         return [
             INSTRUMENT,
             *(f"command.{freedom}" for freedom in self.machine.commanded),
             *(f"joint.{joint}" for joint in self.machine.joints),
-            *(name for name, column in reading_columns(self.machine).items() if column.strut < 1),
+            *(
+                name
+                for name, column in reading_columns(self.machine).items()
+                if column.strut < 1 and not name.startswith(_PARAMETER)
+            ),
+            _PARAMETER + self.machine.parameters[0],
             "temperature.default",
             *WRENCH,
             SET,
@@ -261,7 +309,9 @@ class _Reading:
     def _check_columns(self, table: DataTable) -> None:
         """Whether there are columns of commands or joints, and of readings."""
         strange = [p.path for p in self.problems if p.code == "other-machine" and p.path]
-        unknown = any(p.code in ("unknown-column", "unknown-part") for p in self.problems)
+        unknown = any(
+            p.code in ("unknown-column", "unknown-part", "unknown-parameter") for p in self.problems
+        )
         columns = table.columns
         beginnings = [
             beginning
@@ -280,7 +330,9 @@ class _Reading:
                     hint="what the controller was sent counts",
                 )
             )
-        if not beginnings and not unknown:
+        kinds = [REGISTRY[instrument.kind] for instrument in self.header.instruments]
+        posed = not kinds or any(kind.poses for kind in kinds)
+        if not beginnings and not unknown and posed:
             commands = ", ".join(f"command.{freedom}" for freedom in self.machine.commanded)
             joints = ", ".join(f"joint.{joint}" for joint in self.machine.joints)
             self._tell(
@@ -305,7 +357,6 @@ class _Reading:
                         expected=", ".join(of_machine),
                     )
                 )
-        kinds = [REGISTRY[instrument.kind] for instrument in self.header.instruments]
         readings = [column for column in columns if column in reading_columns(self.machine)]
         silent = any(kind.optional or kind.fixed for kind in kinds)
         wrong = unknown or any(column.startswith("strut.") for column in strange)
@@ -315,8 +366,8 @@ class _Reading:
                     "nothing-measured",
                     "no column holds what was measured",
                     found=", ".join(columns) or "no column",
-                    expected="x, y, z, a, b, c, distance, strut.*.length, strut.*.direction.x or "
-                    "strut.*.angle",
+                    expected="x, y, z, a, b, c, distance, strut.*.length, strut.*.direction.x, "
+                    "strut.*.angle or parameter.*",
                 )
             )
         elif readings and not self.header.declared:

@@ -18,16 +18,21 @@ from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
 from truepose.calibration.measurements.measurements import Measurements, unloaded_at_reference
-from truepose.calibration.observables import OBSERVABLES
+from truepose.calibration.observables import OBSERVABLES, OF_PARAMETERS, parameter_column
 from truepose.errors import Fault
 from truepose.files.data_file import MOST_PROBLEMS
+from truepose.files.dimensions import BY_UNIT
 from truepose.files.wording import counted, one_of
 from truepose.machine import Condition, Machine
 from truepose.machine.condition import DEFAULT_PART
 from truepose.runs.poses import faults_text
+from truepose.sources.tolerance import bands_of
 
 UNCERTAINTY = ".uncertainty"
 """How the column of standard uncertainties of another column ends."""
+
+ALIKE = 1e-9
+"""Sizes that differ by less than this share of themselves are one size, written twice."""
 
 UNIT_LENGTH = 0.01
 """How far a direction's length may be from 1: more than noise does, less than a slip."""
@@ -48,7 +53,10 @@ WRENCH = {f"force.{axis}": "force" for axis in "xyz"} | {
 
 @dataclass(frozen=True)
 class ReadingColumn:
-    """A column of readings: what a kind calls it (`length`), its dimension, and which strut."""
+    """A column of readings: what a kind calls it (`length`), its dimension, and which strut.
+
+    Of a parameter, which parameter.
+    """
 
     word: str
     dimension: str
@@ -61,7 +69,30 @@ def reading_columns(machine: Machine) -> dict[str, ReadingColumn]:
     for number, strut in enumerate(machine.struts):
         for word, dimension in OF_A_STRUT.items():
             columns[f"strut.{strut.name}.{word}"] = ReadingColumn(word, dimension, number)
+    own = {parameter_column(name): number for number, name in enumerate(machine.parameters)}
+    of_groups = {parameter_column(group): first for group, first in sized_groups(machine).items()}
+    for column, number in (own | of_groups).items():
+        unit = machine.units[number]
+        columns[column] = ReadingColumn(OF_PARAMETERS[unit], BY_UNIT[unit], number)
     return columns
+
+
+def sized_groups(machine: Machine) -> dict[str, int]:
+    """Groups of tolerances whose members are of one size, each with one of these parameters.
+
+    They move together: who has measured one has measured all.
+    """
+    bands = bands_of(machine)
+    groups: dict[str, int] = {}
+    for number, group in ({} if bands is None else bands.group_names).items():
+        assert bands is not None
+        members = np.flatnonzero(bands.groups == number)
+        nominal = machine.nominal[bands.parameters[members]]
+        half = bands.signed_half[0][members]
+        alike = [np.ptp(sizes) <= ALIKE * np.abs(sizes).max() for sizes in (half, nominal)]
+        if all(alike):
+            groups[group] = int(bands.parameters[members[0]])
+    return groups
 
 
 @dataclass
@@ -116,7 +147,7 @@ def measurements_in(
     machine: Machine, instruments: Sequence[Instrument], rows: MeasurementRows, report: Report
 ) -> Measurements:
     """Measurements from rows; of no use where something was reported on the way."""
-    placed = _placed(machine, rows, report)
+    placed = _placed(machine, instruments, rows, report)
     conditions = _conditions(machine, rows, report)
     columns = reading_columns(machine)
     observed = _Observations(machine, instruments, rows, report, columns)
@@ -167,12 +198,20 @@ def _with_frame(
     return dataclasses.replace(instrument, frame=frame)
 
 
-def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Floats, Floats]:
-    """Joints (n_row, n_joint) and placements (n_row, 7) of the nominal machine."""
+def _placed(
+    machine: Machine, instruments: Sequence[Instrument], rows: MeasurementRows, report: Report
+) -> tuple[Floats, Floats]:
+    """Joints (n_row, n_joint) and placements (n_row, 7) of the nominal machine.
+
+    Rows of what is measured without a pose have the home pose's.
+    """
     joints = np.full((rows.n_row, len(machine.joints)), math.nan)
     placements = np.full((rows.n_row, 7), math.nan)
+    at_home = _without_pose(machine, instruments, rows, report)
+    if at_home.any():
+        joints[at_home], placements[at_home] = at_rest(machine)
     if rows.commands is not None:
-        good = np.isfinite(rows.commands).all(axis=1)
+        good = np.isfinite(rows.commands).all(axis=1) & ~at_home
         for column in (f"command.{freedom}" for freedom in machine.commanded):
             good &= ~rows.spoilt(column)
         usable = np.flatnonzero(good)
@@ -194,7 +233,7 @@ def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Fl
                 row=int(row),
             )
     if rows.joints is not None:
-        good = np.asarray(np.isfinite(rows.joints).all(axis=1), np.bool_)
+        good = np.asarray(np.isfinite(rows.joints).all(axis=1), np.bool_) & ~at_home
         for column in (f"joint.{joint}" for joint in machine.joints):
             good &= ~rows.spoilt(column)
         usable = np.flatnonzero(good & _within_travel(machine, rows, good, report))
@@ -214,6 +253,51 @@ def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Fl
                 row=row,
             )
     return joints, placements
+
+
+def at_rest(machine: Machine) -> tuple[Floats, Floats]:
+    """Joints (n_joint,) and placement (7,) of the home pose of the nominal machine."""
+    home = machine.home[[machine.dof.index(freedom) for freedom in machine.commanded]]
+    joints, placements, _ = machine.kernel.place(home[np.newaxis])
+    return joints[0], placements[0]
+
+
+def _without_pose(
+    machine: Machine, instruments: Sequence[Instrument], rows: MeasurementRows, report: Report
+) -> Flags:
+    """(n_row,) whether what is measured in a row needs no pose; all others must have one."""
+    needed = np.array([REGISTRY[instrument.kind].poses for instrument in instruments], np.intp)
+    known = rows.instrument >= 0
+    poses = np.ones(rows.n_row, np.intp)
+    poses[known] = needed[rows.instrument[known]]
+    table, prefix, names = rows.joints, "joint.", machine.joints
+    if rows.commands is not None:
+        table, prefix, names = rows.commands, "command.", machine.commanded
+    if table is None:
+        return np.ones(rows.n_row, np.bool_)
+    for at, column in enumerate(f"{prefix}{name}" for name in names):
+        blank = np.isnan(table[:, at])
+        spoilt = rows.spoilt(column)
+        for row in np.flatnonzero(blank & ~spoilt & known & (poses > 0)).tolist():
+            report(
+                Fault("empty-cell", "the cell is empty", found="nothing", expected="a number"),
+                row=row,
+                column=column,
+            )
+        for row in np.flatnonzero(~blank & (poses == 0)).tolist():
+            kind = instruments[int(rows.instrument[row])].kind
+            report(
+                Fault(
+                    "unwanted-value",
+                    "what this row measures does not depend on a pose",
+                    found=report.shown(column, row),
+                    expected=f"an empty cell in a row of kind {kind}",
+                ),
+                row=row,
+                column=column,
+            )
+    without: Flags = poses == 0
+    return without
 
 
 def _within_travel(machine: Machine, rows: MeasurementRows, good: Flags, report: Report) -> Flags:
@@ -337,6 +421,9 @@ class _Observations:
             return
         self._refuse_unwanted(instrument, kind, own_rows)
         own = {name: column for name, column in self.columns.items() if column.word in kind.reads}
+        if kind.poses == 0:
+            self._refuse_conditions(own_rows)
+            self._refuse_doubled(own_rows, own)
         self._require(instrument, kind, own_rows, own)
         self._check_signs(kind, own_rows, own)
         if any(word.startswith("direction") for word in kind.reads):
@@ -439,6 +526,46 @@ class _Observations:
                         "an uncertainty of what the row does not have",
                         found=self.report.shown(name, row),
                         expected=f"an empty cell, or a value in the column {column}",
+                    ),
+                    row=row,
+                    column=name,
+                )
+
+    def _refuse_doubled(self, own_rows: Flags, own: Mapping[str, ReadingColumn]) -> None:
+        """A group and its member in one row: two readings of one parameter."""
+        first: dict[int, str] = {}
+        for name, reading in own.items():
+            if name not in self.rows.readings:
+                continue
+            other = first.setdefault(reading.strut, name)
+            both = own_rows & self.rows.filled(name) & self.rows.filled(other)
+            for row in np.flatnonzero(both).tolist() if other != name else ():
+                self.report(
+                    Fault(
+                        "excluding-columns",
+                        f"the row has this in the column {other} too",
+                        found=self._shown(name, row),
+                        expected="one of the two, or a row for each",
+                    ),
+                    row=row,
+                    column=name,
+                )
+
+    def _refuse_conditions(self, own_rows: Flags) -> None:
+        """Temperatures and loads of what is measured by itself."""
+        temperatures = self.rows.temperatures
+        stated = {f"temperature.{part}": values for part, values in temperatures.items()}
+        reference = self.machine.condition.reference_temperature
+        for name, values in (stated | dict(self.rows.wrench)).items():
+            usual = 0.0 if name in WRENCH else reference
+            other = own_rows & ~np.isnan(values) & (values != usual)
+            for row in np.flatnonzero(other).tolist():
+                self.report(
+                    Fault(
+                        "unwanted-value",
+                        "a parameter is what it is at the reference temperature, without loads",
+                        found=self.report.shown(name, row),
+                        expected="an empty cell, and the value at the reference temperature",
                     ),
                     row=row,
                     column=name,

@@ -43,7 +43,8 @@ def measurements_text(machine: Machine, measurements: Measurements) -> str:
     columns = _Columns(machine)
     columns.words(INSTRUMENT, _names(measurements))
     for joint, drive in enumerate(machine.drives):
-        columns.numbers(f"joint.{drive.name}", drive.coordinate, measurements.joints[:, joint])
+        commanded = np.where(measurements.posed, measurements.joints[:, joint], math.nan)
+        columns.numbers(f"joint.{drive.name}", drive.coordinate, commanded)
     _readings(machine, measurements, columns)
     _conditions(machine, measurements, columns)
     columns.words(SET, [CHECK if held_out else FIT for held_out in measurements.held_out.tolist()])
@@ -172,7 +173,11 @@ def _readings(machine: Machine, measurements: Measurements, columns: _Columns) -
     """The columns of readings, each with its uncertainties."""
     kinds = [REGISTRY[instrument.kind] for instrument in measurements.instruments]
     instrument_of = measurements.instrument[measurements.row]
+    written: set[tuple[str, int]] = set()
     for name, reading in reading_columns(machine).items():
+        if (reading.word, reading.strut) in written:
+            continue  # a group's: what is measured of it stands under its member's name
+        written.add((reading.word, reading.strut))
         value = np.full(measurements.n_row, math.nan)
         stated = np.full(measurements.n_row, math.nan)
         silent = True
@@ -208,6 +213,7 @@ def _readings(machine: Machine, measurements: Measurements, columns: _Columns) -
 
 def _conditions(machine: Machine, measurements: Measurements, columns: _Columns) -> None:
     """The columns of temperatures and loads, those that say something."""
+    posed = measurements.posed
     conditions = measurements.conditions
     reference = machine.condition.reference_temperature
     for condition in {id(condition): condition for condition in conditions}.values():
@@ -216,15 +222,17 @@ def _conditions(machine: Machine, measurements: Measurements, columns: _Columns)
             raise RequestError(_bad("conditions", lost, "temperatures, force and moment only"))
     defaults = np.array([condition.default_temperature for condition in conditions])
     if (defaults != reference).any():
-        columns.numbers(f"temperature.{DEFAULT_PART}", "temperature", defaults)
+        of_poses = np.where(posed, defaults, math.nan)
+        columns.numbers(f"temperature.{DEFAULT_PART}", "temperature", of_poses)
     named = dict.fromkeys(part for condition in conditions for part in condition.part_temperatures)
     for part in named:
         values = [condition.part_temperatures.get(part, math.nan) for condition in conditions]
-        columns.numbers(f"temperature.{part}", "temperature", np.array(values))
+        of_poses = np.where(posed, np.array(values), math.nan)
+        columns.numbers(f"temperature.{part}", "temperature", of_poses)
     wrenches = np.array([condition.wrench for condition in conditions]).reshape(-1, 6)
     for component, (name, dimension) in enumerate(WRENCH.items()):
         if wrenches[:, component].any():
-            columns.numbers(name, dimension, wrenches[:, component])
+            columns.numbers(name, dimension, np.where(posed, wrenches[:, component], math.nan))
 
 
 def _lost(machine: Machine, condition: Condition) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -37,11 +38,17 @@ def shown(
     setups: list[Placement] | None = None,
 ) -> Floats:
     """(n_observation,) what an actual machine shows at the commanded joints, without noise."""
-    start = nominal.kernel.pose_of(measurements.placements)
-    poses, status = actual.kernel.forward(measurements.joints, start, status=True)
-    assert (status <= 1).all()
-    placements = actual.kernel.placement_of(poses)
-    geometry = Geometry.of(actual.kernel, measurements.joints, placements)
+
+    def standing(joints: Floats, placements: Floats) -> Geometry:
+        start = nominal.kernel.pose_of(placements)
+        poses, status = actual.kernel.forward(joints, start, status=True)
+        assert (status <= 1).all()
+        return Geometry.of(actual.kernel, joints, actual.kernel.placement_of(poses))
+
+    geometry = standing(measurements.joints, measurements.placements)
+    others, placements = measurements.other_joints, measurements.other_placements
+    if others is not None and placements is not None:
+        geometry = replace(geometry, others=standing(others, placements))
     return nominal_readings(nominal, measurements, setups, geometry)
 
 

@@ -91,6 +91,11 @@ def made_measurements(
         one.sort(key=lambda each: each[::-1])
     assert all((each in OF_STRUTS) == of_kind.of_struts for each in read)
     n = len(given)
+    second: dict[str, Floats] = {}
+    if of_kind.poses == 2:  # each pose to the one before
+        assert n > 1
+        second["other_joints"] = np.roll(joints, 1, axis=0)
+        second["other_placements"] = np.roll(placements, 1, axis=0)
     conditions: tuple[Condition, ...]
     if condition is None or isinstance(condition, Condition):
         conditions = (reference_condition(machine) if condition is None else condition,) * n
@@ -109,6 +114,7 @@ def made_measurements(
         value=np.zeros(n * len(one)),
         uncertainty=np.tile([by_observable[OBSERVABLES[each]] for each, _ in one], n),
         lines=np.zeros(n, np.intp),
+        **second,
     )
     if values == "nominal":
         return measurements.with_values(nominal_values(machine, measurements))
@@ -168,7 +174,13 @@ def nominal_values(machine: Machine, measurements: Measurements) -> Floats:
         frame = rotation_matrix(instrument.frame.rotation)
         point = placements[row, :3] + turned[row] @ np.array(instrument.target)
         seen = frame.T @ (point - np.array(instrument.frame.origin))
-        if is_parameter(measurements.observable[at]):
+        if name == "separation":
+            assert measurements.other_placements is not None
+            other = measurements.other_placements[row]
+            arm = np.array(instrument.target)
+            far = other[:3] + rotation_matrix(other[3:]) @ arm
+            values[at] = np.linalg.norm(far - point)
+        elif is_parameter(measurements.observable[at]):
             values[at] = machine.nominal[strut]
         elif name in "xyz":
             values[at] = seen["xyz".index(name)]

@@ -131,7 +131,10 @@ def same(one: Measurements, other: Measurements, exact: bool = True) -> None:
     assert one.conditions == other.conditions
     for name in ("instrument", "held_out", "row", "observable", "strut", "uncertainty"):
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
-    for name in ("joints", "placements", "value"):
+    for name in ("joints", "placements", "value", "other_joints", "other_placements"):
+        if getattr(other, name) is None:
+            assert getattr(one, name) is None
+            continue
         assert np.allclose(getattr(one, name), getattr(other, name), rtol=0, atol=1e-12), name
     if exact:
         assert np.array_equal(one.value, other.value)
@@ -153,6 +156,12 @@ def columns_of(machine: Machine, made: Measurements) -> dict[str, np.ndarray]:
     return columns
 
 
+def commands(kind: str, **first: np.ndarray) -> dict[str, np.ndarray]:
+    """What a kind needs of the commands: nothing, the poses, or to which others it measured too."""
+    ((name, table),) = first.items()
+    return [{}, {name: table}, {name: table, "to": np.roll(table, 1, axis=0)}][REGISTRY[kind].poses]
+
+
 @pytest.mark.parametrize("kind", REGISTRY)
 def test_arrays_of_every_kind(machine: Machine, kind: str) -> None:
     poses = poses_within(machine, 6, seed=2)
@@ -161,11 +170,11 @@ def test_arrays_of_every_kind(machine: Machine, kind: str) -> None:
     )
     if kind == "contact":
         made = made.with_values(np.zeros(made.n_observation))
-    commanded = {"poses": poses} if REGISTRY[kind].poses else {}
     values = columns_of(machine, made)
+    commanded = commands(kind, poses=poses)
     found = measurements_of(machine, made.instruments[0], values=values, **commanded)
     same(found, made)
-    commanded = {"joints": made.joints} if REGISTRY[kind].poses else {}
+    commanded = commands(kind, joints=made.joints)
     again = measurements_of(machine, made.instruments[0], values=values, **commanded)
     same(again, made)
 
@@ -315,7 +324,7 @@ def test_every_kind_of_every_machine(path: Path) -> None:
         made = made_measurements(machine, name, poses, values="nominal")
         if name == "contact":
             made = made.with_values(np.zeros(made.n_observation))
-        commanded = {"poses": poses} if kind.poses else {}
         values = columns_of(machine, made)
+        commanded = commands(name, poses=poses)
         found = measurements_of(machine, made.instruments[0], values=values, **commanded)
         same(found, made)

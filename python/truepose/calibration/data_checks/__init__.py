@@ -81,7 +81,7 @@ def suspicions(machine: Machine, measurements: Measurements) -> tuple[Suspicion,
     Empty for data of a machine that is within its tolerances. Raises nothing of its own, and
     `TrueposeError` where a row's condition asks an error source for what the machine does not say.
     """
-    geometry = Geometry.of(machine.kernel, measurements.joints, measurements.placements)
+    geometry = Geometry.of_rows(machine.kernel, measurements)
     allowed = expected_residual(machine, measurements, geometry)
     instrument_of = measurements.instrument[measurements.row]
     suspected: list[Suspicion] = []

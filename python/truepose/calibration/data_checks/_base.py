@@ -237,8 +237,11 @@ class View:
     def other_command(
         self, geometry: Geometry | None, words: str, where: tuple[str, ...]
     ) -> Iterator[Hypothesis]:
-        """That the machine was commanded to another geometry; nothing where it cannot be there."""
-        if geometry is not None:
+        """That the machine was commanded to another geometry; nothing where it cannot be there.
+
+        Nor of rows between two poses, of which the other geometry is one.
+        """
+        if geometry is not None and not self.measurements.between[self.rows].any():
             yield Hypothesis(words, where, self.assess(geometry=geometry), of_command=True)
 
     def rms(self, misfit: Misfit, hypothesis: Hypothesis, unit: str) -> float:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from truepose._kernel import Machine as KernelMachine
 from truepose.arrays import Floats
 from truepose.calibration.data_checks.nominal import (
     DIRECTION,
@@ -70,7 +73,6 @@ def _by_tolerance(machine: Machine, measurements: Measurements, geometry: Geomet
         return assumed
     nominal = nominal_readings(machine, measurements, geometry=geometry)
     ends = np.random.default_rng(0).choice([-1.0, 1.0], (MACHINES, bands.n_variable))
-    start = machine.kernel.pose_of(measurements.placements)
     squares = []
     for signs in ends:
         change = np.zeros(len(machine.parameters))
@@ -82,9 +84,7 @@ def _by_tolerance(machine: Machine, measurements: Measurements, geometry: Geomet
         kernel = machine.kernel.replace(
             {machine.parameters[column]: float(values[column]) for column in columns}
         )
-        poses, _ = kernel.forward(measurements.joints, start, status=True)
-        placements = kernel.placement_of(poses)
-        drawn = Geometry.of(kernel, measurements.joints, placements)
+        drawn = Geometry.of_rows(kernel, _standing(kernel, measurements))
         readings = nominal_readings(machine, measurements, geometry=drawn)
         squares.append(difference(measurements.observable, readings, nominal) ** 2)
     table = np.stack(squares)
@@ -92,6 +92,20 @@ def _by_tolerance(machine: Machine, measurements: Measurements, geometry: Geomet
     # Where no drawn machine could be solved, as near a singularity: as if no tolerance were given.
     mean = np.where(solved, table, 0.0).sum(axis=0) / np.maximum(solved.sum(axis=0), 1)
     return _shared(measurements, np.where(solved.any(axis=0), mean, assumed**2))
+
+
+def _standing(kernel: KernelMachine, measurements: Measurements) -> Measurements:
+    """The measurements with a machine of other dimensions standing at the same joints."""
+
+    def placed(joints: Floats, placements: Floats) -> Floats:
+        poses, _ = kernel.forward(joints, kernel.pose_of(placements), status=True)
+        return np.asarray(kernel.placement_of(poses))
+
+    other_joints, others = measurements.other_joints, measurements.other_placements
+    if other_joints is not None and others is not None:
+        others = placed(other_joints, others)
+    placements = placed(measurements.joints, measurements.placements)
+    return replace(measurements, placements=placements, other_placements=others)
 
 
 def _shared(measurements: Measurements, squares: Floats) -> Floats:

@@ -12,7 +12,7 @@ o and rotation F (frame axes to base axes).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,8 +24,9 @@ from truepose.calibration.observables import OBSERVABLES, is_parameter
 from truepose.machine import Machine
 from truepose.spatial import matrix_to_euler, quaternion_to_matrix
 
-X, A, DISTANCE, LENGTH, DIRECTION, ANGLE = (
-    OBSERVABLES.index(name) for name in ("x", "a", "distance", "length", "direction.x", "angle")
+X, A, DISTANCE, LENGTH, DIRECTION, ANGLE, SEPARATION = (
+    OBSERVABLES.index(name)
+    for name in ("x", "a", "distance", "length", "direction.x", "angle", "separation")
 )
 
 
@@ -35,12 +36,23 @@ class Geometry:
 
     `points` (n, 3) tool point, m; `rotations` (n, 3, 3) platform axes to base axes; `centres`
     (n, n_strut, 2, 3) base-side and platform-side joint centres, m; `parameters` (n_parameter,).
+    `others`: at the second poses of rows that are between two.
     """
 
     points: Floats
     rotations: Floats
     centres: Floats
     parameters: Floats
+    others: Geometry | None = None
+
+    @classmethod
+    def of_rows(cls, kernel: KernelMachine, measurements: Measurements) -> Geometry:
+        """Of measurements, at every row."""
+        geometry = cls.of(kernel, measurements.joints, measurements.placements)
+        if measurements.other_joints is None or measurements.other_placements is None:
+            return geometry
+        others = cls.of(kernel, measurements.other_joints, measurements.other_placements)
+        return replace(geometry, others=others)
 
     @classmethod
     def of(cls, kernel: KernelMachine, joints: Floats, placements: Floats) -> Geometry:
@@ -51,9 +63,15 @@ class Geometry:
 
     def rows(self, rows: Indices) -> Geometry:
         """These rows only."""
+        others = None if self.others is None else self.others.rows(rows)
         return Geometry(
-            self.points[rows], self.rotations[rows], self.centres[rows], self.parameters
+            self.points[rows], self.rotations[rows], self.centres[rows], self.parameters, others
         )
+
+    def targets(self, target: Floats) -> Floats:
+        """(n, 3) where a point of the platform is, given from the tool point in its axes."""
+        points: Floats = self.points + self.rotations @ target
+        return points
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +101,7 @@ def read(
     """(k,) what one instrument reads: observation k is of row `row[k]` of the geometry; SI."""
     value: Floats = np.empty(row.size)
     turned = geometry.rotations
-    from_origin = geometry.points + turned @ placement.target - placement.origin
+    from_origin = geometry.targets(placement.target) - placement.origin
     of_point = (observable < A) | (observable == DISTANCE)
     if of_point.any():
         seen = from_origin @ placement.rotation
@@ -94,6 +112,11 @@ def read(
     if of_angle.any():
         angles = matrix_to_euler(placement.rotation.T @ turned)
         value[of_angle] = angles[row[of_angle], observable[of_angle] - A]
+    of_two = observable == SEPARATION
+    if of_two.any():
+        assert geometry.others is not None
+        apart = geometry.others.targets(placement.target) - geometry.targets(placement.target)
+        value[of_two] = np.linalg.norm(apart, axis=1)[row[of_two]]
     of_parameter = is_parameter(observable)
     value[of_parameter] = geometry.parameters[strut[of_parameter]]
     of_strut = (observable >= LENGTH) & (observable <= ANGLE)
@@ -143,7 +166,7 @@ def nominal_readings(
     counts as its start. Biases count as zero. Raises nothing: a row that is not placed gives NaN.
     """
     if geometry is None:
-        geometry = Geometry.of(machine.kernel, measurements.joints, measurements.placements)
+        geometry = Geometry.of_rows(machine.kernel, measurements)
     value = np.empty(measurements.n_observation)
     instrument_of = measurements.instrument[measurements.row]
     for index, instrument in enumerate(measurements.instruments):

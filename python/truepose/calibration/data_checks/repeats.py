@@ -27,7 +27,7 @@ def inspect_doubled(view: View) -> Iterator[Suspicion]:
         if not value.any():
             return  # a contact reads zero everywhere
         key = (
-            view.measurements.joints[row].tobytes(),
+            view.measurements.command(row),
             value.tobytes(),
             view.readings.observable[of_row].tobytes(),
         )
@@ -58,7 +58,7 @@ def inspect_disagreeing(view: View) -> Iterator[Suspicion]:
         for observation in column.observations.tolist():
             row = int(view.readings.row[observation])
             condition = id(view.measurements.conditions[row])
-            key = (view.measurements.joints[row].tobytes(), condition)
+            key = (view.measurements.command(row), condition)
             first = seen.setdefault(key, observation)
             gap = abs(view.readings.value[observation] - view.readings.value[first])
             noise = np.hypot(

@@ -76,6 +76,7 @@ class IdentificationProblem:
     def __init__(self, machine: Machine, measurements: Measurements, unknowns: Unknowns) -> None:
         """Raises `TrueposeError` where a row's condition asks for what the machine does not say."""
         self.machine, self.measurements, self.unknowns = machine, measurements, unknowns
+        self._each_pose = measurements.with_second_poses()
         self._kernel = Identification(machine.kernel, self._description())
 
     def predict(self, values: ArrayLike) -> Floats:
@@ -83,8 +84,13 @@ class IdentificationProblem:
         return self._kernel.predict(values)[0]
 
     def status(self, values: ArrayLike) -> np.ndarray:
-        """(n_row,) kernel status of each row's pose."""
-        return self._kernel.predict(values)[1]
+        """(n_row,) kernel status of each row's pose, of two that of the first that fails."""
+        status: np.ndarray = self._kernel.predict(values)[1]
+        of_rows = status[: self.measurements.n_row].copy()
+        between = np.flatnonzero(self.measurements.between)
+        second = status[self.measurements.n_row :]
+        of_rows[between] = np.where(of_rows[between] == 0, second, of_rows[between])
+        return of_rows
 
     def jacobian(self, values: ArrayLike) -> Floats:
         """(n_observation, n) derivatives of `predict`; NaN where a pose cannot be solved."""
@@ -136,14 +142,17 @@ class IdentificationProblem:
 
     def _description(self) -> dict[str, object]:
         measurements, unknowns = self.measurements, self.unknowns
-        columns, shifts = row_shifts(self.machine, measurements, unknowns)
+        poses = self._each_pose
+        columns, shifts = row_shifts(self.machine, poses, unknowns)
         terms, coefficients = self._terms(columns, shifts)
         order = np.argsort(measurements.row, kind="stable")
         if not np.array_equal(order, np.arange(order.size)):
             raise ValueError("observations are not in the order of their rows")
         by = measurements.instrument[measurements.row]
+        between = np.flatnonzero(measurements.between).tolist()
+        second = {row: measurements.n_row + at for at, row in enumerate(between)}
         observations = [
-            (int(row), None, int(number), int(what), max(int(strut), 0), bias)
+            (int(row), second.get(int(row)), int(number), int(what), max(int(strut), 0), bias)
             for row, number, what, strut, bias in zip(
                 measurements.row,
                 by,
@@ -160,8 +169,8 @@ class IdentificationProblem:
         ]
         return {
             "unknowns": unknowns.count,
-            "joints": measurements.joints.ravel().tolist(),
-            "starts": measurements.placements.ravel().tolist(),
+            "joints": poses.joints.ravel().tolist(),
+            "starts": poses.placements.ravel().tolist(),
             "shifted": columns.tolist(),
             "shifts": shifts.ravel().tolist(),
             "terms": terms,
@@ -181,7 +190,7 @@ class IdentificationProblem:
         }
 
     def _terms(self, columns: Indices, shifts: Floats) -> tuple[list[tuple[int, int]], Floats]:
-        """(unknown, parameter) of every effect, and the coefficients (1 or n_row, n_term)."""
+        """(unknown, parameter) of every effect, and the coefficients (1 or n_pose, n_term)."""
         unknowns = self.unknowns
         at, numbers = np.nonzero(unknowns.effects)
         terms = [
@@ -191,9 +200,9 @@ class IdentificationProblem:
         constant = unknowns.effects[at, numbers][np.newaxis, :]
         if not unknowns.properties:
             return terms, constant
-        parts = [np.repeat(constant, self.measurements.n_row, axis=0)]
+        parts = [np.repeat(constant, self._each_pose.n_row, axis=0)]
         for number, change in property_effects(
-            self.machine, self.measurements, unknowns, (columns, shifts)
+            self.machine, self._each_pose, unknowns, (columns, shifts)
         ):
             own, slopes = change
             terms += [(number, int(column)) for column in own]

@@ -203,7 +203,17 @@ def _more_poses(machine: Machine, fit: Fit, number: int, count: int) -> Floats |
         value=np.zeros(total * size),
         uncertainty=np.tile(data.uncertainty[of_first], total),
         lines=np.zeros(total, np.intp),
+        other_joints=None,
+        other_placements=None,
     )
+    if data.between[first]:
+        # From each pose to the one half of them further on.
+        half = max(total // 2, 1)
+        more = dataclasses.replace(
+            more,
+            other_joints=np.roll(joints, half, axis=0),
+            other_placements=np.roll(placements, half, axis=0),
+        )
     return _rows(machine, fit, more) if total else None
 
 

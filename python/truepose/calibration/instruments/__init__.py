@@ -19,6 +19,7 @@ from truepose.calibration.instruments import (
     plane,
     pose,
     position,
+    separation,
     strut_direction,
     strut_length,
 )
@@ -45,6 +46,7 @@ REGISTRY: Mapping[str, Kind] = MappingProxyType(
             joint_angle,
             contact,
             parameter,
+            separation,
         )
     }
 )

@@ -43,6 +43,8 @@ class Measurements:
     then is, tool point and quaternion, at its home where a row needs no pose; `instrument`
     (n_row,) which of `instruments` measured; `conditions` (n_row,), equal ones the same object;
     `held_out` (n_row,): kept from the fit; `lines` (n_row,) of the file, 0 where there is none.
+    `other_joints` and `other_placements`: the second pose of rows that are between two, in the
+    others the first again; None where no row is.
 
     Observations: `row` (n_observation,) of each, `observable`: its index in `OBSERVABLES`, `strut`:
     which, of a parameter which parameter, or -1; `value` and standard `uncertainty`, above zero.
@@ -62,6 +64,8 @@ class Measurements:
     lines: Indices
     file: str = ""
     file_hash: str = ""
+    other_joints: Floats | None = None
+    other_placements: Floats | None = None
 
     @property
     def n_row(self) -> int:
@@ -80,6 +84,38 @@ class Measurements:
         flags[self.row[is_parameter(self.observable)]] = False
         return flags
 
+    @property
+    def between(self) -> Flags:
+        """(n_row,) whether the row was measured between two poses."""
+        flags = np.zeros(self.n_row, np.bool_)
+        flags[self.row[self.observable == OBSERVABLES.index("separation")]] = True
+        return flags
+
+    def command(self, row: int) -> bytes:
+        """What a row was commanded to, to the last digit: equal of equal commands only."""
+        tables = [self.joints] + ([] if self.other_joints is None else [self.other_joints])
+        return b"".join(table[row].tobytes() for table in tables)
+
+    def with_second_poses(self) -> Measurements:
+        """The second poses of rows between two as further rows, in their order, without readings.
+
+        Every pose at which anything was measured is then the one pose of a row.
+        """
+        if self.other_joints is None or self.other_placements is None:
+            return self
+        rows = np.flatnonzero(self.between)
+        return dataclasses.replace(
+            self,
+            joints=np.concatenate([self.joints, self.other_joints[rows]]),
+            placements=np.concatenate([self.placements, self.other_placements[rows]]),
+            instrument=np.concatenate([self.instrument, self.instrument[rows]]),
+            conditions=self.conditions + tuple(self.conditions[row] for row in rows.tolist()),
+            held_out=np.concatenate([self.held_out, self.held_out[rows]]),
+            lines=np.concatenate([self.lines, self.lines[rows]]),
+            other_joints=None,
+            other_placements=None,
+        )
+
     def observables(self, instrument: int) -> tuple[str, ...]:
         """Names of what an instrument, by its index, read in any row, in the order of the table."""
         read = self.observable[self.instrument[self.row] == instrument]
@@ -90,7 +126,8 @@ class Measurements:
         """SHA-256 of the file's bytes, or of the numbers where there is no file."""
         if self.file_hash:
             return self.file_hash
-        arrays = (self.joints, self.row, self.observable, self.strut, self.value, self.uncertainty)
+        arrays = [self.joints, self.row, self.observable, self.strut, self.value, self.uncertainty]
+        arrays += [] if self.other_joints is None else [self.other_joints]
         parts = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
         return hashlib.sha256(parts).hexdigest()
 
@@ -114,6 +151,8 @@ class Measurements:
             strut=self.strut[kept],
             value=self.value[kept],
             uncertainty=self.uncertainty[kept],
+            other_joints=_of_rows(self.other_joints, wanted),
+            other_placements=_of_rows(self.other_placements, wanted),
         )
 
     def with_values(self, value: ArrayLike, uncertainty: ArrayLike | None = None) -> Measurements:
@@ -131,3 +170,7 @@ class Measurements:
             if not (np.isfinite(stated) & (stated > 0.0)).all():
                 raise ValueError("expected finite uncertainties above zero")
         return dataclasses.replace(self, value=values, uncertainty=stated)
+
+
+def _of_rows(table: Floats | None, wanted: Flags) -> Floats | None:
+    return None if table is None else table[wanted]

@@ -21,6 +21,13 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments import REGISTRY
+from truepose.calibration.measurements.columns import (
+    TO,
+    UNCERTAINTY,
+    WRENCH,
+    MeasurementRows,
+    reading_columns,
+)
 from truepose.calibration.measurements.declarations import (
     Header,
     read_header,
@@ -28,13 +35,7 @@ from truepose.calibration.measurements.declarations import (
     separated,
 )
 from truepose.calibration.measurements.measurements import Measurements
-from truepose.calibration.measurements.rows import (
-    UNCERTAINTY,
-    WRENCH,
-    MeasurementRows,
-    measurements_in,
-    reading_columns,
-)
+from truepose.calibration.measurements.rows import measurements_in
 from truepose.calibration.observables import parameter_column
 from truepose.errors import Fault, MachineFileError, Problem, RequestError
 from truepose.files.data_file import Column, DataTable, ReadTable, cut_short, read_table
@@ -53,6 +54,8 @@ _KIND = FileKind("a file of measurements (CSV)", ".csv")
 _OF_MACHINE = {
     "joint.": "joints",
     "command.": "freedoms that can be commanded",
+    TO + "joint.": "joints",
+    TO + "command.": "freedoms that can be commanded",
     "strut.": "struts",
 }
 """Beginnings of columns that name something of the machine, and what."""
@@ -93,14 +96,13 @@ def _columns(machine: Machine) -> list[Column]:
         return Column(name, dimension, required=False, words=words, blank=True)
 
     columns = [Column(INSTRUMENT, None, required=False)]
-    columns += [
-        Column(f"command.{freedom}", FREEDOMS[freedom], required=False, blank=True)
-        for freedom in machine.commanded
-    ]
-    columns += [
-        Column(f"joint.{drive.name}", drive.coordinate, required=False, blank=True)
-        for drive in machine.drives
-    ]
+    for beginning in ("", TO):
+        columns += [
+            may(f"{beginning}command.{freedom}", FREEDOMS[freedom]) for freedom in machine.commanded
+        ]
+        columns += [
+            may(f"{beginning}joint.{drive.name}", drive.coordinate) for drive in machine.drives
+        ]
     for name, reading in reading_columns(machine).items():
         columns += [may(name, reading.dimension), may(name + UNCERTAINTY, reading.dimension)]
     columns += [may(f"temperature.{part}", "temperature") for part in _parts(machine)]
@@ -137,6 +139,8 @@ class _Reading:
             return None
         commands = self._stacked(table, "command.", self.machine.commanded)
         joints = self._stacked(table, "joint.", self.machine.joints)
+        to_commands = self._stacked(table, TO + "command.", self.machine.commanded)
+        to_joints = self._stacked(table, TO + "joint.", self.machine.joints)
         readings = reading_columns(self.machine)
         rows = MeasurementRows(
             instrument=self._instruments(table),
@@ -148,6 +152,8 @@ class _Reading:
             lines=table.lines,
             commands=commands if joints is None else None,
             joints=joints,
+            to_commands=to_commands if joints is None else None,
+            to_joints=to_joints,
             temperatures={
                 part: table.numbers[f"temperature.{part}"]
                 for part in _parts(self.machine)
@@ -188,7 +194,8 @@ class _Reading:
                 known = self._words_beside(word)
                 yield replace(problem, expected=one_of(known, limit=40))
         for beginning, same in strange.items():
-            names = dict.fromkeys(_second(problem.path or "") for problem in same)
+            paths = [(problem.path or "").removeprefix(beginning) for problem in same]
+            names = dict.fromkeys(path.partition(".")[0] for path in paths)
             own = self._own(beginning)
             near = next((hint for hint in (did_you_mean(n, own) for n in names) if hint), None)
             yield Problem(
@@ -233,9 +240,9 @@ class _Reading:
         )
 
     def _own(self, beginning: str) -> tuple[str, ...]:
-        if beginning == "joint.":
+        if beginning.endswith("joint."):
             return self.machine.joints
-        if beginning == "command.":
+        if beginning.endswith("command."):
             return self.machine.commanded
         return tuple(strut.name for strut in self.machine.struts)
 
@@ -316,7 +323,7 @@ class _Reading:
         beginnings = [
             beginning
             for beginning in ("command.", "joint.")
-            if any(column.startswith(beginning) for column in (*columns, *strange))
+            if any(column.removeprefix(TO).startswith(beginning) for column in (*columns, *strange))
         ]
         if len(beginnings) > 1:
             self._tell(
@@ -324,7 +331,9 @@ class _Reading:
                     "excluding-columns",
                     "the file has both joints and commanded poses",
                     found=", ".join(
-                        column for column in columns if column.startswith(("command.", "joint."))
+                        column
+                        for column in columns
+                        if column.removeprefix(TO).startswith(("command.", "joint."))
                     ),
                     expected="either columns command.* or columns joint.*",
                     hint="what the controller was sent counts",
@@ -343,7 +352,10 @@ class _Reading:
                     expected=f"{commands}; or {joints}",
                 )
             )
-        for beginning in beginnings if len(beginnings) == 1 else ():
+        two = any(kind.poses == 2 for kind in kinds) or any(c.startswith(TO) for c in columns)
+        wanted = [beginnings[0]] if len(beginnings) == 1 else []
+        wanted += [TO + beginning for beginning in wanted if two]
+        for beginning in wanted:
             of_machine = [beginning + name for name in self._own(beginning)]
             lacking = [column for column in of_machine if column not in columns]
             if lacking and not any(column.startswith(beginning) for column in strange):
@@ -420,11 +432,6 @@ class _Reading:
                     )
                 )
         return np.array([numbers.get(word, -1) for word in words], np.intp)
-
-
-def _second(column: str) -> str:
-    """`d1` of `joint.d1`, `9` of `strut.9.length`."""
-    return column.split(".")[1]
 
 
 @dataclass

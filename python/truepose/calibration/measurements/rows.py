@@ -8,146 +8,41 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
-from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
+from truepose.calibration.measurements.columns import (
+    UNCERTAINTY,
+    WRENCH,
+    MeasurementRows,
+    ReadingColumn,
+    Report,
+    reading_columns,
+)
+from truepose.calibration.measurements.commanded_poses import commanded_poses
 from truepose.calibration.measurements.measurements import Measurements, unloaded_at_reference
-from truepose.calibration.observables import OBSERVABLES, OF_PARAMETERS, parameter_column
+from truepose.calibration.observables import OBSERVABLES
 from truepose.errors import Fault
-from truepose.files.data_file import MOST_PROBLEMS
-from truepose.files.dimensions import BY_UNIT
 from truepose.files.wording import counted, one_of
 from truepose.machine import Condition, Machine
 from truepose.machine.condition import DEFAULT_PART
-from truepose.runs.poses import faults_text
-from truepose.sources.tolerance import bands_of
 
-UNCERTAINTY = ".uncertainty"
-"""How the column of standard uncertainties of another column ends."""
-
-ALIKE = 1e-9
-"""Sizes that differ by less than this share of themselves are one size, written twice."""
+ABOVE_ZERO = ("length", "distance", "separation")
+"""Observables that no instrument reads as zero or less."""
 
 UNIT_LENGTH = 0.01
 """How far a direction's length may be from 1: more than noise does, less than a slip."""
-
-SINGLE = {"x": "length", "y": "length", "z": "length"} | dict.fromkeys("abc", "angle")
-SINGLE["distance"] = "length"
-"""Dimension of the columns that are not of one strut."""
-
-OF_A_STRUT = {"length": "length"} | {f"direction.{axis}": "ratio" for axis in "xyz"}
-OF_A_STRUT["angle"] = "angle"
-"""Dimension of a strut's columns, by the end of their name."""
-
-WRENCH = {f"force.{axis}": "force" for axis in "xyz"} | {
-    f"moment.{axis}": "moment" for axis in "xyz"
-}
-"""Dimension of the columns of what acts on the tool."""
-
-
-@dataclass(frozen=True)
-class ReadingColumn:
-    """A column of readings: what a kind calls it (`length`), its dimension, and which strut.
-
-    Of a parameter, which parameter.
-    """
-
-    word: str
-    dimension: str
-    strut: int = -1
-
-
-def reading_columns(machine: Machine) -> dict[str, ReadingColumn]:
-    """Every column that readings of a machine can have, in the order of a file."""
-    columns = {word: ReadingColumn(word, dimension) for word, dimension in SINGLE.items()}
-    for number, strut in enumerate(machine.struts):
-        for word, dimension in OF_A_STRUT.items():
-            columns[f"strut.{strut.name}.{word}"] = ReadingColumn(word, dimension, number)
-    own = {parameter_column(name): number for number, name in enumerate(machine.parameters)}
-    of_groups = {parameter_column(group): first for group, first in sized_groups(machine).items()}
-    for column, number in (own | of_groups).items():
-        unit = machine.units[number]
-        columns[column] = ReadingColumn(OF_PARAMETERS[unit], BY_UNIT[unit], number)
-    return columns
-
-
-def sized_groups(machine: Machine) -> dict[str, int]:
-    """Groups of tolerances whose members are of one size, each with one of these parameters.
-
-    They move together: who has measured one has measured all.
-    """
-    bands = bands_of(machine)
-    groups: dict[str, int] = {}
-    for number, group in ({} if bands is None else bands.group_names).items():
-        assert bands is not None
-        members = np.flatnonzero(bands.groups == number)
-        nominal = machine.nominal[bands.parameters[members]]
-        half = bands.signed_half[0][members]
-        alike = [np.ptp(sizes) <= ALIKE * np.abs(sizes).max() for sizes in (half, nominal)]
-        if all(alike):
-            groups[group] = int(bands.parameters[members[0]])
-    return groups
-
-
-@dataclass
-class MeasurementRows:
-    """What was given, by columns (n_row,), SI, a blank cell NaN, before anything of it is checked.
-
-    Either `commands` (n_row, n_commanded) or `joints` (n_row, n_joint). `instrument`: which, or -1
-    where that is not known. `temperatures` by part, `wrench` by `force.x`, ... `unreadable`: cells
-    with a problem already. `whole`: names of instruments whose frame is wholly to be found.
-    """
-
-    instrument: Indices
-    readings: Mapping[str, Floats]
-    uncertainties: Mapping[str, Floats]
-    held_out: Flags
-    lines: Indices
-    commands: Floats | None = None
-    joints: Floats | None = None
-    temperatures: Mapping[str, Floats] = field(default_factory=dict)
-    wrench: Mapping[str, Floats] = field(default_factory=dict)
-    unreadable: Mapping[str, Flags] = field(default_factory=dict)
-    whole: frozenset[str] = frozenset()
-
-    @property
-    def n_row(self) -> int:
-        """How many rows there are."""
-        return len(self.instrument)
-
-    def spoilt(self, column: str) -> Flags:
-        """(n_row,) whether a cell of a column has a problem already."""
-        return self.unreadable.get(column, np.zeros(self.n_row, np.bool_))
-
-    def filled(self, column: str) -> Flags:
-        """(n_row,) whether something stands in a column of readings, be it readable or not."""
-        values = self.readings.get(column)
-        if values is None:
-            return np.zeros(self.n_row, np.bool_)
-        return ~np.isnan(values) | self.spoilt(column)
-
-
-class Report(Protocol):
-    """Where problems go, with their place as the source of the rows knows it."""
-
-    def __call__(self, fault: Fault, *, row: int | None = None, column: str | None = None) -> None:
-        """Note a problem of a row (from 0), a column, or the whole."""
-
-    def shown(self, column: str, row: int) -> str:
-        """A number as it was given, with its unit."""
 
 
 def measurements_in(
     machine: Machine, instruments: Sequence[Instrument], rows: MeasurementRows, report: Report
 ) -> Measurements:
     """Measurements from rows; of no use where something was reported on the way."""
-    placed = _placed(machine, instruments, rows, report)
+    placed = commanded_poses(machine, instruments, rows, report)
     conditions = _conditions(machine, rows, report)
     columns = reading_columns(machine)
     observed = _Observations(machine, instruments, rows, report, columns)
@@ -160,8 +55,8 @@ def measurements_in(
     ]
     return Measurements(
         instruments=tuple(framed),
-        joints=placed[0],
-        placements=placed[1],
+        joints=placed.joints,
+        placements=placed.placements,
         instrument=rows.instrument,
         conditions=conditions,
         held_out=rows.held_out,
@@ -171,6 +66,8 @@ def measurements_in(
         value=table.value,
         uncertainty=table.uncertainty,
         lines=rows.lines,
+        other_joints=placed.other_joints,
+        other_placements=placed.other_placements,
     )
 
 
@@ -196,134 +93,6 @@ def _with_frame(
     read = [OBSERVABLES[code] for code in np.unique(table.observable[of_instrument]).tolist()]
     frame = dataclasses.replace(instrument.frame, unknown=rule(read, machine.components))
     return dataclasses.replace(instrument, frame=frame)
-
-
-def _placed(
-    machine: Machine, instruments: Sequence[Instrument], rows: MeasurementRows, report: Report
-) -> tuple[Floats, Floats]:
-    """Joints (n_row, n_joint) and placements (n_row, 7) of the nominal machine.
-
-    Rows of what is measured without a pose have the home pose's.
-    """
-    joints = np.full((rows.n_row, len(machine.joints)), math.nan)
-    placements = np.full((rows.n_row, 7), math.nan)
-    at_home = _without_pose(machine, instruments, rows, report)
-    if at_home.any():
-        joints[at_home], placements[at_home] = at_rest(machine)
-    if rows.commands is not None:
-        good = np.isfinite(rows.commands).all(axis=1) & ~at_home
-        for column in (f"command.{freedom}" for freedom in machine.commanded):
-            good &= ~rows.spoilt(column)
-        usable = np.flatnonzero(good)
-        joints[usable], placements[usable], status = machine.kernel.place(rows.commands[usable])
-        failed = np.flatnonzero(status)
-        for number, (row, code) in enumerate(zip(usable[failed], status[failed], strict=True)):
-            name = why = STATUS[code]
-            if number < MOST_PROBLEMS:  # the others are only counted
-                faults = machine.kernel.explain(rows.commands[row])
-                why = f"{name}: {faults_text(machine, faults)}" if faults else name
-            report(
-                Fault(
-                    "commanded-out-of-reach",
-                    "the machine cannot be commanded to this pose",
-                    found=why,
-                    expected="a pose within the travel of every drive",
-                    hint="is it a pose of this machine, in the unit of the header?",
-                ),
-                row=int(row),
-            )
-    if rows.joints is not None:
-        good = np.asarray(np.isfinite(rows.joints).all(axis=1), np.bool_) & ~at_home
-        for column in (f"joint.{joint}" for joint in machine.joints):
-            good &= ~rows.spoilt(column)
-        usable = np.flatnonzero(good & _within_travel(machine, rows, good, report))
-        joints[usable] = rows.joints[usable]
-        poses, status = machine.kernel.forward(rows.joints[usable], status=True)
-        solved = status == 0
-        placements[usable[solved]] = machine.kernel.placement_of(poses[solved])
-        for row, code in zip(usable[~solved].tolist(), status[~solved].tolist(), strict=True):
-            report(
-                Fault(
-                    "commanded-out-of-reach",
-                    "the machine has no pose at these joints",
-                    found=STATUS[code],
-                    expected="joints at which the platform can be",
-                    hint="are they joints of this machine, in the unit of the header?",
-                ),
-                row=row,
-            )
-    return joints, placements
-
-
-def at_rest(machine: Machine) -> tuple[Floats, Floats]:
-    """Joints (n_joint,) and placement (7,) of the home pose of the nominal machine."""
-    home = machine.home[[machine.dof.index(freedom) for freedom in machine.commanded]]
-    joints, placements, _ = machine.kernel.place(home[np.newaxis])
-    return joints[0], placements[0]
-
-
-def _without_pose(
-    machine: Machine, instruments: Sequence[Instrument], rows: MeasurementRows, report: Report
-) -> Flags:
-    """(n_row,) whether what is measured in a row needs no pose; all others must have one."""
-    needed = np.array([REGISTRY[instrument.kind].poses for instrument in instruments], np.intp)
-    known = rows.instrument >= 0
-    poses = np.ones(rows.n_row, np.intp)
-    poses[known] = needed[rows.instrument[known]]
-    table, prefix, names = rows.joints, "joint.", machine.joints
-    if rows.commands is not None:
-        table, prefix, names = rows.commands, "command.", machine.commanded
-    if table is None:
-        return np.ones(rows.n_row, np.bool_)
-    for at, column in enumerate(f"{prefix}{name}" for name in names):
-        blank = np.isnan(table[:, at])
-        spoilt = rows.spoilt(column)
-        for row in np.flatnonzero(blank & ~spoilt & known & (poses > 0)).tolist():
-            report(
-                Fault("empty-cell", "the cell is empty", found="nothing", expected="a number"),
-                row=row,
-                column=column,
-            )
-        for row in np.flatnonzero(~blank & (poses == 0)).tolist():
-            kind = instruments[int(rows.instrument[row])].kind
-            report(
-                Fault(
-                    "unwanted-value",
-                    "what this row measures does not depend on a pose",
-                    found=report.shown(column, row),
-                    expected=f"an empty cell in a row of kind {kind}",
-                ),
-                row=row,
-                column=column,
-            )
-    without: Flags = poses == 0
-    return without
-
-
-def _within_travel(machine: Machine, rows: MeasurementRows, good: Flags, report: Report) -> Flags:
-    assert rows.joints is not None
-    within = np.ones(rows.n_row, np.bool_)
-    for joint, drive in enumerate(machine.drives):
-        first, last = drive.travel
-        value = rows.joints[:, joint]
-        slack = 1e-9 * (last - first) if math.isfinite(last - first) else 0.0
-        outside = good & ((value < first - slack) | (value > last + slack))
-        within &= ~outside
-        unit = machine.file_units[drive.coordinate]
-        ends = [f"{float(unit.to_file(end)):.10g}" for end in (first, last)]
-        for row in np.flatnonzero(outside).tolist():
-            column = f"joint.{drive.name}"
-            report(
-                Fault(
-                    "commanded-out-of-reach",
-                    "the joint is out of its travel",
-                    found=report.shown(column, row),
-                    expected=f"a joint from {ends[0]} to {ends[1]} {unit.label}",
-                ),
-                row=row,
-                column=column,
-            )
-    return within
 
 
 def _conditions(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Condition, ...]:
@@ -651,7 +420,7 @@ class _Observations:
     def _check_signs(self, kind: Kind, own_rows: Flags, own: Mapping[str, ReadingColumn]) -> None:
         for name, reading in own.items():
             values = self.rows.readings.get(name)
-            if values is None or kind.reads[reading.word] not in ("length", "distance"):
+            if values is None or kind.reads[reading.word] not in ABOVE_ZERO:
                 continue
             for row in np.flatnonzero(
                 own_rows & (values <= 0.0) & ~self.rows.spoilt(name)

@@ -10,9 +10,9 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument
+from truepose.calibration.measurements.columns import TO, UNCERTAINTY, WRENCH, reading_columns
 from truepose.calibration.measurements.measurements import Measurements
 from truepose.calibration.measurements.read_csv import CHECK, FIT, INSTRUMENT, SET
-from truepose.calibration.measurements.rows import UNCERTAINTY, WRENCH, reading_columns
 from truepose.calibration.observables import OBSERVABLES, si_unit
 from truepose.errors import Problem, RequestError
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
@@ -45,6 +45,10 @@ def measurements_text(machine: Machine, measurements: Measurements) -> str:
     for joint, drive in enumerate(machine.drives):
         commanded = np.where(measurements.posed, measurements.joints[:, joint], math.nan)
         columns.numbers(f"joint.{drive.name}", drive.coordinate, commanded)
+        if measurements.other_joints is not None:
+            between = measurements.between
+            second = np.where(between, measurements.other_joints[:, joint], math.nan)
+            columns.numbers(f"{TO}joint.{drive.name}", drive.coordinate, second)
     _readings(machine, measurements, columns)
     _conditions(machine, measurements, columns)
     columns.words(SET, [CHECK if held_out else FIT for held_out in measurements.held_out.tolist()])

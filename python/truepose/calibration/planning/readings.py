@@ -49,6 +49,14 @@ def observed(machine: Machine, instrument: Instrument) -> tuple[str, ...]:
             expected=one_of(sorted(name for name, kind in REGISTRY.items() if kind.poses)),
             hint="measure it at any time: its row joins those of the poses in one file",
         )
+    if kind.poses > 1:
+        raise _refusal(
+            instrument,
+            "a plan chooses poses one by one, and this reads between two",
+            found=instrument.kind,
+            expected=one_of(sorted(name for name, kind in REGISTRY.items() if kind.poses == 1)),
+            hint="plan poses with an instrument of another kind, and measure between those",
+        )
     readable = tuple(dict.fromkeys(kind.reads.values()))
     possible = tuple(name for name in readable if moved(name, machine.components))
     named = tuple(name for name in possible if name in instrument.uncertainty)

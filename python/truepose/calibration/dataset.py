@@ -235,7 +235,7 @@ def determined_covariance(calibration: Calibration) -> Floats:
     """The same over what is determined: nothing along what is not."""
     fit = calibration.fit
     unknowns, n = fit.unknowns, fit.unknowns.n_machine
-    prior = Prior.of(unknowns) if fit.use_prior else Prior.none(unknowns.count)
+    prior = Prior.of(unknowns, tolerances=fit.use_prior)
     rows = np.sqrt(fit.weights)[:, np.newaxis] * fit.jacobian / calibration.gate.birge
     covariance: Floats = Equations.of(rows, prior, unknowns).covariance[:n, :n]
     return covariance

@@ -17,10 +17,13 @@ from truepose.calibration.data_checks.nominal import (
 )
 from truepose.calibration.data_checks.placement import difference
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import UNITS, is_parameter
+from truepose.calibration.observables import OBSERVABLES, UNITS, is_parameter
 from truepose.machine import Machine
 from truepose.sources import Deviation, PoseBlock, acting
 from truepose.sources.tolerance import DimensionalTolerance
+
+OF_TARGET = [OBSERVABLES.index(name) for name in ("x", "y", "z", "distance", "separation")]
+"""What an uncertain target makes uncertain."""
 
 MACHINES = 24
 """Machines that are drawn, each tolerance at one of its ends: the spread is known to a seventh."""
@@ -49,7 +52,11 @@ def expected_residual(machine: Machine, measurements: Measurements, geometry: Ge
         [np.zeros(row.size), np.hypot(linear, own)[row], linear[row]],
         np.hypot(angular, linear / size)[row],
     )
-    allowed: Floats = np.sqrt(by_tolerance**2 + others**2 + measurements.uncertainty**2)
+    known = np.array([max(each.target_uncertainty) for each in measurements.instruments])
+    target = known[measurements.instrument[row]]
+    target[~np.isin(observable, OF_TARGET)] = 0.0
+    squares = by_tolerance**2 + others**2 + measurements.uncertainty**2 + target**2
+    allowed: Floats = np.sqrt(squares)
     return allowed
 
 

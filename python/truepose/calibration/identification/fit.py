@@ -203,8 +203,7 @@ def fit(
     """
     require_enough(measurements, unknowns, use_prior)
     problem, as_filed = place_instruments(machine, measurements, unknowns)
-    known = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
-    prior = Prior(known.rows, unknowns.prior_mean)  # without tolerances, where the gauge holds
+    prior = Prior.of(unknowns, tolerances=use_prior)
     values = unknowns.prior_mean
     slope = whitened(problem, values)
     equations = Equations.of(slope, prior, unknowns)
@@ -319,8 +318,8 @@ def _fit_instruments(
     values = np.zeros(alone.count)
     unsettled = False
     if alone.count:
-        none = Prior.none(alone.count)
-        held = none.with_rows(Equations.of(whitened(problem, values), none, alone).gauge_rows())
+        known = Prior.of(alone)
+        held = known.with_rows(Equations.of(whitened(problem, values), known, alone).gauge_rows())
         solved = problem.solve(prior=held, start=values)
         values = solved.values[0]
         unsettled = solved.ending[0] not in SETTLED
@@ -332,9 +331,8 @@ def _fit_instruments(
 
 def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bool) -> None:
     """Refuse fewer equations than unknowns, saying how many readings are lacking."""
-    free = unknowns.count
-    if use_prior:
-        free -= int(unknowns.has_prior.sum())
+    known = np.diagonal(unknowns.known_beforehand(tolerances=use_prior))
+    free = int(np.isinf(known).sum())
     lacking = free - measurements.n_observation
     if lacking <= 0:
         return

@@ -47,9 +47,10 @@ class Prior:
         return cls(np.empty((0, count)), np.zeros(count))
 
     @classmethod
-    def of(cls, unknowns: Unknowns) -> Prior:
-        """The unknowns' own."""
-        return cls(prior_rows(unknowns.prior_covariance), unknowns.prior_mean)
+    def of(cls, unknowns: Unknowns, *, tolerances: bool = True) -> Prior:
+        """The unknowns' own; without `tolerances` only what is known of the instruments."""
+        known = unknowns.known_beforehand(tolerances=tolerances)
+        return cls(prior_rows(known), unknowns.prior_mean)
 
     def with_rows(self, rows: Floats) -> Prior:
         """Further rows, about the same mean."""

@@ -73,6 +73,18 @@ class Unknowns:
         flags: np.ndarray = np.isfinite(np.diagonal(self.prior_covariance))
         return flags
 
+    def known_beforehand(self, *, tolerances: bool) -> Floats:
+        """(n, n) covariance of what is known beforehand, infinite where nothing is.
+
+        What is known of the instruments stays known where `tolerances` do not count.
+        """
+        covariance = self.prior_covariance.copy()
+        if not tolerances:
+            covariance[: self.n_machine] = covariance[:, : self.n_machine] = 0.0
+            own = np.arange(self.n_machine)
+            covariance[own, own] = np.inf
+        return covariance
+
     def parameter_change(self, values: Floats) -> Floats:
         """(k,) by how much the parameters `columns` differ from nominal, for values (n,)."""
         change: Floats = self.effects @ values
@@ -175,6 +187,8 @@ def unknowns_of(
         covariance[number, number] = unknown.sigma**2
     if bands is not None and bands.correlation is not None:
         _correlate(covariance, wanted, bands)
+    for number, uncertainty in instruments.uncertainties.items():
+        covariance[number, number] = uncertainty**2
     extra = len(instruments.names)
     return Unknowns(
         tuple(unknown.name for unknown in wanted) + tuple(instruments.names),
@@ -369,13 +383,15 @@ class _InstrumentUnknowns:
     labels: list[str]
     frames: dict[int, tuple[int | None, ...]]
     biases: dict[tuple[int, int, int], int]
+    uncertainties: dict[int, float]
+    """Standard ones, of those of which something is known beforehand, by their number."""
 
 
 def _instrument_unknowns(
     machine: Machine, measurements: Measurements, first: int
 ) -> _InstrumentUnknowns:
     """Unknowns of the instruments that measured anything, numbered from `first` on."""
-    unknowns = _InstrumentUnknowns([], [], [], {}, {})
+    unknowns = _InstrumentUnknowns([], [], [], {}, {}, {})
 
     def add(name: str, unit: str, label: str) -> int:
         unknowns.names.append(name)
@@ -389,6 +405,11 @@ def _instrument_unknowns(
         if not own.any():
             continue
         unknowns.frames[number] = _frame_and_target(instrument, add)
+        for at, uncertainty in zip(
+            unknowns.frames[number][6:], instrument.target_uncertainty, strict=True
+        ):
+            if at is not None and uncertainty > 0.0:
+                unknowns.uncertainties[at] = uncertainty
         if not instrument.bias_unknown:
             continue
         read = zip(measurements.observable[own], measurements.strut[own], strict=True)
@@ -412,9 +433,10 @@ def _frame_and_target(instrument: Instrument, add: object) -> tuple[int | None, 
     for (key, unit, what), unknown in zip(named, instrument.frame.unknown, strict=True):
         name, label = f"{instrument.name}.{key}", f"frame of {instrument.name}, {what}"
         own.append(add(name, unit, label) if unknown else None)
-    for axis in "xyz":
+    for axis, uncertainty in zip("xyz", instrument.target_uncertainty, strict=True):
         name, label = f"{instrument.name}.target.{axis}", f"target of {instrument.name}, {axis}"
-        own.append(add(name, "m", label) if instrument.target_unknown else None)
+        sought = instrument.target_unknown or uncertainty > 0.0
+        own.append(add(name, "m", label) if sought else None)
     return tuple(own)
 
 

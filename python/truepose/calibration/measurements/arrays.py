@@ -214,6 +214,7 @@ class _Arguments:
             ("frame.origin", self.instrument.frame.origin),
             ("frame.rotation", self.instrument.frame.rotation),
             ("target", self.instrument.target),
+            ("target_uncertainty", self.instrument.target_uncertainty),
             ("axis", self.instrument.axis),
             ("zero", self.instrument.zero),
         ):
@@ -222,6 +223,13 @@ class _Arguments:
                 self.refuse(f"instrument.{path}", str(vector), f"{wanted} finite numbers")
             elif wanted == 4 and abs(float(np.linalg.norm(vector)) - 1.0) > 1e-9:
                 self.refuse(f"instrument.{path}", str(vector), "a unit quaternion w x y z")
+        known = self.instrument.target_uncertainty
+        if any(known) and not (self.instrument.target_unknown is False and min(known) > 0.0):
+            self.refuse(
+                "instrument.target_uncertainty",
+                str(known),
+                "three above zero of a target that is not unknown, or three zeros",
+            )
         if len(self.instrument.frame.unknown) != 6:
             self.refuse("instrument.frame.unknown", str(self.instrument.frame.unknown), "6 flags")
         for name, amount in self.instrument.uncertainty.items():

@@ -65,10 +65,13 @@ def _declared(machine: Machine, instrument: Instrument) -> list[str]:
     lines = [f"[instrument.{instrument.name}]", f'kind = "{instrument.kind}"']
     if kind.frame is not None and instrument.end == "base":
         lines.append(_frame(machine, instrument.frame))
-    if kind.has_target and (instrument.target_unknown or any(instrument.target)):
+    uncertain = any(instrument.target_uncertainty)
+    if kind.has_target and (instrument.target_unknown or any(instrument.target) or uncertain):
         start = _texts(machine, instrument.target, "length")
+        known = _texts(machine, instrument.target_uncertainty, "length")
         unknown_too = f"{{ start = {start}, unknown = true }}"
-        lines.append(f"target = {unknown_too if instrument.target_unknown else start}")
+        with_uncertainty = f"{{ start = {start}, uncertainty = {known} }}" if uncertain else start
+        lines.append(f"target = {unknown_too if instrument.target_unknown else with_uncertainty}")
     if instrument.bias_unknown:
         lines.append('bias = "unknown"')
     words = {observable: word for word, observable in kind.reads.items()} or {

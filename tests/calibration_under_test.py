@@ -78,7 +78,7 @@ class CalibrationUnderTest:
 
     def equations(self, *, use_prior: bool) -> Equations:
         """At the values where the search starts."""
-        prior = Prior.of(self.unknowns) if use_prior else Prior.none(self.unknowns.count)
+        prior = Prior.of(self.unknowns, tolerances=use_prior)
         slope = whitened(self.problem, self.unknowns.prior_mean)
         return Equations.of(slope, prior, self.unknowns)
 

@@ -40,11 +40,19 @@ def shown(
 
     `instrument`: the one that measured, where it is not as declared.
     """
-    start = nominal.kernel.pose_of(measurements.placements)
-    poses, status = actual.kernel.forward(measurements.joints, start, status=True)
-    assert (status <= 1).all()
-    placements = actual.kernel.placement_of(poses)
-    there = dataclasses.replace(measurements, placements=placements)
+
+    def standing(joints: Floats, placements: Floats) -> Floats:
+        start = nominal.kernel.pose_of(placements)
+        poses, status = actual.kernel.forward(joints, start, status=True)
+        assert (status <= 1).all()
+        return np.asarray(actual.kernel.placement_of(poses))
+
+    there = dataclasses.replace(
+        measurements, placements=standing(measurements.joints, measurements.placements)
+    )
+    joints, others = measurements.other_joints, measurements.other_placements
+    if joints is not None and others is not None:
+        there = dataclasses.replace(there, other_placements=standing(joints, others))
     if instrument is not None:
         there = dataclasses.replace(there, instruments=(instrument,))
     return nominal_values(actual, there)

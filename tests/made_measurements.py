@@ -14,8 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 from truepose.calibration.instruments import REGISTRY, Frame, Instrument
 from truepose.calibration.instruments._base import KNOWN
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import OBSERVABLES, OF_STRUTS, UNITS
+from truepose.calibration.observables import (
+    OBSERVABLES,
+    OF_PARAMETERS,
+    OF_STRUTS,
+    UNITS,
+    is_parameter,
+)
 from truepose.machine import Condition, Machine
+from truepose.sources.tolerance import bands_of
 
 Floats = NDArray[np.float64]
 
@@ -46,13 +53,17 @@ def made_measurements(
     """Measurements of one instrument at commanded poses (n, n_commanded), SI.
 
     `frame`: "base", "unknown" (at the base, with what the kind says to be found) or a `Frame`.
-    `observables`: default all that the kind reads of this machine; `struts`: default all.
+    `observables`: default all that the kind reads of this machine; `struts`: default all; of
+    parameters, which of these, default those with a tolerance. Each row has all of them.
     `values`: "zero", or "nominal": what the machine as filed shows.
     """
     given = np.atleast_2d(np.asarray(poses, np.float64))
+    of_kind = REGISTRY[kind]
+    if not of_kind.poses:
+        columns = [machine.dof.index(name) for name in machine.commanded]
+        given = np.tile(machine.home[columns], (len(given), 1))
     joints, placements, status = machine.kernel.place(given)
     assert not status.any(), "a pose that the machine cannot be commanded to"
-    of_kind = REGISTRY[kind]
     read = tuple(observables or of_kind.observed(machine.components))
     if isinstance(frame, str):
         rule = of_kind.frame if frame == "unknown" else None
@@ -70,8 +81,21 @@ def made_measurements(
         for strut in (of_struts if of_kind.of_struts else [-1])
         for each in read
     ]
+    if not of_kind.poses:
+        bands = bands_of(machine)
+        toleranced = () if bands is None else np.unique(bands.parameters).tolist()
+        one = [
+            (OBSERVABLES.index(OF_PARAMETERS[machine.units[number]]), number)
+            for number in (toleranced if struts is None else struts)
+        ]
+        one.sort(key=lambda each: each[::-1])
     assert all((each in OF_STRUTS) == of_kind.of_struts for each in read)
     n = len(given)
+    second: dict[str, Floats] = {}
+    if of_kind.poses == 2:  # each pose to the one before
+        assert n > 1
+        second["other_joints"] = np.roll(joints, 1, axis=0)
+        second["other_placements"] = np.roll(placements, 1, axis=0)
     conditions: tuple[Condition, ...]
     if condition is None or isinstance(condition, Condition):
         conditions = (reference_condition(machine) if condition is None else condition,) * n
@@ -90,6 +114,7 @@ def made_measurements(
         value=np.zeros(n * len(one)),
         uncertainty=np.tile([by_observable[OBSERVABLES[each]] for each, _ in one], n),
         lines=np.zeros(n, np.intp),
+        **second,
     )
     if values == "nominal":
         return measurements.with_values(nominal_values(machine, measurements))
@@ -149,7 +174,15 @@ def nominal_values(machine: Machine, measurements: Measurements) -> Floats:
         frame = rotation_matrix(instrument.frame.rotation)
         point = placements[row, :3] + turned[row] @ np.array(instrument.target)
         seen = frame.T @ (point - np.array(instrument.frame.origin))
-        if name in "xyz":
+        if name == "separation":
+            assert measurements.other_placements is not None
+            other = measurements.other_placements[row]
+            arm = np.array(instrument.target)
+            far = other[:3] + rotation_matrix(other[3:]) @ arm
+            values[at] = np.linalg.norm(far - point)
+        elif is_parameter(measurements.observable[at]):
+            values[at] = machine.nominal[strut]
+        elif name in "xyz":
             values[at] = seen["xyz".index(name)]
         elif name in "abc":
             values[at] = _angles(frame.T @ turned[row])["abc".index(name)]

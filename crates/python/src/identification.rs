@@ -72,23 +72,30 @@ fn design(machine: &Machine, entry: &Bound<'_, PyDict>) -> PyResult<Design> {
         .iter()
         .map(|entry| instrument(entry, unknowns))
         .collect::<PyResult<Vec<Instrument>>>()?;
-    type Row = (usize, usize, usize, usize, Option<usize>);
+    type Row = (usize, Option<usize>, usize, usize, usize, Option<usize>);
     let rows: Vec<Row> = required(entry, "a design", "observations")?;
     let mut observations = Vec::with_capacity(rows.len());
     let mut last = 0;
-    for (pose, by, observable, strut, bias) in rows {
+    for (pose, other, by, observable, part, bias) in rows {
         let Some(observable) = Observable::from_number(observable) else {
             return Err(PyValueError::new_err(format!("{observable} is no observable")));
         };
-        let no_strut = observable.of_strut() && strut >= machine.struts.len();
+        let parts = match observable {
+            Observable::Parameter => parameters,
+            _ if observable.of_strut() => machine.struts.len(),
+            _ => usize::MAX,
+        };
+        let no_pose = pose >= poses || other.is_some_and(|pose| pose >= poses);
+        let not_between = (observable == Observable::Separation) != other.is_some();
         let no_bias = bias.is_some_and(|index| index >= unknowns);
-        if pose < last || pose >= poses || by >= instruments.len() || no_strut || no_bias {
+        let nothing = no_pose || by >= instruments.len() || part >= parts || no_bias;
+        if pose < last || nothing || not_between {
             return Err(PyValueError::new_err(
                 "an observation of what is not there, or out of order",
             ));
         }
         last = pose;
-        observations.push(Observation { pose, instrument: by, observable, strut, bias });
+        observations.push(Observation { pose, other, instrument: by, observable, part, bias });
     }
     Ok(Design {
         machine: machine.clone(),

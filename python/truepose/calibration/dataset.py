@@ -219,7 +219,7 @@ def determined_covariance(calibration: Calibration) -> Floats:
     """The same over what is determined: nothing along what is not."""
     fit = calibration.fit
     unknowns, n = fit.unknowns, fit.unknowns.n_machine
-    prior = Prior.of(unknowns) if fit.use_prior else Prior.none(unknowns.count)
+    prior = Prior.of(unknowns, tolerances=fit.use_prior)
     rows = np.sqrt(fit.weights)[:, np.newaxis] * fit.jacobian / calibration.gate.birge
     covariance: Floats = Equations.of(rows, prior, unknowns).covariance[:n, :n]
     return covariance
@@ -313,6 +313,7 @@ def _texts(values: Any) -> np.ndarray:
 def _row_coords(machine: Machine, data: Measurements) -> dict[str, xr.Variable]:
     names = [instrument.name for instrument in data.instruments]
     poses = machine.kernel.pose_of(data.placements)
+    poses[~data.posed] = np.nan
     coords = {
         "row": label("row", np.arange(data.n_row), "number of the row, from 0"),
         "row_line": label("row", data.lines, "line of the file, 0 where there is none"),

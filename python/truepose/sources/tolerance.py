@@ -132,6 +132,14 @@ class DimensionalTolerance(Represented):
         return self.bands
 
 
+def bands_of(machine: Machine) -> Deviation | None:
+    """The bands of the machine's tolerances; None where its file has none."""
+    of_tolerances = (
+        source.bands for source in machine.sources if isinstance(source, DimensionalTolerance)
+    )
+    return next(of_tolerances, None)
+
+
 def _mixed_groups(parts: SourceBuilder, entries: Iterable[_Stated]) -> bool:
     """Whether a group has two distributions though one variable; a problem, if so."""
     first: dict[str, _Stated] = {}

@@ -41,7 +41,9 @@ def slider() -> Machine:
 def same_numbers(one: Measurements, other: Measurements, rounding: float) -> None:
     for name in ("instrument", "held_out", "row", "observable", "strut"):
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
-    for name in ("joints", "value", "uncertainty"):
+    assert (one.other_joints is None) == (other.other_joints is None)
+    of_two = ("other_joints",) if other.other_joints is not None else ()
+    for name in ("joints", *of_two, "value", "uncertainty"):
         assert np.allclose(getattr(one, name), getattr(other, name), rtol=rounding, atol=0), name
     assert np.allclose(one.placements, other.placements, rtol=0, atol=1e-10)
     for mine, others in zip(one.instruments, other.instruments, strict=True):
@@ -268,6 +270,7 @@ def rows_of_kinds() -> list[str]:
     for kind in REGISTRY.values():
         dots = "strut.N." if kind.of_struts else ""
         columns = " ".join(f"`{dots}{word}`" for word in kind.reads) or "none"
+        columns = columns if kind.poses else "`parameter.NAME`"
         unknown = "no frame"
         if kind.frame is not None:
             flags = kind.frame(kind.observed(SPACE), SPACE)

@@ -16,7 +16,7 @@ from truepose.calibration import Frame, Instrument, Measurements, joined, measur
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.instruments._base import of_readings
 from truepose.calibration.measurements.rows import within_a_turn
-from truepose.calibration.observables import OBSERVABLES
+from truepose.calibration.observables import OBSERVABLES, column_name
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
 
@@ -131,7 +131,10 @@ def same(one: Measurements, other: Measurements, exact: bool = True) -> None:
     assert one.conditions == other.conditions
     for name in ("instrument", "held_out", "row", "observable", "strut", "uncertainty"):
         assert np.array_equal(getattr(one, name), getattr(other, name)), name
-    for name in ("joints", "placements", "value"):
+    for name in ("joints", "placements", "value", "other_joints", "other_placements"):
+        if getattr(other, name) is None:
+            assert getattr(one, name) is None
+            continue
         assert np.allclose(getattr(one, name), getattr(other, name), rtol=0, atol=1e-12), name
     if exact:
         assert np.array_equal(one.value, other.value)
@@ -148,9 +151,15 @@ def columns_of(machine: Machine, made: Measurements) -> dict[str, np.ndarray]:
         word = words.get(OBSERVABLES[code])
         if word is None:
             continue
-        name = word if strut < 0 else f"strut.{machine.struts[strut].name}.{word}"
+        name = word if strut < 0 else column_name(machine, int(code), int(strut))
         columns.setdefault(name, np.full(made.n_row, math.nan))[row] = value
     return columns
+
+
+def commands(kind: str, **first: np.ndarray) -> dict[str, np.ndarray]:
+    """What a kind needs of the commands: nothing, the poses, or to which others it measured too."""
+    ((name, table),) = first.items()
+    return [{}, {name: table}, {name: table, "to": np.roll(table, 1, axis=0)}][REGISTRY[kind].poses]
 
 
 @pytest.mark.parametrize("kind", REGISTRY)
@@ -161,13 +170,12 @@ def test_arrays_of_every_kind(machine: Machine, kind: str) -> None:
     )
     if kind == "contact":
         made = made.with_values(np.zeros(made.n_observation))
-    found = measurements_of(
-        machine, made.instruments[0], poses=poses, values=columns_of(machine, made)
-    )
+    values = columns_of(machine, made)
+    commanded = commands(kind, poses=poses)
+    found = measurements_of(machine, made.instruments[0], values=values, **commanded)
     same(found, made)
-    again = measurements_of(
-        machine, made.instruments[0], joints=made.joints, values=columns_of(machine, made)
-    )
+    commanded = commands(kind, joints=made.joints)
+    again = measurements_of(machine, made.instruments[0], values=values, **commanded)
     same(again, made)
 
 
@@ -316,7 +324,7 @@ def test_every_kind_of_every_machine(path: Path) -> None:
         made = made_measurements(machine, name, poses, values="nominal")
         if name == "contact":
             made = made.with_values(np.zeros(made.n_observation))
-        found = measurements_of(
-            machine, made.instruments[0], poses=poses, values=columns_of(machine, made)
-        )
+        values = columns_of(machine, made)
+        commanded = commands(name, poses=poses)
+        found = measurements_of(machine, made.instruments[0], values=values, **commanded)
         same(found, made)

@@ -12,17 +12,19 @@ pub struct Term {
     pub parameter: usize,
 }
 
-/// One number that is read at a pose.
+/// One number that is read at a pose, or between two.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation {
     /// At which pose; observations are in the order of poses.
     pub pose: usize,
+    /// The other pose of a separation.
+    pub other: Option<usize>,
     /// By which instrument.
     pub instrument: usize,
     /// Of what.
     pub observable: Observable,
-    /// Of which strut, where it is of one.
-    pub strut: usize,
+    /// Of which strut or parameter, where it is of one.
+    pub part: usize,
     /// The unknown that is added to it.
     pub bias: Option<usize>,
 }
@@ -74,6 +76,19 @@ pub struct Design {
     pub observations: Vec<Observation>,
 }
 
+/// What a reading is made of.
+#[derive(Clone, Copy, Debug)]
+pub enum Sight {
+    /// A view of the platform, by its number.
+    View(usize),
+    /// The views at two poses.
+    Between(usize, usize),
+    /// A strut.
+    Strut,
+    /// A parameter.
+    Parameter,
+}
+
 /// [`Design`] with what follows from it.
 #[derive(Clone, Debug)]
 pub struct Prepared {
@@ -92,8 +107,8 @@ pub struct Prepared {
     pub one_to_one: bool,
     /// The observations of pose i are `of_pose[i]..of_pose[i + 1]`.
     pub of_pose: Vec<usize>,
-    /// Which view each observation is of, `None` where it is of a strut; neighbours share theirs.
-    pub views: Vec<Option<usize>>,
+    /// What each observation is made of; neighbours share their view.
+    pub sights: Vec<Sight>,
     /// Pose and instrument of each view, and whether angles are read in it.
     pub sighted: Vec<(usize, usize, bool)>,
     /// For each parameter of the machine the terms that move it.
@@ -119,20 +134,27 @@ impl Prepared {
             of_pose[pose + 1] += of_pose[pose];
         }
         let mut sighted: Vec<(usize, usize, bool)> = Vec::new();
-        let mut views = Vec::with_capacity(design.observations.len());
-        for observation in &design.observations {
-            if observation.observable.of_strut() {
-                views.push(None);
-                continue;
-            }
-            let here = (observation.pose, observation.instrument);
-            if sighted.last().is_none_or(|&(pose, by, _)| (pose, by) != here) {
-                sighted.push((here.0, here.1, false));
+        let mut sights = Vec::with_capacity(design.observations.len());
+        let mut view = |pose: usize, instrument: usize, angle: bool| {
+            if sighted.last().is_none_or(|&(at, by, _)| (at, by) != (pose, instrument)) {
+                sighted.push((pose, instrument, false));
             }
             if let Some(last) = sighted.last_mut() {
-                last.2 |= observation.observable.is_angle();
+                last.2 |= angle;
             }
-            views.push(Some(sighted.len() - 1));
+            sighted.len() - 1
+        };
+        for observation in &design.observations {
+            let Observation { pose, instrument, observable, other, .. } = *observation;
+            sights.push(match (observable, other) {
+                (Observable::Parameter, _) => Sight::Parameter,
+                (_, Some(other)) => {
+                    let first = view(pose, instrument, false);
+                    Sight::Between(first, view(other, instrument, false))
+                }
+                _ if observable.of_strut() => Sight::Strut,
+                _ => Sight::View(view(pose, instrument, observable.is_angle())),
+            });
         }
         let mut movers = vec![Vec::new(); design.machine.nominal.len()];
         for (number, term) in design.terms.iter().enumerate() {
@@ -153,7 +175,7 @@ impl Prepared {
             shared,
             one_to_one,
             of_pose,
-            views,
+            sights,
             sighted,
             movers,
             design,

@@ -1,6 +1,6 @@
 //! What the instruments read for given unknowns, and its derivatives; normal equations in one pass.
 
-use super::design::{Design, Prepared};
+use super::design::{Design, Prepared, Sight};
 use super::observation::{InstrumentView, Placed, Reading, StrutView, of_strut};
 use crate::batch::{Deviations, Rows, Samples, Sensitivity, first_order, forward_poses};
 use crate::dispatch::{Work, dispatch};
@@ -137,25 +137,29 @@ impl<'a> Evaluation<'a> {
         let mut parameters = Vec::new();
         let mut last = usize::MAX;
         let mut joints: &[f64] = &[];
-        let views = &self.prepared.views;
-        for ((observation, view), out) in design.observations.iter().zip(views).zip(out) {
-            if self.status[observation.pose] != Status::Ok {
+        let sights = &self.prepared.sights;
+        for ((observation, sight), out) in design.observations.iter().zip(sights).zip(out) {
+            let unsolved = |pose: usize| self.status[pose] != Status::Ok;
+            if unsolved(observation.pose) || observation.other.is_some_and(unsolved) {
                 *out = f64::NAN;
                 continue;
             }
             let placed = &self.placed[observation.instrument];
-            let reading = if let Some(view) = *view {
-                self.views[view].value(observation.observable, placed)
-            } else {
-                if last != observation.pose {
-                    joints = self.inputs(observation.pose, &mut parameters);
-                    last = observation.pose;
+            if matches!(sight, Sight::Strut | Sight::Parameter) && last != observation.pose {
+                joints = self.inputs(observation.pose, &mut parameters);
+                last = observation.pose;
+            }
+            let reading = match *sight {
+                Sight::View(view) => self.views[view].value(observation.observable, placed),
+                Sight::Between(from, to) => self.views[from].separation(&self.views[to]).0.value,
+                Sight::Parameter => parameters[observation.part],
+                Sight::Strut => {
+                    let instrument = &design.instruments[observation.instrument];
+                    let what = (observation.observable, observation.part);
+                    let inputs = (parameters.as_slice(), joints);
+                    let pose = self.pose(observation.pose);
+                    of_strut(&design.machine, what, (instrument, placed), inputs, &pose)
                 }
-                let instrument = &design.instruments[observation.instrument];
-                let what = (observation.observable, observation.strut);
-                let inputs = (parameters.as_slice(), joints);
-                let pose = self.pose(observation.pose);
-                of_strut(&design.machine, what, (instrument, placed), inputs, &pose)
             };
             *out = reading + observation.bias.map_or(0.0, |index| values[index]);
         }
@@ -200,6 +204,36 @@ impl<'a> Evaluation<'a> {
         normal.gradient.fill(0.0);
         self.rows(Summed { weights, residuals, normal });
         true
+    }
+
+    /// How the unknowns move the platform at one pose: (twist component, unknown), rows padded. What no
+    /// unknown moves stays as it is, zero.
+    #[inline(always)]
+    fn twists(&self, pose: usize, twists: &mut [f64]) {
+        let (prepared, design) = (self.prepared, &self.prepared.design);
+        let components = indices_of(&design.machine.dof);
+        let columns = prepared.columns.len();
+        let stride = padded(design.unknowns);
+        let width = components.len() * columns;
+        let sensitivity = &self.sensitivities[pose * width..(pose + 1) * width];
+        if prepared.one_to_one {
+            // The same cells at every pose.
+            for (number, &component) in components.iter().enumerate() {
+                let given = &sensitivity[number * columns..(number + 1) * columns];
+                twists[component * stride..component * stride + columns].copy_from_slice(given);
+            }
+        } else if !design.terms.is_empty() {
+            twists.fill(0.0);
+            let factors = design.coefficients.row(pose);
+            for (number, &component) in components.iter().enumerate() {
+                let twist = &mut twists[component * stride..(component + 1) * stride];
+                let given = &sensitivity[number * columns..(number + 1) * columns];
+                for (at, term) in design.terms.iter().enumerate() {
+                    let column = prepared.term_columns[at];
+                    twist[term.unknown] += factors[at] * given[column];
+                }
+            }
+        }
     }
 
     fn rows(&mut self, receiver: impl Receiver) {
@@ -293,10 +327,9 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
     fn run<S: Real>(mut self) {
         let evaluation = self.evaluation;
         let (prepared, design) = (evaluation.prepared, &evaluation.prepared.design);
-        let components = indices_of(&design.machine.dof);
-        let columns = prepared.columns.len();
         let stride = padded(design.unknowns);
         let mut twists = vec![0.0; SIX * stride];
+        let mut other_twists = vec![0.0; SIX * stride];
         let mut rows = Vec::new();
         let mut parameters = Vec::new();
         for pose in 0..design.poses {
@@ -304,26 +337,7 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
             if observed.is_empty() {
                 continue;
             }
-            let width = components.len() * columns;
-            let sensitivity = &evaluation.sensitivities[pose * width..(pose + 1) * width];
-            if prepared.one_to_one {
-                // The same cells at every pose.
-                for (number, &component) in components.iter().enumerate() {
-                    let given = &sensitivity[number * columns..(number + 1) * columns];
-                    twists[component * stride..component * stride + columns].copy_from_slice(given);
-                }
-            } else if !design.terms.is_empty() {
-                twists.fill(0.0);
-                let factors = design.coefficients.row(pose);
-                for (number, &component) in components.iter().enumerate() {
-                    let twist = &mut twists[component * stride..(component + 1) * stride];
-                    let given = &sensitivity[number * columns..(number + 1) * columns];
-                    for (at, term) in design.terms.iter().enumerate() {
-                        let column = prepared.term_columns[at];
-                        twist[term.unknown] += factors[at] * given[column];
-                    }
-                }
-            }
+            evaluation.twists(pose, &mut twists);
             rows.clear();
             rows.resize(observed.len().next_multiple_of(TOGETHER) * stride, 0.0);
             let at = evaluation.pose(pose);
@@ -334,27 +348,48 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
                 let instrument = &design.instruments[observation.instrument];
                 let placed = &evaluation.placed[observation.instrument];
                 let weight = self.receiver.weight(number);
-                let reading = if let Some(view) = prepared.views[number] {
-                    evaluation.views[view].reading(observation.observable, placed)
-                } else {
-                    let q = *joints.get_or_insert_with(|| evaluation.inputs(pose, &mut parameters));
-                    if strut.as_ref().is_none_or(|(index, _)| *index != observation.strut) {
-                        let inputs = (parameters.as_slice(), q);
-                        let seen = StrutView::new(&design.machine, observation.strut, inputs, &at);
-                        strut = Some((observation.strut, seen));
+                let mut moved = |parameter: usize, derivative: f64| {
+                    for &mover in &prepared.movers[parameter] {
+                        let factor = design.coefficients.row(pose)[mover];
+                        row[design.terms[mover].unknown] += weight * derivative * factor;
                     }
-                    let Some((_, seen)) = &strut else { continue };
-                    let (reading, to_parameters) =
-                        seen.reading(observation.observable, (instrument, placed));
-                    for (parameter, derivative) in to_parameters {
-                        for &mover in &prepared.movers[parameter] {
-                            let factor = design.coefficients.row(pose)[mover];
-                            row[design.terms[mover].unknown] += weight * derivative * factor;
-                        }
-                    }
-                    reading
                 };
-                add_twists::<S>(&reading, weight, &twists, row);
+                let reading = match prepared.sights[number] {
+                    Sight::View(view) => {
+                        evaluation.views[view].reading(observation.observable, placed)
+                    }
+                    Sight::Between(from, to) => {
+                        let (from, to) = (&evaluation.views[from], &evaluation.views[to]);
+                        let (reading, to_other) = from.separation(to);
+                        if let Some(other) = observation.other {
+                            evaluation.twists(other, &mut other_twists);
+                            add_twists::<S>(&to_other, weight, &other_twists, row);
+                        }
+                        reading
+                    }
+                    Sight::Parameter => {
+                        moved(observation.part, 1.0);
+                        Reading::new(0.0)
+                    }
+                    Sight::Strut => {
+                        let q =
+                            *joints.get_or_insert_with(|| evaluation.inputs(pose, &mut parameters));
+                        if strut.as_ref().is_none_or(|(index, _)| *index != observation.part) {
+                            let inputs = (parameters.as_slice(), q);
+                            let seen =
+                                StrutView::new(&design.machine, observation.part, inputs, &at);
+                            strut = Some((observation.part, seen));
+                        }
+                        let Some((_, seen)) = &strut else { continue };
+                        let (reading, to_parameters) =
+                            seen.reading(observation.observable, (instrument, placed));
+                        for (parameter, derivative) in to_parameters {
+                            moved(parameter, derivative);
+                        }
+                        reading
+                    }
+                };
+                add_twists::<S>(&reading.to_twist, weight, &twists, row);
                 for (unknown, derivative) in instrument.unknowns.iter().zip(reading.to_own) {
                     if let Some(unknown) = *unknown {
                         row[unknown] += weight * derivative;
@@ -371,10 +406,10 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
 
 /// Adds the weighted derivatives by way of the platform's twist to a row.
 #[inline(always)]
-fn add_twists<S: Real>(reading: &Reading, weight: f64, twists: &[f64], row: &mut [f64]) {
+fn add_twists<S: Real>(to_twist: &[f64; SIX], weight: f64, twists: &[f64], row: &mut [f64]) {
     let stride = row.len();
     for component in 0..SIX {
-        let factor = weight * reading.to_twist[component];
+        let factor = weight * to_twist[component];
         if factor == 0.0 {
             continue;
         }

@@ -1,8 +1,8 @@
-//! What an instrument reads at one pose, with its derivatives.
+//! What an instrument reads at one pose or between two, with its derivatives.
 //!
 //! A reading is a function of the platform's pose, of where the instrument stands and what it looks at, and,
 //! where it looks at a strut, of that strut's own parameters. Derivatives to the first two are written
-//! out; those of struts come from dual numbers.
+//! out; those of struts come from dual numbers. A parameter that was measured by itself is its own reading.
 
 use crate::element::MAX_DRIVE_PARAMETERS;
 use crate::kinematics::{Limb, ring_arm};
@@ -29,6 +29,10 @@ pub enum Observable {
     Direction(usize),
     /// By which a strut's direction is turned about the instrument's axis, rad.
     Turn,
+    /// Distance between the places of the target point at two poses, m.
+    Separation,
+    /// A parameter of the machine, in its own unit.
+    Parameter,
 }
 
 impl Observable {
@@ -41,6 +45,9 @@ impl Observable {
             7 => Some(Observable::Length),
             8..11 => Some(Observable::Direction(number - 8)),
             11 => Some(Observable::Turn),
+            12 => Some(Observable::Separation),
+            // Lengths, angles and plain numbers are told apart in Python only.
+            13..16 => Some(Observable::Parameter),
             _ => None,
         }
     }
@@ -127,7 +134,8 @@ pub struct Reading {
 }
 
 impl Reading {
-    fn new(value: f64) -> Self {
+    /// One that depends on nothing yet.
+    pub fn new(value: f64) -> Self {
         Reading { value, to_twist: [0.0; SIX], to_own: [0.0; OWN] }
     }
 }
@@ -167,8 +175,29 @@ impl InstrumentView {
             Observable::Coordinate(k) => dot(column(&placed.rotation, k), self.away),
             Observable::Distance => norm(self.away),
             Observable::Angle(k) => self.angles[k],
-            _ => unreachable!("readings of struts are of_strut"),
+            _ => unreachable!("other readings are of no view, or of two"),
         }
+    }
+
+    /// How far the target point is from where it is in another view by the same instrument: the distance, with
+    /// its derivatives by way of this view's pose and, whole, to the instrument's own numbers; and those by
+    /// way of the other pose.
+    pub fn separation(&self, other: &InstrumentView) -> (Reading, [f64; SIX]) {
+        let apart = subtract(other.away, self.away);
+        let mut reading = Reading::new(norm(apart));
+        let direction = scale(apart, 1.0 / reading.value);
+        let mut to_other = [0.0; SIX];
+        let (here, there) = (cross(self.arm, direction), cross(other.arm, direction));
+        let target =
+            subtract(rotate_back(&other.body, direction), rotate_back(&self.body, direction));
+        for k in 0..3 {
+            reading.to_twist[k] = -direction[k];
+            reading.to_twist[3 + k] = -here[k];
+            to_other[k] = direction[k];
+            to_other[3 + k] = there[k];
+            reading.to_own[6 + k] = target[k];
+        }
+        (reading, to_other)
     }
 
     /// What is read, with its derivatives.
@@ -186,7 +215,7 @@ impl InstrumentView {
                 }
                 return reading;
             }
-            _ => unreachable!("readings of struts are of_strut"),
+            _ => unreachable!("other readings are of no view, or of two"),
         };
         let moment = cross(self.arm, direction);
         let target = rotate_back(&self.body, direction);

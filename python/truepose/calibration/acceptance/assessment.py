@@ -148,7 +148,7 @@ class Case:
             if not np.isfinite(array).all():
                 raise ValueError(f"{name}: not finite")
         rows = weighted(jacobian, weights)
-        held = prior_rows(unknowns.prior_covariance) if use_prior else np.zeros((0, n))
+        held = prior_rows(unknowns.known_beforehand(tolerances=use_prior))
         if noise is None:
             degrees = float(np.count_nonzero(weights)) - fitted(rows, held)
             noise = (normalised_rms(residual, weights, degrees), degrees)
@@ -189,7 +189,8 @@ class Case:
     @cached_property
     def observability(self) -> Observability:
         """Of the data as their uncertainties are stated."""
-        rows = project_out_instruments(self.rows, self.n, self.sigma)
+        whole = np.vstack([self.rows, self.instrument_rows])
+        rows = project_out_instruments(whole, self.n, self.sigma)
         return observability(rows, int(np.count_nonzero(self.weights > 0.0)), self.sigma)
 
     @cached_property
@@ -198,13 +199,15 @@ class Case:
         half = np.asarray(self.unknowns.half, np.float64)[: self.n]
         return np.where(np.isfinite(half), half, np.nan)
 
+    @cached_property
+    def instrument_rows(self) -> Floats:
+        """(k, n) whitened rows of what is known of the instruments beforehand."""
+        return prior_rows(self.unknowns.known_beforehand(tolerances=False))
+
     def machine_rows(self, extra: Floats | None) -> WhitenedRows:
         """What the data say of the machine's unknowns, their uncertainties times `birge`."""
         parts = [self.factor] if extra is None else [self.factor, extra]
-        if self.use_prior:
-            of_instruments = self.prior_rows.copy()  # what is known of the instruments beforehand
-            of_instruments = of_instruments[np.any(of_instruments[:, self.n :] != 0.0, axis=1)]
-            parts.append(of_instruments)
+        parts.append(self.instrument_rows)
         return project_out_instruments(np.vstack(parts), self.n, self.sigma)
 
     def outcome(self, extra: Floats | None = None) -> Outcome:

@@ -19,7 +19,7 @@ from truepose.calibration.identification.placement import Placement, place_instr
 from truepose.calibration.identification.problem import row_shifts
 from truepose.calibration.identification.unknowns import unknowns_of_instruments
 from truepose.calibration.instruments import Instrument
-from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.calibration.observables import UNITS, column_name
 
 if TYPE_CHECKING:
     from truepose.calibration.measurements import Measurements
@@ -274,8 +274,7 @@ class View:
         return tuple(columns)
 
     def _name(self, observable: int, strut: int) -> str:
-        name = OBSERVABLES[observable]
-        return name if strut < 0 else f"strut.{self.machine.struts[strut].name}.{name}"
+        return column_name(self.machine, observable, strut)
 
     def column(self, observable: str) -> MeasuredColumn | None:
         """The column of an observable that is of no strut."""
@@ -361,8 +360,11 @@ class View:
     def other_command(
         self, commanded: Measurements | None, words: str, where: tuple[str, ...]
     ) -> Iterator[Hypothesis]:
-        """That the machine was commanded otherwise; nothing where it cannot be there."""
-        if commanded is not None:
+        """That the machine was commanded otherwise; nothing where it cannot be there.
+
+        Nor of rows between two poses, of which the other command is one.
+        """
+        if commanded is not None and not self.own.between.any():
             yield Hypothesis(words, where, self.suppose(commanded=commanded), of_command=True)
 
     def rms(self, misfit: Misfit, hypothesis: Hypothesis, unit: str) -> float:

@@ -6,14 +6,17 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.calibration.identification.problem import IdentificationProblem
-from truepose.calibration.identification.unknowns import Unknowns, bands_of
+from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import OBSERVABLES, UNITS
+from truepose.calibration.observables import OBSERVABLES, UNITS, is_parameter
 from truepose.machine import Machine
 from truepose.sources import Deviation, PoseBlock, acting
-from truepose.sources.tolerance import DimensionalTolerance
+from truepose.sources.tolerance import DimensionalTolerance, bands_of
 
 A, LENGTH, DIRECTION = (OBSERVABLES.index(name) for name in ("a", "length", "direction.x"))
+
+OF_TARGET = [OBSERVABLES.index(name) for name in ("x", "y", "z", "distance", "separation")]
+"""What an uncertain target makes uncertain."""
 
 MACHINES = 24
 """Machines that are drawn, each tolerance at one of its ends: the spread is known to a seventh."""
@@ -34,11 +37,19 @@ def expected_residual(machine: Machine, measurements: Measurements) -> Floats:
     linear, angular, own = _by_others(machine, measurements)
     row, observable = measurements.row, measurements.observable
     others = np.select(
-        [observable == LENGTH, np.array([unit == "m" for unit in UNITS])[observable]],
-        [np.hypot(linear, own)[row], linear[row]],
+        [
+            is_parameter(observable),  # measured cold and without loads
+            observable == LENGTH,
+            np.array([unit == "m" for unit in UNITS])[observable],
+        ],
+        [np.zeros(row.size), np.hypot(linear, own)[row], linear[row]],
         np.hypot(angular, linear / size)[row],
     )
-    allowed: Floats = np.sqrt(by_tolerance**2 + others**2 + measurements.uncertainty**2)
+    known = np.array([max(each.target_uncertainty) for each in measurements.instruments])
+    target = known[measurements.instrument[row]]
+    target[~np.isin(observable, OF_TARGET)] = 0.0
+    squares = by_tolerance**2 + others**2 + measurements.uncertainty**2 + target**2
+    allowed: Floats = np.sqrt(squares)
     return allowed
 
 

@@ -231,7 +231,7 @@ def _loss(fitted: Fit, noise: float) -> float:
 
 def _cost(fitted: Fit, noise: float) -> float:
     """What the fit has made least: the loss of the readings, and the prior's squares."""
-    prior = Prior.of(fitted.unknowns) if fitted.use_prior else Prior.none(fitted.unknowns.count)
+    prior = Prior.of(fitted.unknowns, tolerances=fitted.use_prior)
     known = prior.rows @ (fitted.values - prior.mean)
     return _loss(fitted, noise) + float(known @ known)
 

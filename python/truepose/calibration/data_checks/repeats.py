@@ -17,8 +17,8 @@ FINE = 10.0
 
 def inspect_doubled(view: View) -> Iterator[Suspicion]:
     """The same command and the same readings to the last digit."""
-    if not _fine(view):
-        return
+    if not _fine(view) or not view.measurements.posed[view.rows].all():
+        return  # a part is measured twice to the same digit, if the gauge has few
     seen: dict[tuple[bytes, ...], int] = {}
     doubled: list[int] = []
     for row in view.rows.tolist():
@@ -27,7 +27,7 @@ def inspect_doubled(view: View) -> Iterator[Suspicion]:
         if not value.any():
             return  # a contact reads zero everywhere
         key = (
-            view.measurements.joints[row].tobytes(),
+            view.measurements.command(row),
             value.tobytes(),
             view.readings.observable[of_row].tobytes(),
         )
@@ -49,6 +49,8 @@ def inspect_doubled(view: View) -> Iterator[Suspicion]:
 
 def inspect_disagreeing(view: View) -> Iterator[Suspicion]:
     """The same command under the same condition, and readings that differ by more than noise."""
+    if not view.measurements.posed[view.rows].all():
+        return
     rows: list[int] = []
     largest = 0.0
     for column in view.columns:
@@ -56,7 +58,7 @@ def inspect_disagreeing(view: View) -> Iterator[Suspicion]:
         for observation in column.observations.tolist():
             row = int(view.readings.row[observation])
             condition = id(view.measurements.conditions[row])
-            key = (view.measurements.joints[row].tobytes(), condition)
+            key = (view.measurements.command(row), condition)
             first = seen.setdefault(key, observation)
             gap = abs(view.readings.value[observation] - view.readings.value[first])
             noise = np.hypot(

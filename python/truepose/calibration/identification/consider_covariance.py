@@ -108,11 +108,14 @@ def _roots(
     beforehand = covariance_root(every.prior_covariance[:count, :count])
     known = np.zeros((own.count, beforehand.shape[1]))
     known[:n] = beforehand[identified[:n]]
-    held = Prior.of(own).rows if fitted.use_prior else np.zeros((0, own.count))
+    held = Prior.of(own, tolerances=fitted.use_prior).rows
+    of_instruments = Prior.of(own, tolerances=False).rows
     of_identified = (
         fitted.covariance @ (held.T @ (held @ known)) + response @ beforehand[unidentified]
     )
-    noise = np.asarray(np.linalg.qr(gain[:n].T, mode="r"), np.float64).T
+    # Readings err, and so does what was known of the instruments.
+    errors = np.hstack([gain, fitted.covariance @ of_instruments.T])
+    noise = np.asarray(np.linalg.qr(errors[:n].T, mode="r"), np.float64).T
     # The fit takes what was not identified for nominal: middles of bands off zero stay in it.
     middle = response[:n] @ every.prior_mean[unidentified]
     of_prior = np.zeros_like(beforehand)

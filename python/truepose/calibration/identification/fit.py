@@ -123,8 +123,7 @@ def fit(
     standing = place_instruments(machine, measurements) if placements is None else placements
     problem = IdentificationProblem(machine, standing.measurements, unknowns)
     as_filed = standing.as_filed(unknowns)
-    known = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
-    prior = Prior(known.rows, unknowns.prior_mean)  # without tolerances, where the gauge holds
+    prior = Prior.of(unknowns, tolerances=use_prior)
     values = unknowns.prior_mean
     slope = whitened(problem, values)
     equations = Equations.of(slope, prior, unknowns)
@@ -196,7 +195,7 @@ def unfitted(
     residual = problem.residual(as_filed)
     nothing = np.zeros(measurements.n_observation)
     slope = whitened(problem, as_filed)
-    known = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
+    known = Prior.of(unknowns, tolerances=use_prior)
     equations = Equations.of(np.zeros_like(slope), known, unknowns)
     return Fit(
         unknowns,
@@ -218,9 +217,8 @@ def unfitted(
 
 def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bool) -> None:
     """Refuse fewer equations than unknowns, saying how many readings are lacking."""
-    free = unknowns.count
-    if use_prior:
-        free -= int(unknowns.has_prior.sum())
+    known = np.diagonal(unknowns.known_beforehand(tolerances=use_prior))
+    free = int(np.isinf(known).sum())
     lacking = free - measurements.n_observation
     if lacking <= 0:
         return

@@ -191,10 +191,10 @@ class _Search:
         values = np.zeros(self.unknowns.count)
         settled = True
         if self.unknowns.count:
-            none = Prior.none(self.unknowns.count)
-            gauge = Equations.of(whitened(problem, values), none, self.unknowns).gauge_rows()
+            known = Prior.of(self.unknowns)
+            gauge = Equations.of(whitened(problem, values), known, self.unknowns).gauge_rows()
             solved = problem.solve(
-                prior=none.with_rows(gauge),
+                prior=known.with_rows(gauge),
                 weights=self.weights,
                 start=values,
                 tolerances=self.tolerances,

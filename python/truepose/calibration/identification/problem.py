@@ -48,9 +48,10 @@ class Prior:
         return cls(np.empty((0, count)), np.zeros(count))
 
     @classmethod
-    def of(cls, unknowns: Unknowns) -> Prior:
-        """The unknowns' own."""
-        return cls(prior_rows(unknowns.prior_covariance), unknowns.prior_mean)
+    def of(cls, unknowns: Unknowns, *, tolerances: bool = True) -> Prior:
+        """The unknowns' own; without `tolerances` only what is known of the instruments."""
+        known = unknowns.known_beforehand(tolerances=tolerances)
+        return cls(prior_rows(known), unknowns.prior_mean)
 
     def with_rows(self, rows: Floats) -> Prior:
         """Further rows, about the same mean."""
@@ -86,7 +87,10 @@ class IdentificationProblem(Represented):
         Raises `TrueposeError` where a row's condition asks for what the machine does not say.
         """
         self.machine, self.measurements, self.unknowns = machine, measurements, unknowns
-        self.shifts = row_shifts(machine, measurements, unknowns) if shifts is None else shifts
+        self._each_pose = measurements.with_second_poses()
+        if shifts is None:
+            shifts = row_shifts(machine, measurements, unknowns)
+        self.shifts = shifts
         self._kernel = Identification(machine.kernel, self._description())
 
     def _facts(self) -> Facts:
@@ -100,8 +104,13 @@ class IdentificationProblem(Represented):
         return self._kernel.predict(values)[0]
 
     def status(self, values: ArrayLike) -> np.ndarray:
-        """(n_row,) kernel status of each row's pose."""
-        return self._kernel.predict(values)[1]
+        """(n_row,) kernel status of each row's pose, of two that of the first that fails."""
+        status: np.ndarray = self._kernel.predict(values)[1]
+        of_rows = status[: self.measurements.n_row].copy()
+        between = np.flatnonzero(self.measurements.between)
+        second = status[self.measurements.n_row :]
+        of_rows[between] = np.where(of_rows[between] == 0, second, of_rows[between])
+        return of_rows
 
     def jacobian(self, values: ArrayLike) -> Floats:
         """(n_observation, n) derivatives of `predict`; NaN where a pose cannot be solved."""
@@ -155,14 +164,17 @@ class IdentificationProblem(Represented):
 
     def _description(self) -> dict[str, object]:
         measurements, unknowns = self.measurements, self.unknowns
+        poses = self._each_pose
         columns, shifts = self.shifts
         terms, coefficients = self._terms(columns, shifts)
         order = np.argsort(measurements.row, kind="stable")
         if not np.array_equal(order, np.arange(order.size)):
             raise ValueError("observations are not in the order of their rows")
         by = measurements.instrument[measurements.row]
+        between = np.flatnonzero(measurements.between).tolist()
+        second = {row: measurements.n_row + at for at, row in enumerate(between)}
         observations = [
-            (int(row), int(number), int(what), max(int(strut), 0), bias)
+            (int(row), second.get(int(row)), int(number), int(what), max(int(strut), 0), bias)
             for row, number, what, strut, bias in zip(
                 measurements.row,
                 by,
@@ -179,8 +191,8 @@ class IdentificationProblem(Represented):
         ]
         return {
             "unknowns": unknowns.count,
-            "joints": measurements.joints.ravel().tolist(),
-            "starts": measurements.placements.ravel().tolist(),
+            "joints": poses.joints.ravel().tolist(),
+            "starts": poses.placements.ravel().tolist(),
             "shifted": columns.tolist(),
             "shifts": shifts.ravel().tolist(),
             "terms": terms,
@@ -200,7 +212,7 @@ class IdentificationProblem(Represented):
         }
 
     def _terms(self, columns: Indices, shifts: Floats) -> tuple[list[tuple[int, int]], Floats]:
-        """(unknown, parameter) of every effect, and the coefficients (1 or n_row, n_term)."""
+        """(unknown, parameter) of every effect, and the coefficients (1 or n_pose, n_term)."""
         unknowns = self.unknowns
         at, numbers = np.nonzero(unknowns.effects)
         terms = [
@@ -210,9 +222,9 @@ class IdentificationProblem(Represented):
         constant = unknowns.effects[at, numbers][np.newaxis, :]
         if not unknowns.properties:
             return terms, constant
-        parts = [np.repeat(constant, self.measurements.n_row, axis=0)]
+        parts = [np.repeat(constant, self._each_pose.n_row, axis=0)]
         for number, change in property_effects(
-            self.machine, self.measurements, unknowns, (columns, shifts)
+            self.machine, self._each_pose, unknowns, (columns, shifts)
         ):
             own, slopes = change
             terms += [(number, int(column)) for column in own]
@@ -223,11 +235,13 @@ class IdentificationProblem(Represented):
 def row_shifts(
     machine: Machine, measurements: Measurements, unknowns: Unknowns
 ) -> ParameterDeviation:
-    """Parameters (k,) and how far every row's condition is known to move them (n_row, k).
+    """Parameters (k,) and how far every row's condition is known to move them (n_pose, k).
 
     By every source but the tolerances, whose middles are where unknowns start. A strut whose
-    expansion is to be found need not have one in the file.
+    expansion is to be found need not have one in the file. Parts that were measured by themselves
+    were cold and without loads.
     """
+    measurements = measurements.with_second_poses()
     known = machine
     for identified in unknowns.properties.values():
         started = identified.changed(known, 0.0)
@@ -241,6 +255,7 @@ def row_shifts(
     for rows, (own, values) in parts:
         place = np.searchsorted(columns, own)
         shifts[np.ix_(rows, place)] = np.broadcast_to(values, (rows.size, own.size))
+    shifts[~measurements.posed] = 0.0
     used = shifts.any(axis=0)
     return columns[used], np.ascontiguousarray(shifts[:, used])
 

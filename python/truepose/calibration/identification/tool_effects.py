@@ -118,6 +118,8 @@ def candidates(machine: Machine, fit: Fit) -> list[Candidate]:
                 Candidate(f"{instrument.name}: {what}", len(rows), f"probe in {what} too", rows)
             )
     for number, instrument in enumerate(data.instruments):
+        if not data.posed[data.instrument == number].all():
+            continue
         for count in FURTHER:
             more = _more_poses(machine, fit, number, count)
             if more is not None:
@@ -127,7 +129,8 @@ def candidates(machine: Machine, fit: Fit) -> list[Candidate]:
                 name = f"{instrument.name}: {count} poses"
                 additions.append(Candidate(name, len(more), sentence, more))
     axes = [axis for axis in "xyz" if axis in machine.components]
-    if not any(set(axes) <= set(data.observables(at)) for at in range(len(data.instruments))):
+    tracked = any(set(axes) <= set(data.observables(at)) for at in range(len(data.instruments)))
+    if not tracked and data.posed.any():
         rows = _tracker_rows(machine, fit, axes)
         sentence = f"measure {', '.join(axes)} of the tool at these poses, as a laser tracker does"
         additions.append(Candidate("tracker", 2 * len(rows), sentence, rows))
@@ -200,7 +203,17 @@ def _more_poses(machine: Machine, fit: Fit, number: int, count: int) -> Floats |
         value=np.zeros(total * size),
         uncertainty=np.tile(data.uncertainty[of_first], total),
         lines=np.zeros(total, np.intp),
+        other_joints=None,
+        other_placements=None,
     )
+    if data.between[first]:
+        # From each pose to the one half of them further on.
+        half = max(total // 2, 1)
+        more = dataclasses.replace(
+            more,
+            other_joints=np.roll(joints, half, axis=0),
+            other_placements=np.roll(placements, half, axis=0),
+        )
     return _rows(machine, fit, more) if total else None
 
 
@@ -209,5 +222,5 @@ def _tracker_rows(machine: Machine, fit: Fit, axes: list[str]) -> Floats:
     data = fit.measurements
     tracker = Instrument("tracker", "position", Frame())
     wide = dataclasses.replace(data, instruments=(*data.instruments, tracker))
-    rows = np.arange(data.n_row)
+    rows = np.flatnonzero(data.posed)
     return _rows(machine, fit, _observing(wide, rows, axes, 10e-6, len(data.instruments)))

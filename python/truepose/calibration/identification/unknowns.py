@@ -20,7 +20,7 @@ from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property, properties_of
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.observables import UNITS, column_name
+from truepose.calibration.observables import UNITS, column_name, is_parameter
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.files.units import QuantityError, UnitSystem
@@ -28,7 +28,7 @@ from truepose.files.wording import did_you_mean
 from truepose.machine import Machine
 from truepose.representation import Facts, Represented
 from truepose.sources import Deviation
-from truepose.sources.tolerance import DimensionalTolerance
+from truepose.sources.tolerance import bands_of
 
 SCREEN = 1e-9
 """Middles of a group's bands may be this far, of its half band, from moving together."""
@@ -80,6 +80,18 @@ class Unknowns(Represented):
         flags: np.ndarray = np.isfinite(np.diagonal(self.prior_covariance))
         return flags
 
+    def known_beforehand(self, *, tolerances: bool) -> Floats:
+        """(n, n) covariance of what is known beforehand, infinite where nothing is.
+
+        What is known of the instruments stays known where `tolerances` do not count.
+        """
+        covariance = self.prior_covariance.copy()
+        if not tolerances:
+            covariance[: self.n_machine] = covariance[:, : self.n_machine] = 0.0
+            own = np.arange(self.n_machine)
+            covariance[own, own] = np.inf
+        return covariance
+
     def parameter_change(self, values: Floats) -> Floats:
         """(k,) by how much the parameters `columns` differ from nominal, for values (n,)."""
         change: Floats = self.effects @ values
@@ -125,13 +137,15 @@ def unknowns_of(
     `identify`: names, groups or patterns (`strut.*.length`), each with a half band of its own where
     one is given (`strut.*.expansion=2e-6 1/K`, `strut.1.length=0.5 mm`); nothing: everything that
     has a tolerance. What is named without having a tolerance, and without a band, is found from the
-    measurements alone.
+    measurements alone. Parameters that were measured by themselves are always among them.
 
     Raises `RequestError` (unknown-parameter, no-unknowns, bad-band, no-stiffness, bad-prior).
     """
     bands = bands_of(machine)
     tolerated = _tolerance_unknowns(machine, bands)
-    wanted = _chosen_unknowns(machine, tolerated, identify)
+    wanted = _with_measured(
+        machine, measurements, tolerated, _chosen_unknowns(machine, tolerated, identify)
+    )
     if not wanted:
         raise RequestError(
             Problem(
@@ -155,6 +169,8 @@ def unknowns_of(
         covariance[number, number] = unknown.sigma**2
     if bands is not None and bands.correlation is not None:
         _correlate(covariance, wanted, bands)
+    for number, uncertainty in instruments.uncertainties.items():
+        covariance[number, number] = uncertainty**2
     extra = len(instruments.names)
     return Unknowns(
         tuple(unknown.name for unknown in wanted) + tuple(instruments.names),
@@ -177,6 +193,9 @@ def unknowns_of_instruments(machine: Machine, measurements: Measurements) -> Unk
     """Those of the instruments alone; the machine stays as its file has it."""
     own = _instrument_unknowns(machine, measurements, 0)
     count = len(own.names)
+    covariance = np.diag(np.full(count, np.inf))
+    for number, uncertainty in own.uncertainties.items():
+        covariance[number, number] = uncertainty**2
     return Unknowns(
         tuple(own.names),
         tuple(own.units),
@@ -185,20 +204,12 @@ def unknowns_of_instruments(machine: Machine, measurements: Measurements) -> Unk
         np.empty(0, np.intp),
         np.empty((0, count)),
         np.zeros(count),
-        np.diag(np.full(count, np.inf)),
+        covariance,
         np.full(count, np.inf),
         frames=own.frames,
         biases=own.biases,
         shown=machine.shown,
     )
-
-
-def bands_of(machine: Machine) -> Deviation | None:
-    """The bands of the machine's tolerances; None where its file has none."""
-    of_tolerances = (
-        source.bands for source in machine.sources if isinstance(source, DimensionalTolerance)
-    )
-    return next(of_tolerances, None)
 
 
 def _tolerance_unknowns(machine: Machine, bands: Deviation | None) -> list[_MachineUnknown]:
@@ -303,6 +314,27 @@ def _chosen_unknowns(
     return sorted(chosen.values(), key=lambda unknown: order[unknown.name])
 
 
+def _with_measured(
+    machine: Machine,
+    measurements: Measurements,
+    tolerated: Sequence[_MachineUnknown],
+    chosen: list[_MachineUnknown],
+) -> list[_MachineUnknown]:
+    """And the parameters that were measured by themselves, or the groups that they are of."""
+    fitted = ~measurements.held_out[measurements.row]
+    measured = np.unique(measurements.strut[is_parameter(measurements.observable) & fitted])
+    moved = {column for unknown in chosen for column in unknown.effects}
+    for column in measured.tolist():
+        if column in moved:
+            continue
+        name, unit = machine.parameters[column], machine.units[column]
+        alone = _MachineUnknown(name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf)
+        unknown = next((one for one in tolerated if column in one.effects), alone)
+        moved.update(unknown.effects)
+        chosen = [*chosen, unknown]
+    return chosen
+
+
 _DIMENSION_OF_UNIT = {"m": "length", "rad": "angle", "1/K": "expansion", "1": "ratio"}
 
 
@@ -356,13 +388,15 @@ class _InstrumentUnknowns:
     labels: list[str]
     frames: dict[int, tuple[int | None, ...]]
     biases: dict[tuple[int, int, int], int]
+    uncertainties: dict[int, float]
+    """Standard ones, of those of which something is known beforehand, by their number."""
 
 
 def _instrument_unknowns(
     machine: Machine, measurements: Measurements, first: int
 ) -> _InstrumentUnknowns:
     """Unknowns of the instruments that measured anything, numbered from `first` on."""
-    unknowns = _InstrumentUnknowns([], [], [], {}, {})
+    unknowns = _InstrumentUnknowns([], [], [], {}, {}, {})
 
     def add(name: str, unit: str, label: str) -> int:
         unknowns.names.append(name)
@@ -376,6 +410,11 @@ def _instrument_unknowns(
         if not own.any():
             continue
         unknowns.frames[number] = _frame_and_target(instrument, add)
+        for at, uncertainty in zip(
+            unknowns.frames[number][6:], instrument.target_uncertainty, strict=True
+        ):
+            if at is not None and uncertainty > 0.0:
+                unknowns.uncertainties[at] = uncertainty
         if not instrument.bias_unknown:
             continue
         read = zip(measurements.observable[own], measurements.strut[own], strict=True)
@@ -399,9 +438,10 @@ def _frame_and_target(instrument: Instrument, add: object) -> tuple[int | None, 
     for (key, unit, what), unknown in zip(named, instrument.frame.unknown, strict=True):
         name, label = f"{instrument.name}.{key}", f"frame of {instrument.name}, {what}"
         own.append(add(name, unit, label) if unknown else None)
-    for axis in "xyz":
+    for axis, uncertainty in zip("xyz", instrument.target_uncertainty, strict=True):
         name, label = f"{instrument.name}.target.{axis}", f"target of {instrument.name}, {axis}"
-        own.append(add(name, "m", label) if instrument.target_unknown else None)
+        sought = instrument.target_unknown or uncertainty > 0.0
+        own.append(add(name, "m", label) if sought else None)
     return tuple(own)
 
 

@@ -5,7 +5,8 @@ the readings of the fold's rows; so does the machine as its file has it, its ins
 the same rows. A fit that only follows the noise of its own rows is found out here.
 
 A reading is not predicted where the other rows leave the frame, target or constant of its
-instrument open. For every prediction the fit states how uncertain it is.
+instrument open, nor what was measured of a part where they say nothing of it. For every prediction
+the fit states how uncertain it is.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from truepose.calibration.identification.fit import Fit, fit
 from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.calibration.measurements import Measurements
+from truepose.calibration.observables import is_parameter
 from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.representation import Represented
@@ -189,5 +191,7 @@ def _left_open(rows: Measurements, fitted: Fit, slope: Floats) -> Flags:
         affected[instrument] = any(number is not None and open_[number] for number in own)
     for (instrument, _, _), number in unknowns.biases.items():
         affected[instrument] |= open_[number]
-    flags: Flags = changing & affected[rows.instrument[rows.row]]
+    # What nothing else says of a part is not found out by leaving out what was measured of it.
+    by_itself = is_parameter(rows.observable)
+    flags: Flags = changing & (affected[rows.instrument[rows.row]] | by_itself)
     return flags

@@ -15,9 +15,11 @@ from truepose.calibration.instruments import (
     distance,
     joint_angle,
     orientation,
+    parameter,
     plane,
     pose,
     position,
+    separation,
     strut_direction,
     strut_length,
 )
@@ -43,6 +45,8 @@ REGISTRY: Mapping[str, Kind] = MappingProxyType(
             strut_direction,
             joint_angle,
             contact,
+            parameter,
+            separation,
         )
     }
 )

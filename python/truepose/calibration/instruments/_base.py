@@ -45,7 +45,8 @@ class Instrument:
     """One instrument as the measurements declare it; SI.
 
     `kind`: a key of `instruments.REGISTRY`. `target`: what it looks at, from the tool point along
-    the platform's axes, m; the start of a search where it is unknown. With `bias_unknown` an
+    the platform's axes, m; the start of a search where it is unknown; `target_uncertainty`: how
+    well it is known, standard, along each of these axes, 0 exactly. With `bias_unknown` an
     unknown constant is added to what it reads, one for each observable; of struts one for each
     strut. `uncertainty`: standard ones by observable, or by SI unit ("m", "rad", "1"), for rows
     that say none. `axis`, `zero`, `end`: of joint-angle sensors, a strut's turn about `axis` from
@@ -62,6 +63,7 @@ class Instrument:
     axis: Vector = (0.0, 0.0, 1.0)
     zero: Vector = (1.0, 0.0, 0.0)
     end: str = "base"
+    target_uncertainty: Vector = (0.0, 0.0, 0.0)
 
     def uncertainty_of(self, observable: str) -> float | None:
         """Standard uncertainty of an observable where a row says none, SI; None: not stated."""
@@ -86,7 +88,8 @@ class Kind:
     moves in. `fixed`: observables that are 0 in every row, without a column. `optional`: a column
     that may be missing or blank and then is 0. `frame`: which of a frame's freedoms are identified
     where the file says `frame = "unknown"`; None: what it reads has no frame. `has_target`:
-    whether what it reads depends on a target point. `keys`: of `axis`, `zero`, `end` those that it
+    whether what it reads depends on a target point. `poses`: at how many commanded poses each of
+    its rows is. `keys`: of `axis`, `zero`, `end` those that it
     takes.
     """
 
@@ -100,6 +103,7 @@ class Kind:
     optional: bool = False
     frame: FrameRule | None = None
     has_target: bool = True
+    poses: int = 1
     keys: tuple[str, ...] = ()
     phrases: Callable[[Sequence[str]], str] | None = None
 

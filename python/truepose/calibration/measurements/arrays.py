@@ -11,19 +11,20 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.calibration.instruments import REGISTRY, Instrument
+from truepose.calibration.measurements.columns import (
+    TO,
+    UNCERTAINTY,
+    MeasurementRows,
+    ReadingColumn,
+    reading_columns,
+)
 from truepose.calibration.measurements.declarations import (
     expected_name,
     name_is_good,
     reserved_names,
 )
 from truepose.calibration.measurements.measurements import Measurements
-from truepose.calibration.measurements.rows import (
-    UNCERTAINTY,
-    MeasurementRows,
-    ReadingColumn,
-    measurements_in,
-    reading_columns,
-)
+from truepose.calibration.measurements.rows import measurements_in
 from truepose.errors import Fault, Problem, RequestError
 from truepose.files.data_file import cut_short
 from truepose.files.wording import did_you_mean, one_of
@@ -36,6 +37,7 @@ def measurements_of(
     *,
     poses: ArrayLike | None = None,
     joints: ArrayLike | None = None,
+    to: ArrayLike | None = None,
     values: Mapping[str, ArrayLike] | None = None,
     uncertainty: float | Mapping[str, ArrayLike] | None = None,
     condition: Condition | Sequence[Condition] | None = None,
@@ -50,8 +52,10 @@ def measurements_of(
             uncertainty=10e-6, frame_unknown=True,
         )
 
-    Commanded `poses` (n_row, n_commanded), or `joints` (n_row, n_joint). `values`: (n_row,) by the
-    columns of a file ("x", "strut.1.length"), NaN where nothing was read; none of a contact.
+    Commanded `poses` (n_row, n_commanded), or `joints` (n_row, n_joint), neither of a kind that
+    needs no pose; `to`: of a kind that measures between two poses, the second ones likewise.
+    `values`: (n_row,) by the columns of a file ("x", "strut.1.length", "parameter.strut.1.length"),
+    NaN where nothing was read; none of a contact.
     `uncertainty`: standard, one for all, or by column one or (n_row,); default the instrument's.
     `condition`: of all rows or of each; default at reference temperature, no load on the tool.
     `held_out` (n_row,): kept from the fit. `frame_unknown`: all of the instrument's frame that its
@@ -63,9 +67,12 @@ def measurements_of(
     arguments = _Arguments(machine, instrument, problems)
     columns = arguments.columns(values or {})
     commanded = arguments.commanded(poses, joints)
-    if problems or commanded is None:
+    if problems:
         raise RequestError(*problems)
-    n = len(commanded)
+    others = arguments.others(to, commanded, joints is not None)
+    if problems:
+        raise RequestError(*problems)
+    n = arguments.n_row(values or {}) if commanded is None else len(commanded)
     table = {name: arguments.of_rows(name, column, n) for name, column in columns.items()}
     stated = arguments.uncertainties(uncertainty, table, n)
     flags = np.zeros(n, np.bool_) if held_out is None else np.array(held_out, np.bool_)
@@ -81,7 +88,9 @@ def measurements_of(
         held_out=flags,
         lines=np.zeros(n, np.intp),
         commands=commanded if poses is not None else None,
-        joints=commanded if poses is None else None,
+        joints=commanded if joints is not None else None,
+        to_commands=others if poses is not None else None,
+        to_joints=others if joints is not None else None,
         whole=frozenset({instrument.name} if frame_unknown else ()),
     )
     measurements = measurements_in(machine, (instrument,), rows, _Report(problems, rows))
@@ -140,7 +149,17 @@ def joined(*several: Measurements) -> Measurements:
         lines=np.concatenate([part.lines for part in several]),
         file=", ".join(file for file in files if file),
         file_hash=", ".join(dict.fromkeys(part.file_hash for part in several if part.file_hash)),
+        **_second_poses(several),
     )
+
+
+def _second_poses(several: Sequence[Measurements]) -> dict[str, Floats]:
+    """Of all parts, where one has any; in the others the first poses again."""
+    if all(part.other_joints is None for part in several):
+        return {}
+    joints = [p.joints if p.other_joints is None else p.other_joints for p in several]
+    placed = [p.placements if p.other_placements is None else p.other_placements for p in several]
+    return {"other_joints": np.concatenate(joints), "other_placements": np.concatenate(placed)}
 
 
 def _same_objects(conditions: Sequence[Condition]) -> tuple[Condition, ...]:
@@ -195,6 +214,7 @@ class _Arguments:
             ("frame.origin", self.instrument.frame.origin),
             ("frame.rotation", self.instrument.frame.rotation),
             ("target", self.instrument.target),
+            ("target_uncertainty", self.instrument.target_uncertainty),
             ("axis", self.instrument.axis),
             ("zero", self.instrument.zero),
         ):
@@ -203,6 +223,13 @@ class _Arguments:
                 self.refuse(f"instrument.{path}", str(vector), f"{wanted} finite numbers")
             elif wanted == 4 and abs(float(np.linalg.norm(vector)) - 1.0) > 1e-9:
                 self.refuse(f"instrument.{path}", str(vector), "a unit quaternion w x y z")
+        known = self.instrument.target_uncertainty
+        if any(known) and not (self.instrument.target_unknown is False and min(known) > 0.0):
+            self.refuse(
+                "instrument.target_uncertainty",
+                str(known),
+                "three above zero of a target that is not unknown, or three zeros",
+            )
         if len(self.instrument.frame.unknown) != 6:
             self.refuse("instrument.frame.unknown", str(self.instrument.frame.unknown), "6 flags")
         for name, amount in self.instrument.uncertainty.items():
@@ -214,8 +241,36 @@ class _Arguments:
                 self.refuse(f"values.{name}", name, one_of(self.known, limit=16), hint)
         return {name: column for name, column in values.items() if name in self.known}
 
+    def others(self, to: ArrayLike | None, commanded: Floats | None, joints: bool) -> Floats | None:
+        """The second poses or joints, as many as there are first ones; None of other kinds."""
+        two = self.instrument.kind in REGISTRY and REGISTRY[self.instrument.kind].poses == 2
+        if to is None or commanded is None:
+            if two:
+                self.refuse("to", "nothing", "the second pose of each row")
+            return None
+        if not two:
+            self.refuse("to", "second poses", f"none, of kind {self.instrument.kind}")
+            return None
+        table = self._numbers("to", to)
+        if table is None:
+            return None
+        if table.shape != commanded.shape or not np.isfinite(table).all():
+            what = "joints" if joints else "poses"
+            found = f"shape {table.shape}"
+            found = found if table.shape != commanded.shape else "a number that is not finite"
+            self.refuse("to", found, f"{commanded.shape} finite numbers, as {what} have")
+        return table
+
     def commanded(self, poses: ArrayLike | None, joints: ArrayLike | None) -> Floats | None:
-        """(n_row, n_commanded) poses or (n_row, n_joint) joints, whichever is given."""
+        """(n_row, n_commanded) poses or (n_row, n_joint) joints, whichever is given.
+
+        None where that is wrong, and of a kind that needs no pose.
+        """
+        if self.instrument.kind in REGISTRY and not REGISTRY[self.instrument.kind].poses:
+            if poses is not None or joints is not None:
+                found = "poses" if joints is None else "joints"
+                self.refuse("poses", found, f"none, of kind {self.instrument.kind}")
+            return None
         if (poses is None) == (joints is None):
             found = "neither" if poses is None else "both"
             self.refuse("poses", found, "either poses or joints, as they were commanded")
@@ -234,6 +289,10 @@ class _Arguments:
             self.refuse(path, f"a number that is not finite, in row {row}", expected)
             return None
         return table
+
+    def n_row(self, values: Mapping[str, ArrayLike]) -> int:
+        """How many rows values without poses are: as many as the longest has, at least one."""
+        return max((np.size(column) for column in values.values()), default=1)
 
     def of_rows(self, name: str, values: ArrayLike, n: int, what: str = "values") -> Floats:
         """(n_row,) of one column; one number stands for all rows."""
@@ -283,6 +342,10 @@ class _Arguments:
         """(n_row,) conditions, of parts that the machine has; None: the default."""
         if condition is None:
             return None
+        if self.instrument.kind in REGISTRY and not REGISTRY[self.instrument.kind].poses:
+            expected = "none: a part is measured at the reference temperature, without loads"
+            self.refuse("condition", "a condition", expected)
+            return None
         every = (condition,) * n if isinstance(condition, Condition) else tuple(condition)
         if len(every) != n:
             self.refuse(
@@ -329,7 +392,8 @@ class _Report:
 
     def shown(self, column: str, row: int) -> str:
         """A number as it was given, SI."""
-        if column.startswith("joint.") and self.rows.joints is not None:
-            return str(self.rows.joints[row].tolist())
+        joints = self.rows.to_joints if column.startswith(TO) else self.rows.joints
+        if column.removeprefix(TO).startswith("joint.") and joints is not None:
+            return str(joints[row].tolist())
         table = self.rows.uncertainties if column.endswith(UNCERTAINTY) else self.rows.readings
         return f"{table[column][row]:.10g}" if column in table else "nothing"

@@ -49,6 +49,8 @@ ROUNDING = 1e-14
 
 _NO_UNITS = UnitSystem({})
 
+_NOWHERE: Vector = (0.0, 0.0, 0.0)
+
 TOP_KEYS = ("machine", "instrument")
 COMMON_KEYS = ("kind", "bias", "uncertainty")
 
@@ -209,7 +211,7 @@ class _Reader:
         self._check_keys(key, table, self._keys(kind))
         end = str(self._if_there(key, table, "end", self._end, "base"))
         frame = self._frame_of(key, table, kind, end)
-        target = self._if_there(key, table, "target", self._target, ((0.0, 0.0, 0.0), False))
+        target = self._if_there(key, table, "target", self._target, (_NOWHERE, False, _NOWHERE))
         axis = self._if_there(key, table, "axis", self._direction, (0.0, 0.0, 1.0))
         zero = self._if_there(key, table, "zero", self._direction, None)
         if "axis" in kind.keys:
@@ -224,7 +226,7 @@ class _Reader:
         bias = self._if_there(key, table, "bias", self._bias, False)
         if len(self.header.problems) > before:
             return None
-        point, target_unknown = target
+        point, target_unknown, target_uncertainty = target
         return Instrument(
             name,
             kind.name,
@@ -236,9 +238,12 @@ class _Reader:
             axis,
             zero or (1.0, 0.0, 0.0),
             end,
+            target_uncertainty,
         )
 
     def _keys(self, kind: Kind) -> tuple[str, ...]:
+        if kind.poses == 0:  # a constant of its own for each parameter would leave nothing
+            return ("kind", "uncertainty")
         return (*COMMON_KEYS, "frame", *(("target",) if kind.has_target else ()), *kind.keys)
 
     def _kind(self, key: Key, table: dict[str, Any]) -> Kind | None:
@@ -369,16 +374,17 @@ class _Reader:
             size = 1.0
         return (w / size, x / size, y / size, z / size)
 
-    def _target(self, key: Key, value: Any) -> tuple[Vector, bool]:
+    def _target(self, key: Key, value: Any) -> tuple[Vector, bool, Vector]:
+        """The point, whether it is unknown, and how uncertain it is, exactly known where 0."""
         if value == UNKNOWN:
-            return (0.0, 0.0, 0.0), True
+            return _NOWHERE, True, _NOWHERE
         if not isinstance(value, dict):
-            return self._three(key, value, "length"), False
-        self._check_keys(key, value, ("start", "unknown"))
-        start = (0.0, 0.0, 0.0)
+            return self._three(key, value, "length"), False, _NOWHERE
+        self._check_keys(key, value, ("start", "unknown", "uncertainty"))
+        start = _NOWHERE
         if "start" in value:
             start = self._three((*key, "start"), value["start"], "length")
-        unknown = value.get("unknown", True)
+        unknown = value.get("unknown", "uncertainty" not in value)
         if not isinstance(unknown, bool):
             self._refuse(
                 Fault("wrong-type", "expected true or false"),
@@ -386,7 +392,30 @@ class _Reader:
                 unknown,
                 "true or false",
             )
-        return start, unknown
+        if "uncertainty" not in value:
+            return start, unknown, _NOWHERE
+        place = (*key, "uncertainty")
+        if unknown:
+            self._refuse(
+                Fault("excluding-keys", "the target is unknown, and how uncertain it is is said"),
+                place,
+                value["uncertainty"],
+                "either unknown = true or an uncertainty",
+            )
+        return start, False, self._target_uncertainty(place, value["uncertainty"])
+
+    def _target_uncertainty(self, key: Key, value: Any) -> Vector:
+        """Standard uncertainties along the three axes, or one for all of them."""
+        if not isinstance(value, list):
+            amount = self._positive(key, value, ("length",))[0]
+            return (amount, amount, amount)
+        if len(value) != 3:
+            expected = '"0.1 mm", or one for each axis: ["0.1 mm", "0.1 mm", "0.5 mm"]'
+            self._refuse(Fault("wrong-type", "expected 3 lengths"), key, value, expected)
+        x, y, z = (
+            self._positive((*key, at), entry, ("length",))[0] for at, entry in enumerate(value)
+        )
+        return (x, y, z)
 
     def _bias(self, key: Key, value: Any) -> bool:
         if value != UNKNOWN:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments._base import Instrument
-from truepose.calibration.observables import OBSERVABLES
+from truepose.calibration.observables import OBSERVABLES, is_parameter
 from truepose.machine.condition import Condition
 from truepose.representation import Facts, Represented
 
@@ -41,12 +41,14 @@ class Measurements(Represented):
     """What instruments read of a machine; SI, radians and kelvin.
 
     Rows: `joints` (n_row, n_joint) commanded; `placements` (n_row, 7) where the nominal machine
-    then is, tool point and quaternion; `instrument` (n_row,) which of `instruments` measured;
-    `conditions` (n_row,), equal ones the same object; `held_out` (n_row,): kept from the fit;
-    `lines` (n_row,) of the file, 0 where there is none.
+    then is, tool point and quaternion, at its home where a row needs no pose; `instrument`
+    (n_row,) which of `instruments` measured; `conditions` (n_row,), equal ones the same object;
+    `held_out` (n_row,): kept from the fit; `lines` (n_row,) of the file, 0 where there is none.
+    `other_joints` and `other_placements`: the second pose of rows that are between two, in the
+    others the first again; None where no row is.
 
     Observations: `row` (n_observation,) of each, `observable`: its index in `OBSERVABLES`, `strut`:
-    which, or -1; `value` and standard `uncertainty`, above zero.
+    which, of a parameter which parameter, or -1; `value` and standard `uncertainty`, above zero.
     """
 
     instruments: tuple[Instrument, ...]
@@ -63,6 +65,8 @@ class Measurements(Represented):
     lines: Indices
     file: str = ""
     file_hash: str = ""
+    other_joints: Floats | None = None
+    other_placements: Floats | None = None
 
     def _facts(self) -> Facts:
         yield "file", self.file or None
@@ -81,6 +85,45 @@ class Measurements(Represented):
         """How many numbers were measured."""
         return len(self.value)
 
+    @property
+    def posed(self) -> Flags:
+        """(n_row,) whether the row was measured at a pose; a part's own dimensions are not."""
+        flags = np.ones(self.n_row, np.bool_)
+        flags[self.row[is_parameter(self.observable)]] = False
+        return flags
+
+    @property
+    def between(self) -> Flags:
+        """(n_row,) whether the row was measured between two poses."""
+        flags = np.zeros(self.n_row, np.bool_)
+        flags[self.row[self.observable == OBSERVABLES.index("separation")]] = True
+        return flags
+
+    def command(self, row: int) -> bytes:
+        """What a row was commanded to, to the last digit: equal of equal commands only."""
+        tables = [self.joints] + ([] if self.other_joints is None else [self.other_joints])
+        return b"".join(table[row].tobytes() for table in tables)
+
+    def with_second_poses(self) -> Measurements:
+        """The second poses of rows between two as further rows, in their order, without readings.
+
+        Every pose at which anything was measured is then the one pose of a row.
+        """
+        if self.other_joints is None or self.other_placements is None:
+            return self
+        rows = np.flatnonzero(self.between)
+        return dataclasses.replace(
+            self,
+            joints=np.concatenate([self.joints, self.other_joints[rows]]),
+            placements=np.concatenate([self.placements, self.other_placements[rows]]),
+            instrument=np.concatenate([self.instrument, self.instrument[rows]]),
+            conditions=self.conditions + tuple(self.conditions[row] for row in rows.tolist()),
+            held_out=np.concatenate([self.held_out, self.held_out[rows]]),
+            lines=np.concatenate([self.lines, self.lines[rows]]),
+            other_joints=None,
+            other_placements=None,
+        )
+
     def observables(self, instrument: int) -> tuple[str, ...]:
         """Names of what an instrument, by its index, read in any row, in the order of the table."""
         read = self.observable[self.instrument[self.row] == instrument]
@@ -91,7 +134,8 @@ class Measurements(Represented):
         """SHA-256 of the file's bytes, or of the numbers where there is no file."""
         if self.file_hash:
             return self.file_hash
-        arrays = (self.joints, self.row, self.observable, self.strut, self.value, self.uncertainty)
+        arrays = [self.joints, self.row, self.observable, self.strut, self.value, self.uncertainty]
+        arrays += [] if self.other_joints is None else [self.other_joints]
         parts = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
         return hashlib.sha256(parts).hexdigest()
 
@@ -115,6 +159,8 @@ class Measurements(Represented):
             strut=self.strut[kept],
             value=self.value[kept],
             uncertainty=self.uncertainty[kept],
+            other_joints=_of_rows(self.other_joints, wanted),
+            other_placements=_of_rows(self.other_placements, wanted),
         )
 
     def of_instrument(self, instrument: int) -> tuple[Measurements, Indices]:
@@ -143,3 +189,7 @@ class Measurements(Represented):
             if not (np.isfinite(stated) & (stated > 0.0)).all():
                 raise ValueError("expected finite uncertainties above zero")
         return dataclasses.replace(self, value=values, uncertainty=stated)
+
+
+def _of_rows(table: Floats | None, wanted: Flags) -> Floats | None:
+    return None if table is None else table[wanted]

@@ -21,6 +21,13 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments import REGISTRY
+from truepose.calibration.measurements.columns import (
+    TO,
+    UNCERTAINTY,
+    WRENCH,
+    MeasurementRows,
+    reading_columns,
+)
 from truepose.calibration.measurements.declarations import (
     Header,
     read_header,
@@ -28,13 +35,8 @@ from truepose.calibration.measurements.declarations import (
     separated,
 )
 from truepose.calibration.measurements.measurements import Measurements
-from truepose.calibration.measurements.rows import (
-    UNCERTAINTY,
-    WRENCH,
-    MeasurementRows,
-    measurements_in,
-    reading_columns,
-)
+from truepose.calibration.measurements.rows import measurements_in
+from truepose.calibration.observables import parameter_column
 from truepose.errors import Fault, MachineFileError, Problem, RequestError
 from truepose.files.data_file import Column, DataTable, ReadTable, cut_short, read_table
 from truepose.files.dimensions import FREEDOMS
@@ -42,6 +44,7 @@ from truepose.files.text_file import FileKind, read_text
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
 from truepose.machine.condition import DEFAULT_PART
+from truepose.sources.tolerance import bands_of
 
 INSTRUMENT, SET, ID = "instrument", "set", "id"
 FIT, CHECK = "fit", "check"
@@ -51,9 +54,13 @@ _KIND = FileKind("a file of measurements (CSV)", ".csv")
 _OF_MACHINE = {
     "joint.": "joints",
     "command.": "freedoms that can be commanded",
+    TO + "joint.": "joints",
+    TO + "command.": "freedoms that can be commanded",
     "strut.": "struts",
 }
 """Beginnings of columns that name something of the machine, and what."""
+
+_PARAMETER = parameter_column("")
 
 
 def read_measurements(path: str | Path, machine: Machine) -> Measurements:
@@ -89,13 +96,13 @@ def _columns(machine: Machine) -> list[Column]:
         return Column(name, dimension, required=False, words=words, blank=True)
 
     columns = [Column(INSTRUMENT, None, required=False)]
-    columns += [
-        Column(f"command.{freedom}", FREEDOMS[freedom], required=False)
-        for freedom in machine.commanded
-    ]
-    columns += [
-        Column(f"joint.{drive.name}", drive.coordinate, required=False) for drive in machine.drives
-    ]
+    for beginning in ("", TO):
+        columns += [
+            may(f"{beginning}command.{freedom}", FREEDOMS[freedom]) for freedom in machine.commanded
+        ]
+        columns += [
+            may(f"{beginning}joint.{drive.name}", drive.coordinate) for drive in machine.drives
+        ]
     for name, reading in reading_columns(machine).items():
         columns += [may(name, reading.dimension), may(name + UNCERTAINTY, reading.dimension)]
     columns += [may(f"temperature.{part}", "temperature") for part in _parts(machine)]
@@ -132,6 +139,8 @@ class _Reading:
             return None
         commands = self._stacked(table, "command.", self.machine.commanded)
         joints = self._stacked(table, "joint.", self.machine.joints)
+        to_commands = self._stacked(table, TO + "command.", self.machine.commanded)
+        to_joints = self._stacked(table, TO + "joint.", self.machine.joints)
         readings = reading_columns(self.machine)
         rows = MeasurementRows(
             instrument=self._instruments(table),
@@ -143,6 +152,8 @@ class _Reading:
             lines=table.lines,
             commands=commands if joints is None else None,
             joints=joints,
+            to_commands=to_commands if joints is None else None,
+            to_joints=to_joints,
             temperatures={
                 part: table.numbers[f"temperature.{part}"]
                 for part in _parts(self.machine)
@@ -152,7 +163,9 @@ class _Reading:
             unreadable=self.read.unreadable,
             whole=self.header.whole,
         )
-        misnamed = not codes.isdisjoint(("unknown-column", "doubled-column", "other-machine"))
+        misnamed = not codes.isdisjoint(
+            ("unknown-column", "unknown-parameter", "doubled-column", "other-machine")
+        )
         report = _Report(table, self.problems, misnamed)
         return measurements_in(self.machine, self.header.instruments, rows, report)
 
@@ -166,6 +179,8 @@ class _Reading:
                 yield problem
             elif beginning is not None and not self._knows(word):
                 strange.setdefault(beginning, []).append(problem)
+            elif word.startswith(_PARAMETER):
+                yield self._no_parameter(problem, word.removeprefix(_PARAMETER))
             elif word.startswith("temperature."):
                 part = word.removeprefix("temperature.")
                 yield replace(
@@ -179,7 +194,8 @@ class _Reading:
                 known = self._words_beside(word)
                 yield replace(problem, expected=one_of(known, limit=40))
         for beginning, same in strange.items():
-            names = dict.fromkeys(_second(problem.path or "") for problem in same)
+            paths = [(problem.path or "").removeprefix(beginning) for problem in same]
+            names = dict.fromkeys(path.partition(".")[0] for path in paths)
             own = self._own(beginning)
             near = next((hint for hint in (did_you_mean(n, own) for n in names) if hint), None)
             yield Problem(
@@ -193,10 +209,40 @@ class _Reading:
                 hint=near if len(names) == 1 else None,
             )
 
+    def _no_parameter(self, problem: Problem, name: str) -> Problem:
+        """A column `parameter.NAME` of what is none, or of a group that has no value."""
+        known = [
+            column.removeprefix(_PARAMETER)
+            for column in reading_columns(self.machine)
+            if column.startswith(_PARAMETER)
+        ]
+        bands = bands_of(self.machine)
+        for number, group in ({} if bands is None else bands.group_names).items():
+            if group != name:
+                continue
+            assert bands is not None
+            own = bands.parameters[bands.groups == number].tolist()
+            members = [_PARAMETER + self.machine.parameters[at] for at in own]
+            return replace(
+                problem,
+                code="unknown-parameter",
+                message=f"{_PARAMETER}{name}: the parameters of this group are not of one size, so "
+                "that it has no value of its own",
+                expected=f"the value of one of them: {one_of(members, limit=8)}",
+                hint=None,
+            )
+        return replace(
+            problem,
+            code="unknown-parameter",
+            message=f"{_PARAMETER}{name}: the machine has no parameter {name}",
+            expected=one_of((_PARAMETER + each for each in known), limit=8),
+            hint=did_you_mean(name, known),
+        )
+
     def _own(self, beginning: str) -> tuple[str, ...]:
-        if beginning == "joint.":
+        if beginning.endswith("joint."):
             return self.machine.joints
-        if beginning == "command.":
+        if beginning.endswith("command."):
             return self.machine.commanded
         return tuple(strut.name for strut in self.machine.struts)
 
@@ -213,12 +259,21 @@ class _Reading:
             name = next(
                 (s.name for s in self.machine.struts if column.startswith(f"strut.{s.name}.")), "1"
             )
-            return [known for known in reading_columns(self.machine) if f".{name}." in known]
+            return [
+                known
+                for known in reading_columns(self.machine)
+                if known.startswith(f"strut.{name}.")
+            ]
         return [
             INSTRUMENT,
             *(f"command.{freedom}" for freedom in self.machine.commanded),
             *(f"joint.{joint}" for joint in self.machine.joints),
-            *(name for name, column in reading_columns(self.machine).items() if column.strut < 1),
+            *(
+                name
+                for name, column in reading_columns(self.machine).items()
+                if column.strut < 1 and not name.startswith(_PARAMETER)
+            ),
+            _PARAMETER + self.machine.parameters[0],
             "temperature.default",
             *WRENCH,
             SET,
@@ -261,12 +316,14 @@ class _Reading:
     def _check_columns(self, table: DataTable) -> None:
         """Whether there are columns of commands or joints, and of readings."""
         strange = [p.path for p in self.problems if p.code == "other-machine" and p.path]
-        unknown = any(p.code in ("unknown-column", "unknown-part") for p in self.problems)
+        unknown = any(
+            p.code in ("unknown-column", "unknown-part", "unknown-parameter") for p in self.problems
+        )
         columns = table.columns
         beginnings = [
             beginning
             for beginning in ("command.", "joint.")
-            if any(column.startswith(beginning) for column in (*columns, *strange))
+            if any(column.removeprefix(TO).startswith(beginning) for column in (*columns, *strange))
         ]
         if len(beginnings) > 1:
             self._tell(
@@ -274,13 +331,17 @@ class _Reading:
                     "excluding-columns",
                     "the file has both joints and commanded poses",
                     found=", ".join(
-                        column for column in columns if column.startswith(("command.", "joint."))
+                        column
+                        for column in columns
+                        if column.removeprefix(TO).startswith(("command.", "joint."))
                     ),
                     expected="either columns command.* or columns joint.*",
                     hint="what the controller was sent counts",
                 )
             )
-        if not beginnings and not unknown:
+        kinds = [REGISTRY[instrument.kind] for instrument in self.header.instruments]
+        posed = not kinds or any(kind.poses for kind in kinds)
+        if not beginnings and not unknown and posed:
             commands = ", ".join(f"command.{freedom}" for freedom in self.machine.commanded)
             joints = ", ".join(f"joint.{joint}" for joint in self.machine.joints)
             self._tell(
@@ -291,7 +352,10 @@ class _Reading:
                     expected=f"{commands}; or {joints}",
                 )
             )
-        for beginning in beginnings if len(beginnings) == 1 else ():
+        two = any(kind.poses == 2 for kind in kinds) or any(c.startswith(TO) for c in columns)
+        wanted = [beginnings[0]] if len(beginnings) == 1 else []
+        wanted += [TO + beginning for beginning in wanted if two]
+        for beginning in wanted:
             of_machine = [beginning + name for name in self._own(beginning)]
             lacking = [column for column in of_machine if column not in columns]
             if lacking and not any(column.startswith(beginning) for column in strange):
@@ -305,7 +369,6 @@ class _Reading:
                         expected=", ".join(of_machine),
                     )
                 )
-        kinds = [REGISTRY[instrument.kind] for instrument in self.header.instruments]
         readings = [column for column in columns if column in reading_columns(self.machine)]
         silent = any(kind.optional or kind.fixed for kind in kinds)
         wrong = unknown or any(column.startswith("strut.") for column in strange)
@@ -315,8 +378,8 @@ class _Reading:
                     "nothing-measured",
                     "no column holds what was measured",
                     found=", ".join(columns) or "no column",
-                    expected="x, y, z, a, b, c, distance, strut.*.length, strut.*.direction.x or "
-                    "strut.*.angle",
+                    expected="x, y, z, a, b, c, distance, strut.*.length, strut.*.direction.x, "
+                    "strut.*.angle or parameter.*",
                 )
             )
         elif readings and not self.header.declared:
@@ -369,11 +432,6 @@ class _Reading:
                     )
                 )
         return np.array([numbers.get(word, -1) for word in words], np.intp)
-
-
-def _second(column: str) -> str:
-    """`d1` of `joint.d1`, `9` of `strut.9.length`."""
-    return column.split(".")[1]
 
 
 @dataclass

@@ -8,115 +8,41 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
-from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
+from truepose.calibration.measurements.columns import (
+    UNCERTAINTY,
+    WRENCH,
+    MeasurementRows,
+    ReadingColumn,
+    Report,
+    reading_columns,
+)
+from truepose.calibration.measurements.commanded_poses import commanded_poses
 from truepose.calibration.measurements.measurements import Measurements, unloaded_at_reference
 from truepose.calibration.observables import OBSERVABLES
 from truepose.errors import Fault
-from truepose.files.data_file import MOST_PROBLEMS
 from truepose.files.wording import counted, one_of
 from truepose.machine import Condition, Machine
 from truepose.machine.condition import DEFAULT_PART
-from truepose.runs.poses import faults_text
 
-UNCERTAINTY = ".uncertainty"
-"""How the column of standard uncertainties of another column ends."""
+ABOVE_ZERO = ("length", "distance", "separation")
+"""Observables that no instrument reads as zero or less."""
 
 UNIT_LENGTH = 0.01
 """How far a direction's length may be from 1: more than noise does, less than a slip."""
-
-SINGLE = {"x": "length", "y": "length", "z": "length"} | dict.fromkeys("abc", "angle")
-SINGLE["distance"] = "length"
-"""Dimension of the columns that are not of one strut."""
-
-OF_A_STRUT = {"length": "length"} | {f"direction.{axis}": "ratio" for axis in "xyz"}
-OF_A_STRUT["angle"] = "angle"
-"""Dimension of a strut's columns, by the end of their name."""
-
-WRENCH = {f"force.{axis}": "force" for axis in "xyz"} | {
-    f"moment.{axis}": "moment" for axis in "xyz"
-}
-"""Dimension of the columns of what acts on the tool."""
-
-
-@dataclass(frozen=True)
-class ReadingColumn:
-    """A column of readings: what a kind calls it (`length`), its dimension, and which strut."""
-
-    word: str
-    dimension: str
-    strut: int = -1
-
-
-def reading_columns(machine: Machine) -> dict[str, ReadingColumn]:
-    """Every column that readings of a machine can have, in the order of a file."""
-    columns = {word: ReadingColumn(word, dimension) for word, dimension in SINGLE.items()}
-    for number, strut in enumerate(machine.struts):
-        for word, dimension in OF_A_STRUT.items():
-            columns[f"strut.{strut.name}.{word}"] = ReadingColumn(word, dimension, number)
-    return columns
-
-
-@dataclass
-class MeasurementRows:
-    """What was given, by columns (n_row,), SI, a blank cell NaN, before anything of it is checked.
-
-    Either `commands` (n_row, n_commanded) or `joints` (n_row, n_joint). `instrument`: which, or -1
-    where that is not known. `temperatures` by part, `wrench` by `force.x`, ... `unreadable`: cells
-    with a problem already. `whole`: names of instruments whose frame is wholly to be found.
-    """
-
-    instrument: Indices
-    readings: Mapping[str, Floats]
-    uncertainties: Mapping[str, Floats]
-    held_out: Flags
-    lines: Indices
-    commands: Floats | None = None
-    joints: Floats | None = None
-    temperatures: Mapping[str, Floats] = field(default_factory=dict)
-    wrench: Mapping[str, Floats] = field(default_factory=dict)
-    unreadable: Mapping[str, Flags] = field(default_factory=dict)
-    whole: frozenset[str] = frozenset()
-
-    @property
-    def n_row(self) -> int:
-        """How many rows there are."""
-        return len(self.instrument)
-
-    def spoilt(self, column: str) -> Flags:
-        """(n_row,) whether a cell of a column has a problem already."""
-        return self.unreadable.get(column, np.zeros(self.n_row, np.bool_))
-
-    def filled(self, column: str) -> Flags:
-        """(n_row,) whether something stands in a column of readings, be it readable or not."""
-        values = self.readings.get(column)
-        if values is None:
-            return np.zeros(self.n_row, np.bool_)
-        return ~np.isnan(values) | self.spoilt(column)
-
-
-class Report(Protocol):
-    """Where problems go, with their place as the source of the rows knows it."""
-
-    def __call__(self, fault: Fault, *, row: int | None = None, column: str | None = None) -> None:
-        """Note a problem of a row (from 0), a column, or the whole."""
-
-    def shown(self, column: str, row: int) -> str:
-        """A number as it was given, with its unit."""
 
 
 def measurements_in(
     machine: Machine, instruments: Sequence[Instrument], rows: MeasurementRows, report: Report
 ) -> Measurements:
     """Measurements from rows; of no use where something was reported on the way."""
-    placed = _placed(machine, rows, report)
+    placed = commanded_poses(machine, instruments, rows, report)
     conditions = _conditions(machine, rows, report)
     columns = reading_columns(machine)
     observed = _Observations(machine, instruments, rows, report, columns)
@@ -129,8 +55,8 @@ def measurements_in(
     ]
     return Measurements(
         instruments=tuple(framed),
-        joints=placed[0],
-        placements=placed[1],
+        joints=placed.joints,
+        placements=placed.placements,
         instrument=rows.instrument,
         conditions=conditions,
         held_out=rows.held_out,
@@ -140,6 +66,8 @@ def measurements_in(
         value=table.value,
         uncertainty=table.uncertainty,
         lines=rows.lines,
+        other_joints=placed.other_joints,
+        other_placements=placed.other_placements,
     )
 
 
@@ -165,81 +93,6 @@ def _with_frame(
     read = [OBSERVABLES[code] for code in np.unique(table.observable[of_instrument]).tolist()]
     frame = dataclasses.replace(instrument.frame, unknown=rule(read, machine.components))
     return dataclasses.replace(instrument, frame=frame)
-
-
-def _placed(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Floats, Floats]:
-    """Joints (n_row, n_joint) and placements (n_row, 7) of the nominal machine."""
-    joints = np.full((rows.n_row, len(machine.joints)), math.nan)
-    placements = np.full((rows.n_row, 7), math.nan)
-    if rows.commands is not None:
-        good = np.isfinite(rows.commands).all(axis=1)
-        for column in (f"command.{freedom}" for freedom in machine.commanded):
-            good &= ~rows.spoilt(column)
-        usable = np.flatnonzero(good)
-        joints[usable], placements[usable], status = machine.kernel.place(rows.commands[usable])
-        failed = np.flatnonzero(status)
-        for number, (row, code) in enumerate(zip(usable[failed], status[failed], strict=True)):
-            name = why = STATUS[code]
-            if number < MOST_PROBLEMS:  # the others are only counted
-                faults = machine.kernel.explain(rows.commands[row])
-                why = f"{name}: {faults_text(machine, faults)}" if faults else name
-            report(
-                Fault(
-                    "commanded-out-of-reach",
-                    "the machine cannot be commanded to this pose",
-                    found=why,
-                    expected="a pose within the travel of every drive",
-                    hint="is it a pose of this machine, in the unit of the header?",
-                ),
-                row=int(row),
-            )
-    if rows.joints is not None:
-        good = np.asarray(np.isfinite(rows.joints).all(axis=1), np.bool_)
-        for column in (f"joint.{joint}" for joint in machine.joints):
-            good &= ~rows.spoilt(column)
-        usable = np.flatnonzero(good & _within_travel(machine, rows, good, report))
-        joints[usable] = rows.joints[usable]
-        poses, status = machine.kernel.forward(rows.joints[usable], status=True)
-        solved = status == 0
-        placements[usable[solved]] = machine.kernel.placement_of(poses[solved])
-        for row, code in zip(usable[~solved].tolist(), status[~solved].tolist(), strict=True):
-            report(
-                Fault(
-                    "commanded-out-of-reach",
-                    "the machine has no pose at these joints",
-                    found=STATUS[code],
-                    expected="joints at which the platform can be",
-                    hint="are they joints of this machine, in the unit of the header?",
-                ),
-                row=row,
-            )
-    return joints, placements
-
-
-def _within_travel(machine: Machine, rows: MeasurementRows, good: Flags, report: Report) -> Flags:
-    assert rows.joints is not None
-    within = np.ones(rows.n_row, np.bool_)
-    for joint, drive in enumerate(machine.drives):
-        first, last = drive.travel
-        value = rows.joints[:, joint]
-        slack = 1e-9 * (last - first) if math.isfinite(last - first) else 0.0
-        outside = good & ((value < first - slack) | (value > last + slack))
-        within &= ~outside
-        unit = machine.file_units[drive.coordinate]
-        ends = [f"{float(unit.to_file(end)):.10g}" for end in (first, last)]
-        for row in np.flatnonzero(outside).tolist():
-            column = f"joint.{drive.name}"
-            report(
-                Fault(
-                    "commanded-out-of-reach",
-                    "the joint is out of its travel",
-                    found=report.shown(column, row),
-                    expected=f"a joint from {ends[0]} to {ends[1]} {unit.label}",
-                ),
-                row=row,
-                column=column,
-            )
-    return within
 
 
 def _conditions(machine: Machine, rows: MeasurementRows, report: Report) -> tuple[Condition, ...]:
@@ -337,6 +190,9 @@ class _Observations:
             return
         self._refuse_unwanted(instrument, kind, own_rows)
         own = {name: column for name, column in self.columns.items() if column.word in kind.reads}
+        if kind.poses == 0:
+            self._refuse_conditions(own_rows)
+            self._refuse_doubled(own_rows, own)
         self._require(instrument, kind, own_rows, own)
         self._check_signs(kind, own_rows, own)
         if any(word.startswith("direction") for word in kind.reads):
@@ -444,6 +300,46 @@ class _Observations:
                     column=name,
                 )
 
+    def _refuse_doubled(self, own_rows: Flags, own: Mapping[str, ReadingColumn]) -> None:
+        """A group and its member in one row: two readings of one parameter."""
+        first: dict[int, str] = {}
+        for name, reading in own.items():
+            if name not in self.rows.readings:
+                continue
+            other = first.setdefault(reading.strut, name)
+            both = own_rows & self.rows.filled(name) & self.rows.filled(other)
+            for row in np.flatnonzero(both).tolist() if other != name else ():
+                self.report(
+                    Fault(
+                        "excluding-columns",
+                        f"the row has this in the column {other} too",
+                        found=self._shown(name, row),
+                        expected="one of the two, or a row for each",
+                    ),
+                    row=row,
+                    column=name,
+                )
+
+    def _refuse_conditions(self, own_rows: Flags) -> None:
+        """Temperatures and loads of what is measured by itself."""
+        temperatures = self.rows.temperatures
+        stated = {f"temperature.{part}": values for part, values in temperatures.items()}
+        reference = self.machine.condition.reference_temperature
+        for name, values in (stated | dict(self.rows.wrench)).items():
+            usual = 0.0 if name in WRENCH else reference
+            other = own_rows & ~np.isnan(values) & (values != usual)
+            for row in np.flatnonzero(other).tolist():
+                self.report(
+                    Fault(
+                        "unwanted-value",
+                        "a parameter is what it is at the reference temperature, without loads",
+                        found=self.report.shown(name, row),
+                        expected="an empty cell, and the value at the reference temperature",
+                    ),
+                    row=row,
+                    column=name,
+                )
+
     def _shown(self, column: str, row: int) -> str:
         if self.rows.spoilt(column)[row]:
             return "something"
@@ -524,7 +420,7 @@ class _Observations:
     def _check_signs(self, kind: Kind, own_rows: Flags, own: Mapping[str, ReadingColumn]) -> None:
         for name, reading in own.items():
             values = self.rows.readings.get(name)
-            if values is None or kind.reads[reading.word] not in ("length", "distance"):
+            if values is None or kind.reads[reading.word] not in ABOVE_ZERO:
                 continue
             for row in np.flatnonzero(
                 own_rows & (values <= 0.0) & ~self.rows.spoilt(name)

@@ -10,9 +10,9 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument
+from truepose.calibration.measurements.columns import TO, UNCERTAINTY, WRENCH, reading_columns
 from truepose.calibration.measurements.measurements import Measurements
 from truepose.calibration.measurements.read_csv import CHECK, FIT, INSTRUMENT, SET
-from truepose.calibration.measurements.rows import UNCERTAINTY, WRENCH, reading_columns
 from truepose.calibration.observables import OBSERVABLES, si_unit
 from truepose.errors import Problem, RequestError
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
@@ -43,7 +43,12 @@ def measurements_text(machine: Machine, measurements: Measurements) -> str:
     columns = _Columns(machine)
     columns.words(INSTRUMENT, _names(measurements))
     for joint, drive in enumerate(machine.drives):
-        columns.numbers(f"joint.{drive.name}", drive.coordinate, measurements.joints[:, joint])
+        commanded = np.where(measurements.posed, measurements.joints[:, joint], math.nan)
+        columns.numbers(f"joint.{drive.name}", drive.coordinate, commanded)
+        if measurements.other_joints is not None:
+            between = measurements.between
+            second = np.where(between, measurements.other_joints[:, joint], math.nan)
+            columns.numbers(f"{TO}joint.{drive.name}", drive.coordinate, second)
     _readings(machine, measurements, columns)
     _conditions(machine, measurements, columns)
     columns.words(SET, [CHECK if held_out else FIT for held_out in measurements.held_out.tolist()])
@@ -60,10 +65,13 @@ def _declared(machine: Machine, instrument: Instrument) -> list[str]:
     lines = [f"[instrument.{instrument.name}]", f'kind = "{instrument.kind}"']
     if kind.frame is not None and instrument.end == "base":
         lines.append(_frame(machine, instrument.frame))
-    if kind.has_target and (instrument.target_unknown or any(instrument.target)):
+    uncertain = any(instrument.target_uncertainty)
+    if kind.has_target and (instrument.target_unknown or any(instrument.target) or uncertain):
         start = _texts(machine, instrument.target, "length")
+        known = _texts(machine, instrument.target_uncertainty, "length")
         unknown_too = f"{{ start = {start}, unknown = true }}"
-        lines.append(f"target = {unknown_too if instrument.target_unknown else start}")
+        with_uncertainty = f"{{ start = {start}, uncertainty = {known} }}" if uncertain else start
+        lines.append(f"target = {unknown_too if instrument.target_unknown else with_uncertainty}")
     if instrument.bias_unknown:
         lines.append('bias = "unknown"')
     words = {observable: word for word, observable in kind.reads.items()} or {
@@ -172,7 +180,11 @@ def _readings(machine: Machine, measurements: Measurements, columns: _Columns) -
     """The columns of readings, each with its uncertainties."""
     kinds = [REGISTRY[instrument.kind] for instrument in measurements.instruments]
     instrument_of = measurements.instrument[measurements.row]
+    written: set[tuple[str, int]] = set()
     for name, reading in reading_columns(machine).items():
+        if (reading.word, reading.strut) in written:
+            continue  # a group's: what is measured of it stands under its member's name
+        written.add((reading.word, reading.strut))
         value = np.full(measurements.n_row, math.nan)
         stated = np.full(measurements.n_row, math.nan)
         silent = True
@@ -208,6 +220,7 @@ def _readings(machine: Machine, measurements: Measurements, columns: _Columns) -
 
 def _conditions(machine: Machine, measurements: Measurements, columns: _Columns) -> None:
     """The columns of temperatures and loads, those that say something."""
+    posed = measurements.posed
     conditions = measurements.conditions
     reference = machine.condition.reference_temperature
     for condition in {id(condition): condition for condition in conditions}.values():
@@ -216,15 +229,17 @@ def _conditions(machine: Machine, measurements: Measurements, columns: _Columns)
             raise RequestError(_bad("conditions", lost, "temperatures, force and moment only"))
     defaults = np.array([condition.default_temperature for condition in conditions])
     if (defaults != reference).any():
-        columns.numbers(f"temperature.{DEFAULT_PART}", "temperature", defaults)
+        of_poses = np.where(posed, defaults, math.nan)
+        columns.numbers(f"temperature.{DEFAULT_PART}", "temperature", of_poses)
     named = dict.fromkeys(part for condition in conditions for part in condition.part_temperatures)
     for part in named:
         values = [condition.part_temperatures.get(part, math.nan) for condition in conditions]
-        columns.numbers(f"temperature.{part}", "temperature", np.array(values))
+        of_poses = np.where(posed, np.array(values), math.nan)
+        columns.numbers(f"temperature.{part}", "temperature", of_poses)
     wrenches = np.array([condition.wrench for condition in conditions]).reshape(-1, 6)
     for component, (name, dimension) in enumerate(WRENCH.items()):
         if wrenches[:, component].any():
-            columns.numbers(name, dimension, wrenches[:, component])
+            columns.numbers(name, dimension, np.where(posed, wrenches[:, component], math.nan))
 
 
 def _lost(machine: Machine, condition: Condition) -> str | None:

@@ -15,8 +15,8 @@ import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments import Instrument
+from truepose.calibration.measurements.columns import UNCERTAINTY
 from truepose.calibration.measurements.read_csv import INSTRUMENT, SET
-from truepose.calibration.measurements.rows import UNCERTAINTY
 from truepose.calibration.measurements.write_csv import measurements_text
 from truepose.calibration.planning.poses import Placed, home_of
 from truepose.calibration.planning.readings import planned

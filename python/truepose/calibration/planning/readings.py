@@ -41,6 +41,22 @@ def observed(machine: Machine, instrument: Instrument) -> tuple[str, ...]:
             found=instrument.kind,
             expected=one_of(sorted(name for name, kind in REGISTRY.items() if not kind.fixed)),
         )
+    if not kind.poses:
+        raise _refusal(
+            instrument,
+            "a dimension of a part is measured without a pose: nothing is to choose",
+            found=instrument.kind,
+            expected=one_of(sorted(name for name, kind in REGISTRY.items() if kind.poses)),
+            hint="measure it at any time: its row joins those of the poses in one file",
+        )
+    if kind.poses > 1:
+        raise _refusal(
+            instrument,
+            "a plan chooses poses one by one, and this reads between two",
+            found=instrument.kind,
+            expected=one_of(sorted(name for name, kind in REGISTRY.items() if kind.poses == 1)),
+            hint="plan poses with an instrument of another kind, and measure between those",
+        )
     readable = tuple(dict.fromkeys(kind.reads.values()))
     possible = tuple(name for name in readable if moved(name, machine.components))
     named = tuple(name for name in possible if name in instrument.uncertainty)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats, Indices
-from truepose.calibration.identification.unknowns import bands_of
 from truepose.machine import Machine
+from truepose.sources.tolerance import bands_of
 
 
 @dataclass(frozen=True)

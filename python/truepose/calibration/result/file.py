@@ -21,7 +21,6 @@ import tomlkit
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.identification.properties import Property
-from truepose.calibration.identification.unknowns import bands_of
 from truepose.calibration.result.bands import (
     Banded,
     ToleranceCovariance,
@@ -41,6 +40,7 @@ from truepose.machine import Machine, load
 from truepose.machine.workspace import Accuracy
 from truepose.sources import REGISTRY
 from truepose.sources.deviation import Deviation
+from truepose.sources.tolerance import bands_of
 from truepose.version import version
 
 DEFAULT_COVERAGE = 2.0

@@ -1,8 +1,9 @@
 """The calibrated machine in memory: the one that its file, read again, is.
 
-What was found, bands and correlations included, is worked out once for both, by `Result`. Only a
-direction is told in another way: a file has its new axis, a machine in memory the deviation from
-the axis that it had. It points the same way; the two angles of its band count about the old axis.
+What was found, bands and correlations included, is worked out once for both, `CalibratedValues`.
+Only a direction is told in another way: a file has its new axis, a machine in memory the deviation
+from the axis that it had. It points the same way; the two angles of its band count about the old
+axis.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from truepose.calibration.result.bands import Banded
 from truepose.calibration.result.file import (
     AT,
     DEFAULT_COVERAGE,
+    CalibratedValues,
     MachineUnknowns,
-    Result,
     require_determined,
     variable_names,
 )
@@ -47,7 +48,7 @@ def calibrated_machine(
     own_values = np.asarray(values, np.float64)[: unknowns.n_machine]
     own_covariance = np.asarray(covariance, np.float64)[: unknowns.n_machine, : unknowns.n_machine]
     require_determined(machine.file, unknowns, own_values, own_covariance)
-    result = Result.of(
+    result = CalibratedValues.of(
         machine, unknowns, own_values, own_covariance, as_shifts=False, new_axes=False
     )
     found = machine
@@ -62,7 +63,9 @@ def calibrated_machine(
     return replace(found, sources=_sources(machine, result, coverage), accuracy=asked)
 
 
-def _sources(machine: Machine, result: Result, coverage: float) -> tuple[ErrorSource, ...]:
+def _sources(
+    machine: Machine, result: CalibratedValues, coverage: float
+) -> tuple[ErrorSource, ...]:
     """Those of the machine, the tolerances with the bands of the result."""
     bands = _bands(machine, result, coverage)
     by_kind: dict[type, ErrorSource] = {type(source): source for source in machine.sources}
@@ -89,7 +92,7 @@ class _Column(NamedTuple):
 _FILED, _FOUND = "filed", "found"
 
 
-def _bands(machine: Machine, result: Result, coverage: float) -> Deviation:
+def _bands(machine: Machine, result: CalibratedValues, coverage: float) -> Deviation:
     """The file's bands of what was not identified, and those found, in the parameters' order."""
     filed = [] if result.forgotten is None else _filed(result.forgotten)
     moved = set(result.moved.tolist())
@@ -147,7 +150,9 @@ def _found(machine: Machine, bands: Banded, coverage: float) -> Iterator[_Column
         yield _Column(parameter, 0.0, half, group, sign, normal(coverage), (_FOUND, variable))
 
 
-def _correlation(bands: Deviation, columns: Sequence[_Column], result: Result) -> Floats | None:
+def _correlation(
+    bands: Deviation, columns: Sequence[_Column], result: CalibratedValues
+) -> Floats | None:
     """(n_variable, n_variable) of the variables of `bands`; None where all are independent."""
     given = {_FOUND: result.bands.correlation}
     if result.forgotten is not None and result.forgotten.correlation is not None:

@@ -145,7 +145,7 @@ def write_calibrated(
     own_values = np.asarray(values, np.float64)[: unknowns.n_machine]
     own_covariance = np.asarray(covariance, np.float64)[: unknowns.n_machine, : unknowns.n_machine]
     require_determined(path, unknowns, own_values, own_covariance)
-    result = Result.of(machine, unknowns, own_values, own_covariance, as_shifts)
+    result = CalibratedValues.of(machine, unknowns, own_values, own_covariance, as_shifts)
     text = MachineText(original, machine, _changed(original, machine))
     _write_values(text, machine, result)
     for edit in property_edits(machine, unknowns, own_values):
@@ -186,7 +186,7 @@ def property_edits(
 
 
 @dataclass(frozen=True)
-class Result:
+class CalibratedValues:
     """What the file is to say: nominal values and axes, shifts of all parameters, bands.
 
     `nominal` (n_parameter,) has 0 for the tilts of the directions that `axes` gives anew; `moved`
@@ -210,7 +210,7 @@ class Result:
         as_shifts: bool,
         *,
         new_axes: bool = True,
-    ) -> Result:
+    ) -> CalibratedValues:
         """`new_axes`: whether directions are told by new axes, as in a file, or by their tilts."""
         count = len(machine.parameters)
         effects = np.zeros((count, unknowns.n_machine))
@@ -237,7 +237,7 @@ class Result:
         return cls(nominal, tuple(axes), shift, bands, columns, bands_of(machine))
 
 
-def _write_values(text: MachineText, machine: Machine, result: Result) -> None:
+def _write_values(text: MachineText, machine: Machine, result: CalibratedValues) -> None:
     """Nominal values and directions that differ from those of the file."""
     turned_columns = {column for direction, _ in result.axes for column in direction.columns}
     filed = np.array(machine.nominal)
@@ -251,7 +251,9 @@ def _write_values(text: MachineText, machine: Machine, result: Result) -> None:
         text.set_direction(direction.table, direction.part, direction.key, axis)
 
 
-def _write_bands(text: MachineText, machine: Machine, result: Result, coverage: float) -> None:
+def _write_bands(
+    text: MachineText, machine: Machine, result: CalibratedValues, coverage: float
+) -> None:
     """The bands of what was identified, in place of those of the file, and their correlations."""
     names, bands, old = machine.parameters, result.bands, result.forgotten
     variables = variable_names(machine, bands)
@@ -307,7 +309,7 @@ def variable_names(machine: Machine, bands: Banded) -> list[str]:
     return names
 
 
-def _forget_correlations(text: MachineText, machine: Machine, result: Result) -> None:
+def _forget_correlations(text: MachineText, machine: Machine, result: CalibratedValues) -> None:
     """Take what was identified out of the correlations that the file has already."""
     old = result.forgotten
     if old is None or old.correlation is None:
@@ -354,7 +356,7 @@ def _write_provenance(
 
 
 def _require_same(
-    path: Path, filed: Machine, result: Result, asked: Accuracy, written: Machine
+    path: Path, filed: Machine, result: CalibratedValues, asked: Accuracy, written: Machine
 ) -> None:
     """Refuse a file that, read again, is not the machine that was to be written.
 
@@ -378,7 +380,9 @@ def _require_same(
         raise _not_written(path, "the data files differ")
 
 
-def _require_same_bands(path: Path, machine: Machine, result: Result, written: Machine) -> None:
+def _require_same_bands(
+    path: Path, machine: Machine, result: CalibratedValues, written: Machine
+) -> None:
     read_back, filed, moved, bands = (
         tolerance_covariance(written),
         tolerance_covariance(machine),

@@ -262,3 +262,23 @@ def test_the_page_begins_with_it(study: Study) -> None:
     without = page.render(replace(study, calibration=None))
     assert 'id="calibration"' not in without
     assert "calibration_tool" not in without
+
+
+def test_a_row_without_a_pose_is_at_no_place_of_the_map(study: Study) -> None:
+    """The map is that of the other rows, with all their axes."""
+    found = study.calibrated
+    names = [f"row_{name}" for name in study.machine.dof]
+    poses = {name: found[name].values.astype(float) for name in names}
+    for values in poses.values():
+        values[-1] = np.nan
+    without = found.assign_coords({name: ("row", values) for name, values in poses.items()})
+    last = found["observation_row"].values == len(found["row"]) - 1
+    fewer = found.isel(row=slice(-1), observation=~last)
+    drawn, expected = (
+        calibration_map.figure(replace(study, calibration=each)).to_json()
+        for each in (without, fewer)
+    )
+    assert drawn == expected
+    nowhere = {name: ("row", np.full(len(found["row"]), np.nan)) for name in names}
+    empty = calibration_map.figure(replace(study, calibration=found.assign_coords(nowhere)))
+    assert not len(empty.data[0].x)

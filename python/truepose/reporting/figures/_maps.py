@@ -36,7 +36,7 @@ def places_of(given: Floats, names: Sequence[str], units: ShownUnits) -> Places:
     """
     labels = [units.pose(name).label for name in names]
     poses = given * np.array([units.pose(name).per_si for name in names])
-    varying = [index for index in range(len(names)) if np.ptp(poses[:, index]) > 0]
+    varying = [at for at in range(len(names)) if len(poses) and np.ptp(poses[:, at]) > 0]
     positions = [index for index in range(len(names)) if is_position(names[index])]
     moving = [index for index in positions if index in varying]
     # A line of poses, or one pose, is still drawn on a plane.

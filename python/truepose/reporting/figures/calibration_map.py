@@ -34,7 +34,10 @@ def figure(study: Study) -> go.Figure:
     result = study.calibrated
     names = study.machine.commanded
     poses = np.stack([result[f"row_{name}"].values for name in names], axis=-1)
-    places = places_of(poses, names, study.units)
+    posed = np.isfinite(poses).all(axis=1)
+    places = places_of(poses[posed], names, study.units)
+    of_row = np.full(len(poses), len(places.points))  # beyond the last: at no place
+    of_row[posed] = places.of_pose
     kinds = [("before", "normalised_before"), ("after", "normalised_after")]
     spatial = len(places.axes) == 3
     figure = make_subplots(
@@ -46,7 +49,7 @@ def figure(study: Study) -> go.Figure:
     )
     finish(figure, HEIGHT, margin=_MARGINS[spatial])
     for number, (_, name) in enumerate(kinds):
-        sizes = _by_place(study, result[name].values, places.of_pose, len(places.points))
+        sizes = _by_place(study, result[name].values, of_row, len(places.points))
         drawn = np.flatnonzero(np.isfinite(sizes))
         axis = "coloraxis" if number == 0 else "coloraxis2"
         trace = map_trace(places, drawn, sizes, "stated uncertainties", axis)
@@ -73,7 +76,7 @@ def figure(study: Study) -> go.Figure:
 def _by_place(study: Study, values: Floats, of_row: np.ndarray, count: int) -> Floats:
     """(n_place,) root mean square of the residuals at each place; NaN where none was fitted."""
     rows = study.calibrated["observation_row"].values
-    there = np.isfinite(values)
+    there = np.isfinite(values) & (of_row[rows] < count)
     at = of_row[rows[there]]
     total = np.bincount(at, values[there] ** 2, minlength=count)
     number = np.bincount(at, minlength=count)

@@ -14,6 +14,7 @@ import numpy as np
 from truepose.calibration.acceptance import sentences
 from truepose.calibration.acceptance.tool_uncertainty import ToolUncertainty
 from truepose.files.shown_units import METRIC, ShownUnits
+from truepose.representation import Facts, Represented
 
 NOTHING = 100.0
 """Half bands of a tolerance: a larger uncertainty is said in words, not as a number."""
@@ -21,8 +22,8 @@ NOTHING = 100.0
 Values = Mapping[str, Any]
 
 
-@dataclass(frozen=True, eq=False)
-class Reason:
+@dataclass(frozen=True, eq=False, repr=False)
+class Reason(Represented):
     """A reason against the calibration, or a warning: its code, and the values it rests on, SI.
 
     `docs/calibration_gate.md` lists the codes; the functions of `SENTENCES` read the values.
@@ -32,6 +33,10 @@ class Reason:
     code: str
     values: Values = field(default_factory=dict)
     shown: ShownUnits = METRIC
+
+    def _facts(self) -> Facts:
+        yield "code", self.code
+        yield "sentence", self.sentence
 
     @property
     def sentence(self) -> str:

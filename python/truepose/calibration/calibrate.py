@@ -36,6 +36,7 @@ from truepose.calibration.identification.validate import Validation, validate
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.read_csv import read_measurements
+from truepose.calibration.residual_checks import residual_patterns
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.representation import Facts, Represented
@@ -179,11 +180,13 @@ def calibrate(
     effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
     rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
     if failure is None and not _refuse(suspected):
+        tool = Tool.of(effects, tool_components(machine), placements[usable, :3])
         if fitted.noise > CONTRADICTED:
             suspected += explained_otherwise(refit, fitted, HYPOTHESES)
         else:
-            tool = Tool.of(effects, tool_components(machine), placements[usable, :3])
             suspected += alternatives(refit, fitted, tool, table[usable], HYPOTHESES)
+        if not _refuse(suspected):
+            suspected += residual_patterns(machine, fitted, tool)
     gate = _assessed(
         machine,
         fitted,

@@ -13,12 +13,17 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import Gate, HeldOut, assess
 from truepose.calibration.acceptance.decision import MARGIN
-from truepose.calibration.acceptance.tool_uncertainty import Considered, tool_components
+from truepose.calibration.acceptance.tool_uncertainty import (
+    Considered,
+    commanded_components,
+    tool_components,
+)
 from truepose.calibration.data_checks import Suspicion, suspicions
 from truepose.calibration.identification.consider_covariance import consider_covariance
 from truepose.calibration.identification.fit import Fit, fit, place_instruments
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
+    ToolEffects,
     candidates,
     tool_effects,
     workspace_poses,
@@ -121,7 +126,7 @@ def calibrate(
     whole = data if isinstance(data, Measurements) else read_measurements(data, machine)
     if whole.held_out.all():
         raise _nothing_to_fit(whole)
-    table, joints, placements = workspace_poses(machine, poses)
+    table = workspace_poses(machine, poses)
     unknowns = unknowns_of(machine, whole, identify)
     suspected = _suspected(machine, whole, unknowns)
     used = whole.select(~whole.held_out) if whole.held_out.any() else whole
@@ -130,11 +135,9 @@ def calibrate(
     except RequestError as failure:
         raise _with_suspicions(failure, suspected) from failure
     checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
-    effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
-    rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
-    gate = _assessed(
-        machine, fitted, checked, effects, placements[usable, :3], margin, rest, suspected
-    )
+    tool = tool_effects(machine, unknowns, fitted.values, table)
+    left_out = consider_covariance(machine, fitted, identify, table[tool.usable])
+    gate = _assessed(machine, fitted, checked, tool, margin, left_out, suspected)
     return Calibration(
         machine,
         whole,
@@ -144,7 +147,7 @@ def calibrate(
         suspected,
         checked,
         table,
-        usable,
+        tool.usable,
         seed,
     )
 
@@ -194,8 +197,7 @@ def _assessed(
     machine: Machine,
     fitted: Fit,
     checked: Validation | None,
-    effects: Floats,
-    positions: Floats,
+    tool: ToolEffects,
     margin: float,
     considered: Considered | None,
     suspected: Sequence[Suspicion],
@@ -209,9 +211,10 @@ def _assessed(
         residual=fitted.residual,
         before=fitted.before,
         use_prior=fitted.use_prior,
-        tool=effects,
+        tool=tool.effects,
         components=tool_components(machine),
-        positions=positions,
+        commanded=commanded_components(machine),
+        positions=tool.positions,
         weights=fitted.weights,
         by=phrases(machine, fitted.measurements),
         nominal=unknowns.nominal_sizes(machine),

@@ -42,9 +42,9 @@ def test_the_figures_are_the_commands(
     rods = re.findall(r"length of strut \w .*?\N{MINUS SIGN}(\d\.\d+) mm", alone)
     assert [round(float(rod), 1) for rod in rods] == [2.1, 2.6, 2.7]
     with_tolerances = call(capsys, "calibrate", machine, data.format("heights")).out
-    assert "known to 0.16 mm at the worst pose" in " ".join(with_tolerances.split())
+    assert "known to within 0.27 mm at the worst pose (95 %)" in " ".join(with_tolerances.split())
     positions = call(capsys, "calibrate", machine, data.format("positions")).out
-    assert "becomes known to 11 µm" in positions
+    assert "becomes known to within 18 µm" in positions
     assert re.search(r"294\.7 +8\.4 +294\.7 +13\.8", positions)
 
 

@@ -49,8 +49,10 @@ def decide(
     """The reasons against the calibration, none: it may be used; and warnings."""
     of_data = lacking(case, outcome)
     suspected = tuple(suspicion.sentence for suspicion in suspicions if suspicion.refuses)
+    nowhere = len(case.tool.effects) == 0
     reasons = [
         *([case.reason(WRONG_DATA, suspected=suspected)] if suspected else []),
+        *([case.reason("out-of-reach")] if nowhere else []),
         *of_data,
         *_not_confirmed(case, held_out),
         *_absurd_value(case, outcome),
@@ -136,7 +138,9 @@ def _no_gain(case: Case, outcome: Outcome) -> list[Reason]:
     left_out = outcome.considered
     if left_out is None:
         return [case.reason("no-gain", measured=outcome.before is None, **values)]
-    parts = zip(at_worst_pose(left_out.part), at_worst_pose(left_out.after), strict=True)
+    parts = zip(
+        at_worst_pose(left_out.part.worst), at_worst_pose(left_out.after.worst), strict=True
+    )
     if not any(whole.after > 0.0 and part.after >= SOURCE * whole.after for part, whole in parts):
         return [case.reason("no-gain", measured=False, **values)]
     return [case.reason("not-identified", labels=left_out.labels, every=left_out.every, **values)]
@@ -232,7 +236,7 @@ def _considered(case: Case, outcome: Outcome, of_data: Sequence[Reason]) -> list
     exact = [
         ToolSize(alone.quantity, alone.unit, alone.after, whole.after)
         for alone, whole in zip(
-            at_worst_pose(left_out.alone), at_worst_pose(left_out.after), strict=True
+            at_worst_pose(left_out.alone.worst), at_worst_pose(left_out.after.worst), strict=True
         )
         if whole.after > SLIGHT * alone.after
     ]

@@ -13,7 +13,12 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import Gate, HeldOut, assess
 from truepose.calibration.acceptance.decision import CONTRADICTED, MARGIN
-from truepose.calibration.acceptance.tool_uncertainty import Considered, Tool, tool_components
+from truepose.calibration.acceptance.tool_uncertainty import (
+    Considered,
+    Tool,
+    commanded_components,
+    tool_components,
+)
 from truepose.calibration.data_checks import (
     HYPOTHESES,
     Refit,
@@ -27,6 +32,7 @@ from truepose.calibration.identification.fit import Fit, fit, unfitted
 from truepose.calibration.identification.placement import Placements, place_instruments
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
+    ToolEffects,
     candidates,
     tool_effects,
     workspace_poses,
@@ -152,7 +158,7 @@ def calibrate(
     whole = data if isinstance(data, Measurements) else read_measurements(data, machine)
     if whole.held_out.all():
         raise _nothing_to_fit(whole)
-    table, joints, placements = workspace_poses(machine, poses)
+    table = workspace_poses(machine, poses)
     unknowns = unknowns_of(machine, whole, identify)
     used = whole.select(~whole.held_out) if whole.held_out.any() else whole
     standing = _placed(machine, whole)
@@ -177,27 +183,22 @@ def calibrate(
         fitted = unfitted(used, unknowns, place_instruments(machine, used), use_prior=use_prior)
     else:
         checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
-    effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
-    rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
+    effects = tool_effects(machine, unknowns, fitted.values, table)
+    left_out = consider_covariance(machine, fitted, identify, table[effects.usable])
+    tool = Tool.of(
+        effects.effects,
+        tool_components(machine),
+        effects.positions,
+        commanded_components(machine),
+    )
     if failure is None and not _refuse(suspected):
-        tool = Tool.of(effects, tool_components(machine), placements[usable, :3])
         if fitted.noise > CONTRADICTED:
             suspected += explained_otherwise(refit, fitted, HYPOTHESES)
         else:
-            suspected += alternatives(refit, fitted, tool, table[usable], HYPOTHESES)
+            suspected += alternatives(refit, fitted, tool, table[effects.usable], HYPOTHESES)
         if not _refuse(suspected):
             suspected += residual_patterns(machine, fitted, tool)
-    gate = _assessed(
-        machine,
-        fitted,
-        checked,
-        effects,
-        placements[usable, :3],
-        margin,
-        rest,
-        suspected,
-        failure,
-    )
+    gate = _assessed(machine, fitted, checked, effects, margin, left_out, suspected, failure)
     return Calibration(
         machine,
         whole,
@@ -207,7 +208,7 @@ def calibrate(
         suspected,
         checked,
         table,
-        usable,
+        effects.usable,
         seed,
         failure,
     )
@@ -241,8 +242,7 @@ def _assessed(
     machine: Machine,
     fitted: Fit,
     checked: Validation | None,
-    effects: Floats,
-    positions: Floats,
+    tool: ToolEffects,
     margin: float,
     considered: Considered | None,
     suspected: Sequence[Suspicion],
@@ -257,9 +257,10 @@ def _assessed(
         residual=fitted.residual,
         before=fitted.before,
         use_prior=fitted.use_prior,
-        tool=effects,
+        tool=tool.effects,
         components=tool_components(machine),
-        positions=positions,
+        commanded=commanded_components(machine),
+        positions=tool.positions,
         weights=fitted.weights,
         by=phrases(machine, fitted.measurements),
         nominal=unknowns.nominal_sizes(machine),

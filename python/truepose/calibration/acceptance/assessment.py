@@ -290,7 +290,7 @@ class Case:
         """The tool at the worst pose, of which something is known before."""
         return [
             size
-            for size in at_worst_pose(outcome.after, self.reference(outcome.before))
+            for size in at_worst_pose(outcome.after.worst, self.reference(outcome.before))
             if size.before is not None and (size.before > 0.0 or size.after > 0.0)
         ]
 

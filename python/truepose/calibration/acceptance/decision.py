@@ -63,8 +63,10 @@ def decide(
     wrong = [case.reason(WRONG_DATA, suspected=suspected, wrong=looks_wrong)] if suspected else []
     if failure is not None:  # there is nothing else to be judged
         return (*wrong, case.reason("no-fit", failure=failure)), ()
+    nowhere = len(case.tool.effects) == 0
     reasons = [
         *wrong,
+        *([case.reason("out-of-reach")] if nowhere else []),
         *of_data,
         *_not_confirmed(case, held_out),
         *_absurd_value(case, outcome),
@@ -150,7 +152,9 @@ def _no_gain(case: Case, outcome: Outcome) -> list[Reason]:
     left_out = outcome.considered
     if left_out is None:
         return [case.reason("no-gain", measured=outcome.before is None, **values)]
-    parts = zip(at_worst_pose(left_out.part), at_worst_pose(left_out.after), strict=True)
+    parts = zip(
+        at_worst_pose(left_out.part.worst), at_worst_pose(left_out.after.worst), strict=True
+    )
     if not any(whole.after > 0.0 and part.after >= SOURCE * whole.after for part, whole in parts):
         return [case.reason("no-gain", measured=False, **values)]
     return [case.reason("not-identified", labels=left_out.labels, every=left_out.every, **values)]
@@ -246,7 +250,7 @@ def _considered(case: Case, outcome: Outcome, of_data: Sequence[Reason]) -> list
     exact = [
         ToolSize(alone.quantity, alone.unit, alone.after, whole.after)
         for alone, whole in zip(
-            at_worst_pose(left_out.alone), at_worst_pose(left_out.after), strict=True
+            at_worst_pose(left_out.alone.worst), at_worst_pose(left_out.after.worst), strict=True
         )
         if whole.after > SLIGHT * alone.after
     ]

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.tool_uncertainty import ToolUncertainty
+from truepose.calibration.acceptance.tool_uncertainty import KEPT, ToolUncertainty
 from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.representation import Facts, Represented
 
@@ -78,14 +78,15 @@ class ToolSize(NamedTuple):
     before: float | None = None
 
 
-def at_worst_pose(
-    after: ToolUncertainty, before: tuple[float | None, float | None] = (None, None)
-) -> list[ToolSize]:
+Sizes = tuple[float | None, float | None]
+
+
+def at_worst_pose(after: tuple[float, float], before: Sizes = (None, None)) -> list[ToolSize]:
     """Position and rotation at the worst pose."""
-    sizes = (("position", "m"), ("rotation", "rad"))
+    quantities = (("position", "m"), ("rotation", "rad"))
     return [
         ToolSize(*named, size, was)
-        for named, size, was in zip(sizes, after.worst, before, strict=True)
+        for named, size, was in zip(quantities, after, before, strict=True)
     ]
 
 
@@ -111,23 +112,43 @@ def verdict_sentences(reasons: Sequence[Reason], gain: str) -> str:
     return f"No: {wrong[0]}." + (f" As they are: {others}." if others else "")
 
 
-def gain_sentence(sizes: Sequence[ToolSize], falling: HeldOut | None, shown: ShownUnits) -> str:
-    """What was gained: at the tool, and where one shows it, of the errors that `falling` held."""
+def gain_sentence(
+    sizes: Sequence[ToolSize], left_out: Sequence[str], falling: HeldOut | None, shown: ShownUnits
+) -> str:
+    """What was gained: `sizes` that the tool keeps, and what they leave out.
+
+    And where one shows it, of the errors that `falling` held.
+    """
     texts = []
-    for quantity, unit, after, before in sizes:
-        if after == 0.0 and not before:
+    for size in sizes:
+        if size.after == 0.0 and not size.before:
             continue
-        known = sentences.quantity(after, unit, units=shown)
-        was = "" if before is None else sentences.quantity(before, unit, units=shown)
+        was = "" if size.before is None else f", against {_of(size, size.before, shown)} before"
         texts.append(
-            f"the tool's {quantity} becomes known to {known} at the worst pose"
-            + (f", against {was} before" if was else "")
+            f"the tool's {size.quantity} becomes known to within {_of(size, size.after, shown)} at "
+            f"the worst pose ({100.0 * KEPT:g} %){was}"
         )
+    if texts and left_out:
+        texts[-1] += f", {' and '.join(left_out)} left out"
     texts = texts or ["the unknowns are determined"]
     if falling is not None:
         was, now = (falling.shown(size, shown) for size in (falling.before, falling.after))
         texts.append(f"on poses that were not fitted the error falls from {was} to {now}")
     return "; ".join(texts)
+
+
+def left_out_of(after: ToolUncertainty, relative: bool) -> list[str]:
+    """What the promised sizes of the tool do not hold, in words."""
+    parasitic = [name for name in after.components if name not in after.commanded]
+    moved = [
+        name
+        for name in parasitic
+        if after.standard[:, after.components.index(name)].max(initial=0.0) > 0.0
+    ]
+    texts = ["where the machine as a whole stands in the room"] if relative else []
+    if moved:
+        texts.append(f"its parasitic motion in {sentences.listed(moved)}")
+    return texts
 
 
 # --- reasons against it ---------------------------------------------------------------------------
@@ -289,6 +310,10 @@ WRONG_DATA = "data-look-wrong"
 SENTENCES: Mapping[str, Callable[[Values, ShownUnits], str]] = {
     WRONG_DATA: _wrong_data,
     "no-fit": _no_fit,
+    "out-of-reach": _always(
+        "the calibrated machine reaches none of the poses of the workspace: it cannot be assembled "
+        "there"
+    ),
     "not-determined": _open,
     "not-told-apart": _open,
     "less-than-tolerance": _less_than_tolerance,

@@ -9,8 +9,9 @@ change of the readings). That is the gauge rule; it holds for frames as for mach
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -40,6 +41,14 @@ ROUNDING = 1e-13
 HELD = 1e-3
 """Weight of the rows that hold an undetermined direction, in shares of the largest singular value;
 no other equation acts on it."""
+
+FIRM = 1e-3
+"""Share of the machine, or radians, by which a held direction gives way to one standard
+uncertainty: what readings see of it once the machine has moved must not pull it away."""
+
+FAINT = (1.0, 0.1, 0.01, 1e-3)
+"""Shares of the machine, or radians: directions known to no better than this by themselves are held
+where the search does not settle, the faintest first."""
 
 SETTLED = ("cost", "step", "gradient")
 
@@ -164,10 +173,34 @@ class Equations:
         covariance: Floats = rows.T @ rows
         return covariance
 
-    def gauge_rows(self) -> Floats:
-        """(k, n) rows that hold what is not determined."""
-        firmness = HELD * float(self.singular.max(initial=1.0))
-        rows: Floats = firmness * self.null_space / self.scale
+    def faint(self, extent: Floats, share: float) -> Floats:
+        """(k, n) directions, in the unknowns' own units, that are hardly determined.
+
+        One standard uncertainty along them is more than `share` of `extent` (n,) of an unknown: a
+        model that is linear over such a way is none, and a search does not come to its end.
+        """
+        steps = self.directions * self.scale
+        lengths = np.abs(steps / extent).max(axis=1, initial=0.0)
+        rows: Floats = steps[lengths > share * self.singular]
+        return rows
+
+    def gauge_rows(self, extent: Floats | None = None, *, own_scale: bool = True) -> Floats:
+        """(k, n) rows that hold what is not determined.
+
+        With `extent` (n,), firmly: one standard uncertainty of a row is at most `FIRM` of it. Held
+        is what is across all else in values over `scale`, or, where not `own_scale`, over `extent`:
+        a scale that faint columns gave says nothing once the machine has moved.
+        """
+        firmness = np.full(len(self.null_space), HELD * float(self.singular.max(initial=1.0)))
+        rows: Floats = firmness[:, np.newaxis] * self.null_space / self.scale
+        if extent is None:
+            return rows
+        steps = self.null_space * self.scale / extent
+        lengths = np.abs(steps).max(axis=1, initial=0.0)
+        loose = lengths > FIRM * firmness
+        rows[loose] *= (lengths / (FIRM * firmness))[loose, np.newaxis]
+        if not own_scale:
+            rows[loose] = steps[loose] / (FIRM * lengths[loose, np.newaxis] * extent)
         return rows
 
 
@@ -198,22 +231,26 @@ def fit(
 ) -> Fit:
     """Fit the unknowns to all rows of the measurements.
 
-    Raises `RequestError` (too-few-measurements) where there are fewer equations than unknowns, and
-    (no-fit) where the search does not settle.
+    Directions that the readings do not see, or too faintly for a search to follow them, are held.
+
+    Raises `RequestError` (too-few-measurements) where more readings would see more and none can be
+    spared, and (no-fit) where the search does not settle.
     """
-    require_enough(measurements, unknowns, use_prior)
     problem, as_filed = place_instruments(machine, measurements, unknowns)
     known = Prior.of(unknowns) if use_prior else Prior.none(unknowns.count)
     prior = Prior(known.rows, unknowns.prior_mean)  # without tolerances, where the gauge holds
     values = unknowns.prior_mean
     slope = whitened(problem, values)
     equations = Equations.of(slope, prior, unknowns)
+    require_enough(measurements, unknowns, equations, prior)
     weights, scale, noise = np.ones(measurements.n_observation), 1.0, float("nan")
     factor = weights
     evaluations, same = 0, True
     freed, left_out = np.empty((0, unknowns.count)), None
+    holds = _firmer_holds(_extent(machine, unknowns))
+    holding: Callable[[Equations], Floats] = Equations.gauge_rows
     for _ in range(LOSS_ROUNDS):
-        held = prior.with_rows(equations.gauge_rows())
+        held = prior.with_rows(holding(equations))
         solved = problem.solve(prior=held, weights=weights / scale**2, start=values)
         evaluations += solved.evaluations[0]
         # Readings that fit to the last digit leave nothing that a step could be judged by.
@@ -224,6 +261,11 @@ def fit(
         if not (usable or same) and left_out is None:
             # What the first solution begins to see is seen too little to be followed.
             left_out = freed
+            equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
+            continue
+        if not usable and (firmer := next(holds, None)) is not None:
+            holding, faint = firmer
+            left_out = faint(equations)
             equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
             continue
         if not settled:
@@ -330,14 +372,42 @@ def _fit_instruments(
     return unsettled and cost > EXACT**2 * measurements.n_observation, cost, problem, values
 
 
-def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bool) -> None:
-    """Refuse fewer equations than unknowns, saying how many readings are lacking."""
-    free = unknowns.count
-    if use_prior:
-        free -= int(unknowns.has_prior.sum())
-    lacking = free - measurements.n_observation
-    if lacking <= 0:
+def _extent(machine: Machine, unknowns: Unknowns) -> Floats:
+    """(n,) what an unknown is small against: the machine's size, a radian; no end for others."""
+    extents = {"m": machine.characteristic_length, "rad": 1.0}
+    return np.array([extents.get(unit, np.inf) for unit in unknowns.units])
+
+
+Hold = tuple[Callable[[Equations], Floats], Callable[[Equations], Floats]]
+"""Of equations: the rows that hold what is not determined, and the directions that count as it."""
+
+
+def _firmer_holds(extent: Floats) -> Iterator[Hold]:
+    """What to try in turn where a search does not settle, the slightest change first."""
+    for own_scale in (True, False):
+        for share in FAINT:
+            yield (
+                partial(Equations.gauge_rows, extent=extent, own_scale=own_scale),
+                partial(Equations.faint, extent=extent, share=share),
+            )
+
+
+def require_enough(
+    measurements: Measurements, unknowns: Unknowns, equations: Equations, prior: Prior
+) -> None:
+    """Refuse readings of which none can be spared, and which leave directions open all the same.
+
+    What counts is rank: unknowns that no reading sees ask for no reading, and a reading that says
+    what others do is no equation more. `equations`: of readings and `prior`.
+
+    Raises `RequestError` (too-few-measurements), saying how many readings are lacking.
+    """
+    lacking = len(equations.null_space)
+    known = int(np.linalg.matrix_rank(prior.rows)) if len(prior.rows) else 0
+    seen = unknowns.count - lacking - known
+    if not lacking or seen < measurements.n_observation:
         return
+    free = unknowns.count - known
     rows = max(measurements.n_row, 1)
     readings_a_row = max(measurements.n_observation // rows, 1)
     more = -(-lacking // readings_a_row)
@@ -349,9 +419,9 @@ def require_enough(measurements: Measurements, unknowns: Unknowns, use_prior: bo
             found=f"{measurements.n_row} rows with {measurements.n_observation} readings",
             expected=f"{lacking} more readings: {more} more rows of the same kind at other poses, "
             f"and more to spare",
-            hint=None
-            if use_prior
-            else "the tolerances are equations too: leave them in, or identify fewer parameters",
+            hint="the tolerances are equations too: leave them in, or identify fewer parameters"
+            if not len(prior.rows)
+            else None,
         )
     )
 

@@ -10,12 +10,14 @@ change of the readings). That is the gauge rule; it holds for frames as for mach
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 
-from truepose.arrays import Floats
+from truepose.arrays import Flags, Floats
+from truepose.calibration.identification.approach import approach, rows_in_the_way
+from truepose.calibration.identification.data_snooping import FEW, given_up
 from truepose.calibration.identification.frames import (
     FAR,
     TURNED,
@@ -50,6 +52,9 @@ FAINT = (1.0, 0.1, 0.01, 1e-3)
 """Shares of the machine, or radians: directions known to no better than this by themselves are held
 where the search does not settle, the faintest first."""
 
+SNOOPINGS = 10
+"""Most times that it is asked which readings to give up; two or three do."""
+
 SETTLED = ("cost", "step", "gradient")
 
 EXACT = 1e-6
@@ -64,8 +69,9 @@ class Fit:
     the readings over their uncertainties, before robust weights. `residual` (m,): (predicted -
     measured) over the uncertainty; `before` (m,) the same with the machine as its file has it and
     only the instruments' unknowns fitted. `weights` (m,): of the robust loss, 1 where it changes
-    nothing. `null_space` (k, n): unit directions, in values over `scale` (n,), that neither
-    readings nor prior determine. `leverage` (m,): how much of itself each reading determines.
+    nothing, 0 of a reading that was given up. `null_space` (k, n): unit directions, in values over
+    `scale` (n,), that neither readings nor prior determine. `leverage` (m,): how much of itself
+    each reading determines.
     """
 
     unknowns: Unknowns
@@ -86,13 +92,35 @@ class Fit:
     evaluations: int = 0
     noise: float = float("nan")
     """Residuals in stated uncertainties, robust, over their freedom; NaN where there is none."""
+    unplaced: Flags = field(default_factory=lambda: np.zeros(0, np.bool_))
+    """(n_row,) rows where the machine found cannot be assembled; their residuals are 0."""
 
     @property
     def standardised(self) -> Floats:
         """(m,) residuals in units of their own standard deviation after the fit."""
         left = np.maximum(1.0 - self.leverage, 1e-12)
-        standardised: Floats = self.residual / (self.birge * np.sqrt(left))
+        # What a reading without weight differs by from the others holds their uncertainty too.
+        variance = np.where(self.weights > 0.0, left, 1.0 + self.prediction / self.birge**2)
+        standardised: Floats = self.residual / (self.birge * np.sqrt(variance))
         return standardised
+
+    @property
+    def prediction(self) -> Floats:
+        """(m,) variances with which the fit predicts the readings, over the stated ones."""
+        along = self.jacobian @ self.covariance
+        variances: Floats = np.einsum("ij,ij->i", along, self.jacobian)
+        return variances
+
+    @property
+    def redundancy(self) -> Floats:
+        """(m,) redundancy numbers, 0 to 1: how much of an error of its own each reading shows.
+
+        The diagonal of I less the hat matrix, of readings as they count; of one that was given up
+        what it would be, did it count.
+        """
+        spread = self.prediction / self.birge**2
+        of_given_up = 1.0 / (1.0 + spread)
+        return np.where(self.weights > 0.0, np.clip(1.0 - self.leverage, 0.0, 1.0), of_given_up)
 
     @property
     def birge(self) -> float:
@@ -106,7 +134,7 @@ class Fit:
     @property
     def freedom(self) -> float:
         """Expected sum of squared residuals, were the stated uncertainties (and prior) right."""
-        return float(np.sum(1.0 - self.leverage))
+        return float(np.sum((1.0 - self.leverage)[self.weights > 0.0]))
 
     @property
     def deviations(self) -> Floats:
@@ -209,16 +237,20 @@ def whitened(problem: IdentificationProblem, values: Floats) -> Floats:
 
     Raises `RequestError` (no-fit) where a pose of the machine with these values cannot be solved.
     """
-    return _whitened(problem, values, problem.jacobian(values))
+    every = np.ones(problem.measurements.n_observation, np.bool_)
+    return _whitened(problem, values, problem.jacobian(values), every)
 
 
-def _whitened(problem: IdentificationProblem, values: Floats, jacobian: Floats) -> Floats:
-    if not np.isfinite(jacobian).all():
+def _whitened(
+    problem: IdentificationProblem, values: Floats, jacobian: Floats, counted: Flags
+) -> Floats:
+    """The same of a Jacobian that is there; zero where a reading does not count and has none."""
+    if not np.isfinite(jacobian[counted]).all():
         status = problem.status(values)
         rows = np.flatnonzero(status)
         raise _no_fit(problem, "a pose of it cannot be solved or is singular", rows)
     slope: Floats = jacobian / problem.measurements.uncertainty[:, np.newaxis]
-    return slope
+    return np.where(np.isfinite(slope).all(axis=1, keepdims=True), slope, 0.0)
 
 
 def fit(
@@ -243,9 +275,17 @@ def fit(
     slope = whitened(problem, values)
     equations = Equations.of(slope, prior, unknowns)
     require_enough(measurements, unknowns, equations, prior)
+    counted = np.ones(measurements.n_observation, np.bool_)
+    in_the_way, pardoned, given = np.zeros(measurements.n_row, np.bool_), False, 0
     weights, scale, noise = np.ones(measurements.n_observation), 1.0, float("nan")
     factor = weights
     evaluations, same = 0, True
+    if robust:
+        near = approach(problem, prior.with_rows(equations.gauge_rows()), values, counted)
+        values, weights, scale = near.values, near.weights, near.scale
+        evaluations = near.evaluations
+        in_the_way = problem.status(values) != 0
+        counted = ~in_the_way[measurements.row]
     freed, left_out = np.empty((0, unknowns.count)), None
     holds = _firmer_holds(_extent(machine, unknowns))
     holding: Callable[[Equations], Floats] = Equations.gauge_rows
@@ -257,7 +297,15 @@ def fit(
         exact = solved.cost[0] < EXACT**2 * measurements.n_observation
         settled = solved.ending[0] in SETTLED or exact
         jacobian = problem.jacobian(solved.values[0])
-        usable = settled and np.isfinite(jacobian).all()
+        usable = settled and np.isfinite(jacobian[counted]).all()
+        if robust and not usable:
+            ahead = rows_in_the_way(problem, held, solved.values[0], weights / scale**2)
+            if ahead.any() and (in_the_way | ahead).sum() <= max(1, FEW * measurements.n_row):
+                in_the_way |= ahead
+                counted &= ~ahead[measurements.row]
+                weights = weights * counted
+                values = solved.values[0]
+                continue
         if not (usable or same) and left_out is None:
             # What the first solution begins to see is seen too little to be followed.
             left_out = freed
@@ -272,19 +320,36 @@ def fit(
             raise _no_fit(problem, f"it ended as {solved.ending[0]}", np.empty(0, np.intp))
         values = solved.values[0]
         residual = problem.residual(values)
-        slope = _whitened(problem, values, jacobian)
+        slope = _whitened(problem, values, jacobian, counted)
+        # Rows that only the way there could not pass count again, once.
+        missing = problem.status(values) != 0
+        back = in_the_way & ~missing & (not pardoned)
+        pardoned |= bool(in_the_way.any())
+        in_the_way = (in_the_way | missing) & ~back
+        counted = (counted | back[measurements.row]) & ~in_the_way[measurements.row]
         freed = equations.null_space * equations.scale
         factor = np.sqrt(weights) / scale
         equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
         covariance = equations.covariance
         leverage = np.einsum("ij,jk,ik->i", slope, covariance, slope) * factor**2
-        noise = noise_of(weights * residual, float(np.sum(1.0 - leverage)))
+        residual = np.where(in_the_way[measurements.row], 0.0, residual)
+        noise = noise_of(weights * residual, float(np.sum((1.0 - leverage)[weights > 0.0])))
         larger = max(1.0, noise) if np.isfinite(noise) else 1.0
-        changed = weights_of(residual / larger) if robust else weights
+        changed = weights_of(residual / larger) * counted if robust else weights
         # What nothing saw at the start may be seen where the machine really is.
         same = len(equations.null_space) == len(freed)
         if same and abs(larger / scale - 1.0) < 1e-3 and np.abs(changed - weights).max() < 1e-3:
-            break
+            root = (equations.directions[equations.seen] * equations.scale).T
+            away = prior.rows @ (values - prior.mean)
+            judged = ~in_the_way[measurements.row]
+            kept = judged.copy()
+            if robust and given < SNOOPINGS:
+                kept[judged] = ~given_up(slope[judged], residual[judged], (prior.rows, away), root)
+                given += 1
+            if not robust or given == SNOOPINGS or np.array_equal(kept, counted):
+                break
+            counted = kept
+            changed = weights_of(residual / larger) * counted
         weights, scale = changed, larger
     return Fit(
         unknowns,
@@ -303,6 +368,7 @@ def fit(
         problem,
         evaluations,
         noise,
+        in_the_way,
     )
 
 

@@ -12,13 +12,17 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, assess
-from truepose.calibration.acceptance.tool_uncertainty import tool_components
+from truepose.calibration.acceptance.tool_uncertainty import Tool, tool_components
 from truepose.calibration.data_checks import Suspicion, suspicions
 from truepose.calibration.identification.consider_covariance import (
     consider_covariance,
     with_considered,
 )
 from truepose.calibration.identification.fit import Fit, fit, place_instruments
+from truepose.calibration.identification.reliability import (
+    ExternalReliability,
+    external_reliability,
+)
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
     candidates,
@@ -45,6 +49,7 @@ class Calibration:
     like; `outliers` readings that do not fit; `validation` None where there was too little to
     hold anything back. `poses` (n, n_commanded): where the tool was looked at, those that are
     `usable` (n,): the calibrated machine reaches them too. `seed`: of the folds.
+    `external_reliability`: how far a wrong reading that is not named can move the tool there.
     """
 
     machine: Machine
@@ -57,6 +62,7 @@ class Calibration:
     poses: Floats
     usable: Flags
     seed: int = 0
+    external_reliability: ExternalReliability | None = None
 
     @property
     def accepted(self) -> bool:
@@ -147,7 +153,15 @@ def calibrate(
         table,
         usable,
         seed,
+        external_reliability(fitted, _judged_tool(machine, gate, effects, placements[usable, :3])),
     )
+
+
+def _judged_tool(machine: Machine, gate: Gate, effects: Floats, positions: Floats) -> Tool:
+    """What unknowns do at the tool, without what moves the machine as a whole."""
+    gauge = [direction.effects for direction in gate.directions if direction.kind == "gauge"]
+    tool = Tool.of(effects, tool_components(machine), positions)
+    return tool.relative(np.array(gauge).reshape(-1, effects.shape[2]))
 
 
 def _suspected(machine: Machine, whole: Measurements, unknowns: Unknowns) -> tuple[Suspicion, ...]:

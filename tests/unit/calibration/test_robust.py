@@ -12,9 +12,12 @@ import truepose as tp
 from build_machine import machine_files
 from made_measurements import made_measurements, poses_within
 from sweeps import thinned
+from truepose.calibration.acceptance.tool_uncertainty import Tool, tool_components
 from truepose.calibration.identification.fit import fit
 from truepose.calibration.identification.problem import IdentificationProblem
+from truepose.calibration.identification.reliability import DETECTED, external_reliability
 from truepose.calibration.identification.robust import outliers
+from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.calibration.measurements import Measurements
 from truepose.machine import Machine
@@ -22,8 +25,6 @@ from truepose.machine import Machine
 Floats = NDArray[np.float64]
 FILES = {path.stem: path for path in machine_files()}
 WIDE = 5e-3
-DETECTED = 7.6
-"""Standard deviations of its own residual from which a wrong reading is to be named."""
 
 CASES = [
     ("hexapod", "position"),
@@ -191,3 +192,68 @@ def test_a_row_that_cannot_be_placed_loses_its_weight_and_is_named() -> None:
     assert all("cannot be assembled" in one.sentence for one in named)
     others = fit(machine, good.select(np.arange(25) != 7), unknowns)
     np.testing.assert_allclose(found.values, others.values, atol=0.05 * others.deviations.min())
+
+
+def tool_of(machine: Machine, unknowns: Unknowns, values: Floats) -> tuple[Tool, Floats]:
+    """The tool's sensitivity at 25 poses, and the positions there."""
+    poses = poses_within(machine, 25, seed=9)
+    joints, placements, _ = machine.kernel.place(poses)
+    effects, usable = tool_effects(machine, unknowns, values, joints, placements)
+    return Tool.of(effects, tool_components(machine), placements[usable, :3]), effects
+
+
+def test_external_reliability_is_the_largest_effect_of_an_error_not_named() -> None:
+    """By linear least squares in NumPy, one reading after the other moved by what is detected."""
+    machine, good, unknowns, _ = drawn("orthoglide", "position", np.random.default_rng(5))
+    found = fit(machine, good, unknowns)
+    tool, effects = tool_of(machine, unknowns, found.values)
+    stated = external_reliability(found, tool)
+    noise = found.birge * good.uncertainty
+    rows = found.problem.jacobian(found.values) / noise[:, np.newaxis]
+    prior = np.diag(1.0 / np.sqrt(np.diagonal(unknowns.prior_covariance)))
+    weights = np.sqrt(found.weights)
+    every = np.vstack([weights[:, np.newaxis] * rows, prior])
+    inverse = np.linalg.pinv(every)
+    redundancy = 1.0 - np.diagonal(every @ inverse)[: len(rows)]
+    largest = 0.0
+    for at in range(len(rows)):
+        off = np.zeros(len(every))
+        off[at] = weights[at] * DETECTED / np.sqrt(redundancy[at])
+        largest = max(largest, np.linalg.norm(effects[:, :3] @ (inverse @ off), axis=1).max())
+    np.testing.assert_allclose(stated.position, largest, rtol=1e-3)
+    bias = DETECTED * noise / np.sqrt(redundancy)
+    np.testing.assert_allclose(stated.minimal_detectable_bias, bias, rtol=1e-3)
+
+
+@pytest.mark.parametrize("sets", [pytest.param(12, id="few"), *thinned([150], quick=set())])
+@pytest.mark.parametrize("name", ["orthoglide", "five_bar"])
+def test_the_tool_is_within_what_is_stated_and_what_a_reading_may_do_unnamed(
+    name: str, sets: int
+) -> None:
+    """One reading off, by anything up to half as much again as is detected, named or not."""
+    random = np.random.default_rng(23)
+    outside = 0.0
+    for _ in range(sets):
+        machine, good, unknowns, truth = drawn(name, "position", random)
+        slope = IdentificationProblem(machine, good, unknowns).jacobian(truth)
+        redundancy = redundancy_numbers(good, unknowns, slope)
+        at = int(random.choice(np.flatnonzero(redundancy > 1e-3)))
+        values = good.value.copy()
+        off = DETECTED * good.uncertainty[at] / np.sqrt(redundancy[at])
+        values[at] += random.uniform(-1.5, 1.5) * off
+        found = fit(machine, good.with_values(values), unknowns)
+        tool, effects = tool_of(machine, unknowns, found.values)
+        of_position = [tool.components.index(axis) for axis in "xyz" if axis in tool.components]
+        effects = effects[:, of_position]
+        # Where the tool really is, not to first order.
+        at_poses = made_measurements(machine, "position", poses_within(machine, 25, seed=9))
+        shown = IdentificationProblem(machine, at_poses, unknowns)
+        error = shown.predict(found.values) - shown.predict(truth)
+        error = np.linalg.norm(error.reshape(25, -1), axis=1)
+        assert len(effects) == 25
+        root = np.linalg.cholesky(found.covariance + 1e-18 * np.eye(unknowns.count))
+        scatter = effects @ root @ random.standard_normal((unknowns.count, 2000))
+        stated = np.quantile(np.linalg.norm(scatter, axis=1), 0.95, axis=1)
+        further = external_reliability(found, tool).position
+        outside += float(np.mean(error > stated + further))
+    assert outside <= 0.05 * sets + 3.0 * np.sqrt(0.05 * 0.95 * sets)

@@ -30,6 +30,10 @@ from truepose.calibration.data_checks import (
 from truepose.calibration.identification.consider_covariance import consider_covariance
 from truepose.calibration.identification.fit import Fit, fit, unfitted
 from truepose.calibration.identification.placement import Placements, place_instruments
+from truepose.calibration.identification.reliability import (
+    ExternalReliability,
+    external_reliability,
+)
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
     ToolEffects,
@@ -60,7 +64,8 @@ class Calibration(Represented):
     hold anything back. `poses` (n, n_commanded): where the tool was looked at, those that are
     `usable` (n,): the calibrated machine reaches them too. `seed`: of the folds. `failure`: why no
     machine was found that explains the measurements, where something is wrong with these; the
-    machine then stays as filed.
+    machine then stays as filed. `external_reliability`: how far a wrong reading that is not named
+    can move the tool there.
     """
 
     machine: Machine
@@ -74,6 +79,7 @@ class Calibration(Represented):
     usable: Flags
     seed: int = 0
     failure: Problem | None = None
+    external_reliability: ExternalReliability | None = None
 
     def _facts(self) -> Facts:
         from truepose.calibration.dataset import verdict_of
@@ -211,7 +217,14 @@ def calibrate(
         effects.usable,
         seed,
         failure,
+        external_reliability(fitted, _judged_tool(tool, gate)),
     )
+
+
+def _judged_tool(tool: Tool, gate: Gate) -> Tool:
+    """What unknowns do at the tool, without what moves the machine as a whole."""
+    gauge = [direction.effects for direction in gate.directions if direction.kind == "gauge"]
+    return tool.relative(np.array(gauge).reshape(-1, tool.effects.shape[2]))
 
 
 def _refuse(suspected: Sequence[Suspicion]) -> bool:

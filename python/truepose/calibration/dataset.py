@@ -394,6 +394,8 @@ def _attrs(calibration: Calibration) -> dict[str, str | int | float]:
         "use_prior": int(fit.use_prior),
         "margin": gate.margin,
         "relative": int(gate.relative),
+        "position_within": gate.after.within[0],
+        "rotation_within": gate.after.within[1],
         "observations": fit.measurements.n_observation,
         "validation": "none" if checked is None else checked.kind,
         "folds": 0 if checked is None else checked.folds,

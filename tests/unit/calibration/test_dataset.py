@@ -216,6 +216,16 @@ def test_measurements_that_look_wrong_are_the_first_reason() -> None:
     }
 
 
+def test_the_headline_is_a_number_too() -> None:
+    found = delta("positions")
+    within = found.dataset.attrs["position_within"]
+    assert f"{within * 1e6:.0f} µm at the worst pose (95 %)" in found.gate.answer
+    # Of one to three alike directions, of the pose that is worst by either.
+    largest = np.sqrt(np.linalg.eigvalsh(found.gate.after.covariance)[:, -1].max())
+    assert 1.959 * largest < within < 2.796 * largest
+    assert found.dataset.attrs["rotation_within"] == 0.0
+
+
 def test_saving_is_refused_where_the_answer_is_no(tmp_path: Path) -> None:
     found = delta("heights", use_prior=False)
     path, original = tmp_path / "calibrated.toml", DATA / "delta_printer.toml"

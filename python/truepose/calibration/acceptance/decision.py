@@ -27,6 +27,8 @@ OPEN_CHOICE = "open-choice"
 """Code of suspicions that the data could be others, not that they are wrong."""
 MARGIN = 0.8
 """What is left of an uncertainty or error must be less than this of what it was."""
+LEAST_SHARE = 0.5
+"""Of the tool's variance that the data must take away where held-out rows show no gain."""
 ABOVE_NOISE = 2.0
 """An error on held-out poses can be made smaller if it is so many times the noise."""
 OFF_PRIOR = 4.0
@@ -48,7 +50,6 @@ SOURCE = 0.5
 def decide(
     case: Case,
     outcome: Outcome,
-    held_out: Sequence[HeldOut],
     suspicions: Sequence[Suspicion],
     failure: str | None = None,
 ) -> tuple[tuple[Reason, ...], tuple[Reason, ...]]:
@@ -68,7 +69,7 @@ def decide(
         *wrong,
         *([case.reason("out-of-reach")] if nowhere else []),
         *of_data,
-        *_not_confirmed(case, held_out),
+        *_not_confirmed(case),
         *_absurd_value(case, outcome),
         *_contradicts_noise(case),
     ]
@@ -93,19 +94,26 @@ def lacking(case: Case, outcome: Outcome) -> list[Reason]:
             reasons.append(case.reason("not-told-apart", **weak))
         reasons += _less_than_tolerance(case, outcome)
     if not len(outcome.moving):
-        reasons += _no_gain(case, outcome)
+        reasons += _no_gain(case, outcome) or _gain_unconfirmed(case, outcome)
     return reasons
 
 
 def gain_is_asked(case: Case, outcome: Outcome) -> bool:
     """Whether more is lacking than a gain that the accuracy asked does without."""
-    only = {reason.code for reason in lacking(case, outcome)} in ({"no-gain"}, {"not-identified"})
+    codes = {reason.code for reason in lacking(case, outcome)}
+    only = len(codes) == 1 and codes <= {"no-gain", "gain-unconfirmed", "not-identified"}
     return not (only and case.keeps_target(outcome))
 
 
 def is_turned_by_measuring(reasons: Iterable[Reason]) -> bool:
     """Whether one of the reasons is what further measurements are for."""
-    codes = {"not-determined", "not-told-apart", "less-than-tolerance", "no-gain"}
+    codes = {
+        "not-determined",
+        "not-told-apart",
+        "less-than-tolerance",
+        "no-gain",
+        "gain-unconfirmed",
+    }
     return any(reason.code in codes for reason in reasons)
 
 
@@ -160,11 +168,32 @@ def _no_gain(case: Case, outcome: Outcome) -> list[Reason]:
     return [case.reason("not-identified", labels=left_out.labels, every=left_out.every, **values)]
 
 
-def _not_confirmed(case: Case, held_out: Sequence[HeldOut]) -> list[Reason]:
+def _gain_unconfirmed(case: Case, outcome: Outcome) -> list[Reason]:
+    """Little is gained in what is commanded, and rows that were not fitted do not show it.
+
+    Of a machine that was good before such rows are explained no better by a good calibration
+    either, which then has taken away most of the tool's variance.
+    """
+    share = case.gained_share(outcome)
+    if not case.held_out or any(held.after < held.before for held in case.held_out):
+        return []
+    if not share < LEAST_SHARE:
+        return []
+    return [
+        case.reason(
+            "gain-unconfirmed",
+            share=share,
+            held_out=case.held_out[0],
+            kept=case.keeps_target(outcome),
+        )
+    ]
+
+
+def _not_confirmed(case: Case) -> list[Reason]:
     """Poses that were not fitted do not confirm the fit."""
     return [
         case.reason("not-confirmed", held_out=held)
-        for held in held_out
+        for held in case.held_out
         if above_noise(held) and held.after > case.margin * held.before and not held.consistent
     ]
 

@@ -197,11 +197,12 @@ def assess(
         measured=measured,
         target=target,
         margin=margin,
+        held_out=tuple(held_out),
         noise=noise,
     )
     alone = case.outcome()
-    outcome, held = alone.with_considered(considered), tuple(held_out)
-    reasons, warnings = decide(case, outcome, held, tuple(suspicions), failure)
+    outcome = alone.with_considered(considered)
+    reasons, warnings = decide(case, outcome, tuple(suspicions), failure)
     remedy = None
     if lacking(case, alone) and is_turned_by_measuring(reasons) and gain_is_asked(case, outcome):
         remedy = cheapest_remedy(case, [*candidates, *direct_candidates(unknowns, direct)])
@@ -229,7 +230,7 @@ def assess(
         rms=case.rms,
         birge=case.birge,
         degrees_of_freedom=case.degrees,
-        held_out=held,
+        held_out=case.held_out,
         shown=unknowns.shown,
     )
 

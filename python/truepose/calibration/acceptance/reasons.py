@@ -59,11 +59,11 @@ class HeldOut:
     unit: str = "1"
     consistent: bool = False
 
-    def shown(self, value: float, units: ShownUnits) -> str:
+    def shown(self, value: float, units: ShownUnits, digits: int = 2) -> str:
         """A value of it for people: "12 µm", "1.2 times the noise"."""
         if self.unit == "1":
-            return f"{sentences.times(value)} times the noise"
-        return sentences.quantity(value, self.unit, units=units)
+            return f"{sentences.times(value, digits)} times the noise"
+        return sentences.quantity(value, self.unit, digits, units)
 
 
 class ToolSize(NamedTuple):
@@ -237,6 +237,17 @@ def _not_identified(values: Values, shown: ShownUnits) -> str:
     )
 
 
+def _gain_unconfirmed(values: Values, shown: ShownUnits) -> str:
+    held: HeldOut = values["held_out"]
+    was, now = (held.shown(size, shown, 3) for size in (held.before, held.after))
+    much = "nothing" if values["share"] < 0.005 else f"only {100.0 * values['share']:.0f} %"
+    return (
+        f"of the variance of what is commanded the measurements take away {much}, at the worst "
+        f"pose, and poses that were not fitted show no gain: {was} before, {now} after"
+        f"{_kept(values)}"
+    )
+
+
 def _not_confirmed(values: Values, shown: ShownUnits) -> str:
     held: HeldOut = values["held_out"]
     was, now = (held.shown(size, shown) for size in (held.before, held.after))
@@ -318,6 +329,7 @@ SENTENCES: Mapping[str, Callable[[Values, ShownUnits], str]] = {
     "not-told-apart": _open,
     "less-than-tolerance": _less_than_tolerance,
     "no-gain": _no_gain,
+    "gain-unconfirmed": _gain_unconfirmed,
     "not-identified": _not_identified,
     "not-confirmed": _not_confirmed,
     "absurd-value": _absurd_value,

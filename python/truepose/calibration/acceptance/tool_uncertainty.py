@@ -92,6 +92,13 @@ class ToolUncertainty(Represented):
         )
         return position, rotation
 
+    def largest_variance(self, length: float) -> float:
+        """Trace of the covariance of what is commanded at its worst pose, m², rotations times m."""
+        position, rotation = (
+            np.einsum("pcc->p", self._commanded(names)) for names in (POSITION, ROTATION)
+        )
+        return float((position + length**2 * rotation).max(initial=0.0))
+
     def _commanded(self, names: str) -> Floats:
         at = [
             index

@@ -14,6 +14,7 @@ from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, assess
 from truepose.calibration.acceptance.tool_uncertainty import Tool, tool_components
 from truepose.calibration.data_checks import Suspicion, suspicions
+from truepose.calibration.identification.assembly_modes import of_other_modes, placed_as_read
 from truepose.calibration.identification.consider_covariance import (
     consider_covariance,
     with_considered,
@@ -131,7 +132,8 @@ def calibrate(
         raise _nothing_to_fit(whole)
     table, joints, placements = workspace_poses(machine, poses)
     unknowns = unknowns_of(machine, whole, identify)
-    suspected = _suspected(machine, whole, unknowns)
+    whole, in_other_modes = placed_as_read(machine, whole, unknowns)
+    suspected = _suspected(machine, whole, unknowns) + of_other_modes(whole, in_other_modes)
     used = whole.select(~whole.held_out) if whole.held_out.any() else whole
     try:
         fitted = fit(machine, used, unknowns, use_prior=use_prior, robust=robust)

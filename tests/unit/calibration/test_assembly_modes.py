@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from truepose.calibration.calibrate import calibrate
 from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.measurements import Measurements
+from truepose.calibration.measurements.read_csv import read_measurements
+from truepose.calibration.measurements.write_csv import write_measurements
 from truepose.machine import Machine
 
 Floats = NDArray[np.float64]
@@ -78,3 +81,58 @@ def test_good_rows_stay_where_they_are() -> None:
     data = made_measurements(machine, "pose", poses, values="nominal")
     found = calibrate(machine, data)
     np.testing.assert_array_equal(found.measurements.placements, data.placements)
+
+
+HEAD = """#: [instrument.probe]
+#: kind = "coordinate"
+#: frame = "base"
+#: uncertainty = "10 um"
+"""
+
+
+def written(path: Path, machine: Machine, modes: list[str]) -> tuple[Path, Floats]:
+    """A file of heights of the five-bar, with the mode of each row; where its tool is."""
+    poses = poses_within(machine, len(modes), seed=3)
+    joints = machine.kernel.inverse(poses)
+    places = [
+        crossed_circles(machine, joints[row], poses[row]) if mode == "-" else poses[row]
+        for row, mode in enumerate(modes)
+    ]
+    lines = ["joint.left (rad), joint.right (rad), y (m), assembly_mode"]
+    lines += [
+        f"{joints[row, 0]!r}, {joints[row, 1]!r}, {places[row][1]!r}, {mode}".replace(
+            "np.float64(", ""
+        ).replace(")", "")
+        for row, mode in enumerate(modes)
+    ]
+    path.write_text(HEAD + "\n".join([lines[0], *lines[1:]]) + "\n", encoding="utf-8")
+    return path, np.array(places)
+
+
+def test_a_column_says_which_assembly_mode(tmp_path: Path) -> None:
+    machine = tp.load(FILES["five_bar"])
+    modes = ["+", "-", "", "-", "+"]
+    file, places = written(tmp_path / "heights.csv", machine, modes)
+    data = read_measurements(file, machine)
+    np.testing.assert_allclose(data.placements[:, :2], places, atol=1e-9)
+    again = tmp_path / "again.csv"
+    write_measurements(again, machine, data)
+    np.testing.assert_allclose(
+        read_measurements(again, machine).placements, data.placements, atol=1e-9
+    )
+
+
+def test_a_mode_that_is_neither_is_refused(tmp_path: Path) -> None:
+    machine = tp.load(FILES["five_bar"])
+    file, _ = written(tmp_path / "heights.csv", machine, ["+", "+"])
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.rstrip("\n +") + " up\n", encoding="utf-8")
+    with pytest.raises(tp.errors.RequestError) as refused:
+        read_measurements(file, machine)
+    (problem,) = refused.value.problems
+    assert problem.code == "unknown-choice"
+    assert problem.line == 7
+    assert problem.path is not None
+    assert "assembly_mode" in problem.path
+    assert problem.expected is not None
+    assert "+" in problem.expected

@@ -21,6 +21,7 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments import REGISTRY
+from truepose.calibration.measurements.assembly_modes import HOME, OTHER
 from truepose.calibration.measurements.declarations import (
     Header,
     read_header,
@@ -44,6 +45,7 @@ from truepose.machine import Machine
 from truepose.machine.condition import DEFAULT_PART
 
 INSTRUMENT, SET, ID = "instrument", "set", "id"
+ASSEMBLY_MODE = "assembly_mode"
 FIT, CHECK = "fit", "check"
 
 _KIND = FileKind("a file of measurements (CSV)", ".csv")
@@ -100,6 +102,7 @@ def _columns(machine: Machine) -> list[Column]:
         columns += [may(name, reading.dimension), may(name + UNCERTAINTY, reading.dimension)]
     columns += [may(f"temperature.{part}", "temperature") for part in _parts(machine)]
     columns += [may(name, dimension) for name, dimension in WRENCH.items()]
+    columns.append(may(ASSEMBLY_MODE, None, (HOME, OTHER)))
     return [*columns, may(SET, None, (FIT, CHECK)), may(ID, None)]
 
 
@@ -151,6 +154,9 @@ class _Reading:
             wrench={name: table.numbers[name] for name in WRENCH if name in table.numbers},
             unreadable=self.read.unreadable,
             whole=self.header.whole,
+            other_mode=np.array([w == OTHER for w in table.texts.get(ASSEMBLY_MODE, ())])
+            if ASSEMBLY_MODE in table.texts
+            else None,
         )
         misnamed = not codes.isdisjoint(("unknown-column", "doubled-column", "other-machine"))
         report = _Report(table, self.problems, misnamed)
@@ -221,6 +227,7 @@ class _Reading:
             *(name for name, column in reading_columns(self.machine).items() if column.strut < 1),
             "temperature.default",
             *WRENCH,
+            ASSEMBLY_MODE,
             SET,
             ID,
         ]

@@ -17,6 +17,10 @@ from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
+from truepose.calibration.measurements.assembly_modes import (
+    NO_OTHER_MODE,
+    stand_in_other_modes,
+)
 from truepose.calibration.measurements.measurements import Measurements, unloaded_at_reference
 from truepose.calibration.observables import OBSERVABLES
 from truepose.errors import Fault
@@ -84,6 +88,8 @@ class MeasurementRows:
     wrench: Mapping[str, Floats] = field(default_factory=dict)
     unreadable: Mapping[str, Flags] = field(default_factory=dict)
     whole: frozenset[str] = frozenset()
+    other_mode: Flags | None = None
+    """(n_row,) rows that are stated to be in another assembly mode than that of home."""
 
     @property
     def n_row(self) -> int:
@@ -117,6 +123,8 @@ def measurements_in(
 ) -> Measurements:
     """Measurements from rows; of no use where something was reported on the way."""
     placed = _placed(machine, rows, report)
+    for row in stand_in_other_modes(machine, rows.other_mode, *placed):
+        report(NO_OTHER_MODE, row=row, column="assembly_mode")
     conditions = _conditions(machine, rows, report)
     columns = reading_columns(machine)
     observed = _Observations(machine, instruments, rows, report, columns)

@@ -27,6 +27,10 @@ from truepose.calibration.data_checks import (
     explained_otherwise,
     suspicions,
 )
+from truepose.calibration.identification.assembly_modes import (
+    of_other_modes,
+    placed_as_read,
+)
 from truepose.calibration.identification.consider_covariance import consider_covariance
 from truepose.calibration.identification.fit import Fit, fit, unfitted
 from truepose.calibration.identification.placement import Placements, place_instruments
@@ -166,9 +170,12 @@ def calibrate(
         raise _nothing_to_fit(whole)
     table = workspace_poses(machine, poses)
     unknowns = unknowns_of(machine, whole, identify)
-    used = whole.select(~whole.held_out) if whole.held_out.any() else whole
     standing = _placed(machine, whole)
-    suspected = suspicions(machine, whole, standing)
+    whole, in_other_modes = placed_as_read(machine, whole, standing)
+    if in_other_modes.any():
+        standing = _placed(machine, whole)
+    used = whole.select(~whole.held_out) if whole.held_out.any() else whole
+    suspected = suspicions(machine, whole, standing) + of_other_modes(whole, in_other_modes)
     refit = Refit(machine, used, unknowns, use_prior)
     failure, checked = None, None
     try:

@@ -29,17 +29,19 @@ ROUNDS = 30
 SLOWER = 0.9
 """The scale falls to less than this, or the way is gone."""
 
+GROSS = 0.5
+"""Readings of a larger weight count in full when the fit begins."""
+
 ALONG = (1e-6, 1e-4, 1e-2, 0.1, 0.3, 1.0)
 """Shares of a step at which rows are looked at, the first that cannot be assembled."""
 
 
 @dataclass(frozen=True, eq=False)
 class Approach:
-    """`values` (n,) near the fit, `weights` (m,) and `scale`, in stated uncertainties, there."""
+    """`values` (n,) near the fit, and `weights` (m,) there: what is far off has little."""
 
     values: Floats
     weights: Floats
-    scale: float
     evaluations: int
 
 
@@ -68,7 +70,8 @@ def approach(
             break
         values = solved.values[0]
         evaluations += solved.evaluations[0]
-    return Approach(values, weights, scale, evaluations)
+    # What is only a little off may be so because the scale is still rough.
+    return Approach(values, np.where(weights < GROSS, weights, 1.0), evaluations)
 
 
 def rows_in_the_way(

@@ -166,8 +166,7 @@ def fit(
     evaluations, same = 0, True
     if robust:
         near = approach(problem, prior.with_rows(equations.gauge_rows()), values, counted)
-        values, weights, scale = near.values, near.weights, near.scale
-        evaluations = near.evaluations
+        values, weights, evaluations = near.values, near.weights, near.evaluations
         in_the_way = problem.status(values) != 0
         counted = ~in_the_way[measurements.row]
     freed, left_out = np.empty((0, unknowns.count)), None

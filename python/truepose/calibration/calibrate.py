@@ -14,7 +14,11 @@ from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance.decision import MARGIN, Gate, HeldOut, assess
 from truepose.calibration.acceptance.tool_uncertainty import Tool, tool_components
 from truepose.calibration.data_checks import Suspicion, suspicions
-from truepose.calibration.identification.assembly_modes import of_other_modes, placed_as_read
+from truepose.calibration.identification.assembly_modes import (
+    in_unstated_modes,
+    of_other_modes,
+    placed_as_read,
+)
 from truepose.calibration.identification.consider_covariance import (
     consider_covariance,
     with_considered,
@@ -139,6 +143,7 @@ def calibrate(
         fitted = fit(machine, used, unknowns, use_prior=use_prior, robust=robust)
     except RequestError as failure:
         raise _with_suspicions(failure, suspected) from failure
+    suspected += in_unstated_modes(machine, fitted, whole)
     checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
     gate = _assessed(machine, fitted, checked, effects, placements[usable, :3], margin)

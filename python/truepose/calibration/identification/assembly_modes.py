@@ -14,11 +14,14 @@ import numpy as np
 from truepose.arrays import Flags, Floats
 from truepose.calibration.data_checks import Suspicion
 from truepose.calibration.data_checks._base import listed
-from truepose.calibration.identification.fit import place_instruments
+from truepose.calibration.identification.fit import Fit, place_instruments
 from truepose.calibration.identification.frames import rebase_frame
+from truepose.calibration.identification.problem import IdentificationProblem
+from truepose.calibration.identification.robust import OUTLIER
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.instruments import Instrument
 from truepose.calibration.measurements import Measurements
+from truepose.calibration.measurements.assembly_modes import other_modes
 from truepose.calibration.observables import OBSERVABLES
 from truepose.errors import RequestError
 from truepose.machine import Machine
@@ -31,6 +34,9 @@ APART = 1e-3
 """Placements nearer than this share of the machine are one; two modes meet only where singular."""
 
 CODE = "other-assembly-mode"
+
+MOST_ROWS = 50
+"""So many rows that do not fit are tried in the other mode; more are no matter of modes."""
 
 
 def placed_as_read(
@@ -108,27 +114,63 @@ def _nearest(
 
 def of_other_modes(measurements: Measurements, rows: Flags) -> tuple[Suspicion, ...]:
     """What is said of rows (n_row,) that were placed in another assembly mode."""
+    return _named(
+        measurements,
+        rows,
+        "the readings are of another assembly mode of the machine than the one that it is in at "
+        "home; they were taken as of that one",
+    )
+
+
+def in_unstated_modes(machine: Machine, fitted: Fit, whole: Measurements) -> tuple[Suspicion, ...]:
+    """Rows that do not fit, and would, did the machine stand in its other assembly mode there.
+
+    Readings that do not give the pose leave that to whoever measured. `whole`: all measurements, in
+    which rows are counted.
+    """
+    data = fitted.measurements
+    odd = np.zeros(data.n_row, np.bool_)
+    odd[data.row[np.abs(fitted.standardised) >= OUTLIER]] = True
+    numbers = np.flatnonzero(odd | fitted.unplaced)[:MOST_ROWS]
+    if not numbers.size:
+        return ()
+    placements = data.placements.copy()
+    placements[numbers], has = other_modes(machine, data.joints[numbers], placements[numbers])
+    there = dataclasses.replace(data, placements=placements)
+    problems = (fitted.problem, IdentificationProblem(machine, there, fitted.unknowns))
+    here, other = (
+        np.bincount(data.row, problem.residual(fitted.values) ** 2, data.n_row)[numbers]
+        for problem in problems
+    )
+    better = has & (np.isnan(here) & np.isfinite(other) | (other < NEARER**2 * here))
+    rows = np.zeros(whole.n_row, np.bool_)
+    rows[np.flatnonzero(~whole.held_out)[numbers[better]]] = True
+    return _named(
+        whole,
+        rows,
+        "the readings would fit, did the machine stand in its other assembly mode there: if it "
+        'did, say so by "-" in a column assembly_mode',
+    )
+
+
+def _named(measurements: Measurements, rows: Flags, sentence: str) -> tuple[Suspicion, ...]:
     numbers = np.flatnonzero(rows)
     if not numbers.size:
         return ()
     lines = tuple(int(line) for line in measurements.lines[numbers])
-    word = "line" if all(lines) else "row"
-    shown = [str(line) for line in (lines if all(lines) else (numbers + 1).tolist())]
+    in_file = all(lines)
+    shown = [str(number) for number in (lines if in_file else (numbers + 1).tolist())]
     more = [f"{len(shown) - 6} more"] if len(shown) > 6 else []
-    sentence = (
-        f"{word}{'s' if numbers.size > 1 else ''} {listed([*shown[:6], *more])}: the readings are "
-        "of another assembly mode of the machine than the one that it is in at home; they were "
-        "taken as of that one"
-    )
+    word = f"{'line' if in_file else 'row'}{'s' if len(shown) > 1 else ''}"
     return (
         Suspicion(
             CODE,
-            sentence,
+            f"{word} {listed([*shown[:6], *more])}: {sentence}",
             rows=tuple(numbers.tolist()),
-            lines=lines if all(lines) else (),
+            lines=lines if in_file else (),
             refuses=False,
         ),
     )
 
 
-__all__ = ["CODE", "of_other_modes", "placed_as_read"]
+__all__ = ["CODE", "in_unstated_modes", "of_other_modes", "placed_as_read"]

@@ -28,6 +28,7 @@ from truepose.calibration.data_checks import (
     suspicions,
 )
 from truepose.calibration.identification.assembly_modes import (
+    in_unstated_modes,
     of_other_modes,
     placed_as_read,
 )
@@ -195,6 +196,7 @@ def calibrate(
             raise
         fitted = unfitted(used, unknowns, place_instruments(machine, used), use_prior=use_prior)
     else:
+        suspected += in_unstated_modes(machine, fitted, whole)
         checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects = tool_effects(machine, unknowns, fitted.values, table)
     left_out = consider_covariance(machine, fitted, identify, table[effects.usable])

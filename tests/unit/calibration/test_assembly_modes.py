@@ -136,3 +136,25 @@ def test_a_mode_that_is_neither_is_refused(tmp_path: Path) -> None:
     assert "assembly_mode" in problem.path
     assert problem.expected is not None
     assert "+" in problem.expected
+
+
+def test_a_row_that_stays_on_another_branch_is_named() -> None:
+    """Heights alone do not say where the tool is: the row is given up, and said to be of a mode."""
+    machine = tp.load(FILES["five_bar"])
+    poses = poses_within(machine, 30, seed=3)
+    data = made_measurements(machine, "coordinate", poses, observables=["y"])
+    unknowns = unknowns_of(machine, data)
+    truth = 0.5 * np.where(unknowns.has_prior, unknowns.half, 0.0)
+    other = crossed_circles(machine, data.joints[8], poses[8])
+    placements = data.placements.copy()
+    placements[8] = machine.kernel.placement_of(other[np.newaxis])[0]
+    there = dataclasses.replace(data, placements=placements)
+    read = IdentificationProblem(machine, there, unknowns).predict(truth)
+    read += data.uncertainty * np.random.default_rng(3).standard_normal(read.size)
+    found = calibrate(machine, data.with_values(read))
+    assert {one.row for one in found.outliers} == {8}
+    assert found.fit.noise < 1.5
+    (named,) = [each for each in found.suspicions if each.code == "other-assembly-mode"]
+    assert named.rows == (8,)
+    assert named.sentence.startswith("row 9:")
+    assert "assembly_mode" in named.sentence

@@ -14,13 +14,14 @@ import numpy as np
 from truepose.arrays import Flags, Floats
 from truepose.calibration.data_checks import Suspicion
 from truepose.calibration.data_checks._base import listed
-from truepose.calibration.identification.fit import place_instruments
-from truepose.calibration.identification.frames import rebase_frame
-from truepose.calibration.identification.unknowns import Unknowns
+from truepose.calibration.identification.fit import Fit
+from truepose.calibration.identification.placement import Placements
+from truepose.calibration.identification.problem import IdentificationProblem
+from truepose.calibration.identification.robust import OUTLIER
 from truepose.calibration.instruments import Instrument
 from truepose.calibration.measurements import Measurements
+from truepose.calibration.measurements.assembly_modes import other_modes
 from truepose.calibration.observables import OBSERVABLES
-from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.spatial import euler_to_matrix, matrix_to_quaternion, quaternion_to_matrix
 
@@ -32,27 +33,26 @@ APART = 1e-3
 
 CODE = "other-assembly-mode"
 
+MOST_ROWS = 50
+"""So many rows that do not fit are tried in the other mode; more are no matter of modes."""
+
 
 def placed_as_read(
-    machine: Machine, measurements: Measurements, unknowns: Unknowns
+    machine: Machine, measurements: Measurements, standing: Placements | None
 ) -> tuple[Measurements, Flags]:
     """The measurements with each row placed in the assembly mode that its readings show.
 
-    And the rows (n_row,) that changed. What an instrument does not read of the pose starts from
-    the mode that is reached from home. Nothing changes where frames that are to be found cannot be.
+    And the rows (n_row,) that changed. `standing`: where the instruments stand. What an instrument
+    does not read of the pose starts from the mode that is reached from home. Nothing changes where
+    frames that are to be found cannot be.
     """
     changed = np.zeros(measurements.n_row, np.bool_)
     reading = [_reads_pose(measurements, number) for number in range(len(measurements.instruments))]
-    if not any(reading):
+    if not any(reading) or standing is None:
         return measurements, changed
-    if any(any(each.frame.unknown) for each in measurements.instruments):
-        try:
-            problem, values = place_instruments(machine, measurements, unknowns)
-        except RequestError:
-            return measurements, changed
-        instruments = rebase_frame(problem.measurements, unknowns, values).instruments
-    else:
-        instruments = measurements.instruments
+    instruments = list(measurements.instruments)
+    for number, placement in standing.of.items():
+        instruments[number] = dataclasses.replace(instruments[number], frame=placement.frame)
     placements = measurements.placements.copy()
     for number, instrument in enumerate(instruments):
         rows = np.flatnonzero(measurements.instrument == number)
@@ -108,27 +108,63 @@ def _nearest(
 
 def of_other_modes(measurements: Measurements, rows: Flags) -> tuple[Suspicion, ...]:
     """What is said of rows (n_row,) that were placed in another assembly mode."""
+    return _named(
+        measurements,
+        rows,
+        "the readings are of another assembly mode of the machine than the one that it is in at "
+        "home; they were taken as of that one",
+    )
+
+
+def in_unstated_modes(machine: Machine, fitted: Fit, whole: Measurements) -> tuple[Suspicion, ...]:
+    """Rows that do not fit, and would, did the machine stand in its other assembly mode there.
+
+    Readings that do not give the pose leave that to whoever measured. `whole`: all measurements, in
+    which rows are counted.
+    """
+    data = fitted.measurements
+    odd = np.zeros(data.n_row, np.bool_)
+    odd[data.row[np.abs(fitted.standardised) >= OUTLIER]] = True
+    numbers = np.flatnonzero(odd | fitted.unplaced)[:MOST_ROWS]
+    if not numbers.size:
+        return ()
+    placements = data.placements.copy()
+    placements[numbers], has = other_modes(machine, data.joints[numbers], placements[numbers])
+    there = dataclasses.replace(data, placements=placements)
+    problems = (fitted.problem, IdentificationProblem(machine, there, fitted.unknowns))
+    here, other = (
+        np.bincount(data.row, problem.residual(fitted.values) ** 2, data.n_row)[numbers]
+        for problem in problems
+    )
+    better = has & (np.isnan(here) & np.isfinite(other) | (other < NEARER**2 * here))
+    rows = np.zeros(whole.n_row, np.bool_)
+    rows[np.flatnonzero(~whole.held_out)[numbers[better]]] = True
+    return _named(
+        whole,
+        rows,
+        "the readings would fit, did the machine stand in its other assembly mode there: if it "
+        'did, say so by "-" in a column assembly_mode',
+    )
+
+
+def _named(measurements: Measurements, rows: Flags, sentence: str) -> tuple[Suspicion, ...]:
     numbers = np.flatnonzero(rows)
     if not numbers.size:
         return ()
     lines = tuple(int(line) for line in measurements.lines[numbers])
-    word = "line" if all(lines) else "row"
-    shown = [str(line) for line in (lines if all(lines) else (numbers + 1).tolist())]
+    in_file = all(lines)
+    shown = [str(number) for number in (lines if in_file else (numbers + 1).tolist())]
     more = [f"{len(shown) - 6} more"] if len(shown) > 6 else []
-    sentence = (
-        f"{word}{'s' if numbers.size > 1 else ''} {listed([*shown[:6], *more])}: the readings are "
-        "of another assembly mode of the machine than the one that it is in at home; they were "
-        "taken as of that one"
-    )
+    word = f"{'line' if in_file else 'row'}{'s' if len(shown) > 1 else ''}"
     return (
         Suspicion(
             CODE,
-            sentence,
+            f"{word} {listed([*shown[:6], *more])}: {sentence}",
             rows=tuple(numbers.tolist()),
-            lines=lines if all(lines) else (),
+            lines=lines if in_file else (),
             refuses=False,
         ),
     )
 
 
-__all__ = ["CODE", "of_other_modes", "placed_as_read"]
+__all__ = ["CODE", "in_unstated_modes", "of_other_modes", "placed_as_read"]

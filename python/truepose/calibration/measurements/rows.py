@@ -42,7 +42,6 @@ UNIT_LENGTH = 0.01
 """How far a direction's length may be from 1: more than noise does, less than a slip."""
 
 
-
 def measurements_in(
     machine: Machine, instruments: Sequence[Instrument], rows: MeasurementRows, report: Report
 ) -> Measurements:

@@ -284,6 +284,7 @@ def unfitted(
         nothing,
         as_filed,
         problem,
+        unplaced=np.zeros(measurements.n_row, np.bool_),
     )
 
 

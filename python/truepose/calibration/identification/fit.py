@@ -197,9 +197,15 @@ class Equations:
     @property
     def covariance(self) -> Floats:
         """(n, n) over what is determined, in the unknowns' own units."""
-        rows = self.directions[self.seen] / self.singular[self.seen, np.newaxis] * self.scale
-        covariance: Floats = rows.T @ rows
+        covariance: Floats = self.root @ self.root.T
         return covariance
+
+    @property
+    def root(self) -> Floats:
+        """(n, r) whose product with its transpose is the covariance."""
+        rows = self.directions[self.seen] / self.singular[self.seen, np.newaxis] * self.scale
+        columns: Floats = rows.T
+        return columns
 
     def faint(self, extent: Floats, share: float) -> Floats:
         """(k, n) directions, in the unknowns' own units, that are hardly determined.
@@ -285,6 +291,7 @@ def fit(
         values, weights, evaluations = near.values, near.weights, near.evaluations
         in_the_way = problem.status(values) != 0
         counted = ~in_the_way[measurements.row]
+        weights = weights * counted
     freed, left_out = np.empty((0, unknowns.count)), None
     holds = _firmer_holds(_extent(machine, unknowns))
     holding: Callable[[Equations], Floats] = Equations.gauge_rows
@@ -338,7 +345,7 @@ def fit(
         # What nothing saw at the start may be seen where the machine really is.
         same = len(equations.null_space) == len(freed)
         if same and abs(larger / scale - 1.0) < 1e-3 and np.abs(changed - weights).max() < 1e-3:
-            root = (equations.directions[equations.seen] * equations.scale).T
+            root = equations.root
             away = prior.rows @ (values - prior.mean)
             judged = ~in_the_way[measurements.row]
             kept = judged.copy()

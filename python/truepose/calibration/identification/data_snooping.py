@@ -87,7 +87,7 @@ def _given_up(slope: Floats, residual: Floats, prior: tuple[Floats, Floats], roo
     normal = inside.T @ inside + outside.T @ outside
     covariance = np.asarray(np.linalg.inv(normal), np.float64)
     step: Floats = -covariance @ (inside.T @ residual + outside.T @ off)
-    spread: Floats = np.einsum("ij,jk,ik->i", inside, covariance, inside)
+    spread: Floats = np.sum((inside @ covariance) * inside, axis=1)
     used = np.ones(residual.size, np.bool_)
     fit = _Adjustment(inside, covariance, residual + inside @ step, spread, used)
     most = max(AT_LEAST, int(FEW * residual.size))

@@ -337,7 +337,7 @@ def fit(
         factor = np.sqrt(weights) / scale
         equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
         covariance = equations.covariance
-        leverage = np.einsum("ij,jk,ik->i", slope, covariance, slope) * factor**2
+        leverage = np.square(slope @ equations.root).sum(axis=1) * factor**2
         residual = np.where(in_the_way[measurements.row], 0.0, residual)
         noise = noise_of(weights * residual, float(np.sum((1.0 - leverage)[weights > 0.0])))
         larger = max(1.0, noise) if np.isfinite(noise) else 1.0

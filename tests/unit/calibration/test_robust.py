@@ -197,9 +197,8 @@ def test_a_row_that_cannot_be_placed_loses_its_weight_and_is_named() -> None:
 def tool_of(machine: Machine, unknowns: Unknowns, values: Floats) -> tuple[Tool, Floats]:
     """The tool's sensitivity at 25 poses, and the positions there."""
     poses = poses_within(machine, 25, seed=9)
-    joints, placements, _ = machine.kernel.place(poses)
-    effects, usable = tool_effects(machine, unknowns, values, joints, placements)
-    return Tool.of(effects, tool_components(machine), placements[usable, :3]), effects
+    at = tool_effects(machine, unknowns, values, poses)
+    return Tool.of(at.effects, tool_components(machine), at.positions), at.effects
 
 
 def test_external_reliability_is_the_largest_effect_of_an_error_not_named() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from truepose.calibration.acceptance.assessment import Case, Outcome
 from truepose.calibration.acceptance.reasons import (
+    OPEN_CHOICE,
     WRONG_DATA,
     HeldOut,
     Reason,
@@ -23,8 +24,6 @@ from truepose.calibration.acceptance.reasons import (
 if TYPE_CHECKING:
     from truepose.calibration.data_checks import Suspicion
 
-OPEN_CHOICE = "open-choice"
-"""Code of suspicions that the data could be others, not that they are wrong."""
 MARGIN = 0.8
 """What is left of an uncertainty or error must be less than this of what it was."""
 LEAST_SHARE = 0.5
@@ -59,9 +58,7 @@ def decide(
     """
     of_data = lacking(case, outcome)
     refusing = [suspicion for suspicion in suspicions if suspicion.refuses]
-    suspected = tuple(suspicion.sentence for suspicion in refusing)
-    looks_wrong = any(suspicion.code != OPEN_CHOICE for suspicion in refusing)
-    wrong = [case.reason(WRONG_DATA, suspected=suspected, wrong=looks_wrong)] if suspected else []
+    wrong = _suspected(case, refusing)
     if failure is not None:  # there is nothing else to be judged
         return (*wrong, case.reason("no-fit", failure=failure)), ()
     nowhere = len(case.tool.effects) == 0
@@ -81,6 +78,19 @@ def decide(
         *_considered(case, outcome, of_data),
     ]
     return tuple(reasons), tuple(warnings)
+
+
+def _suspected(case: Case, refusing: Sequence[Suspicion]) -> list[Reason]:
+    """That the data look wrong, and that they could be others."""
+    by_code: dict[str, list[str]] = {}
+    for suspicion in refusing:
+        code = OPEN_CHOICE if suspicion.code == OPEN_CHOICE else WRONG_DATA
+        by_code.setdefault(code, []).append(suspicion.sentence)
+    return [
+        case.reason(code, suspected=tuple(by_code[code]))
+        for code in (WRONG_DATA, OPEN_CHOICE)
+        if code in by_code
+    ]
 
 
 def lacking(case: Case, outcome: Outcome) -> list[Reason]:

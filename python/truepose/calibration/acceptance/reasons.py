@@ -155,9 +155,12 @@ def left_out_of(after: ToolUncertainty, relative: bool) -> list[str]:
 
 
 def _wrong_data(values: Values, shown: ShownUnits) -> str:
-    what = "look wrong" if values["wrong"] else "leave open what they say"
     # They begin with the instrument's name, which stays as it is written.
-    return f"the measurements {what}. {'. '.join(values['suspected'])}"
+    return f"the measurements look wrong. {'. '.join(values['suspected'])}"
+
+
+def _open_choice(values: Values, shown: ShownUnits) -> str:
+    return "; ".join(values["suspected"])
 
 
 def _no_fit(values: Values, shown: ShownUnits) -> str:
@@ -318,8 +321,11 @@ def _always(text: str) -> Callable[[Values, ShownUnits], str]:
 
 
 WRONG_DATA = "data-look-wrong"
+OPEN_CHOICE = "open-choice"
+"""Of suspicions that the data could be others, not that they are wrong."""
 SENTENCES: Mapping[str, Callable[[Values, ShownUnits], str]] = {
     WRONG_DATA: _wrong_data,
+    OPEN_CHOICE: _open_choice,
     "no-fit": _no_fit,
     "out-of-reach": _always(
         "the calibrated machine reaches none of the poses of the workspace: it cannot be assembled "

@@ -73,7 +73,7 @@ def given_up(slope: Floats, residual: Floats, prior: tuple[Floats, Floats], root
     `slope` (m, n) and `residual` (m,), predicted less measured, over the stated uncertainties, NaN
     where a reading cannot be predicted, which is then not judged; `prior`: rows (k, n) of what is
     known beforehand, and their residuals (k,). `root` (n, r): directions that readings and prior
-    determine, of any length.
+    determine, of lengths that make their equations sound: standard uncertainties.
     """
     known = np.isfinite(residual) & np.isfinite(slope).all(axis=1)
     flags = np.zeros(residual.size, np.bool_)
@@ -87,7 +87,7 @@ def _given_up(slope: Floats, residual: Floats, prior: tuple[Floats, Floats], roo
     normal = inside.T @ inside + outside.T @ outside
     covariance = np.asarray(np.linalg.inv(normal), np.float64)
     step: Floats = -covariance @ (inside.T @ residual + outside.T @ off)
-    spread: Floats = np.einsum("ij,jk,ik->i", inside, covariance, inside)
+    spread: Floats = np.sum((inside @ covariance) * inside, axis=1)
     used = np.ones(residual.size, np.bool_)
     fit = _Adjustment(inside, covariance, residual + inside @ step, spread, used)
     most = max(AT_LEAST, int(FEW * residual.size))

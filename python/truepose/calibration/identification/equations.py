@@ -90,9 +90,15 @@ class Equations:
     @property
     def covariance(self) -> Floats:
         """(n, n) over what is determined, in the unknowns' own units."""
-        rows = self.directions[self.seen] / self.singular[self.seen, np.newaxis] * self.scale
-        covariance: Floats = rows.T @ rows
+        covariance: Floats = self.root @ self.root.T
         return covariance
+
+    @property
+    def root(self) -> Floats:
+        """(n, r) whose product with its transpose is the covariance."""
+        rows = self.directions[self.seen] / self.singular[self.seen, np.newaxis] * self.scale
+        columns: Floats = rows.T
+        return columns
 
     def faint(self, extent: Floats, share: float) -> Floats:
         """(k, n) directions, in the unknowns' own units, that are hardly determined.

@@ -169,6 +169,7 @@ def fit(
         values, weights, evaluations = near.values, near.weights, near.evaluations
         in_the_way = problem.status(values) != 0
         counted = ~in_the_way[measurements.row]
+        weights = weights * counted
     freed, left_out = np.empty((0, unknowns.count)), None
     holds = _firmer_holds(_extent(machine, unknowns))
     holding: Callable[[Equations], Floats] = Equations.gauge_rows
@@ -214,7 +215,7 @@ def fit(
         factor = np.sqrt(weights) / scale
         equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
         covariance = equations.covariance
-        leverage = np.einsum("ij,jk,ik->i", slope, covariance, slope) * factor**2
+        leverage = np.square(slope @ equations.root).sum(axis=1) * factor**2
         residual = np.where(in_the_way[measurements.row], 0.0, residual)
         noise = noise_of(weights * residual, float(np.sum((1.0 - leverage)[weights > 0.0])))
         larger = max(1.0, noise) if np.isfinite(noise) else 1.0
@@ -222,7 +223,7 @@ def fit(
         # What nothing saw at the start may be seen where the machine really is.
         same = len(equations.null_space) == len(freed)
         if same and abs(larger / scale - 1.0) < 1e-3 and np.abs(changed - weights).max() < 1e-3:
-            root = (equations.directions[equations.seen] * equations.scale).T
+            root = equations.root
             away = prior.rows @ (values - prior.mean)
             judged = ~in_the_way[measurements.row]
             kept = judged.copy()

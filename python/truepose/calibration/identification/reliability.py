@@ -51,15 +51,16 @@ def external_reliability(fit: Fit, tool: Tool) -> ExternalReliability:
     n_machine = fit.unknowns.n_machine
     gain = fit.covariance[:n_machine] @ (fit.jacobian * fit.weights[:, np.newaxis]).T
     gain /= fit.birge**2
-    moved = np.any(gain != 0.0, axis=0)
+    unchecked = gain[:, counted & ~checked & np.any(gain != 0.0, axis=0)]
+    by_error = gain[:, checked] * bias[checked]
     size = {}
     for name, letters in (("position", "xyz"), ("rotation", "abc")):
         of = [number for number, component in enumerate(tool.components) if component in letters]
         largest = 0.0
         for effects in tool.effects[:, of]:  # pose by pose: all at once would be large
-            own = np.linalg.norm(effects @ gain[:, checked] * bias[checked], axis=0)
-            largest = max(largest, float(own.max(initial=0.0)))
-            if np.any(effects @ gain[:, counted & ~checked & moved]):
+            squares = np.square(effects @ by_error).sum(axis=0)
+            largest = max(largest, float(np.sqrt(squares.max(initial=0.0))))
+            if unchecked.size and np.any(effects @ unchecked):
                 largest = np.inf
         size[name] = largest
     return ExternalReliability(

@@ -7,6 +7,8 @@ enough, and a machine that is wrong. Each kind of pattern is a file and a line o
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from truepose.calibration.acceptance.decision import CONTRADICTED
@@ -15,7 +17,13 @@ from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.data_checks import Suspicion
 from truepose.calibration.identification.fit import Fit
 from truepose.calibration.residual_checks import drift, scale, step, target_offset, workspace
-from truepose.calibration.residual_checks._base import ALARM, PatternKind, ResidualsView
+from truepose.calibration.residual_checks._base import (
+    ALARM,
+    Found,
+    Left,
+    PatternKind,
+    ResidualsView,
+)
 from truepose.calibration.residual_checks.sizes import length_words
 from truepose.machine import Machine
 
@@ -48,33 +56,47 @@ def residual_patterns(machine: Machine, fitted: Fit, tool: Tool) -> tuple[Suspic
     suspected: list[Suspicion] = []
     posed = fitted.measurements.posed
     for number in np.unique(fitted.measurements.instrument[posed]).tolist():
-        view = ResidualsView(machine, fitted, tool, after, number)
-        likeliest = _likeliest(view)
-        suspected += [] if likeliest is None else [likeliest]
+        view = ResidualsView(machine, fitted, tool, after, number, Left.of(fitted))
+        likeliest = _of_given_up(view) or _likeliest(view)
+        suspected += [] if likeliest is None else [_said(view, *likeliest)]
         suspected += _rests_on_target(view)
     return tuple(suspected)
 
 
-def _likeliest(view: ResidualsView) -> Suspicion | None:
-    best = None
+def _likeliest(view: ResidualsView) -> tuple[str, Found] | None:
+    """What is least likely by chance, with its code."""
+    best: tuple[str, Found] | None = None
     for kind in KINDS:
-        inspected = kind.inspect(view)
-        if inspected is None or inspected[0].probability > ALARM:
+        found = kind.inspect(view)
+        if found is None or found.pattern.probability > ALARM:
             continue
-        if best is None or inspected[0].probability < best[0].probability:
-            best = *inspected, kind.code
-    if best is None:
+        if best is None or found.pattern.probability < best[1].pattern.probability:
+            best = kind.code, found
+    return best
+
+
+def _of_given_up(view: ResidualsView) -> tuple[str, Found] | None:
+    """What explains the readings that the fit gave up, if anything does."""
+    left = Left.with_given_up(view.fitted, view.number)
+    if left is None:
         return None
-    pattern, words, rows, code = best
-    moved = f"which puts the tool up to {length_words(view, pattern.moved)} off" + (
-        "" if pattern.beyond else ", within what is stated of it"
-    )
-    lines = tuple(int(view.data.lines[row]) for row in rows)
+    restored = replace(view, left=left)
+    best = _likeliest(restored)
+    explained = best is not None and restored.explains_given_up(best[1].pattern, best[1].columns)
+    return best if explained else None
+
+
+def _said(view: ResidualsView, code: str, found: Found) -> Suspicion:
+    pattern = found.pattern
+    moved = f"which puts the tool up to {length_words(view, pattern.moved)} off"
+    if not pattern.beyond:
+        moved += ", within what is stated of it"
+    lines = tuple(int(view.data.lines[row]) for row in found.rows)
     return Suspicion(
         code,
-        f"{view.instrument.name}: {words}, {moved}",
+        f"{view.instrument.name}: {found.words}, {moved}",
         view.instrument.name,
-        rows=rows,
+        rows=found.rows,
         lines=lines if all(lines) else (),
         refuses=pattern.beyond or view.fitted.birge > CONTRADICTED,
     )

@@ -21,9 +21,11 @@ import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
+from truepose.calibration.identification.equations import Equations
 from truepose.calibration.identification.fit import Fit
 from truepose.calibration.identification.frames import moved_frame
-from truepose.calibration.identification.problem import IdentificationProblem
+from truepose.calibration.identification.problem import IdentificationProblem, Prior
+from truepose.calibration.identification.robust import OUTLIER
 from truepose.calibration.instruments import Instrument
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import UNITS
@@ -41,6 +43,12 @@ SPARE = 4.0
 
 STEP = 1e-5
 """m and rad of differences."""
+
+LEAST_GIVEN_UP = 4
+"""Readings that were given up, from which they may be more than single mistakes."""
+
+RESTORED = 0.8
+"""Share of them that a pattern must explain."""
 
 COVERAGE = 2.0
 """Standard uncertainties of the tool beyond which a pattern moves it farther than is stated."""
@@ -62,11 +70,60 @@ class Pattern:
 
 
 @dataclass(frozen=True, eq=False)
+class Left:
+    """What a fit leaves: `residual` (m,) over the stated uncertainties, and their `weights`.
+
+    `covariance` (n, n) of the unknowns as those state it, and `freedom` of the residuals.
+    """
+
+    weights: Floats
+    residual: Floats
+    covariance: Floats
+    freedom: float
+
+    @classmethod
+    def of(cls, fitted: Fit) -> Left:
+        """As it was fitted."""
+        covariance = fitted.covariance / fitted.birge**2
+        return cls(fitted.weights, fitted.residual, covariance, fitted.freedom)
+
+    @classmethod
+    def with_given_up(cls, fitted: Fit, number: int) -> Left | None:
+        """With the readings of an instrument that the fit gave up, as one linear step has it.
+
+        What was given up for wrong may be right of an instrument that stands elsewhere. None where
+        too few were given up for that.
+        """
+        back = given_up(fitted, number)
+        if back.sum() < LEAST_GIVEN_UP:
+            return None
+        weights = np.where(back, 1.0, fitted.weights)
+        factor = np.sqrt(weights)[:, np.newaxis]
+        known = Prior.of(fitted.unknowns, tolerances=fitted.use_prior)
+        prior = Prior(fitted.birge * known.rows, known.mean)
+        slope = factor * fitted.jacobian
+        covariance = Equations.of(slope, prior, fitted.unknowns).covariance
+        away = prior.rows @ (fitted.values - prior.mean)
+        step = -covariance @ (slope.T @ (factor[:, 0] * fitted.residual) + prior.rows.T @ away)
+        residual = fitted.residual + fitted.jacobian @ step
+        leverage = np.einsum("ij,jk,ik->i", slope, covariance, slope)
+        freedom = float(np.sum((1.0 - leverage)[weights > 0.0]))
+        return cls(weights, residual, covariance, freedom)
+
+
+def given_up(fitted: Fit, number: int) -> Flags:
+    """(m,) readings of an instrument that were given up, of rows that could be placed."""
+    data = fitted.measurements
+    flags: Flags = (fitted.weights == 0.0) & (data.instrument[data.row] == number)
+    return flags & ~fitted.unplaced[data.row]
+
+
+@dataclass(frozen=True, eq=False)
 class ResidualsView:
     """The residuals of one instrument after the fit.
 
     `own` (k,): its observations. `tool` and `after`: effects of the machine's unknowns at the tool,
-    and how uncertain it is stated to be.
+    and how uncertain it is stated to be. `left`: what the readings differ by, of all instruments.
     """
 
     machine: Machine
@@ -74,6 +131,7 @@ class ResidualsView:
     tool: Tool
     after: ToolUncertainty
     number: int
+    left: Left
 
     @property
     def data(self) -> Measurements:
@@ -102,7 +160,7 @@ class ResidualsView:
 
     @cached_property
     def _factor(self) -> Floats:
-        return np.sqrt(self.fitted.weights[self.own])
+        return np.sqrt(self.left.weights[self.own])
 
     @cached_property
     def _slope(self) -> Floats:
@@ -110,12 +168,12 @@ class ResidualsView:
 
     @cached_property
     def _left(self) -> Floats:
-        return self._factor * self.fitted.residual[self.own]
+        return self._factor * self.left.residual[self.own]
 
     @cached_property
     def _squares(self) -> float:
         """Of all residuals, weighted."""
-        return float(np.sum(self.fitted.weights * self.fitted.residual**2))
+        return float(np.sum(self.left.weights * self.left.residual**2))
 
     @cached_property
     def by_frame(self) -> Floats:
@@ -202,8 +260,7 @@ class ResidualsView:
         self, squares: Floats, products: Floats, left: Floats, tests: int
     ) -> Pattern | None:
         """The same from sums: G^T G (k, k), J^T G (n, k), G^T r (k,)."""
-        noise = self.fitted.birge**2
-        covariance = self.fitted.covariance / noise
+        covariance = self.left.covariance
         length = np.sqrt(np.diagonal(squares))
         if not (length > 0.0).any():
             return None
@@ -212,7 +269,7 @@ class ResidualsView:
         values, vectors = np.linalg.eigh(normal / np.outer(length, length))
         seen = values > SEEN
         count = int(seen.sum())
-        spare = self.fitted.freedom - count
+        spare = self.left.freedom - count
         if count == 0 or spare < SPARE:
             return None
         along = vectors[:, seen].T @ (left / length)
@@ -222,6 +279,15 @@ class ResidualsView:
         sizes = -(vectors[:, seen] @ (along / values[seen])) / length
         change = covariance @ (products @ sizes)
         return Pattern(sizes, probability, *self.tool_moved(change))
+
+    def explains_given_up(self, pattern: Pattern, columns: Floats) -> bool:
+        """Whether what was given up fits with `columns` (k, n) of a pattern's sizes."""
+        change = self.left.covariance @ (self._slope.T @ (self._factor * (columns @ pattern.sizes)))
+        slope = self.fitted.jacobian[self.own]
+        left = self.left.residual[self.own] + columns @ pattern.sizes - slope @ change
+        back = given_up(self.fitted, self.number)[self.own]
+        fits = np.abs(left[back]) < OUTLIER * self.fitted.birge
+        return bool(fits.mean() >= RESTORED)
 
     def tool_moved(self, change: Floats) -> tuple[float, bool]:
         """m by which other unknowns move the tool at most; whether that is beyond the stated."""
@@ -237,7 +303,7 @@ class ResidualsView:
         Of the columns (k, n) the one that does the most; 0 where all would be seen.
         """
         whitened = self._factor[:, np.newaxis] * columns
-        covariance = self.fitted.covariance / self.fitted.birge**2
+        covariance = self.left.covariance
         worst, beyond = 0.0, False
         for column in whitened.T:
             product = self._slope.T @ column
@@ -267,10 +333,20 @@ WOULD_SHOW = 5.0
 """Standard deviations of a pattern that would be seen almost certainly."""
 
 
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A pattern, its `columns` (k, n), what is said of it, and the rows from which it is."""
+
+    pattern: Pattern
+    columns: Floats
+    words: str
+    rows: tuple[int, ...] = ()
+
+
 @dataclass(frozen=True)
 class PatternKind:
-    """A registry's line: `inspect(view)` gives the pattern with its sentence, or None."""
+    """A registry's line: `inspect(view)` gives what it finds, or None."""
 
     code: str
     doc: str
-    inspect: Callable[[ResidualsView], tuple[Pattern, str, tuple[int, ...]] | None]
+    inspect: Callable[[ResidualsView], Found | None]

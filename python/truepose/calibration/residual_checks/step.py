@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from truepose.calibration.residual_checks._base import Pattern, PatternKind, ResidualsView
+import numpy as np
+
+from truepose.calibration.residual_checks._base import Found, Pattern, PatternKind, ResidualsView
 from truepose.calibration.residual_checks.sizes import place_words
 
 LEAST_ROWS = 3
 """Rows on either side of a step: fewer are outliers."""
 
 
-def inspect(view: ResidualsView) -> tuple[Pattern, str, tuple[int, ...]] | None:
+def inspect(view: ResidualsView) -> Found | None:
     """The likeliest row from which on it stands elsewhere."""
     count = view.rows.size
     tests = count - 2 * LEAST_ROWS + 1
@@ -25,7 +27,8 @@ def inspect(view: ResidualsView) -> tuple[Pattern, str, tuple[int, ...]] | None:
     row, pattern = best
     where = view.named_rows(row - 1, row)
     words = f"it looks as if it was moved {where}, by {place_words(view, pattern.sizes)}"
-    return pattern, words, (int(view.rows[row]),)
+    columns = np.where((view.place >= row)[:, np.newaxis], view.by_place, 0.0)
+    return Found(pattern, columns, words, (int(view.rows[row]),))
 
 
 KIND = PatternKind("step", "an instrument was moved between two rows", inspect)

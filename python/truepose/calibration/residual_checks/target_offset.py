@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from truepose.calibration.residual_checks._base import Pattern, PatternKind, ResidualsView
+from truepose.calibration.residual_checks._base import Found, PatternKind, ResidualsView
 from truepose.calibration.residual_checks.sizes import length_words
 
 
-def inspect(view: ResidualsView) -> tuple[Pattern, str, tuple[int, ...]] | None:
+def inspect(view: ResidualsView) -> Found | None:
     """The offset that explains most; where it is looked for already, nothing is left."""
     if view.instrument.target_unknown or not view.by_target.any():
         return None
@@ -16,7 +16,8 @@ def inspect(view: ResidualsView) -> tuple[Pattern, str, tuple[int, ...]] | None:
     if pattern is None:
         return None
     size = length_words(view, float(np.linalg.norm(pattern.sizes)))
-    return pattern, f"its target looks {size} off the stated point, in the platform's axes", ()
+    words = f"its target looks {size} off the stated point, in the platform's axes"
+    return Found(pattern, view.by_target, words)
 
 
 KIND = PatternKind("target-offset", "the target is not at the stated point", inspect)

@@ -232,7 +232,13 @@ def test_saving_is_refused_where_the_answer_is_no(tmp_path: Path) -> None:
 def test_what_is_saved_is_the_calibrated_machine(tmp_path: Path) -> None:
     found = delta("positions")
     path = tmp_path / "calibrated.toml"
-    written = save(found, path, original=DATA / "delta_printer.toml", date="2026-01-31")
+    written = save(
+        found,
+        path,
+        original=DATA / "delta_printer.toml",
+        date="2026-01-31",
+        controller_holds="calibrated",
+    )
     np.testing.assert_allclose(written.nominal, found.calibrated().nominal, rtol=1e-14)
     uncertainty = tp.uncertainty(written, found.poses)["standard_uncertainty"]
     # The gate looks where the machine as filed would go, the budget where the new file sends it.

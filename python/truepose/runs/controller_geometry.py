@@ -9,7 +9,16 @@ from __future__ import annotations
 
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
+from truepose.probability.distributions import normal
+from truepose.sources.deviation import Deviation
 from truepose.sources.tolerance import bands_of
+
+_NORMAL = normal().name
+
+CODE = "nothing-to-correct"
+
+ROUNDING = 1e-10
+"""m and rad: an error that no result of a correction shows."""
 
 WAYS = (
     '[controller] with holds = "drawing" where the controller was not touched and the nominal '
@@ -26,7 +35,7 @@ def require_known_controller(machine: Machine) -> None:
     if machine.calibration is None or machine.controller_holds == "calibrated":
         return
     bands = bands_of(machine)
-    shifted = bands is not None and bool(bands.shift.any())
+    shifted = bands is not None and _about_shifts(bands)
     if machine.controller_holds is None:
         raise RequestError(
             Problem(
@@ -58,6 +67,32 @@ def require_known_controller(machine: Machine) -> None:
         )
 
 
+def _about_shifts(bands: Deviation) -> bool:
+    """Whether what was found stands as known deviations; a calibration writes normal bands."""
+    found = [distribution.name == _NORMAL for distribution in bands.distribution]
+    return bool(bands.shift[:, found].any())
+
+
+def nothing_to_correct(machine: Machine) -> dict[str, str]:
+    """The warning, code and sentence, where no error before was above `ROUNDING`, and why so."""
+    why = {
+        "calibrated": 'the file says that the controller holds the calibrated geometry (holds = "'
+        'calibrated"), which is the nominal one here',
+        "drawing": "the file knows no deviation from the geometry of the drawing, which it says "
+        'that the controller holds (holds = "drawing")',
+        None: "the file knows no deviation from its nominal geometry, which is taken for the "
+        "controller's",
+    }[machine.controller_holds]
+    sentence = f"there is nothing to correct, the error before is below rounding: {why}"
+    if machine.controller_holds == "calibrated" and machine.calibration is not None:
+        said = machine.calibration
+        sentence += (
+            f"; for a controller that was not touched calibrate {said.machine} with {said.data} "
+            "again"
+        )
+    return {"code": CODE, "sentence": sentence}
+
+
 def _written_as_shifts() -> str:
     return (
         "this file has known deviations in [tolerance], as --as-shifts wrote them: its nominal "
@@ -75,4 +110,4 @@ def _again(machine: Machine) -> str:
     )
 
 
-__all__ = ["require_known_controller"]
+__all__ = ["CODE", "ROUNDING", "nothing_to_correct", "require_known_controller"]

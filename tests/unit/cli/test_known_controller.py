@@ -179,3 +179,38 @@ def test_what_shows_a_machine_asks_nothing(files: Path) -> None:
     poses = now.poses()[:3]
     ours, known = against_nominal(former, poses), tp.compensate(now, poses)
     assert np.array_equal(ours["joint"], known["joint"])
+
+
+@pytest.mark.parametrize(
+    "name", ["marlin", "reprap", "klipper", "linuxcnc-lineardelta", "c", "linuxcnc", "pose-map"]
+)
+def test_an_export_says_what_the_controller_holds_with_it(
+    name: str, files: Path, capsys: Capture, tmp_path: Path
+) -> None:
+    own = {
+        "drawing": "no more with drawing.toml, but with the file that truepose calibrate writes "
+        "with --controller-holds calibrated",
+        "calibrated": 'with calibrated.toml, which says so (holds = "calibrated")',
+        "former_calibrated": 'with a file that says so, [controller] holds = "calibrated"',
+    }
+    loaded = "once this is loaded the controller holds the calibrated geometry: correct programs"
+    alone = "with its compensated joints the controller holds the calibrated geometry: programs"
+    for stem, how in own.items():
+        path = files / f"{stem}.toml"
+        if name == "pose-map":  # that is a correction, no geometry
+            if not stem.startswith("former"):
+                done = call(capsys, "export", name, path, "--option", "count=2")
+                assert "holds the calibrated geometry: " not in done.err
+            continue
+        done = call(capsys, "export", name, path, "-o", tmp_path / stem)
+        assert done.code == 0
+        written = "".join(each.read_text("utf-8") for each in (tmp_path / stem).iterdir())
+        if name in ("c", "linuxcnc"):
+            assert f"{alone} that are corrected as well are corrected twice" in done.out
+            assert "Compensated joints hold the calibrated geometry" in written
+        else:
+            assert f"{loaded} for it {how}" in done.out
+            assert f"{loaded} for it {how}" in written
+    done = call(capsys, "export", name, DRAWING)
+    assert done.code == 0
+    assert "calibrated" not in done.out + done.err

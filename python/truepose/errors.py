@@ -141,6 +141,8 @@ CATALOGUE: dict[str, str] = {
     "bad-option": "an option of a controller's adapter that it does not have or cannot read",
     "controller-cannot": "a machine that the controller has no way to take",
     # calibration
+    "controller-unsaid": "a calibrated file that does not say which geometry its controller has",
+    "controller-contradicted": "a controller said to hold the drawing, of a file without it",
     "too-few-measurements": "fewer readings than unknowns",
     "no-fit": "measurements that no machine near the nominal one explains",
     "no-unknowns": "a calibration with nothing to identify",

@@ -209,6 +209,8 @@ PRINTER_OPTIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     "margin": ("positions", ("--margin", "0.001")),
     "written": ("positions", ("--machine-output", "new.toml", *DATE)),
     "shifts": ("positions", ("--machine-output", "new.toml", *DATE, "--as-shifts")),
+    "loaded": ("positions",
+        ("--machine-output", "new.toml", *DATE, "--controller-holds", "calibrated")),
     "refused": ("heights", ("--no-prior", "--machine-output", "new.toml", *DATE)),
     "forced": ("heights", ("--no-prior", "--machine-output", "new.toml", *DATE, "--force")),
     "expansion": (

@@ -72,7 +72,13 @@ def test_the_budget_of_the_calibrated_file_is_what_the_tool_is_off(
     for seed in range(MACHINES):
         calibration, truth = measured(machine, rows=15, held_out=30, seed=seed)
         path = tmp_path / f"{name}_{seed}.toml"
-        written = calibration.save(path, original=FILES[name], date="2026-11-21", force=True)
+        written = calibration.save(
+            path,
+            original=FILES[name],
+            date="2026-11-21",
+            controller_holds="calibrated",
+            force=True,
+        )
         linear = [written.components.index(axis) for axis in "xyz" if axis in written.components]
         budget = tp.budget(written, calibration.poses)
         tolerance = budget["uncertainty"].sel(source="tolerance").values
@@ -100,7 +106,9 @@ def test_a_calibrated_file_goes_through_the_other_commands(tmp_path: Path) -> No
     calibration, _ = measured(machine, rows=20, held_out=0, seed=1)
     assert calibration.accepted
     path = tmp_path / "calibrated.toml"
-    written = calibration.save(path, original=FILES[name], date="2026-11-21")
+    written = calibration.save(
+        path, original=FILES[name], date="2026-11-21", controller_holds="calibrated"
+    )
     assert path.read_text(encoding="utf-8").count("#") >= FILES[name].read_text(
         encoding="utf-8"
     ).count("#")

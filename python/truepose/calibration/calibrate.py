@@ -59,6 +59,8 @@ from truepose.representation import Facts, Represented
 if TYPE_CHECKING:
     import xarray as xr
 
+    from truepose.machine.tables.controller import Holds
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Represented):
@@ -106,8 +108,9 @@ class Calibration(Represented):
     def calibrated(self) -> Machine:
         """The machine with the nominal geometry, the bands and the correlations that were found.
 
-        What its file says, read again, but for the accuracy's words. Raises `RequestError`
-        (calibration-undetermined) where something has no finite uncertainty.
+        What its file says with `controller_holds="calibrated"`, read again, but for the accuracy's
+        words. Raises `RequestError` (calibration-undetermined) where something has no finite
+        uncertainty.
         """
         from truepose.calibration.result.calibrated_machine import calibrated_machine
         from truepose.calibration.result.save import covariance_to_write
@@ -122,13 +125,26 @@ class Calibration(Represented):
         *,
         original: str | Path,
         date: str,
-        as_shifts: bool = False,
+        controller_holds: Holds = "drawing",
+        as_shifts: bool | None = None,
         force: bool = False,
     ) -> Machine:
-        """Write the calibrated machine file; see `truepose.calibration.result.save.save`."""
+        """Write the calibrated machine file; see `truepose.calibration.result.save.save`.
+
+        By default for a controller that was not touched; `controller_holds="calibrated"`: for one
+        into which the geometry found is loaded.
+        """
         from truepose.calibration.result.save import save
 
-        return save(self, path, original=original, date=date, as_shifts=as_shifts, force=force)
+        return save(
+            self,
+            path,
+            original=original,
+            date=date,
+            controller_holds=controller_holds,
+            as_shifts=as_shifts,
+            force=force,
+        )
 
     @property
     def dataset(self) -> xr.Dataset:

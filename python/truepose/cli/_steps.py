@@ -17,6 +17,7 @@ import truepose
 from truepose.cli._options import Request
 from truepose.cli._progress import progress, waiting
 from truepose.cli._show import show_answers, show_tables
+from truepose.compensation.compensate import against_nominal
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import counted
 from truepose.files.writing import require_writable
@@ -76,15 +77,20 @@ def evaluate(request: Request, machine: Machine) -> xr.Dataset:
     with progress("error budget") as report:
         result = truepose.budget(machine, progress=report)
     refuse_left_out_of(request, machine, result)
-    for warning in warnings_of(result):
-        click.echo(f"warning[{warning['code']}]: {warning['sentence']}", err=True)
+    show_warnings(result)
     return result
 
 
+def show_warnings(result: xr.Dataset) -> None:
+    """What a result warns of, on stderr."""
+    for warning in warnings_of(result):
+        click.echo(f"warning[{warning['code']}]: {warning['sentence']}", err=True)
+
+
 def correct(request: Request, machine: Machine) -> xr.Dataset:
-    """The compensation over the file's workspace."""
+    """The compensation over the file's workspace, of any file: who commands asks for more."""
     with progress("compensation") as report:
-        result = truepose.compensate(machine, progress=report)
+        result = against_nominal(machine, progress=report)
     refuse_left_out_of(request, machine, result)
     return result
 

@@ -21,6 +21,7 @@ from truepose.cli._options import (
 if TYPE_CHECKING:
     from truepose.calibration.calibrate import Calibration
     from truepose.machine import Machine
+    from truepose.machine.tables.controller import Holds
     from truepose.reporting.result import Result
 
 _FILE = click.Path(path_type=Path)
@@ -85,10 +86,16 @@ class _Day(click.ParamType):  # type: ignore[type-arg]
     ),
     click.option("--date", type=_Day(), metavar="YYYY-MM-DD", help="The day of the measurements."),
     click.option(
+        "--controller-holds",
+        type=click.Choice(["drawing", "calibrated"]),
+        help="What the calibrated file is for: a controller that was not touched, whose nominal "
+        "values stay, with what was found as known deviations from them, the default; or one into "
+        "which the geometry found is loaded, which is nominal then.",
+    ),
+    click.option(
         "--as-shifts",
         is_flag=True,
-        help="In the calibrated file nominal values stay, as a controller has them, and what was "
-        "found is the middle of their bands.",
+        help="The former word for --controller-holds drawing. It warns.",
     ),
     click.option(
         "--force",
@@ -123,6 +130,7 @@ def command(**options: Any) -> int:
     from truepose.errors import TrueposeError
     from truepose.files.writing import require_writable
     from truepose.reporting.result import Result
+    from truepose.runs.controller_geometry import require_known_controller
 
     request = asked.request
     if asked.page is not None:
@@ -134,6 +142,14 @@ def command(**options: Any) -> int:
     if request.output is not None:
         require_writable(request.output, [".nc", ".json", ".csv"], inputs)
     machine = _steps.read_machine(request)
+    if asked.machine_output is not None and asked.controller_holds != "calibrated":
+        require_known_controller(machine)
+    if asked.as_shifts:
+        click.echo(
+            "Warning: --as-shifts goes: --controller-holds drawing is what it says, and the "
+            "default.",
+            err=True,
+        )
     with waiting("calibration"):
         calibration = calibrate(
             machine,
@@ -173,12 +189,17 @@ class _Options:
         self.page: Path | None = options["report"]
         self.date: str | None = options["date"]
         self.as_shifts: bool = options["as_shifts"]
+        self.controller_holds: Holds | None = options["controller_holds"]
         self.force: bool = options["force"]
         names = ("machine_file", "settings", "format", "output")
         self.request = Request(**{name: options[name] for name in names})
 
     def check(self) -> None:
-        """Refuse options that ask for a file, or need a date, without the other."""
+        """Refuse options that exclude each other, or that are of no use without the other."""
+        if self.as_shifts and self.controller_holds == "calibrated":
+            raise click.UsageError(
+                "--as-shifts means --controller-holds drawing, and excludes calibrated."
+            )
         if self.machine_output is not None:
             if self.date is None:
                 raise click.UsageError(
@@ -189,6 +210,7 @@ class _Options:
         for given, name in (
             (self.date is not None, "--date"),
             (self.as_shifts, "--as-shifts"),
+            (self.controller_holds is not None, "--controller-holds"),
             (self.force, "--force"),
         ):
             if given:
@@ -236,7 +258,7 @@ def _write_machine(asked: _Options, calibration: Calibration) -> None:
         asked.machine_output,
         original=asked.request.machine_file,
         date=asked.date,
-        as_shifts=asked.as_shifts,
+        controller_holds=asked.controller_holds or "drawing",
         force=asked.force,
     )
     note_written(asked.machine_output)

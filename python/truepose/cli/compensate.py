@@ -40,11 +40,15 @@ def command(**options: Any) -> int:
     from truepose.cli import _steps
     from truepose.reporting import tables
     from truepose.reporting.result import Result
+    from truepose.runs.controller_geometry import require_known_controller
     from truepose.verdict.answer import AFTER, met
 
     request = Request(**options)
-    study = _steps.study_of(request, _steps.read_machine(request))
+    machine = _steps.read_machine(request)
+    require_known_controller(machine)
+    study = _steps.study_of(request, machine)
     assert study.compensation is not None
+    _steps.show_warnings(study.compensation)
     answers = study.accuracy
     written = _steps.write_witness(request, answers, AFTER)
     _steps.deliver(

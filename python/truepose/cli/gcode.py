@@ -155,7 +155,10 @@ def command(
 def _show(machine: Machine, proof: Proof, form: str, said: str, *, written: bool) -> None:
     """Print what was found, whether or not a program was written; `said`: the tolerance asked."""
     from truepose.cli._show import show_tables
+    from truepose.runs.controller_geometry import CODE
 
+    for sentence in proof.warnings:
+        click.echo(f"warning[{CODE}]: {sentence}", err=True)
     if form == "json":
         json.dump(_as_json(proof, written=written), sys.stdout, indent=1, ensure_ascii=False)
         sys.stdout.write("\n")
@@ -286,6 +289,7 @@ def _scaled(value: float, unit: Shown) -> str:
 
 def _as_json(proof: Proof, *, written: bool) -> Mapping[str, object]:
     """The proof for programs, m and rad; the start in the program's own mm and degrees."""
+    from truepose.runs.controller_geometry import CODE
 
     def of(errors: Errors) -> dict[str, object]:
         answer: dict[str, object] = {}
@@ -316,5 +320,6 @@ def _as_json(proof: Proof, *, written: bool) -> Mapping[str, object]:
         "before": of(proof.before),
         "after": of(proof.after),
         "improves": proof.improves,
+        "warnings": [{"code": CODE, "sentence": sentence} for sentence in proof.warnings],
         "written": written,
     }

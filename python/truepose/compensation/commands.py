@@ -28,6 +28,7 @@ from truepose.arrays import Codes, Flags, Floats
 from truepose.compensation.corrected import corrected_joints
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.controller_geometry import require_known_controller
 from truepose.runs.displacement import ParameterDeviation, displacement, sum_deviations
 from truepose.runs.poses import BLOCK, OK, requested_poses
 from truepose.sources import PoseBlock, acting
@@ -64,8 +65,11 @@ def corrected_poses(
     command is NaN; one that must not be commanded (out_of_travel, joint_limit) still has numbers.
     Play that nothing presses to one side has no known side and is left as it is.
 
-    Raises `RequestError` (bad-poses, unknown-part), `TrueposeError` as `truepose.budget` does.
+    Raises `RequestError` (bad-poses, unknown-part; controller-unsaid, controller-contradicted for
+    a calibrated file of which it is not known what its controller works with), `TrueposeError` as
+    `truepose.budget` does.
     """
+    require_known_controller(machine)
     actual = ActualMachine(machine, condition)
     table = requested_poses(machine, poses)
     commanded = np.full(table.shape, np.nan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +13,11 @@ from truepose.compensation.corrected import corrected_deviations
 from truepose.compensation.remainder import Remainder
 from truepose.error_budget.largest import largest
 from truepose.machine import Condition, Machine
+from truepose.runs.controller_geometry import (
+    ROUNDING,
+    nothing_to_correct,
+    require_known_controller,
+)
 from truepose.runs.dataset import Schema, Variable, quantity_coords
 from truepose.runs.displacement import at_shifts, displacement, sum_deviations
 from truepose.runs.first_order import first_order
@@ -78,7 +84,24 @@ def compensate(
     command not be followed (`correction_` and the kernel's status). `poses` (..., n_commanded), SI,
     default the file's workspace. The Dataset, SI, and both terms are described in docs/results.md.
 
-    Raises as `truepose.budget`.
+    Where there is nothing to correct, the attribute `warnings` has the reason. Raises as
+    `truepose.budget`; `RequestError` (controller-unsaid, controller-contradicted) for a calibrated
+    file of which it is not known with which geometry its controller works.
+    """
+    require_known_controller(machine)
+    return against_nominal(machine, poses, condition, progress=progress)
+
+
+def against_nominal(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    *,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """The same of any file: of a controller that works with the nominal geometry, be it so or not.
+
+    For what shows a machine and commands none.
     """
     run = Run(machine, poses, condition, progress)
     run.begin(SCHEMA)
@@ -89,7 +112,11 @@ def compensate(
         shifted = at_shifts(machine, block, alone, sum_deviations(alone))
         values, followed, edges = _correct(machine, block, run.sources, deviations, remainder)
         run.fill(block, values, shifted, *map(of_correction, followed), *map(of_band, edges))
-    return run.dataset(coords=quantity_coords(machine))
+    dataset = run.dataset(coords=quantity_coords(machine))
+    moved = np.abs(dataset["joint"] - dataset["joint_nominal"]).max()
+    if max(moved, np.abs(dataset["residual_middle"]).max()) < ROUNDING:
+        dataset.attrs["warnings"] = json.dumps([nothing_to_correct(machine)])
+    return dataset
 
 
 def _correct(

@@ -138,6 +138,34 @@ def _unknown(controller: type[Controller], key: str) -> Problem:
     )
 
 
+def geometry_loaded(machine: Machine) -> tuple[str, ...]:
+    """What changes once a controller has its kinematics from a calibrated file; else nothing."""
+    if machine.calibration is None:
+        return ()
+    line = (
+        "once this is loaded the controller holds the calibrated geometry: correct programs for it "
+    )
+    if machine.controller_holds == "calibrated":
+        return (line + f'with {machine.file}, which says so (holds = "calibrated")',)
+    if machine.controller_holds is None:
+        return (line + 'with a file that says so, [controller] holds = "calibrated"',)
+    return (
+        line
+        + f"no more with {machine.file}, but with the file that truepose calibrate writes with "
+        "--controller-holds calibrated",
+    )
+
+
+def geometry_compensated(machine: Machine) -> tuple[str, ...]:
+    """What kinematics with a compensation of their own make of a calibrated file; else nothing."""
+    if machine.calibration is None:
+        return ()
+    return (
+        "with its compensated joints the controller holds the calibrated geometry: programs that "
+        "are corrected as well are corrected twice",
+    )
+
+
 def unsupported_machine(
     controller: str, machine: Machine, found: str, expected: str, hint: str
 ) -> RequestError:
@@ -154,4 +182,12 @@ def unsupported_machine(
     )
 
 
-__all__ = ["Controller", "Export", "Option", "options_of", "unsupported_machine"]
+__all__ = [
+    "Controller",
+    "Export",
+    "Option",
+    "geometry_compensated",
+    "geometry_loaded",
+    "options_of",
+    "unsupported_machine",
+]

@@ -23,6 +23,7 @@ import numpy as np
 from truepose.arrays import Flags, Floats
 from truepose.calibration import Solution, least_squares
 from truepose.compensation.commands import ActualMachine, blocks
+from truepose.controllers._export import geometry_loaded
 from truepose.controllers._homing import switch_words
 from truepose.controllers._small_model import (
     INSTEAD,
@@ -173,7 +174,7 @@ class ModelFit:
         lines += _scales(machine)
         if not self.settled:
             lines.append("the fit has not converged: other numbers may leave less")
-        return tuple(lines)
+        return (*lines, *geometry_loaded(machine))
 
 
 def heading(machine: Machine, fit: ModelFit, controller: str) -> tuple[str, ...]:

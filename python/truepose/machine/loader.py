@@ -22,6 +22,7 @@ from truepose.machine.tables import SCHEMA, owners
 from truepose.machine.tables.accuracy import AccuracyTable
 from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.condition import ConditionTable
+from truepose.machine.tables.controller import ControllerTable
 from truepose.machine.tables.machine import MachineTable
 from truepose.machine.temperature_log import read_temperature_log
 from truepose.machine.validation import Validated
@@ -130,6 +131,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
     _raise([*parts.problems, *data_files.problems])
     sources: tuple[ErrorSource, ...] = tuple(source for source in built if source is not None)
     accuracy = validated.table(AccuracyTable)
+    controller = validated.table(ControllerTable)
     return Machine(
         kernel=kernel,
         name=machine.name,
@@ -152,6 +154,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         mounting=build_parts.mounting(validated),
         data_files=data_files.hashes,
         calibration=validated.table(CalibrationTable),
+        controller_holds=None if controller is None else controller.holds,
     )
 
 

@@ -22,6 +22,7 @@ from truepose.machine.compliances import compliances, end_compliances, known
 from truepose.machine.condition import DEFAULT_PART, Condition
 from truepose.machine.parts import BODIES, Body, Drive, Guide, Strut, Vector
 from truepose.machine.tables.calibration import CalibrationTable
+from truepose.machine.tables.controller import Holds
 from truepose.machine.workspace import Accuracy, Workspace
 from truepose.representation import Facts, Represented
 
@@ -94,6 +95,9 @@ class Machine(Represented):
     replaced: Mapping[str, float] = field(default_factory=dict)
     calibration: CalibrationTable | None = None
     """Where the numbers of a calibrated machine file come from."""
+    controller_holds: Holds | None = None
+    """Which geometry the nominal one is, that the controller works with: that of the drawing, or
+    a calibrated one that was loaded into it. None where the file does not say."""
 
     forward: Callable[..., Any] = field(init=False, repr=False)
     inverse: Callable[..., Any] = field(init=False, repr=False)

@@ -64,7 +64,12 @@ def delta() -> Calibration:
 def test_it_is_the_machine_that_the_saved_file_is(delta: Calibration, tmp_path: Path) -> None:
     ours = delta.calibrated()
     original = DATA / "delta_printer.toml"
-    delta.save(tmp_path / "calibrated.toml", original=original, date="2026-01-31")
+    delta.save(
+        tmp_path / "calibrated.toml",
+        original=original,
+        date="2026-01-31",
+        controller_holds="calibrated",
+    )
     filed = tp.load(tmp_path / "calibrated.toml")
     assert_same_bands(ours, filed)
     assert_same_uncertainty(ours, filed, 1e-9)
@@ -83,7 +88,11 @@ def test_directions_point_where_the_file_says(tmp_path: Path) -> None:
     found = tp.calibrate(machine, good(machine, "pose", seed=3, count=40))
     ours = found.calibrated()
     filed = found.save(
-        tmp_path / "calibrated.toml", original=original, date="2026-01-31", force=True
+        tmp_path / "calibrated.toml",
+        original=original,
+        date="2026-01-31",
+        controller_holds="calibrated",
+        force=True,
     )
     tilts = [at for at, name in enumerate(machine.parameters) if name.endswith(".axis.u")]
     assert ours.nominal[tilts].all()
@@ -106,7 +115,7 @@ def test_it_is_of_every_machine(tmp_path: Path, path: Path) -> None:
     ours = calibrated_machine(machine, unknowns, values, covariance)
     filed = write_calibrated(
         tmp_path / "calibrated.toml", machine, unknowns, values, covariance, PROVENANCE,
-        original=path,
+        original=path, controller_holds="calibrated",
     )  # fmt: skip
     assert_same_uncertainty(ours, filed, SECOND_ORDER)
 
@@ -132,7 +141,7 @@ def test_what_was_not_identified_keeps_its_band_group_and_correlation(tmp_path: 
     ours = calibrated_machine(machine, unknowns, values, covariance)
     filed = write_calibrated(
         tmp_path / "calibrated.toml", machine, unknowns, values, covariance, PROVENANCE,
-        original=tmp_path / "machine.toml",
+        original=tmp_path / "machine.toml", controller_holds="calibrated",
     )  # fmt: skip
     assert_same_bands(ours, filed)
     assert_same_uncertainty(ours, filed, 1e-9)

@@ -22,7 +22,7 @@ MACHINES = Path(__file__).parents[3] / "machines"
 
 
 def calibrated(folder: Path, name: str, values: np.ndarray, covariance: np.ndarray,
-               as_shifts: bool = False) -> Machine:  # fmt: skip
+               holds: str = "calibrated") -> Machine:  # fmt: skip
     machine = load(name, registry=REGISTRY)
     return write_calibrated(
         folder / "calibrated.toml",
@@ -32,7 +32,7 @@ def calibrated(folder: Path, name: str, values: np.ndarray, covariance: np.ndarr
         covariance,
         PROVENANCE,
         original=name,
-        as_shifts=as_shifts,
+        controller_holds=holds,
     )
 
 
@@ -96,8 +96,8 @@ def test_no_change_says_why_the_tool_may_be_elsewhere(tmp_path: Path) -> None:
     assert "moves" not in said
 
 
-@pytest.mark.parametrize("as_shifts", [False, True], ids=["values", "shifts"])
-def test_a_change_is_found_where_it_is(tmp_path: Path, as_shifts: bool) -> None:
+@pytest.mark.parametrize("holds", ["calibrated", "drawing"])
+def test_a_change_is_found_where_it_is(tmp_path: Path, holds: str) -> None:
     path = MACHINES / "linear_delta.toml"
     machine = load(path, registry=REGISTRY)
     unknowns, deviations = of_bands(machine)
@@ -108,7 +108,7 @@ def test_a_change_is_found_where_it_is(tmp_path: Path, as_shifts: bool) -> None:
     at = unknowns.names.index("drive.b.offset")
     second[at] += 12 * 0.02 * deviations[at]
     old = calibrated(tmp_path, path, first, covariance)
-    new = calibrated(tmp_path, path, second, covariance, as_shifts)
+    new = calibrated(tmp_path, path, second, covariance, holds)
     found = compare(old, new)
     each = found.parameter.values[found.parameter_changed.values]
     assert found.attrs["changed"] == 1
@@ -120,7 +120,7 @@ def test_a_change_is_found_where_it_is(tmp_path: Path, as_shifts: bool) -> None:
     pose = machine.poses()[int(found.pose[7])]
     joints = old.inverse(pose)
     values = dict(zip(machine.parameters, found.new.values.tolist(), strict=True))
-    estimate = new.replace(values) if as_shifts else new
+    estimate = new.replace(values) if holds == "drawing" else new
     components = [machine.dof.index(axis) for axis in "xyz"]
     went = (estimate.forward(joints) - old.forward(joints))[components]
     assert np.allclose(found.displacement[7, :3], went, rtol=1e-6, atol=1e-12)

@@ -190,7 +190,12 @@ def test_what_is_not_determined_is_infinite_and_has_no_correlation(tmp_path: Pat
 
 def test_the_verdict_and_its_parts() -> None:
     refused, accepted = delta("heights", use_prior=False), delta("positions")
-    assert verdict_of(accepted) == accepted.gate.words
+    assert accepted.external_reliability is not None
+    unnoticed = f"{accepted.external_reliability.position * 1e6:.0f} µm"
+    assert verdict_of(accepted) == (
+        f"{accepted.gate.words} A wrong reading that is not named moves the tool by at most "
+        f"{unnoticed}."
+    )
     assert answer_of(refused).startswith("No: ")
     assert verdict_of(refused).startswith(answer_of(refused))
     assert refused.gate.remedy is not None
@@ -242,7 +247,13 @@ def test_saving_is_refused_where_the_answer_is_no(tmp_path: Path) -> None:
 def test_what_is_saved_is_the_calibrated_machine(tmp_path: Path) -> None:
     found = delta("positions")
     path = tmp_path / "calibrated.toml"
-    written = save(found, path, original=DATA / "delta_printer.toml", date="2026-01-31")
+    written = save(
+        found,
+        path,
+        original=DATA / "delta_printer.toml",
+        date="2026-01-31",
+        controller_holds="calibrated",
+    )
     np.testing.assert_allclose(written.nominal, found.calibrated().nominal, rtol=1e-14)
     uncertainty = tp.uncertainty(written, found.poses)["standard_uncertainty"]
     np.testing.assert_allclose(uncertainty, found.gate.after.standard, rtol=1e-6)

@@ -56,6 +56,7 @@ def write(
     covariance: Floats,
     **options: object,
 ) -> tuple[Machine, str]:
+    options.setdefault("controller_holds", "calibrated")
     path = folder / "calibrated.toml"
     written = write_calibrated(
         path,
@@ -80,23 +81,23 @@ def effects_of(machine: Machine, unknowns: MadeUnknowns) -> Floats:
     return every
 
 
-@pytest.mark.parametrize("as_shifts", thinned([False, True]), ids=["values", "shifts"])
+@pytest.mark.parametrize("holds", thinned(["calibrated", "drawing"]))
 @pytest.mark.parametrize("path", sorted(MACHINES.glob("*.toml")), ids=lambda path: path.stem)
-def test_every_machine_comes_back(tmp_path: Path, path: Path, as_shifts: bool) -> None:
+def test_every_machine_comes_back(tmp_path: Path, path: Path, holds: str) -> None:
     machine = load(path, registry=REGISTRY)
     unknowns, deviations = of_bands(machine)
     random = np.random.default_rng(11)
     values = random.normal(size=len(deviations)) * deviations
     covariance = posterior(deviations, random, 1e-4)
     written, text = write(
-        tmp_path, path, machine, unknowns, values, covariance, as_shifts=as_shifts
+        tmp_path, path, machine, unknowns, values, covariance, controller_holds=holds
     )
     original = path.read_text(encoding="utf-8")
     found = comments(text)
     for line in comments(original):
         found.remove(line)
     effects = effects_of(machine, unknowns)
-    if as_shifts:
+    if holds == "drawing":
         assert np.array_equal(written.nominal, machine.nominal)
         shift = tolerance_covariance(written).shift
         assert np.allclose(shift, effects @ values, rtol=1e-9, atol=1e-15)
@@ -134,10 +135,8 @@ def _assert_values(machine: Machine, written: Machine, deviation: Floats) -> Non
     assert np.allclose(moved.forward(joints), written.forward(joints), rtol=0.0, atol=1e-13)
 
 
-@pytest.mark.parametrize("as_shifts", [False, True], ids=["values", "shifts"])
-def test_the_uncertainty_at_the_tool_is_that_of_the_posterior(
-    tmp_path: Path, as_shifts: bool
-) -> None:
+@pytest.mark.parametrize("holds", ["calibrated", "drawing"])
+def test_the_uncertainty_at_the_tool_is_that_of_the_posterior(tmp_path: Path, holds: str) -> None:
     """It lies in differences of nearly equal numbers: eigenvalues down to 1e-8 of the largest."""
     path = MACHINES / "hexapod.toml"
     machine = load(path, registry=REGISTRY)
@@ -157,13 +156,13 @@ def test_the_uncertainty_at_the_tool_is_that_of_the_posterior(
     for covariance in (seen, posterior(deviations, random, 1e-8)):
         values = random.multivariate_normal(np.zeros(len(deviations)), covariance)
         written, _ = write(
-            tmp_path, path, machine, unknowns, values, covariance, as_shifts=as_shifts
+            tmp_path, path, machine, unknowns, values, covariance, controller_holds=holds
         )
         budget = tp.budget(written, poses).sel(source="tolerance")
         slopes = written.sensitivity(poses) @ effects
         wanted = np.sqrt(np.einsum("pcv,vw,pcw->pc", slopes, covariance, slopes))
         # Written as shifts, the slopes are those of the machine that they move.
-        close = 1e-4 if as_shifts else 1e-6
+        close = 1e-4 if holds == "drawing" else 1e-6
         assert np.allclose(budget.uncertainty, wanted, rtol=close, atol=0.0)
         alone = np.sqrt(np.einsum("pcv,v->pc", slopes**2, np.diagonal(covariance)))
         if covariance is seen:
@@ -380,9 +379,9 @@ def test_a_shift_far_larger_than_its_uncertainty(tmp_path: Path) -> None:
     path, machine = filed(tmp_path, PLANAR)
     unknowns = unknown(machine, {"strut.1.length": 1.0}, {"strut.2.length": 1.0})
     covariance = 1e-24 * np.array([[1.0, 0.5], [0.5, 1.0]])
-    for as_shifts in (False, True):
+    for holds in ("calibrated", "drawing"):
         written, _ = write(
-            tmp_path, path, machine, unknowns, [1e-3, 1e-3], covariance, as_shifts=as_shifts
+            tmp_path, path, machine, unknowns, [1e-3, 1e-3], covariance, controller_holds=holds
         )
         spread = tolerance_covariance(written).covariance
         assert spread[spread != 0.0] == pytest.approx(covariance.ravel(), rel=1e-3)
@@ -480,8 +479,9 @@ def test_shifts_leave_what_the_controller_has(tmp_path: Path) -> None:
     unknowns = unknown(machine, {"strut.1.length": 1.0}, {"strut.2.length": 1.0})
     covariance = np.diag([1e-12, 0.0])
     written, said = write(
-        tmp_path, path, machine, unknowns, [1e-4, 2e-4], covariance, as_shifts=True, coverage=3.0
-    )
+        tmp_path, path, machine, unknowns, [1e-4, 2e-4], covariance,
+        controller_holds="drawing", coverage=3.0,
+    )  # fmt: skip
     assert np.array_equal(written.nominal, machine.nominal)
     bands = bands_of(written)
     assert bands is not None
@@ -509,6 +509,7 @@ def test_what_is_refused(tmp_path: Path) -> None:
                 np.asarray(given["covariance"]),
                 PROVENANCE,
                 original=path,
+                controller_holds="calibrated",
             )
         (problem,) = caught.value.problems
         return problem.code

@@ -12,6 +12,7 @@ import pytest
 
 import truepose as tp
 from command_line import PLANAR, Outcome, call
+from truepose.sources.tolerance import bands_of
 
 DATA = Path(__file__).parents[3] / "examples" / "data"
 MACHINE = DATA / "delta_printer.toml"
@@ -70,19 +71,35 @@ def test_a_forced_file_says_so_inside(capsys: Capture, tmp_path: Path) -> None:
     assert "cannot be told apart" in written.calibration.warning[0]
 
 
-@pytest.mark.parametrize("shifts", [(), ("--as-shifts",)])
+@pytest.mark.parametrize(
+    ("said", "holds"),
+    [
+        ((), "drawing"),
+        (("--controller-holds", "drawing"), "drawing"),
+        (("--controller-holds", "calibrated"), "calibrated"),
+        (("--as-shifts",), "drawing"),
+    ],
+)
 def test_the_calibrated_file_goes_on(
-    shifts: tuple[str, ...], capsys: Capture, tmp_path: Path
+    said: tuple[str, ...], holds: str, capsys: Capture, tmp_path: Path
 ) -> None:
     machine = tmp_path / "calibrated.toml"
-    asked = ("--machine-output", machine, "--date", "2026-01-31", *shifts)
-    assert calibrate(capsys, POSITIONS, *asked).code == 0
+    asked = ("--machine-output", machine, "--date", "2026-01-31", *said)
+    done = calibrate(capsys, POSITIONS, *asked)
+    assert done.code == 0
+    assert ("--controller-holds drawing is what it says" in done.err) == ("--as-shifts" in said)
+    assert machine.read_text("utf-8").count(f'[controller]\nholds = "{holds}"\n') == 1
     written = tp.load(machine)
     assert written.calibration is not None
     assert written.calibration.date == "2026-01-31"
     assert written.calibration.data == "delta_positions.csv"
     at = written.parameters.index("strut.a.length")
-    assert (written.nominal[at] == 0.28814) == bool(shifts)
+    assert written.controller_holds == holds
+    assert (written.nominal[at] == 0.28814) == (holds == "drawing")
+    bands = bands_of(written)
+    assert bands is not None
+    known = written.nominal[at] + bands.shift[0, list(bands.parameters).index(at)]
+    assert known == pytest.approx(0.2885958, abs=5e-8), "as the table says"
     assert call(capsys, "check", machine).code == 0
     assert call(capsys, "compensate", machine).code == 0
 
@@ -164,6 +181,12 @@ def test_a_report_may_begin_with_a_calibration(capsys: Capture, tmp_path: Path) 
         (["--machine-output", "new.toml", "--date", "2026-02-30"], "is not a day"),
         (["--force"], "--force is for a machine file"),
         (["--as-shifts"], "--as-shifts is for a machine file"),
+        (["--controller-holds", "drawing"], "--controller-holds is for a machine file"),
+        (["--controller-holds", "paper"], "--controller-holds"),
+        (
+            ["--as-shifts", "--controller-holds", "calibrated"],
+            "--as-shifts means --controller-holds drawing, and excludes calibrated",
+        ),
         (["--folds", "1"], "--folds"),
         (["--margin", "0"], "--margin"),
     ],

@@ -47,6 +47,7 @@ KIENZLE = (
 )
 STRUT = "length_tolerance = [-0.3, 0.3]"
 DRIVE = "working_mode"
+CONTROLLER = "[controller]\n"
 ASKED = 'target = "0.5 mm"'
 
 
@@ -63,6 +64,16 @@ CASES = [
     bad("unknown-key", 'axis = [0, 1, 0]', "axis = [0, 1, 0]\nofset = 3", "ofset", '"offset"'),
     bad("unknown-key", "length_tolerance", "length_tolerence", "length_tolerence", "length_tol"),
     bad("unknown-key", 'angle = "deg"', 'angel = "deg"', "angel", '"angle"'),
+    bad("unknown-key", "[accuracy]", CONTROLLER + 'hold = "drawing"\n[accuracy]', "hold = ",
+        "controller.hold", 'did you mean "holds"?'),
+    bad("missing-key", "[accuracy]", CONTROLLER + "[accuracy]", "[controller]", "controller.holds",
+        "in a controller that was not touched"),
+    bad("unknown-choice", "[accuracy]", CONTROLLER + 'holds = "drawings"\n[accuracy]', "holds = ",
+        "controller.holds", "found:    \"drawings\"", "'drawing' or 'calibrated'"),
+    bad("unknown-choice", "[accuracy]", CONTROLLER + "holds = true\n[accuracy]", "holds = ",
+        "controller.holds", "found:    true", "'drawing' or 'calibrated'"),
+    bad("wrong-type", "schema = 1", 'schema = 1\ncontroller = "drawing"', "controller = ",
+        "expected a table, found text", "[controller]"),
     bad("missing-key", 'name = "planar"\n', "", "[machine]", "machine.name", "Name of the mach"),
     bad("missing-key", "axis = [0, 1, 0]\n", "", "[[drive]]", "drive.d1.axis", "missing"),
     bad("missing-key", "length = 500\nlength_t", "length_t", "[[strut]]", "strut.1.length"),

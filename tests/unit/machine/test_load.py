@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -247,3 +248,15 @@ def test_every_material_states_where_it_is_from() -> None:
         assert -1e-6 < material.expansion < 3e-5
         assert material.expansion
         assert len(material.source) > 20
+
+
+@pytest.mark.parametrize("holds", ["drawing", "calibrated"])
+def test_what_the_controller_holds(tmp_path: Path, holds: str) -> None:
+    said = load_text(tmp_path, f'{PLANAR}\n[controller]\nholds = "{holds}"\n')
+    told = load_text(tmp_path, PLANAR, f"controller.holds={holds}")
+    silent = load_text(tmp_path, PLANAR)
+    assert (said.controller_holds, told.controller_holds) == (holds, holds)
+    assert silent.controller_holds is None
+    assert np.array_equal(said.nominal, silent.nominal)
+    again = pickle.loads(pickle.dumps(said))  # noqa: S301
+    assert again.controller_holds == holds

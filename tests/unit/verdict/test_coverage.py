@@ -524,7 +524,8 @@ def test_what_a_calibration_knows_counts(
     """The delta printer of the examples: known to 11 um, and bands by themselves reach 0.6 mm."""
     path = tmp_path / "calibrated.toml"
     files = (DATA / "delta_printer.toml", DATA / "delta_positions.csv")
-    asked = ("--set", "accuracy.target=0.05 mm", "--date", "2026-01-31", "--machine-output", path)
+    asked = ("--set", "accuracy.target=0.05 mm", "--date", "2026-01-31", "--machine-output", path,
+             "--controller-holds", "calibrated")  # fmt: skip
     done = call(capsys, "calibrate", *files, *asked)
     assert "the tool's position becomes known to within 18 µm" in done.out
     machine = tp.load(path)

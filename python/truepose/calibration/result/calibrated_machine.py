@@ -40,7 +40,7 @@ def calibrated_machine(
     *,
     coverage: float = DEFAULT_COVERAGE,
 ) -> Machine:
-    """The machine whose nominal geometry and bands are those found.
+    """The machine whose nominal geometry and bands are those found, with a controller to match.
 
     `values` (n,) and `covariance` (n, n) of the unknowns, SI; those of instruments are not read.
     `coverage`: half bands in standard deviations. Raises `RequestError` (calibration-undetermined).
@@ -49,7 +49,7 @@ def calibrated_machine(
     own_covariance = np.asarray(covariance, np.float64)[: unknowns.n_machine, : unknowns.n_machine]
     require_determined(machine.file, unknowns, own_values, own_covariance)
     result = CalibratedValues.of(
-        machine, unknowns, own_values, own_covariance, as_shifts=False, new_axes=False
+        machine, unknowns, own_values, own_covariance, "calibrated", new_axes=False
     )
     found = machine
     for number, identified in unknowns.properties.items():
@@ -60,7 +60,12 @@ def calibrated_machine(
     asked = machine.accuracy
     if asked.at is None and (asked.target is not None or asked.angle_target is not None):
         asked = replace(asked, at=AT)
-    return replace(found, sources=_sources(machine, result, coverage), accuracy=asked)
+    return replace(
+        found,
+        sources=_sources(machine, result, coverage),
+        accuracy=asked,
+        controller_holds="calibrated",
+    )
 
 
 def _sources(

@@ -1,8 +1,9 @@
 """The calibrated machine as a machine file: the original's text, with what was found written in.
 
-Every parameter that the unknowns move has its identified value, or, with `as_shifts`, keeps the one
-that the controller has and gets the deviation as the middle of its band. Bands are normal, of the
-identified covariance, with all correlations. What the file says besides, comments included, stays.
+For a controller that was not touched every parameter keeps the value that the controller has, and
+the deviation found is the middle of its band. For one into which the geometry found is loaded every
+parameter that the unknowns move has its identified value. Bands are normal, of the identified
+covariance, with all correlations. What the file says besides, comments included, stays.
 
 An accuracy that the original asks in the worst case (it states no coverage) is asked at a coverage
 in the calibrated file: normal bands have no ends, and a calibration knows most by the correlations,
@@ -37,6 +38,7 @@ from truepose.calibration.result.toml_edits import MachineText, warning_comment
 from truepose.errors import MachineFileError, Problem, RequestError
 from truepose.files.writing import replacing, require_writable
 from truepose.machine import Machine, load
+from truepose.machine.tables.controller import Holds
 from truepose.machine.workspace import Accuracy
 from truepose.sources import REGISTRY
 from truepose.sources.deviation import Deviation
@@ -128,14 +130,16 @@ def write_calibrated(
     *,
     original: str | Path,
     coverage: float = DEFAULT_COVERAGE,
-    as_shifts: bool = False,
+    controller_holds: Holds = "drawing",
     warnings: Sequence[str] = (),
 ) -> Machine:
     """Write the calibrated machine to `path` and return it as it is read from there.
 
     `values` (n,) and `covariance` (n, n) of the unknowns, SI; those of instruments are not read.
     `original`: the file that `machine` was read from. `coverage`: half bands in standard
-    deviations. `warnings` go into the file, for a result that was forced.
+    deviations. `controller_holds`: "drawing", a controller that was not touched, whose geometry
+    stays nominal, with what was found as known deviations; "calibrated", one into which what was
+    found is loaded, which is nominal then. `warnings` go into the file, for a forced result.
 
     Raises `RequestError` (`output-*`, calibration-undetermined, calibration-file-changed,
     calibration-not-written), and writes the file whole or not at all.
@@ -145,7 +149,8 @@ def write_calibrated(
     own_values = np.asarray(values, np.float64)[: unknowns.n_machine]
     own_covariance = np.asarray(covariance, np.float64)[: unknowns.n_machine, : unknowns.n_machine]
     require_determined(path, unknowns, own_values, own_covariance)
-    result = CalibratedValues.of(machine, unknowns, own_values, own_covariance, as_shifts)
+    result = CalibratedValues.of(machine, unknowns, own_values, own_covariance, controller_holds)
+    held = _held(machine, controller_holds)
     text = MachineText(original, machine, _changed(original, machine))
     _write_values(text, machine, result)
     for edit in property_edits(machine, unknowns, own_values):
@@ -153,6 +158,7 @@ def write_calibrated(
     _write_bands(text, machine, result, coverage)
     given_at = text.set_coverage(Accuracy(at=AT).at_text)
     text.move_to(path.parent)
+    text.set_controller(held)
     _write_provenance(text, machine, provenance, warnings)
     with replacing(path) as temporary:
         temporary.write_text(text.text(), encoding="utf-8")
@@ -164,6 +170,8 @@ def write_calibrated(
         filed = load(original, settings=dict(machine.settings), registry=REGISTRY)
         asked = replace(filed.accuracy, at=AT) if given_at else filed.accuracy
         _require_same(path, filed, result, asked, written)
+        if written.controller_holds != held:
+            raise _not_written(path, "what the controller holds differs")
     return load(path, registry=REGISTRY)
 
 
@@ -207,17 +215,18 @@ class CalibratedValues:
         unknowns: MachineUnknowns,
         values: Floats,
         covariance: Floats,
-        as_shifts: bool,
+        controller_holds: Holds,
         *,
         new_axes: bool = True,
     ) -> CalibratedValues:
         """`new_axes`: whether directions are told by new axes, as in a file, or by their tilts."""
+        stays = controller_holds == "drawing"
         count = len(machine.parameters)
         effects = np.zeros((count, unknowns.n_machine))
         np.add.at(effects, np.asarray(unknowns.columns), unknowns.effects[:, : unknowns.n_machine])
         moved = np.asarray(effects.any(axis=1), np.bool_)
         deviation = effects @ values
-        nominal = np.array(machine.nominal) + (0.0 if as_shifts else deviation)
+        nominal = np.array(machine.nominal) + (0.0 if stays else deviation)
         axes = []
         for direction in directions(machine) if new_axes else ():
             at = list(direction.columns)
@@ -226,15 +235,20 @@ class CalibratedValues:
             axis = direction_at(direction.axis, nominal[at])
             if moved[at].any():
                 effects[at] = deviation_jacobian(direction.axis, nominal[at], axis) @ effects[at]
-                if as_shifts:
+                if stays:
                     deviation[at] = effects[at] @ values
                 moved[at] = True
             nominal[at] = 0.0
             axes.append((direction, axis))
         columns = np.flatnonzero(moved)
         bands = banded(columns, effects[columns], covariance, unknowns.names[: unknowns.n_machine])
-        shift = deviation if as_shifts else np.zeros(count)
+        shift = deviation if stays else np.zeros(count)
         return cls(nominal, tuple(axes), shift, bands, columns, bands_of(machine))
+
+
+def _held(machine: Machine, asked: Holds) -> Holds:
+    """What the written file says: whose geometry stays nominal is still what it was before."""
+    return machine.controller_holds or asked if asked == "drawing" else asked
 
 
 def _write_values(text: MachineText, machine: Machine, result: CalibratedValues) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
@@ -15,7 +16,10 @@ from truepose.calibration.dataset import covariance_of, determined_covariance, v
 from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.result.file import DEFAULT_COVERAGE, Provenance, write_calibrated
 from truepose.errors import Problem, RequestError
+from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
+from truepose.machine.tables.controller import Holds
+from truepose.runs.controller_geometry import require_known_controller
 
 if TYPE_CHECKING:
     from truepose.calibration.calibrate import Calibration
@@ -27,20 +31,32 @@ def save(
     *,
     original: str | Path,
     date: str,
-    as_shifts: bool = False,
+    controller_holds: Holds = "drawing",
+    as_shifts: bool | None = None,
     force: bool = False,
     coverage: float = DEFAULT_COVERAGE,
 ) -> Machine:
     """Write the calibrated machine to `path`; the machine as it is read from there.
 
-    `original`: the file that was calibrated; `date`: the caller's, written as it is. `as_shifts`:
-    nominal values stay, what was found becomes the middle of their bands. `force`: write it though
-    the answer is no, with the verdict as a warning inside. `coverage`: half bands in standard
-    deviations. A property that was found (an expansion, a compliance) is written without its
-    uncertainty, for which a machine file has no place: a warning inside says so.
+    `original`: the file that was calibrated; `date`: the caller's, written as it is.
+    `controller_holds`: "drawing", a controller that was not touched: nominal values stay, what was
+    found becomes the middle of their bands, and `compensate` corrects it; "calibrated", one into
+    which what was found is loaded, and which is nominal then. `as_shifts`: the former word; it
+    warns, and the file is written as `controller_holds` says. `force`: write it though the answer
+    is no, with the verdict as a warning inside. `coverage`: half bands in standard deviations. A
+    property that was found (an expansion, a compliance) is written without its uncertainty, for
+    which a machine file has no place: a warning inside says so.
 
-    Raises `RequestError` (calibration-refused, and what `write_calibrated` raises).
+    Raises `RequestError` (calibration-refused, unknown-choice, excluding-keys; controller-unsaid
+    where nominal values stay of which it is not known whose they are; and what `write_calibrated`
+    raises).
     """
+    if as_shifts is not None:
+        _former_word(as_shifts, controller_holds)
+    if controller_holds not in get_args(Holds):
+        raise _unknown_choice(controller_holds)
+    if controller_holds == "drawing":
+        require_known_controller(calibration.machine)
     if calibration.failure is not None:
         raise RequestError(calibration.failure)
     verdict = verdict_of(calibration)
@@ -78,11 +94,44 @@ def save(
         provenance,
         original=original,
         coverage=coverage,
-        as_shifts=as_shifts,
+        controller_holds=controller_holds,
         warnings=(
             *(() if calibration.accepted else (verdict,)),
             *_of_properties(calibration, covariance),
         ),
+    )
+
+
+def _former_word(as_shifts: bool, controller_holds: Holds) -> None:
+    """Warn of the word, and refuse it where it says the contrary of the new one."""
+    if as_shifts and controller_holds == "calibrated":
+        raise RequestError(
+            Problem(
+                "excluding-keys",
+                "as_shifts is for a controller that was not touched",
+                found='as_shifts=True and controller_holds="calibrated"',
+                expected='controller_holds="drawing", which as_shifts=True means, or "calibrated"',
+            )
+        )
+    warnings.warn(
+        'as_shifts goes: say what the controller holds. controller_holds="drawing", the default, '
+        'writes what as_shifts=True wrote, and controller_holds="calibrated" what was written '
+        "without",
+        DeprecationWarning,
+        stacklevel=4,
+    )
+
+
+def _unknown_choice(word: object) -> RequestError:
+    words = get_args(Holds)
+    return RequestError(
+        Problem(
+            "unknown-choice",
+            "a controller holds the geometry of the drawing or the calibrated one",
+            found=repr(word),
+            expected=one_of(f'"{each}"' for each in words),
+            hint=did_you_mean(word, words) if isinstance(word, str) else None,
+        )
     )
 
 

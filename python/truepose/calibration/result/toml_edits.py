@@ -146,6 +146,13 @@ class MachineText:
         body.extend(below)
         return True
 
+    def set_controller(self, holds: str) -> None:
+        """Write which geometry the controller works with."""
+        if "controller" in self.toml:
+            self.toml["controller"]["holds"] = holds
+        else:
+            self.append(f'[controller]\nholds = "{holds}"\n')
+
     # --- tolerances
 
     def set_tolerance(self, name: str, stated: Mapping[str, Any]) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from truepose.controllers._export import Export, Option
+from truepose.controllers._export import Export, Option, geometry_compensated
 from truepose.controllers.c._program import Program, program_of
 from truepose.machine import Machine
 
@@ -34,7 +34,7 @@ class C:
         program = program_of(machine, without=names_of(options["without"]))
         return Export(
             {f"{program.prefix}.h": program.header, f"{program.prefix}.c": program.source},
-            program.statement,
+            (*program.statement, *geometry_compensated(machine)),
         )
 
 

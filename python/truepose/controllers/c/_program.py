@@ -241,6 +241,9 @@ class _Writer:
         if self.known.left_out:
             yield f"Left out, and not compensated: {', '.join(self.known.left_out)}."
         yield "Loads are those of the nominal machine at the pose asked for."
+        if self.machine.calibration is not None:
+            yield "Compensated joints hold the calibrated geometry: programs that are corrected as"
+            yield "well are corrected twice."
 
     # ---- tables and pieces of code ----
 

@@ -32,12 +32,17 @@ from truepose.controllers.gcode.division import (
     MachineState,
     Moves,
 )
-from truepose.controllers.gcode.proof import Proof, Proving, improves
+from truepose.controllers.gcode.proof import Errors, Proof, Proving, improves
 from truepose.controllers.gcode.tolerance import MOST, PathTolerance, least_of, tolerance_for
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import one_of
 from truepose.files.writing import replacing, require_writable
 from truepose.machine import Condition, Machine
+from truepose.runs.controller_geometry import (
+    ROUNDING,
+    nothing_to_correct,
+    require_known_controller,
+)
 from truepose.runs.poses import required_sources
 
 BATCH = 8192
@@ -150,8 +155,11 @@ def correct_program(
     `NoBetter`, a `RequestError` with that proof, where the error after is not less than the one
     before (gcode-no-better); nothing is written then. Raises `RequestError`: the program's problems
     with file, line and column (gcode-...), bad-correction for an option, no-source,
-    output-not-writable, output-is-input; `TrueposeError` as `truepose.budget`.
+    output-not-writable, output-is-input; controller-unsaid, controller-contradicted for a
+    calibrated file of which it is not known with which geometry its controller works;
+    `TrueposeError` as `truepose.budget`.
     """
+    require_known_controller(machine)
     program, written = Path(source), Path(target)
     axes = Axes(machine)
     options = _options(axes, tolerance, interpolation, units, start, offsets, block_delete, digits)
@@ -280,11 +288,20 @@ class _Session:
             points=proving.points,
             before=before,
             after=after,
+            warnings=_warnings(machine, before),
         )
         for worst, unit in ((after.position, 1.0), (after.orientation, length)):
             if worst is not None and not worst.value * unit <= limits.chord:
                 raise _refusals.of_proof(machine, proof, worst.value * unit, worst.line)
         return proof
+
+
+def _warnings(machine: Machine, before: Errors) -> tuple[str, ...]:
+    """What to know of a program that was right before."""
+    known = [worst.value for worst in (before.position, before.orientation) if worst is not None]
+    if not known or max(known) >= ROUNDING:
+        return ()
+    return (nothing_to_correct(machine)["sentence"],)
 
 
 class _Writing:

@@ -58,7 +58,8 @@ class Proof(Represented):
     machine; `improves`: whether it became better. `moves` of the program, `blocks` written for
     them, `points` compared. `tolerance`, m, where that is from, and `interpolation` for which it
     holds. `approach`: the line of the first block, or None; it
-    begins where the machine is not corrected, and its path counts from its end on.
+    begins where the machine is not corrected, and its path counts from its end on. `warnings`: why
+    there was nothing to correct, if so.
     """
 
     machine: str
@@ -76,6 +77,7 @@ class Proof(Represented):
     before: Errors
     after: Errors
     improves: bool
+    warnings: tuple[str, ...] = ()
 
 
 def sizes(errors: Errors, length: float) -> tuple[float | None, float | None]:

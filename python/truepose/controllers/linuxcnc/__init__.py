@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from truepose.controllers._export import Export, Option
+from truepose.controllers._export import Export, Option, geometry_compensated
 from truepose.controllers.c import C, names_of, program_of
 from truepose.controllers.linuxcnc._compensation import SPARE, default_clamp
 from truepose.controllers.linuxcnc._configuration import hal_text, ini_text
@@ -56,7 +56,11 @@ class LinuxCNC:
                 f"{module}.ini": ini_text(description, box, clamp),
                 f"{module}.hal": hal_text(description, clamp, rate_limit),
             },
-            (*program.statement, *_statement(description, box, clamp, rate_limit, asked > 0.0)),
+            (
+                *program.statement,
+                *_statement(description, box, clamp, rate_limit, asked > 0.0),
+                *geometry_compensated(machine),
+            ),
         )
 
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats
-from truepose.compensation.commands import corrected_poses, has_joints
+from truepose.compensation.commands import ActualMachine, blocks, corrected_poses, has_joints
 from truepose.controllers._export import Export, Option
 from truepose.controllers._fit import Extent, extent
 from truepose.controllers._small_model import ascii_only, fixed, stem
@@ -30,6 +30,7 @@ from truepose.errors import Problem, RequestError
 from truepose.files.units import FileUnit, default_units
 from truepose.files.wording import counted
 from truepose.machine import Machine
+from truepose.runs.controller_geometry import ROUNDING, nothing_to_correct
 from truepose.runs.dataset import provenance
 from truepose.runs.poses import OK, pose_in_words
 from truepose.spatial import angle_between
@@ -249,7 +250,8 @@ class PoseMap:
     def export(cls, machine: Machine, options: Mapping[str, float | str]) -> Export:
         """The same map in both formats.
 
-        Raises `RequestError`: bad-option, no-workspace, grid-too-large, no-pose-left.
+        Raises `RequestError`: bad-option, no-workspace, grid-too-large, no-pose-left; and
+        controller-unsaid, controller-contradicted as `corrected_poses`.
         """
         nodes = pose_map(machine, grid_of(machine, str(options["count"])))
         judged = assess(nodes)
@@ -268,6 +270,8 @@ def statement(nodes: NodeCorrections, judged: MapErrors) -> tuple[str, ...]:
     machine = nodes.machine
     count = " x ".join(str(number) for number in nodes.grid.shape)
     lines = [f"{counted(len(nodes.status), 'node')} ({count}); {USE}"]
+    if not np.nan_to_num(nodes.corrections).any() and not _deviates(nodes):
+        lines.insert(0, f"WARNING: {nothing_to_correct(machine)['sentence']}")
     if judged.points == 1:
         lines.append("one node: there is nothing to interpolate")
     else:
@@ -293,6 +297,18 @@ def statement(nodes: NodeCorrections, judged: MapErrors) -> tuple[str, ...]:
         points = counted(judged.left_out, "point")
         lines.append(f"{points} in cells with such a node {were} not compared")
     return tuple(lines)
+
+
+def _deviates(nodes: NodeCorrections) -> bool:
+    """Whether anything is known to be off at a node, be it what no command corrects."""
+    actual = ActualMachine(nodes.machine)
+    wanted = nodes.grid.nodes
+    for rows in blocks(len(wanted)):
+        known = actual.deviations_at(wanted[rows])
+        error, _ = actual.error(known, known.block.joints)
+        if np.abs(np.nan_to_num(error)).max(initial=0.0) >= ROUNDING:
+            return True
+    return False
 
 
 def _sizes(nodes: NodeCorrections) -> Extent:

@@ -16,6 +16,7 @@ from truepose.machine.tables.accuracy import AccuracyTable
 from truepose.machine.tables.body import FrameTable, PlatformTable, ToolTable
 from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.condition import ConditionTable
+from truepose.machine.tables.controller import ControllerTable
 from truepose.machine.tables.drive import DriveTable
 from truepose.machine.tables.guide import GuideTable
 from truepose.machine.tables.machine import MachineTable
@@ -70,6 +71,7 @@ def owners(added: Iterable[Mapping[str, type[BaseModel]]]) -> Owners:
         "condition": [ConditionTable],
         "workspace": [WorkspaceTable],
         "accuracy": [AccuracyTable],
+        "controller": [ControllerTable],
         "calibration": [CalibrationTable],
     }
     for tables in added:

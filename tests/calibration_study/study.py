@@ -205,24 +205,34 @@ def share(flags: Iterable[bool]) -> float:
     return sum(every) / len(every) if every else math.nan
 
 
+def allowed_share(count: int) -> float:
+    """Of tools beyond the stated 95 %: 5 %, and three standard errors for chance."""
+    return 0.05 + CHANCE * math.sqrt(0.05 * 0.95 / count)
+
+
 def rates(kind: str, every: Iterable[Result]) -> Rates:
-    """Of one kind. `allowed`: 5 % of the accepted, and three standard errors for chance."""
+    """Of one kind."""
     mine = [each for each in every if each.kind == kind]
     own = [each for each in mine if each.demanded]
     accepted = [each for each in own if each.accepted]
     moved = [each for each in own if each.moved]
-    chance = CHANCE * math.sqrt(0.05 * 0.95 / len(accepted)) if accepted else math.nan
-    worst = [
-        share(r > 1.0 for r in ratios if not math.isnan(r))
+    by_quantity = [
+        [ratio for ratio in ratios if not math.isnan(ratio)]
         for ratios in ([e.position for e in accepted], [e.rotation for e in accepted])
     ]
-    known = [w for w in worst if not math.isnan(w)]
+    # Each quantity by itself, for the stated 95 % are of each: the one that is nearer to its limit.
+    compared = [
+        (share(ratio > 1.0 for ratio in ratios), allowed_share(len(ratios)))
+        for ratios in by_quantity
+        if ratios
+    ]
+    beyond, allowed = max(compared, key=lambda at: at[0] - at[1], default=(math.nan, math.nan))
     return Rates(
         kind,
         len(own),
         share(each.accepted for each in own),
-        max(known) if known else math.nan,
-        0.05 + chance,
+        beyond,
+        allowed,
         len(moved),
         share(each.named for each in moved),
         share(each.named for each in own),

@@ -151,9 +151,9 @@ impl Identification {
         let mut evaluation = Evaluation::new(&self.inner);
         let mut array = out.readwrite();
         let data = array.as_slice_mut()?;
-        if !(evaluation.place(values.data()) && evaluation.jacobian(data)) {
-            data.fill(f64::NAN);
-        }
+        data.fill(f64::NAN);
+        evaluation.place(values.data());
+        evaluation.jacobian(data);
         drop(array);
         with_codes(py, out, &evaluation.status)
     }

@@ -13,7 +13,12 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import Gate, HeldOut, assess
 from truepose.calibration.acceptance.decision import CONTRADICTED, MARGIN
-from truepose.calibration.acceptance.tool_uncertainty import Considered, Tool, tool_components
+from truepose.calibration.acceptance.tool_uncertainty import (
+    Considered,
+    Tool,
+    commanded_components,
+    tool_components,
+)
 from truepose.calibration.data_checks import (
     HYPOTHESES,
     Refit,
@@ -22,11 +27,21 @@ from truepose.calibration.data_checks import (
     explained_otherwise,
     suspicions,
 )
+from truepose.calibration.identification.assembly_modes import (
+    in_unstated_modes,
+    of_other_modes,
+    placed_as_read,
+)
 from truepose.calibration.identification.consider_covariance import consider_covariance
 from truepose.calibration.identification.fit import Fit, fit, unfitted
 from truepose.calibration.identification.placement import Placements, place_instruments
+from truepose.calibration.identification.reliability import (
+    ExternalReliability,
+    external_reliability,
+)
 from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
+    ToolEffects,
     candidates,
     tool_effects,
     workspace_poses,
@@ -36,6 +51,7 @@ from truepose.calibration.identification.validate import Validation, validate
 from truepose.calibration.instruments import REGISTRY
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.read_csv import read_measurements
+from truepose.calibration.residual_checks import residual_patterns
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.representation import Facts, Represented
@@ -55,7 +71,8 @@ class Calibration(Represented):
     hold anything back. `poses` (n, n_commanded): where the tool was looked at, those that are
     `usable` (n,): the calibrated machine reaches them too. `seed`: of the folds. `failure`: why no
     machine was found that explains the measurements, where something is wrong with these; the
-    machine then stays as filed.
+    machine then stays as filed. `external_reliability`: how far a wrong reading that is not named
+    can move the tool there.
     """
 
     machine: Machine
@@ -69,6 +86,7 @@ class Calibration(Represented):
     usable: Flags
     seed: int = 0
     failure: Problem | None = None
+    external_reliability: ExternalReliability | None = None
 
     def _facts(self) -> Facts:
         from truepose.calibration.dataset import verdict_of
@@ -167,11 +185,14 @@ def calibrate(
     whole = data if isinstance(data, Measurements) else read_measurements(data, machine)
     if whole.held_out.all():
         raise _nothing_to_fit(whole)
-    table, joints, placements = workspace_poses(machine, poses)
+    table = workspace_poses(machine, poses)
     unknowns = unknowns_of(machine, whole, identify)
-    used = whole.select(~whole.held_out) if whole.held_out.any() else whole
     standing = _placed(machine, whole)
-    suspected = suspicions(machine, whole, standing)
+    whole, in_other_modes = placed_as_read(machine, whole, standing)
+    if in_other_modes.any():
+        standing = _placed(machine, whole)
+    used = whole.select(~whole.held_out) if whole.held_out.any() else whole
+    suspected = suspicions(machine, whole, standing) + of_other_modes(whole, in_other_modes)
     refit = Refit(machine, used, unknowns, use_prior)
     failure, checked = None, None
     try:
@@ -191,26 +212,24 @@ def calibrate(
             raise
         fitted = unfitted(used, unknowns, place_instruments(machine, used), use_prior=use_prior)
     else:
+        suspected += in_unstated_modes(machine, fitted, whole)
         checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
-    effects, usable = tool_effects(machine, unknowns, fitted.values, joints, placements)
-    rest = consider_covariance(machine, fitted, identify, joints[usable], placements[usable])
+    effects = tool_effects(machine, unknowns, fitted.values, table)
+    left_out = consider_covariance(machine, fitted, identify, table[effects.usable])
+    tool = Tool.of(
+        effects.effects,
+        tool_components(machine),
+        effects.positions,
+        commanded_components(machine),
+    )
     if failure is None and not _refuse(suspected):
         if fitted.noise > CONTRADICTED:
             suspected += explained_otherwise(refit, fitted, HYPOTHESES)
         else:
-            tool = Tool.of(effects, tool_components(machine), placements[usable, :3])
-            suspected += alternatives(refit, fitted, tool, table[usable], HYPOTHESES)
-    gate = _assessed(
-        machine,
-        fitted,
-        checked,
-        effects,
-        placements[usable, :3],
-        margin,
-        rest,
-        suspected,
-        failure,
-    )
+            suspected += alternatives(refit, fitted, tool, table[effects.usable], HYPOTHESES)
+        if not _refuse(suspected):
+            suspected += residual_patterns(machine, fitted, tool)
+    gate = _assessed(machine, fitted, checked, effects, margin, left_out, suspected, failure)
     return Calibration(
         machine,
         whole,
@@ -220,10 +239,17 @@ def calibrate(
         suspected,
         checked,
         table,
-        usable,
+        effects.usable,
         seed,
         failure,
+        external_reliability(fitted, _judged_tool(tool, gate)),
     )
+
+
+def _judged_tool(tool: Tool, gate: Gate) -> Tool:
+    """What unknowns do at the tool, without what moves the machine as a whole."""
+    gauge = [direction.effects for direction in gate.directions if direction.kind == "gauge"]
+    return tool.relative(np.array(gauge).reshape(-1, tool.effects.shape[2]))
 
 
 def _refuse(suspected: Sequence[Suspicion]) -> bool:
@@ -254,8 +280,7 @@ def _assessed(
     machine: Machine,
     fitted: Fit,
     checked: Validation | None,
-    effects: Floats,
-    positions: Floats,
+    tool: ToolEffects,
     margin: float,
     considered: Considered | None,
     suspected: Sequence[Suspicion],
@@ -270,9 +295,10 @@ def _assessed(
         residual=fitted.residual,
         before=fitted.before,
         use_prior=fitted.use_prior,
-        tool=effects,
+        tool=tool.effects,
         components=tool_components(machine),
-        positions=positions,
+        commanded=commanded_components(machine),
+        positions=tool.positions,
         weights=fitted.weights,
         by=phrases(machine, fitted.measurements),
         nominal=unknowns.nominal_sizes(machine),

@@ -13,6 +13,7 @@ import numpy as np
 import xarray as xr
 
 from truepose.arrays import Flags, Floats
+from truepose.calibration.acceptance import sentences
 from truepose.calibration.identification.equations import Equations
 from truepose.calibration.identification.problem import Prior
 from truepose.calibration.observables import UNITS, column_name
@@ -147,13 +148,24 @@ def dataset_of(calibration: Calibration) -> xr.Dataset:
 
 
 def verdict_of(calibration: Calibration) -> str:
-    """Yes or no with its reasons, the remedy and the warnings."""
-    return calibration.gate.words
+    """Yes or no with its reasons, the remedy and the warnings; and what might go unnoticed."""
+    return calibration.gate.words + _unnoticed(calibration)
 
 
 def answer_of(calibration: Calibration) -> str:
     """The verdict without its warnings and the remedy, which are shown elsewhere."""
-    return calibration.gate.answer
+    return calibration.gate.answer + _unnoticed(calibration)
+
+
+def _unnoticed(calibration: Calibration) -> str:
+    """How far a wrong reading that is not named may move the tool, where the answer is yes."""
+    unnamed = calibration.external_reliability
+    if not calibration.accepted or unnamed is None:
+        return ""
+    if not np.isfinite(unnamed.position):
+        return " Some readings are checked by no other: whether they are right is not known."
+    size = sentences.quantity(unnamed.position, "m", units=calibration.machine.shown)
+    return f" A wrong reading that is not named moves the tool by at most {size}."
 
 
 # --- values --------------------------------------------------------------------------------------
@@ -394,6 +406,8 @@ def _attrs(calibration: Calibration) -> dict[str, str | int | float]:
         "use_prior": int(fit.use_prior),
         "margin": gate.margin,
         "relative": int(gate.relative),
+        "position_within": gate.after.within[0],
+        "rotation_within": gate.after.within[1],
         "observations": fit.measurements.n_observation,
         "validation": "none" if checked is None else checked.kind,
         "folds": 0 if checked is None else checked.folds,

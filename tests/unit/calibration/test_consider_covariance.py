@@ -13,7 +13,6 @@ from made_measurements import made_measurements, nominal_values, poses_within
 from truepose.arrays import Floats
 from truepose.calibration.calibrate import Calibration, calibrate
 from truepose.calibration.identification.consider_covariance import consider_covariance
-from truepose.calibration.identification.tool_effects import workspace_poses
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.result.bands import tolerance_covariance
 from truepose.machine import Machine
@@ -98,14 +97,13 @@ def test_the_parts_add_up(walking: Machine) -> None:
     rng = np.random.default_rng(3)
     data = measured(walking, walking, rng)
     part = calibrate(walking, data, identify=LENGTHS)
-    _, joints, placements = workspace_poses(walking, part.poses)
-    found = consider_covariance(walking, part.fit, LENGTHS, joints, placements)
+    found = consider_covariance(walking, part.fit, LENGTHS, part.poses)
     assert found is not None
     assert found.every[: len(found.labels)] != found.labels
     assert (found.alone.position <= found.after.position).all()
     squares = found.alone.position**2 + found.part.position**2
     np.testing.assert_allclose(found.after.position**2, squares, rtol=1e-3)
-    assert consider_covariance(walking, part.fit, (), joints, placements) is None
+    assert consider_covariance(walking, part.fit, (), part.poses) is None
 
 
 @pytest.mark.parametrize("use_prior", [True, False])

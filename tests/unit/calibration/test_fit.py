@@ -124,6 +124,60 @@ def test_too_few_readings_say_how_many_more() -> None:
     assert problem.expected.startswith("2 more readings: 1 more rows")
 
 
+ALL = ("strut.*.base.*", "strut.*.platform.*", "strut.*.length", "drive.*")
+
+
+def test_too_few_counts_rank_and_not_unknowns() -> None:
+    """Sixty heights of a delta determine no more than some twenty of 66: none more is asked for."""
+    machine = tp.load(FILES["linear_delta"])
+    poses = poses_within(machine, 60, seed=3)
+    data = made_measurements(machine, "coordinate", poses, values="nominal", frame="unknown")
+    unknowns = unknowns_of(machine, data, ALL)
+    assert unknowns.count > data.n_observation
+    found = fit(machine, data, unknowns, use_prior=False)
+    slope = found.problem.jacobian(found.values) / data.uncertainty[:, np.newaxis]
+    assert np.linalg.matrix_rank(slope * found.scale, tol=1e-6) < 40
+    assert len(found.null_space) >= unknowns.count - 40
+    # Of six heights none can be spared, and more would see more.
+    with pytest.raises(RequestError) as refused:
+        fitted(machine, data.select(np.arange(60) < 6), *ALL, use_prior=False)
+    assert codes(refused) == ["too-few-measurements"]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "use_prior", "identify"),
+    [
+        ("linear_delta", "coordinate", False, ()),
+        ("linear_delta", "plane", False, ()),
+        ("five_bar", "contact", True, ALL),
+        ("3prs", "pose", True, ALL),
+        ("3prs", "distance", False, ()),
+    ],
+)
+def test_directions_that_no_reading_sees_are_held_and_named(
+    name: str, kind: str, use_prior: bool, identify: tuple[str, ...]
+) -> None:
+    """What noise says of them is no way to follow: the search settles, and says what it held."""
+    machine = tp.load(FILES[name])
+    poses = poses_within(machine, 60, seed=3)
+    data = made_measurements(machine, kind, poses, values="nominal", frame="unknown")
+    unknowns = unknowns_of(machine, data, identify)
+    random = np.random.default_rng(1)
+    truth = np.zeros(unknowns.count)
+    banded = np.isfinite(unknowns.half)
+    truth[banded] = unknowns.half[banded] * random.uniform(-1.0, 1.0, int(banded.sum()))
+    truth[~banded] = 1e-4 * random.standard_normal(int((~banded).sum()))
+    found = fit(machine, read_of(machine, data, unknowns, truth, 1), unknowns, use_prior=use_prior)
+    assert found.noise < 1.5
+    assert np.isinf(found.deviations).any()
+    # A thousandth of the machine along what is held is less than noise, where the fit ended.
+    sizes = {"m": machine.characteristic_length}
+    length = np.array([sizes.get(unit, 1.0) for unit in unknowns.units])
+    steps = found.null_space * found.scale
+    steps /= np.abs(steps / length).max(axis=1, keepdims=True)
+    assert np.linalg.norm(found.jacobian @ (1e-4 * steps).T, axis=0).max() < 1.0
+
+
 def test_readings_of_no_such_machine_are_refused() -> None:
     data = tracked(CROSSED)
     far = data.with_values(data.value + 3.0 * np.sign(data.value))

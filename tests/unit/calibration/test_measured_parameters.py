@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
 
 MACHINES = Path(__file__).parents[3] / "machines"
+EXAMPLES = Path(__file__).parents[3] / "examples"
 RODS = [f"strut.{name}.length" for name in ("a1", "a2", "b1", "b2", "c1", "c2")]
 
 HEAD = """\
@@ -227,6 +229,50 @@ def test_a_wrong_unit_of_a_part_is_named(delta: Machine) -> None:
         )
         == ()
     )
+
+
+def test_the_advice_to_measure_the_rods_can_be_followed(tmp_path: Path) -> None:
+    """The sentences of the refusal, read and done: rows in the same file, and the answer is yes.
+
+    The rods, and the height of one more point, are those of the machine that the positions of the same printer give.
+    """
+    data = EXAMPLES / "data"
+    machine = tp.load(data / "delta_printer.toml")
+    heights_file = data / "delta_heights.csv"
+    refused = tp.calibrate(machine, heights_file, use_prior=False).gate
+    assert not refused.accepted
+    assert refused.remedy is not None
+    advice = re.search(r"Measure the length of every strut \(to (\S+ mm)\)", refused.words)
+    assert advice is not None, refused.words
+    higher = re.search(r"one row at another commanded z, such as (\d+) mm", refused.words)
+    assert higher is not None, refused.words
+    truth = tp.calibrate(machine, data / "delta_positions.csv").calibrated()
+    joints, placements, _ = machine.kernel.place([[0.0, 0.0, 1e-3 * float(higher[1])]])
+    reached = truth.kernel.forward(joints, machine.kernel.pose_of(placements))
+    height = 1e3 * float(reached[0, machine.dof.index("z")])
+    sizes = dict(zip(truth.parameters, (1e3 * truth.nominal).tolist(), strict=True))
+    rods = [f"strut.{strut.name}.length" for strut in machine.struts]
+    head, _, table = heights_file.read_text().partition("\ncommand.")
+    head += f'\n#: [instrument.gauge]\n#: kind = "parameter"\n#: uncertainty = "{advice[1]}"\n'
+    (name,) = re.findall(r"\[instrument\.(.*)\]", heights_file.read_text())
+    first, *rows = ("command." + table).strip().splitlines()
+    columns = [f"parameter.{rod} (mm)" for rod in rods]
+    noise = 0.02 * np.random.default_rng(3).standard_normal(len(rods))
+    lengths = [f"{sizes[rod] + by:.2f}" for rod, by in zip(rods, noise, strict=True)]
+    lines = [",".join(["instrument", first, *columns])]
+    lines += [",".join([name, row, *[""] * len(rods)]) for row in rows]
+    lines.append(",".join([name, "0", "0", higher[1], f"{height:.3f}", *[""] * len(rods)]))
+    lines.append(",".join(["gauge", *[""] * (first.count(",") + 1), *lengths]))
+    followed = tmp_path / "with_rods.csv"
+    followed.write_text(head + "\n".join(lines) + "\n")
+    for use_prior in (False, True):
+        gate = tp.calibrate(machine, followed, use_prior=use_prior).gate
+        assert gate.accepted, gate.words
+        assert gate.after is not None
+        if not use_prior:
+            # As well known as the advice promised, or better by the further row.
+            assert gate.after.position_max > 0.3 * refused.remedy.position
+        assert gate.after.position_max < 1.05 * refused.remedy.position
 
 
 WRONG = [

@@ -78,4 +78,4 @@ def test_angles_in_another_order_are_found_where_tolerances_hide_them(wide: Mach
 
 def test_the_same_data_in_our_order_are_good(wide: Machine) -> None:
     answer = calibrate(wide, good(wide, "pose", seed=1, count=40))
-    assert not answer.suspicions
+    assert not [each for each in answer.suspicions if each.refuses]

@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from height_only_delta import HEIGHTS, P02, POSITIONS, codes, verdict
@@ -40,6 +41,15 @@ def test_a_reason_is_a_code_with_values_in_si() -> None:
     inches = replace(loose, shown=ShownUnits(INCHES, small_length=MICROINCHES))
     assert "only to 0.15 in, its tolerance is 0.02 in" in inches.sentence
     assert "only to 3.7 mm, its tolerance is 0.5 mm" in loose.sentence
+
+
+def test_a_machine_that_reaches_no_pose_is_refused() -> None:
+    gate = verdict(POSITIONS, tool=np.zeros((0, 3, 9)), positions=np.zeros((0, 3)))
+    assert codes(gate) == {"out-of-reach"}
+    assert gate.answer == (
+        "No: the calibrated machine reaches none of the poses of the workspace: it cannot be "
+        "assembled there."
+    )
 
 
 def test_the_page_has_every_code() -> None:

@@ -180,8 +180,7 @@ def test_where_tolerances_are_left_out_the_target_is_not(hexapod: Machine) -> No
     """With a part of the tolerances identified the tool is no surer than the fit itself says."""
     data = tracked(hexapod, 5e-5)
     found = fitted(hexapod, data, use_prior=False)
-    joints, placements, _ = hexapod.kernel.place(poses_within(hexapod, 6, seed=9))
-    considered = consider_covariance(hexapod, found, SOME, joints, placements)
+    considered = consider_covariance(hexapod, found, SOME, poses_within(hexapod, 6, seed=9))
     assert considered is not None
     assert considered.after.position_max >= considered.alone.position_max
     calibrated = tp.calibrate(hexapod, data)

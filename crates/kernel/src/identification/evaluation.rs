@@ -29,6 +29,8 @@ pub struct Evaluation<'a> {
     poses: Vec<f64>,
     /// What became of them.
     pub status: Vec<Status>,
+    /// Which of them must be solved: those of which a reading counts.
+    needed: Vec<bool>,
     placed: Vec<Placed>,
     views: Vec<InstrumentView>,
     sensitivities: Vec<f64>,
@@ -63,10 +65,26 @@ impl<'a> Evaluation<'a> {
             starts: starts.clone(),
             poses: vec![0.0; 7 * poses],
             status: vec![Status::Ok; *poses],
+            needed: vec![true; *poses],
             placed: Vec::new(),
             views: Vec::new(),
             sensitivities: vec![0.0; poses * width],
         }
+    }
+
+    /// Readings of weight zero do not count from now on: a pose of which no reading counts need not be solved.
+    pub fn count_only(&mut self, weights: &[f64]) {
+        self.needed.fill(false);
+        for (observation, weight) in self.prepared.design.observations.iter().zip(weights) {
+            self.needed[observation.pose] |= *weight != 0.0;
+        }
+    }
+
+    fn all_needed(&self) -> bool {
+        self.status
+            .iter()
+            .zip(&self.needed)
+            .all(|(status, needed)| *status == Status::Ok || !needed)
     }
 
     fn samples<'b>(&'b self, poses: &'b [f64]) -> Samples<'b> {
@@ -86,7 +104,7 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// Solves all poses for these values; whether all could be.
+    /// Solves all poses for these values; whether all that must be could be.
     pub fn place(&mut self, values: &[f64]) -> bool {
         let mut deviations = std::mem::take(&mut self.deviations);
         self.prepared.deviations(values, &mut deviations);
@@ -104,12 +122,17 @@ impl<'a> Evaluation<'a> {
             let at = self.pose(pose);
             self.views.push(InstrumentView::new(&self.placed[instrument], &at, with_angles));
         }
-        self.status.iter().all(|status| *status == Status::Ok)
+        self.all_needed()
     }
 
-    /// Starts from the poses of the last [`Self::place`] from now on.
+    /// Starts from the poses of the last [`Self::place`] from now on, where there are any.
     pub fn accept(&mut self) {
-        self.starts.copy_from_slice(&self.poses);
+        let rows = self.starts.chunks_exact_mut(7).zip(self.poses.chunks_exact(7));
+        for ((start, pose), status) in rows.zip(&self.status) {
+            if *status == Status::Ok {
+                start.copy_from_slice(pose);
+            }
+        }
     }
 
     fn pose(&self, number: usize) -> Pose<f64> {
@@ -165,10 +188,10 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// Sensitivities of the poses of the last [`Self::place`] to the parameters; whether all exist.
+    /// Sensitivities of the poses of the last [`Self::place`] to the parameters; whether all that must exist do.
     fn differentiate(&mut self) -> bool {
         let mut sensitivities = std::mem::take(&mut self.sensitivities);
-        let mut status = std::mem::take(&mut self.status);
+        let mut status = vec![Status::Ok; self.status.len()];
         let machine = &self.prepared.design.machine;
         let quantity = Sensitivity::new(machine, &self.prepared.columns);
         first_order(
@@ -178,24 +201,27 @@ impl<'a> Evaluation<'a> {
             &mut sensitivities,
             &mut status,
         );
-        (self.sensitivities, self.status) = (sensitivities, status);
-        self.status.iter().all(|status| *status == Status::Ok)
+        self.sensitivities = sensitivities;
+        for (before, now) in self.status.iter_mut().zip(status) {
+            if *before == Status::Ok {
+                *before = now;
+            }
+        }
+        self.all_needed()
     }
 
     /// Derivatives of everything read to the unknowns, (observation, unknown), at the poses of the last
-    /// [`Self::place`]; false where a pose is singular.
+    /// [`Self::place`]; rows of poses that have none are left as they are. False where one that must be solved is singular.
     pub fn jacobian(&mut self, out: &mut [f64]) -> bool {
-        if !self.differentiate() {
-            return false;
-        }
+        let all = self.differentiate();
         let count = self.prepared.design.unknowns;
         let ones = vec![1.0; self.prepared.design.observations.len()];
         self.rows(Each { ones: &ones, count, out });
-        true
+        all
     }
 
     /// Normal equations of `weights` times `residuals`, at the poses of the last [`Self::place`]; false
-    /// where a pose is singular.
+    /// where one that must be solved is singular.
     pub fn normal(&mut self, weights: &[f64], residuals: &[f64], normal: &mut Normal) -> bool {
         if !self.differentiate() {
             return false;
@@ -334,7 +360,7 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
         let mut parameters = Vec::new();
         for pose in 0..design.poses {
             let observed = prepared.of_pose[pose]..prepared.of_pose[pose + 1];
-            if observed.is_empty() {
+            if observed.is_empty() || evaluation.status[pose] != Status::Ok {
                 continue;
             }
             evaluation.twists(pose, &mut twists);

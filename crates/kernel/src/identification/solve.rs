@@ -20,7 +20,7 @@ pub struct Prior {
 pub struct Readings<'a> {
     /// In the order of the observations, SI.
     pub measured: &'a [f64],
-    /// Likewise.
+    /// Likewise; a reading of weight zero does not count, and need not be predicted.
     pub weights: &'a [f64],
 }
 
@@ -96,6 +96,10 @@ impl Problem for Fit<'_> {
         let observations = &self.evaluation.prepared.design.observations;
         let mut cost = 0.0;
         for (i, observation) in observations.iter().enumerate() {
+            if self.readings.weights[i] == 0.0 {
+                self.residuals[i] = 0.0; // whatever it is, or where it cannot be predicted
+                continue;
+            }
             let mut away = self.predicted[i] - self.readings.measured[i];
             if observation.observable.is_angle() {
                 let turn = std::f64::consts::TAU;
@@ -187,8 +191,10 @@ fn one<'a>(
 ) -> Found {
     let (unknowns, count) = (prepared.design.unknowns, prepared.design.observations.len());
     let normal = Normal::new(unknowns);
+    let mut evaluation = Evaluation::new(prepared);
+    evaluation.count_only(readings.weights);
     let mut problem = Fit {
-        evaluation: Evaluation::new(prepared),
+        evaluation,
         readings,
         prior,
         information,

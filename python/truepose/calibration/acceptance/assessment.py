@@ -24,7 +24,7 @@ from truepose.calibration.acceptance.observability import (
     stacked,
     weighted,
 )
-from truepose.calibration.acceptance.reasons import Reason, ToolSize, at_worst_pose
+from truepose.calibration.acceptance.reasons import HeldOut, Reason, ToolSize, at_worst_pose
 from truepose.calibration.acceptance.tool_uncertainty import Considered, Tool, ToolUncertainty
 from truepose.calibration.least_squares import singular_decomposition
 from truepose.representation import Represented
@@ -113,6 +113,7 @@ class Case:
     measured: tuple[float | None, float | None]
     target: tuple[float | None, float | None]
     margin: float
+    held_out: tuple[HeldOut, ...]
     prior_rows: Floats = field(repr=False)  # (k, n)
 
     @classmethod
@@ -131,6 +132,7 @@ class Case:
         measured: tuple[float | None, float | None],
         target: tuple[float | None, float | None],
         margin: float,
+        held_out: tuple[HeldOut, ...] = (),
         noise: tuple[float, float] | None = None,
     ) -> Case:
         """Raises `ValueError` for arrays whose shapes do not fit."""
@@ -157,7 +159,7 @@ class Case:
         triangle = np.linalg.qr(rows / birge, mode="r") if rows.shape[0] > n else rows / birge
         return cls(
             unknowns, values, rows, np.asarray(triangle, np.float64), weights, rms, degrees,
-            use_prior, tool, by, nominal, measured, target, margin, held,
+            use_prior, tool, by, nominal, measured, target, margin, held_out, held,
         )  # fmt: skip
 
     @property
@@ -290,9 +292,17 @@ class Case:
         """The tool at the worst pose, of which something is known before."""
         return [
             size
-            for size in at_worst_pose(outcome.after, self.reference(outcome.before))
+            for size in at_worst_pose(outcome.after.worst, self.reference(outcome.before))
             if size.before is not None and (size.before > 0.0 or size.after > 0.0)
         ]
+
+    def gained_share(self, outcome: Outcome) -> float:
+        """Share of the tool's variance that the data take away, of what is commanded; NaN: unknown.
+
+        1 - largest after / largest before, each the trace at its worst pose.
+        """
+        before = outcome.before and outcome.before.largest_variance(self.tool.length)
+        return 1.0 - outcome.after.largest_variance(self.tool.length) / before if before else np.nan
 
     def keeps_target(self, outcome: Outcome) -> bool:
         """Whether something is asked, and the machine as filed is known to keep it."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from truepose.calibration.acceptance.assessment import Case, Outcome
 from truepose.calibration.acceptance.reasons import (
+    OPEN_CHOICE,
     WRONG_DATA,
     HeldOut,
     Reason,
@@ -23,10 +24,10 @@ from truepose.calibration.acceptance.reasons import (
 if TYPE_CHECKING:
     from truepose.calibration.data_checks import Suspicion
 
-OPEN_CHOICE = "open-choice"
-"""Code of suspicions that the data could be others, not that they are wrong."""
 MARGIN = 0.8
 """What is left of an uncertainty or error must be less than this of what it was."""
+LEAST_SHARE = 0.5
+"""Of the tool's variance that the data must take away where held-out rows show no gain."""
 ABOVE_NOISE = 2.0
 """An error on held-out poses can be made smaller if it is so many times the noise."""
 OFF_PRIOR = 4.0
@@ -48,7 +49,6 @@ SOURCE = 0.5
 def decide(
     case: Case,
     outcome: Outcome,
-    held_out: Sequence[HeldOut],
     suspicions: Sequence[Suspicion],
     failure: str | None = None,
 ) -> tuple[tuple[Reason, ...], tuple[Reason, ...]]:
@@ -58,15 +58,15 @@ def decide(
     """
     of_data = lacking(case, outcome)
     refusing = [suspicion for suspicion in suspicions if suspicion.refuses]
-    suspected = tuple(suspicion.sentence for suspicion in refusing)
-    looks_wrong = any(suspicion.code != OPEN_CHOICE for suspicion in refusing)
-    wrong = [case.reason(WRONG_DATA, suspected=suspected, wrong=looks_wrong)] if suspected else []
+    wrong = _suspected(case, refusing)
     if failure is not None:  # there is nothing else to be judged
         return (*wrong, case.reason("no-fit", failure=failure)), ()
+    nowhere = len(case.tool.effects) == 0
     reasons = [
         *wrong,
+        *([case.reason("out-of-reach")] if nowhere else []),
         *of_data,
-        *_not_confirmed(case, held_out),
+        *_not_confirmed(case),
         *_absurd_value(case, outcome),
         *_contradicts_noise(case),
     ]
@@ -80,6 +80,19 @@ def decide(
     return tuple(reasons), tuple(warnings)
 
 
+def _suspected(case: Case, refusing: Sequence[Suspicion]) -> list[Reason]:
+    """That the data look wrong, and that they could be others."""
+    by_code: dict[str, list[str]] = {}
+    for suspicion in refusing:
+        code = OPEN_CHOICE if suspicion.code == OPEN_CHOICE else WRONG_DATA
+        by_code.setdefault(code, []).append(suspicion.sentence)
+    return [
+        case.reason(code, suspected=tuple(by_code[code]))
+        for code in (WRONG_DATA, OPEN_CHOICE)
+        if code in by_code
+    ]
+
+
 def lacking(case: Case, outcome: Outcome) -> list[Reason]:
     """What speaks against it for want of knowledge, which further measurements bring."""
     reasons = []
@@ -91,19 +104,26 @@ def lacking(case: Case, outcome: Outcome) -> list[Reason]:
             reasons.append(case.reason("not-told-apart", **weak))
         reasons += _less_than_tolerance(case, outcome)
     if not len(outcome.moving):
-        reasons += _no_gain(case, outcome)
+        reasons += _no_gain(case, outcome) or _gain_unconfirmed(case, outcome)
     return reasons
 
 
 def gain_is_asked(case: Case, outcome: Outcome) -> bool:
     """Whether more is lacking than a gain that the accuracy asked does without."""
-    only = {reason.code for reason in lacking(case, outcome)} in ({"no-gain"}, {"not-identified"})
+    codes = {reason.code for reason in lacking(case, outcome)}
+    only = len(codes) == 1 and codes <= {"no-gain", "gain-unconfirmed", "not-identified"}
     return not (only and case.keeps_target(outcome))
 
 
 def is_turned_by_measuring(reasons: Iterable[Reason]) -> bool:
     """Whether one of the reasons is what further measurements are for."""
-    codes = {"not-determined", "not-told-apart", "less-than-tolerance", "no-gain"}
+    codes = {
+        "not-determined",
+        "not-told-apart",
+        "less-than-tolerance",
+        "no-gain",
+        "gain-unconfirmed",
+    }
     return any(reason.code in codes for reason in reasons)
 
 
@@ -150,17 +170,40 @@ def _no_gain(case: Case, outcome: Outcome) -> list[Reason]:
     left_out = outcome.considered
     if left_out is None:
         return [case.reason("no-gain", measured=outcome.before is None, **values)]
-    parts = zip(at_worst_pose(left_out.part), at_worst_pose(left_out.after), strict=True)
+    parts = zip(
+        at_worst_pose(left_out.part.worst), at_worst_pose(left_out.after.worst), strict=True
+    )
     if not any(whole.after > 0.0 and part.after >= SOURCE * whole.after for part, whole in parts):
         return [case.reason("no-gain", measured=False, **values)]
     return [case.reason("not-identified", labels=left_out.labels, every=left_out.every, **values)]
 
 
-def _not_confirmed(case: Case, held_out: Sequence[HeldOut]) -> list[Reason]:
+def _gain_unconfirmed(case: Case, outcome: Outcome) -> list[Reason]:
+    """Little is gained in what is commanded, and rows that were not fitted do not show it.
+
+    Of a machine that was good before such rows are explained no better by a good calibration
+    either, which then has taken away most of the tool's variance.
+    """
+    share = case.gained_share(outcome)
+    if not case.held_out or any(held.after < held.before for held in case.held_out):
+        return []
+    if not share < LEAST_SHARE:
+        return []
+    return [
+        case.reason(
+            "gain-unconfirmed",
+            share=share,
+            held_out=case.held_out[0],
+            kept=case.keeps_target(outcome),
+        )
+    ]
+
+
+def _not_confirmed(case: Case) -> list[Reason]:
     """Poses that were not fitted do not confirm the fit."""
     return [
         case.reason("not-confirmed", held_out=held)
-        for held in held_out
+        for held in case.held_out
         if above_noise(held) and held.after > case.margin * held.before and not held.consistent
     ]
 
@@ -246,7 +289,7 @@ def _considered(case: Case, outcome: Outcome, of_data: Sequence[Reason]) -> list
     exact = [
         ToolSize(alone.quantity, alone.unit, alone.after, whole.after)
         for alone, whole in zip(
-            at_worst_pose(left_out.alone), at_worst_pose(left_out.after), strict=True
+            at_worst_pose(left_out.alone.worst), at_worst_pose(left_out.after.worst), strict=True
         )
         if whole.after > SLIGHT * alone.after
     ]

@@ -34,6 +34,7 @@ from truepose.calibration.acceptance.reasons import (
     Reason,
     at_worst_pose,
     gain_sentence,
+    left_out_of,
     open_clauses,
     verdict_sentences,
 )
@@ -115,11 +116,14 @@ class Gate(Represented):
     @property
     def answer(self) -> str:
         """Yes with what is gained, or no with the reasons."""
-        sizes = at_worst_pose(
-            self.after, (None, None) if self.before is None else self.before.worst
-        )
+        before = (None, None) if self.before is None else self.before.within
         falling = (held for held in self.held_out if above_noise(held) and held.after < held.before)
-        gain = gain_sentence(sizes, next(falling, None), self.shown)
+        gain = gain_sentence(
+            at_worst_pose(self.after.within, before),
+            left_out_of(self.after, self.relative),
+            next(falling, None),
+            self.shown,
+        )
         return verdict_sentences(self.reasons, gain)
 
     @property
@@ -143,6 +147,7 @@ def assess(
     use_prior: bool,
     tool: ArrayLike,
     components: Sequence[str],
+    commanded: Sequence[str] | None = None,
     positions: ArrayLike | None = None,
     weights: ArrayLike | None = None,
     by: Iterable[str] = (),
@@ -162,8 +167,9 @@ def assess(
 
     `jacobian` (m, n), `residual` (m,) and `before` (m,) are divided by the uncertainties, before
     robust `weights` (m,). `tool` (n_pose, n_component, n_machine): d(error of the tool)/d(unknown)
-    over the workspace, at the fitted values, base frame, components among x y z a b c; `positions`
-    (n_pose, 3), m, of the tool point, without which moves of the whole machine are not recognised.
+    over the workspace, where the fitted machine is commanded to, base frame, components among
+    x y z a b c, of which those `commanded` (default all) are promised; `positions` (n_pose, 3), m,
+    of the tool point, without which moves of the whole machine are not recognised.
     `by`: the instruments' phrases. `nominal` (n_machine,): the parameter that an unknown moves
     most, NaN where it should not be shown. `measured`: root mean square of the tool's errors
     measured before, m and
@@ -185,17 +191,18 @@ def assess(
         residual=np.asarray(residual, np.float64),
         weights=np.ones(np.shape(residual)) if weights is None else np.asarray(weights, float),
         use_prior=use_prior,
-        tool=Tool.of(tool, components, positions),
+        tool=Tool.of(tool, components, positions, commanded),
         by=sentences.by_phrase(by),
         nominal=_or_nan(nominal, unknowns.n_machine),
         measured=measured,
         target=target,
         margin=margin,
+        held_out=tuple(held_out),
         noise=noise,
     )
     alone = case.outcome()
-    outcome, held = alone.with_considered(considered), tuple(held_out)
-    reasons, warnings = decide(case, outcome, held, tuple(suspicions), failure)
+    outcome = alone.with_considered(considered)
+    reasons, warnings = decide(case, outcome, tuple(suspicions), failure)
     remedy = None
     if lacking(case, alone) and is_turned_by_measuring(reasons) and gain_is_asked(case, outcome):
         remedy = cheapest_remedy(case, [*candidates, *direct_candidates(unknowns, direct)])
@@ -223,7 +230,7 @@ def assess(
         rms=case.rms,
         birge=case.birge,
         degrees_of_freedom=case.degrees,
-        held_out=held,
+        held_out=case.held_out,
         shown=unknowns.shown,
     )
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from truepose.calibration.acceptance import sentences
-from truepose.calibration.acceptance.tool_uncertainty import ToolUncertainty
+from truepose.calibration.acceptance.tool_uncertainty import KEPT, ToolUncertainty
 from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.representation import Facts, Represented
 
@@ -59,11 +59,11 @@ class HeldOut:
     unit: str = "1"
     consistent: bool = False
 
-    def shown(self, value: float, units: ShownUnits) -> str:
+    def shown(self, value: float, units: ShownUnits, digits: int = 2) -> str:
         """A value of it for people: "12 µm", "1.2 times the noise"."""
         if self.unit == "1":
-            return f"{sentences.times(value)} times the noise"
-        return sentences.quantity(value, self.unit, units=units)
+            return f"{sentences.times(value, digits)} times the noise"
+        return sentences.quantity(value, self.unit, digits, units)
 
 
 class ToolSize(NamedTuple):
@@ -78,14 +78,15 @@ class ToolSize(NamedTuple):
     before: float | None = None
 
 
-def at_worst_pose(
-    after: ToolUncertainty, before: tuple[float | None, float | None] = (None, None)
-) -> list[ToolSize]:
+Sizes = tuple[float | None, float | None]
+
+
+def at_worst_pose(after: tuple[float, float], before: Sizes = (None, None)) -> list[ToolSize]:
     """Position and rotation at the worst pose."""
-    sizes = (("position", "m"), ("rotation", "rad"))
+    quantities = (("position", "m"), ("rotation", "rad"))
     return [
         ToolSize(*named, size, was)
-        for named, size, was in zip(sizes, after.worst, before, strict=True)
+        for named, size, was in zip(quantities, after, before, strict=True)
     ]
 
 
@@ -111,18 +112,24 @@ def verdict_sentences(reasons: Sequence[Reason], gain: str) -> str:
     return f"No: {wrong[0]}." + (f" As they are: {others}." if others else "")
 
 
-def gain_sentence(sizes: Sequence[ToolSize], falling: HeldOut | None, shown: ShownUnits) -> str:
-    """What was gained: at the tool, and where one shows it, of the errors that `falling` held."""
+def gain_sentence(
+    sizes: Sequence[ToolSize], left_out: Sequence[str], falling: HeldOut | None, shown: ShownUnits
+) -> str:
+    """What was gained: `sizes` that the tool keeps, and what they leave out.
+
+    And where one shows it, of the errors that `falling` held.
+    """
     texts = []
-    for quantity, unit, after, before in sizes:
-        if after == 0.0 and not before:
+    for size in sizes:
+        if size.after == 0.0 and not size.before:
             continue
-        known = sentences.quantity(after, unit, units=shown)
-        was = "" if before is None else sentences.quantity(before, unit, units=shown)
+        was = "" if size.before is None else f", against {_of(size, size.before, shown)} before"
         texts.append(
-            f"the tool's {quantity} becomes known to {known} at the worst pose"
-            + (f", against {was} before" if was else "")
+            f"the tool's {size.quantity} becomes known to within {_of(size, size.after, shown)} at "
+            f"the worst pose ({100.0 * KEPT:g} %){was}"
         )
+    if texts and left_out:
+        texts[-1] += f", {' and '.join(left_out)} left out"
     texts = texts or ["the unknowns are determined"]
     if falling is not None:
         was, now = (falling.shown(size, shown) for size in (falling.before, falling.after))
@@ -130,13 +137,30 @@ def gain_sentence(sizes: Sequence[ToolSize], falling: HeldOut | None, shown: Sho
     return "; ".join(texts)
 
 
+def left_out_of(after: ToolUncertainty, relative: bool) -> list[str]:
+    """What the promised sizes of the tool do not hold, in words."""
+    parasitic = [name for name in after.components if name not in after.commanded]
+    moved = [
+        name
+        for name in parasitic
+        if after.standard[:, after.components.index(name)].max(initial=0.0) > 0.0
+    ]
+    texts = ["where the machine as a whole stands in the room"] if relative else []
+    if moved:
+        texts.append(f"its parasitic motion in {sentences.listed(moved)}")
+    return texts
+
+
 # --- reasons against it ---------------------------------------------------------------------------
 
 
 def _wrong_data(values: Values, shown: ShownUnits) -> str:
-    what = "look wrong" if values["wrong"] else "leave open what they say"
     # They begin with the instrument's name, which stays as it is written.
-    return f"the measurements {what}. {'. '.join(values['suspected'])}"
+    return f"the measurements look wrong. {'. '.join(values['suspected'])}"
+
+
+def _open_choice(values: Values, shown: ShownUnits) -> str:
+    return "; ".join(values["suspected"])
 
 
 def _no_fit(values: Values, shown: ShownUnits) -> str:
@@ -216,6 +240,17 @@ def _not_identified(values: Values, shown: ShownUnits) -> str:
     )
 
 
+def _gain_unconfirmed(values: Values, shown: ShownUnits) -> str:
+    held: HeldOut = values["held_out"]
+    was, now = (held.shown(size, shown, 3) for size in (held.before, held.after))
+    much = "nothing" if values["share"] < 0.005 else f"only {100.0 * values['share']:.0f} %"
+    return (
+        f"of the variance of what is commanded the measurements take away {much}, at the worst "
+        f"pose, and poses that were not fitted show no gain: {was} before, {now} after"
+        f"{_kept(values)}"
+    )
+
+
 def _not_confirmed(values: Values, shown: ShownUnits) -> str:
     held: HeldOut = values["held_out"]
     was, now = (held.shown(size, shown) for size in (held.before, held.after))
@@ -286,13 +321,21 @@ def _always(text: str) -> Callable[[Values, ShownUnits], str]:
 
 
 WRONG_DATA = "data-look-wrong"
+OPEN_CHOICE = "open-choice"
+"""Of suspicions that the data could be others, not that they are wrong."""
 SENTENCES: Mapping[str, Callable[[Values, ShownUnits], str]] = {
     WRONG_DATA: _wrong_data,
+    OPEN_CHOICE: _open_choice,
     "no-fit": _no_fit,
+    "out-of-reach": _always(
+        "the calibrated machine reaches none of the poses of the workspace: it cannot be assembled "
+        "there"
+    ),
     "not-determined": _open,
     "not-told-apart": _open,
     "less-than-tolerance": _less_than_tolerance,
     "no-gain": _no_gain,
+    "gain-unconfirmed": _gain_unconfirmed,
     "not-identified": _not_identified,
     "not-confirmed": _not_confirmed,
     "absurd-value": _absurd_value,

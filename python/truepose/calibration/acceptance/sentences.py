@@ -62,9 +62,9 @@ def _trimmed(text: str) -> str:
     return re.sub(r"^(\D?\d+)(?:\.0+|(\.\d*?)0+)(?!\d)", r"\1\2", text)
 
 
-def times(ratio: float) -> str:
+def times(ratio: float, digits: int = 2) -> str:
     """A ratio with two digits: "37", "1.2", "410"."""
-    return _digits(ratio, 2)
+    return _digits(ratio, digits)
 
 
 def _digits(value: float, digits: int) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,10 +17,13 @@ from truepose.calibration.least_squares import (
     singular_decomposition,
 )
 from truepose.machine import Machine
+from truepose.probability.normal_length import length_quantile
 from truepose.representation import Represented
 
 POSITION = "xyz"
 ROTATION = "abc"
+KEPT = 0.95
+"""Probability of what is promised of the tool."""
 SLIGHT = 1e-3
 """Of the largest effect of any unknown at the tool, by columns of length one: less is none."""
 
@@ -28,6 +31,11 @@ SLIGHT = 1e-3
 def tool_components(machine: Machine) -> list[str]:
     """The machine's components as they are called here: x y z, and a b c for rotations."""
     return [_ROTATIONS.get(name, name) for name in machine.components]
+
+
+def commanded_components(machine: Machine) -> list[str]:
+    """Those of them that are commanded; the others are parasitic motions."""
+    return [name for name in tool_components(machine) if name in machine.commanded]
 
 
 _ROTATIONS = {"rx": "a", "ry": "b", "rz": "c"}
@@ -38,13 +46,16 @@ class ToolUncertainty(Represented):
     """Standard uncertainty of the tool, base frame, m and rad, inf where it is not determined.
 
     `standard` (n_pose, n_component); `position` and `rotation` (n_pose,): square roots of the sums
-    of the squares of their components.
+    of the squares of their components. `commanded`: the components that a command sets; the others
+    are parasitic motions. `root` (n_pose, n_component, r): of the covariance.
     """
 
     components: tuple[str, ...]
     standard: Floats
     position: Floats
     rotation: Floats
+    commanded: tuple[str, ...]
+    root: Floats
 
     @property
     def position_max(self) -> float:
@@ -60,6 +71,41 @@ class ToolUncertainty(Represented):
     def worst(self) -> tuple[float, float]:
         """`position_max` and `rotation_max`."""
         return self.position_max, self.rotation_max
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(n_pose, n_component, n_component), inf in rows and columns that are not determined."""
+        covariance: Floats = self.root @ self.root.transpose(0, 2, 1)
+        open_ = np.isinf(self.standard)
+        covariance[open_[:, :, np.newaxis] | open_[:, np.newaxis, :]] = np.inf
+        return covariance
+
+    @cached_property
+    def within(self) -> tuple[float, float]:
+        """What position (m) and rotation (rad) keep in 95 % at their worst pose, as commanded.
+
+        The quantile of the length of the error over the freedoms that are commanded.
+        """
+        position, rotation = (
+            float(length_quantile(self._commanded(names), KEPT).max(initial=0.0))
+            for names in (POSITION, ROTATION)
+        )
+        return position, rotation
+
+    def largest_variance(self, length: float) -> float:
+        """Trace of the covariance of what is commanded at its worst pose, m², rotations times m."""
+        position, rotation = (
+            np.einsum("pcc->p", self._commanded(names)) for names in (POSITION, ROTATION)
+        )
+        return float((position + length**2 * rotation).max(initial=0.0))
+
+    def _commanded(self, names: str) -> Floats:
+        at = [
+            index
+            for index, name in enumerate(self.components)
+            if name in names and name in self.commanded
+        ]
+        return self.covariance[:, at][:, :, at]
 
     @property
     def position_rms(self) -> float:
@@ -106,16 +152,27 @@ class Tool:
 
     `positions` (n_pose, 3), m, or None. `length`: what a rotation is multiplied with to be compared
     with a displacement, the root mean square distance of the positions from their middle.
+    `commanded`: components that a command sets.
     """
 
     components: tuple[str, ...]
     effects: Floats
     positions: Floats | None
     length: float
+    commanded: tuple[str, ...]
 
     @classmethod
-    def of(cls, effects: ArrayLike, components: Sequence[str], positions: ArrayLike | None) -> Tool:
-        """Raises `ValueError` for shapes that do not fit."""
+    def of(
+        cls,
+        effects: ArrayLike,
+        components: Sequence[str],
+        positions: ArrayLike | None,
+        commanded: Sequence[str] | None = None,
+    ) -> Tool:
+        """All components are `commanded` where it is not said.
+
+        Raises `ValueError` for shapes that do not fit.
+        """
         array = np.asarray(effects, np.float64)
         if array.ndim != 3 or array.shape[1] != len(components):
             raise ValueError(
@@ -130,7 +187,8 @@ class Tool:
         length = 1.0
         if points is not None and points.size:
             length = _rms(np.linalg.norm(points - points.mean(axis=0), axis=1)) or 1.0
-        return cls(tuple(components), array, points, length)
+        set_ = tuple(components if commanded is None else commanded)
+        return cls(tuple(components), array, points, length, set_)
 
     @cached_property
     def moved(self) -> Flags:
@@ -154,6 +212,8 @@ class Tool:
             standard,
             self._size(standard, POSITION),
             self._size(standard, ROTATION),
+            self.commanded,
+            of_root.reshape(n_pose, n_component, root.shape[1]),
         )
 
     def beforehand(self, prior: Floats) -> ToolUncertainty | None:
@@ -202,7 +262,7 @@ class Tool:
         basis = column_basis(flat @ gauge.T, SLIGHT)
         left = flat - basis @ (basis.T @ flat)
         effects = left.reshape(self.effects.shape) / self._weights()[:, np.newaxis]
-        return Tool(self.components, effects, self.positions, self.length)
+        return replace(self, effects=effects)
 
     def _weights(self) -> Floats:
         return np.array([1.0 if name in POSITION else self.length for name in self.components])

@@ -24,7 +24,12 @@ from truepose.calibration.acceptance.observability import (
     project_out_instruments,
     row_covariance,
 )
-from truepose.calibration.acceptance.tool_uncertainty import Considered, Tool, tool_components
+from truepose.calibration.acceptance.tool_uncertainty import (
+    Considered,
+    Tool,
+    commanded_components,
+    tool_components,
+)
 from truepose.calibration.identification.equations import whitened
 from truepose.calibration.identification.fit import Fit
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
@@ -35,12 +40,12 @@ from truepose.machine import Machine
 
 
 def consider_covariance(
-    machine: Machine, fitted: Fit, identify: Sequence[str], joints: Floats, placements: Floats
+    machine: Machine, fitted: Fit, identify: Sequence[str], poses: Floats
 ) -> Considered | None:
     """None where every tolerance was identified.
 
-    `identify`: as it was asked; `joints`, `placements`: of the poses at which the tool counts, all
-    of them within reach of the calibrated machine.
+    `identify`: as it was asked; `poses` (n, n_commanded), at which the tool counts, all of them
+    within reach of the calibrated machine.
     """
     every = _with_unidentified(machine, fitted, identify)
     if every is None:
@@ -52,8 +57,10 @@ def consider_covariance(
     unidentified = np.setdiff1d(np.arange(count), identified)
     problem = IdentificationProblem(machine, fitted.measurements, every)
     rows = np.sqrt(fitted.weights)[:, np.newaxis] * whitened(problem, values) / fitted.birge
-    effects, _ = tool_effects(machine, every, values, joints, placements)
-    tool = Tool.of(effects, tool_components(machine), placements[:, :3])
+    at = tool_effects(machine, every, values, poses)
+    tool = Tool.of(
+        at.effects, tool_components(machine), at.positions, commanded_components(machine)
+    )
     prior = np.asarray(every.prior_covariance, np.float64)[:count, :count]
     sigma: Floats = np.sqrt(np.diagonal(prior))
     relative = False
@@ -69,7 +76,7 @@ def consider_covariance(
     )
     root, part = _roots(fitted, every, rows, identified, unidentified)
     return Considered(
-        tuple(every.labels[at] for at in unidentified),
+        tuple(every.labels[number] for number in unidentified),
         every.labels[:count],
         tool.beforehand(prior),
         tool.uncertainty(root, none),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.arrays import Floats
+from truepose.arrays import Flags, Floats
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.least_squares import singular_decomposition
@@ -21,6 +21,14 @@ ROUNDING = 1e-13
 HELD = 1e-3
 """Weight of the rows that hold an undetermined direction, in shares of the largest singular value;
 no other equation acts on it."""
+
+FIRM = 1e-3
+"""Share of the machine, or radians, by which a held direction gives way to one standard
+uncertainty: what readings see of it once the machine has moved must not pull it away."""
+
+FAINT = (1.0, 0.1, 0.01, 1e-3)
+"""Shares of the machine, or radians: directions known to no better than this by themselves are held
+where the search does not settle, the faintest first."""
 
 SETTLED = ("cost", "step", "gradient")
 """How a search ends that found what it looked for."""
@@ -82,14 +90,44 @@ class Equations:
     @property
     def covariance(self) -> Floats:
         """(n, n) over what is determined, in the unknowns' own units."""
-        rows = self.directions[self.seen] / self.singular[self.seen, np.newaxis] * self.scale
-        covariance: Floats = rows.T @ rows
+        covariance: Floats = self.root @ self.root.T
         return covariance
 
-    def gauge_rows(self) -> Floats:
-        """(k, n) rows that hold what is not determined."""
-        firmness = HELD * float(self.singular.max(initial=1.0))
-        rows: Floats = firmness * self.null_space / self.scale
+    @property
+    def root(self) -> Floats:
+        """(n, r) whose product with its transpose is the covariance."""
+        rows = self.directions[self.seen] / self.singular[self.seen, np.newaxis] * self.scale
+        columns: Floats = rows.T
+        return columns
+
+    def faint(self, extent: Floats, share: float) -> Floats:
+        """(k, n) directions, in the unknowns' own units, that are hardly determined.
+
+        One standard uncertainty along them is more than `share` of `extent` (n,) of an unknown: a
+        model that is linear over such a way is none, and a search does not come to its end.
+        """
+        steps = self.directions * self.scale
+        lengths = np.abs(steps / extent).max(axis=1, initial=0.0)
+        rows: Floats = steps[lengths > share * self.singular]
+        return rows
+
+    def gauge_rows(self, extent: Floats | None = None, *, own_scale: bool = True) -> Floats:
+        """(k, n) rows that hold what is not determined.
+
+        With `extent` (n,), firmly: one standard uncertainty of a row is at most `FIRM` of it. Held
+        is what is across all else in values over `scale`, or, where not `own_scale`, over `extent`:
+        a scale that faint columns gave says nothing once the machine has moved.
+        """
+        firmness = np.full(len(self.null_space), HELD * float(self.singular.max(initial=1.0)))
+        rows: Floats = firmness[:, np.newaxis] * self.null_space / self.scale
+        if extent is None:
+            return rows
+        steps = self.null_space * self.scale / extent
+        lengths = np.abs(steps).max(axis=1, initial=0.0)
+        loose = lengths > FIRM * firmness
+        rows[loose] *= (lengths / (FIRM * firmness))[loose, np.newaxis]
+        if not own_scale:
+            rows[loose] = steps[loose] / (FIRM * lengths[loose, np.newaxis] * extent)
         return rows
 
 
@@ -98,17 +136,20 @@ def whitened(problem: IdentificationProblem, values: Floats) -> Floats:
 
     Raises `RequestError` (no-fit) where a pose of the machine with these values cannot be solved.
     """
-    return whitened_jacobian(problem, values, problem.jacobian(values))
+    every = np.ones(problem.measurements.n_observation, np.bool_)
+    return whitened_jacobian(problem, values, problem.jacobian(values), every)
 
 
-def whitened_jacobian(problem: IdentificationProblem, values: Floats, jacobian: Floats) -> Floats:
-    """The same of derivatives (m, n) that are at hand."""
-    if not np.isfinite(jacobian).all():
+def whitened_jacobian(
+    problem: IdentificationProblem, values: Floats, jacobian: Floats, counted: Flags
+) -> Floats:
+    """The same of a Jacobian that is there; zero where a reading does not count and has none."""
+    if not np.isfinite(jacobian[counted]).all():
         status = problem.status(values)
         rows = np.flatnonzero(status)
         raise no_fit(problem, "a pose of it cannot be solved or is singular", rows)
     slope: Floats = jacobian / problem.measurements.uncertainty[:, np.newaxis]
-    return slope
+    return np.where(np.isfinite(slope).all(axis=1, keepdims=True), slope, 0.0)
 
 
 def no_fit(problem: IdentificationProblem, reason: str, rows: np.ndarray) -> RequestError:

@@ -138,13 +138,14 @@ class IdentificationProblem(Represented):
         weights: ArrayLike | None = None,
         start: ArrayLike | None = None,
         tolerances: tuple[float, float, float] = TOLERANCES,
+        most_evaluations: int = MOST_EVALUATIONS,
     ) -> Solved:
         """Values that explain the readings best.
 
         `measured` (n_observation,) or (n_set, n_observation), default the measurements' own; every
         set is fitted alone, from `start` (n,), default the prior's mean. `weights` (n_observation,)
-        multiply squared residuals. `prior`: default the unknowns' own where they have one.
-        `tolerances`: when the search has settled.
+        multiply squared residuals; a row of which all are 0 need not be solved. `prior`: default
+        the unknowns' own where they have one. `tolerances`: when the search has settled.
         """
         known = Prior.of(self.unknowns) if prior is None else prior
         read = np.atleast_2d(self.measurements.value if measured is None else measured)
@@ -158,7 +159,7 @@ class IdentificationProblem(Represented):
             known.mean,
             known.mean if start is None else start,
             tolerances,
-            MOST_EVALUATIONS,
+            most_evaluations,
         )
         return Solved(values, cost, tuple(ending), tuple(evaluations))
 

@@ -58,7 +58,8 @@ class Outlier:
     """A reading that does not fit: `row` counts from 0, `line` is the file's (0: none).
 
     `sigmas`: its residual in standard deviations, with its sign. `held_out`: of a row that was kept
-    from the fit, whose prediction adds to them.
+    from the fit, whose prediction adds to them. `unplaced`: of a row at whose joints the machine
+    found cannot be assembled, which therefore has no residual: `sigmas` is 0.
     """
 
     row: int
@@ -67,11 +68,17 @@ class Outlier:
     what: str
     sigmas: float
     held_out: bool = False
+    unplaced: bool = False
 
     @property
     def sentence(self) -> str:
         """For people."""
         where = f"line {self.line}" if self.line else f"row {self.row}"
+        if self.unplaced:
+            return (
+                f"{where}: {self.what} of {self.instrument} was left out, because the machine "
+                "cannot be assembled where it was commanded to: look at the command"
+            )
         kept = ", in a row kept from the fit" if self.held_out else ""
         size = f"{abs(self.sigmas):.3g} sigma off"
         return f"{where}: {self.what} of {self.instrument} is {size}{kept}"
@@ -85,6 +92,8 @@ def outliers(
 ) -> tuple[Outlier, ...]:
     """Readings that are `OUTLIER` standard deviations or more off, the worst first.
 
+    Before them those of rows that cannot be placed.
+
     `whole`: all measurements, in which rows are counted; of those kept from the fit, `checked` says
     how far they are off.
     """
@@ -96,10 +105,12 @@ def outliers(
     if checked is not None:
         size[kept] = checked.standardised[kept]
     odd = []
-    for at in np.flatnonzero(np.abs(size) >= OUTLIER).tolist():
+    unplaced = np.zeros(data.n_observation, np.bool_)
+    unplaced[~kept] = fit.unplaced[fit.measurements.row]
+    for at in np.flatnonzero(unplaced | (np.abs(size) >= OUTLIER)).tolist():
         row = int(data.row[at])
         what = column_name(machine, int(data.observable[at]), int(data.strut[at]))
         name = data.instruments[int(data.instrument[row])].name
         line, sigmas = int(data.lines[row]), float(size[at])
-        odd.append(Outlier(row, line, name, what, sigmas, bool(kept[at])))
-    return tuple(sorted(odd, key=lambda outlier: -abs(outlier.sigmas)))
+        odd.append(Outlier(row, line, name, what, sigmas, bool(kept[at]), bool(unplaced[at])))
+    return tuple(sorted(odd, key=lambda one: (not one.unplaced, -abs(one.sigmas))))

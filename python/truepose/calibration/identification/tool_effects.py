@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose.arrays import Floats
+from truepose._kernel import STATUS
+from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import Candidate
 from truepose.calibration.identification.fit import Fit
 from truepose.calibration.identification.problem import (
@@ -27,19 +28,21 @@ from truepose.runs.poses import OK, requested_poses
 MOST_POSES = 300
 """Poses of the workspace at which the tool's uncertainty is computed; more are thinned evenly."""
 
+OUT_OF_TRAVEL = STATUS.index("out_of_travel")
+
 FURTHER = (5, 20)
 """Numbers of further poses that are tried as a remedy."""
 
 
-def workspace_poses(machine: Machine, poses: ArrayLike | None) -> tuple[Floats, Floats, Floats]:
-    """(poses (n, n_commanded), joints, placements) that the machine can take, thinned evenly.
+def workspace_poses(machine: Machine, poses: ArrayLike | None) -> Floats:
+    """Poses (n, n_commanded) that the machine as filed can take, thinned evenly.
 
     Raises `RequestError` (no-workspace, no-pose-left).
     """
     table = machine.poses() if poses is None else requested_poses(machine, poses)
     if len(table) > MOST_POSES:
         table = table[np.linspace(0, len(table) - 1, MOST_POSES).round().astype(np.intp)]
-    joints, placements, status = machine.kernel.place(table)
+    _, _, status = machine.kernel.place(table)
     usable = status == OK
     if not usable.any():
         raise RequestError(
@@ -51,32 +54,48 @@ def workspace_poses(machine: Machine, poses: ArrayLike | None) -> tuple[Floats, 
                 expected="poses of the workspace that it reaches",
             )
         )
-    return table[usable], joints[usable], placements[usable]
+    reached: Floats = table[usable]
+    return reached
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ToolEffects:
+    """What unknowns do at the tool of the machine in use: commanded as it was found to be.
+
+    `effects` (n_usable, n_component, n_machine): d(error of the tool)/d(unknown), base frame.
+    `positions` (n_usable, 3), m. `usable` (n_pose,): whether the calibrated machine can be there.
+    """
+
+    effects: Floats
+    positions: Floats
+    usable: Flags
 
 
 def tool_effects(
-    machine: Machine, unknowns: Unknowns, values: Floats, joints: Floats, placements: Floats
-) -> tuple[Floats, np.ndarray]:
-    """d(error of the tool)/d(unknown) (n_usable, n_component, n_machine), once calibrated.
+    machine: Machine, unknowns: Unknowns, values: Floats, poses: Floats
+) -> ToolEffects:
+    """At `poses` (n_pose, n_commanded), to which the joints take the machine with these values.
 
-    And which poses (n_pose,) are usable: those that the calibrated machine still reaches.
-    Properties act as the machine's own condition lets them.
+    They are those of its own inverse kinematics: what a controller commands that holds the
+    calibrated machine, or whose commands are compensated. Properties act as the machine's own
+    condition lets them.
     """
-    change = unknowns.parameter_change(values)
-    columns, moved = unknowns.columns, unknowns.columns
-    effects = np.zeros((len(joints), len(machine.components), unknowns.n_machine))
-    slopes, status = machine.kernel.sensitivity_moved(
-        joints, placements, columns, moved, change[np.newaxis, :]
-    )
-    effects += slopes @ unknowns.effects[:, : unknowns.n_machine]
+    change = unknowns.parameter_change(values)[np.newaxis, :]
+    columns = unknowns.columns
+    joints, placements, placed = machine.kernel.corrected(poses, columns, change)
+    slopes, status = machine.kernel.sensitivity_moved(joints, placements, columns, columns, change)
+    effects = slopes @ unknowns.effects[:, : unknowns.n_machine]
     if unknowns.properties:
         rows = _without_readings(joints, placements, (machine.condition,) * len(joints))
         base = row_shifts(machine, rows, unknowns)
         for number, (own, amounts) in property_effects(machine, rows, unknowns, base):
-            sensitivity, _ = machine.kernel.sensitivity_at(joints, placements, own)
+            sensitivity, _ = machine.kernel.sensitivity_moved(
+                joints, placements, own, columns, change
+            )
             effects[:, :, number] = np.einsum("pck,pk->pc", sensitivity, amounts)
-    usable = status == OK
-    return effects[usable], usable
+    # Out of travel there is a pose as well, and an offset that is found moves the travel with it.
+    usable = np.isin(placed, (OK, OUT_OF_TRAVEL)) & (status == OK)
+    return ToolEffects(effects[usable], placements[usable, :3], usable)
 
 
 def _without_readings(

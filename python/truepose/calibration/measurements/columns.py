@@ -105,6 +105,8 @@ class MeasurementRows:
     wrench: Mapping[str, Floats] = field(default_factory=dict)
     unreadable: Mapping[str, Flags] = field(default_factory=dict)
     whole: frozenset[str] = frozenset()
+    other_mode: Flags | None = None
+    """(n_row,) rows that are stated to be in another assembly mode than that of home."""
 
     @property
     def n_row(self) -> int:

@@ -21,6 +21,7 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.instruments import REGISTRY
+from truepose.calibration.measurements.assembly_modes import HOME, OTHER
 from truepose.calibration.measurements.columns import (
     TO,
     UNCERTAINTY,
@@ -47,6 +48,7 @@ from truepose.machine.condition import DEFAULT_PART
 from truepose.sources.tolerance import bands_of
 
 INSTRUMENT, SET, ID = "instrument", "set", "id"
+ASSEMBLY_MODE = "assembly_mode"
 FIT, CHECK = "fit", "check"
 
 _KIND = FileKind("a file of measurements (CSV)", ".csv")
@@ -107,6 +109,7 @@ def _columns(machine: Machine) -> list[Column]:
         columns += [may(name, reading.dimension), may(name + UNCERTAINTY, reading.dimension)]
     columns += [may(f"temperature.{part}", "temperature") for part in _parts(machine)]
     columns += [may(name, dimension) for name, dimension in WRENCH.items()]
+    columns.append(may(ASSEMBLY_MODE, None, (HOME, OTHER)))
     return [*columns, may(SET, None, (FIT, CHECK)), may(ID, None)]
 
 
@@ -162,6 +165,9 @@ class _Reading:
             wrench={name: table.numbers[name] for name in WRENCH if name in table.numbers},
             unreadable=self.read.unreadable,
             whole=self.header.whole,
+            other_mode=np.array([w == OTHER for w in table.texts.get(ASSEMBLY_MODE, ())])
+            if ASSEMBLY_MODE in table.texts
+            else None,
         )
         misnamed = not codes.isdisjoint(
             ("unknown-column", "unknown-parameter", "doubled-column", "other-machine")
@@ -276,6 +282,7 @@ class _Reading:
             _PARAMETER + self.machine.parameters[0],
             "temperature.default",
             *WRENCH,
+            ASSEMBLY_MODE,
             SET,
             ID,
         ]

@@ -15,6 +15,10 @@ import numpy as np
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.instruments import REGISTRY, Instrument, Kind
 from truepose.calibration.instruments._base import moved
+from truepose.calibration.measurements.assembly_modes import (
+    NO_OTHER_MODE,
+    stand_in_other_modes,
+)
 from truepose.calibration.measurements.columns import (
     UNCERTAINTY,
     WRENCH,
@@ -43,6 +47,8 @@ def measurements_in(
 ) -> Measurements:
     """Measurements from rows; of no use where something was reported on the way."""
     placed = commanded_poses(machine, instruments, rows, report)
+    for row in stand_in_other_modes(machine, rows.other_mode, placed.joints, placed.placements):
+        report(NO_OTHER_MODE, row=row, column="assembly_mode")
     conditions = _conditions(machine, rows, report)
     columns = reading_columns(machine)
     observed = _Observations(machine, instruments, rows, report, columns)

@@ -10,9 +10,16 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument
+from truepose.calibration.measurements.assembly_modes import HOME, OTHER, in_other_mode
 from truepose.calibration.measurements.columns import TO, UNCERTAINTY, WRENCH, reading_columns
 from truepose.calibration.measurements.measurements import Measurements
-from truepose.calibration.measurements.read_csv import CHECK, FIT, INSTRUMENT, SET
+from truepose.calibration.measurements.read_csv import (
+    ASSEMBLY_MODE,
+    CHECK,
+    FIT,
+    INSTRUMENT,
+    SET,
+)
 from truepose.calibration.observables import OBSERVABLES, si_unit
 from truepose.errors import Problem, RequestError
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
@@ -51,6 +58,9 @@ def measurements_text(machine: Machine, measurements: Measurements) -> str:
             columns.numbers(f"{TO}joint.{drive.name}", drive.coordinate, second)
     _readings(machine, measurements, columns)
     _conditions(machine, measurements, columns)
+    other = in_other_mode(machine, measurements.joints, measurements.placements)
+    if other.any():
+        columns.words(ASSEMBLY_MODE, [OTHER if each else HOME for each in other.tolist()])
     columns.words(SET, [CHECK if held_out else FIT for held_out in measurements.held_out.tolist()])
     return "\n".join([*head, *columns.lines(), ""])
 

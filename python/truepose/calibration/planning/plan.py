@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.acceptance.observability import project_out_instruments, row_covariance
-from truepose.calibration.acceptance.tool_uncertainty import Tool
+from truepose.calibration.acceptance.tool_uncertainty import Tool, tool_components
 from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.calibration.instruments import Instrument
@@ -380,19 +380,15 @@ def _tool(
     part of every effect is removed, as in the acceptance, and the flag is set.
     """
     n_machine = unknowns.n_machine
-    own_effects, solved = tool_effects(
-        machine, unknowns, unknowns.prior_mean, over.joints, over.placements
-    )
-    effects = np.zeros((*own_effects.shape[:2], unknowns.count))
-    effects[:, :, :n_machine] = own_effects
+    own = tool_effects(machine, unknowns, unknowns.prior_mean, over.poses)
+    effects = np.zeros((*own.effects.shape[:2], unknowns.count))
+    effects[:, :, :n_machine] = own.effects
     if n_machine == unknowns.count:
         return effects, False
     sigma = np.sqrt(np.diagonal(unknowns.prior_covariance))[:n_machine]
     triangle = np.linalg.qr(blocks.reshape(-1, unknowns.count), mode="r")
     seen = row_covariance(project_out_instruments(triangle, n_machine, sigma))
-    # The tool's rotations are named as angles there.
-    names = ["abc"["xyz".index(name[1])] if name[0] == "r" else name for name in machine.components]
-    tool = Tool.of(own_effects, names, over.placements[solved, :3])
+    tool = Tool.of(own.effects, tool_components(machine), own.positions)
     gauge = tool.sort(seen, with_gauge=True).gauge
     effects[:, :, :n_machine] = tool.relative(gauge).effects
     return effects, len(gauge) > 0

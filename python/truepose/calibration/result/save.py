@@ -13,7 +13,7 @@ from truepose.calibration.acceptance import sentences
 from truepose.calibration.acceptance.observability import covariance_root, prior_rows
 from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.dataset import covariance_of, determined_covariance, verdict_of
-from truepose.calibration.identification.tool_effects import tool_effects, workspace_poses
+from truepose.calibration.identification.tool_effects import tool_effects
 from truepose.calibration.result.file import DEFAULT_COVERAGE, Provenance, write_calibrated
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import did_you_mean, one_of
@@ -164,8 +164,7 @@ def _of_properties(calibration: Calibration, covariance: Floats) -> list[str]:
     unknowns, machine = calibration.fit.unknowns, calibration.machine
     if not unknowns.properties or not np.isfinite(covariance).all():
         return []
-    _, joints, placements = workspace_poses(machine, calibration.poses)
-    effects, _ = tool_effects(machine, unknowns, calibration.fit.values, joints, placements)
+    effects = tool_effects(machine, unknowns, calibration.fit.values, calibration.poses).effects
     stated = effects.copy()
     stated[:, :, list(unknowns.properties)] = 0.0
     root, none = covariance_root(covariance), np.zeros((0, unknowns.n_machine))

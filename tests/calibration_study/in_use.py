@@ -7,7 +7,6 @@ of the drawing. Its joints are worked out in NumPy, and so is where the tool the
 from __future__ import annotations
 
 import csv
-import inspect
 import io
 import re
 from collections.abc import Callable
@@ -45,10 +44,7 @@ def written(found: Calibration, twin: Twin, folder: Path) -> Machine:
     """The machine file of a controller that keeps the drawing's geometry, as it is read again."""
     path = folder / f"{twin.path.stem}-calibrated.toml"
     path.unlink(missing_ok=True)
-    asked = inspect.signature(found.save).parameters
-    # The former way to say so; where the controller has a key of its own it is the default.
-    old = {} if "controller_holds" in asked else {"as_shifts": True}
-    return found.save(path, original=twin.path, date="2026-01-01", **old)
+    return found.save(path, original=twin.path, date="2026-01-01")
 
 
 def used_of(drawn: DrawnSet) -> list[Used]:

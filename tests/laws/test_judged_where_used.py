@@ -22,6 +22,7 @@ from truepose.calibration.identification.problem import IdentificationProblem
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.result.bands import tolerance_covariance
 from truepose.machine import Machine
+from truepose.machine.tables.controller import Holds
 
 Floats = NDArray[np.float64]
 NEAR = 0.01
@@ -35,11 +36,11 @@ class Made:
     found: Calibration
     original: Path
 
-    def written(self, folder: Path, *, as_shifts: bool = False) -> Machine:
+    def written(self, folder: Path, holds: Holds = "calibrated") -> Machine:
         """The machine of its file, forced where the answer is no."""
-        path = folder / f"{self.original.stem}_{as_shifts}.toml"
+        path = folder / f"{self.original.stem}_{holds}.toml"
         settings = {"original": self.original, "date": "2026-01-31", "force": True}
-        return self.found.save(path, as_shifts=as_shifts, **settings)
+        return self.found.save(path, controller_holds=holds, **settings)
 
 
 def made(name: str, band: str = "", *, frame: str = "base", identify: tuple[str, ...] = ()) -> Made:
@@ -110,7 +111,7 @@ def test_it_is_not_that_of_the_joints_of_the_drawing(tmp_path: Path) -> None:
     assert np.abs(unknowns.parameter_change(case.found.fit.values)).max() > 0.04
     # Values as known deviations, and nothing is compensated: the tool is elsewhere.
     elsewhere, kept = covariance_of(
-        case.written(tmp_path, as_shifts=True), case.found.poses[case.found.usable]
+        case.written(tmp_path, "drawing"), case.found.poses[case.found.usable]
     )
     after = case.found.gate.after.covariance[kept]
     sizes = np.einsum("pcc->pc", after).max(axis=0)
@@ -120,7 +121,7 @@ def test_it_is_not_that_of_the_joints_of_the_drawing(tmp_path: Path) -> None:
 def test_corrected_commands_of_known_deviations_lead_there(tmp_path: Path) -> None:
     """By draws: machines of the file, commanded as `truepose compensate` does, about the pose."""
     case = made("walking_6psu", "3 mm")
-    written, found = case.written(tmp_path, as_shifts=True), case.found
+    written, found = case.written(tmp_path, "drawing"), case.found
     poses = found.poses[found.usable]
     bands = tolerance_covariance(written)
     corrected = tp.compensate(written, poses, reference_condition(written))

@@ -24,8 +24,9 @@ from calibration_study.truth import (
     Twin,
     assembled_elsewhere,
 )
-from truepose.calibration.identification.fit import place_instruments, whitened
-from truepose.calibration.identification.problem import Prior
+from truepose.calibration.identification.equations import whitened
+from truepose.calibration.identification.placement import place_instruments
+from truepose.calibration.identification.problem import IdentificationProblem, Prior
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.errors import TrueposeError
@@ -75,7 +76,8 @@ class Measured:
                 machine = self.twin.loaded
                 data = read_measurements(self.csv(self.table), machine)
                 unknowns = unknowns_of(machine, data)
-                problem = place_instruments(machine, data, unknowns)[0]
+                standing = place_instruments(machine, data).measurements
+                problem = IdentificationProblem(machine, standing, unknowns)
                 rows = whitened(problem, unknowns.prior_mean)
             except TrueposeError:
                 return None

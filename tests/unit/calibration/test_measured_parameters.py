@@ -234,7 +234,8 @@ def test_a_wrong_unit_of_a_part_is_named(delta: Machine) -> None:
 def test_the_advice_to_measure_the_rods_can_be_followed(tmp_path: Path) -> None:
     """The sentences of the refusal, read and done: rows in the same file, and it is a yes.
 
-    The rods, and the height of one more point, are those of the machine that the positions of the same printer give.
+    The rods, and the height of one more point, are those of the machine that the positions of the
+    same printer give.
     """
     data = EXAMPLES / "data"
     machine = tp.load(data / "delta_printer.toml")

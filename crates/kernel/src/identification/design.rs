@@ -78,7 +78,7 @@ pub struct Design {
 
 /// What a reading is made of.
 #[derive(Clone, Copy, Debug)]
-pub enum Sight {
+pub enum Observed {
     /// A view of the platform, by its number.
     View(usize),
     /// The views at two poses.
@@ -108,7 +108,7 @@ pub struct Prepared {
     /// The observations of pose i are `of_pose[i]..of_pose[i + 1]`.
     pub of_pose: Vec<usize>,
     /// What each observation is made of; neighbours share their view.
-    pub sights: Vec<Sight>,
+    pub sights: Vec<Observed>,
     /// Pose and instrument of each view, and whether angles are read in it.
     pub sighted: Vec<(usize, usize, bool)>,
     /// For each parameter of the machine the terms that move it.
@@ -147,13 +147,13 @@ impl Prepared {
         for observation in &design.observations {
             let Observation { pose, instrument, observable, other, .. } = *observation;
             sights.push(match (observable, other) {
-                (Observable::Parameter, _) => Sight::Parameter,
+                (Observable::Parameter, _) => Observed::Parameter,
                 (_, Some(other)) => {
                     let first = view(pose, instrument, false);
-                    Sight::Between(first, view(other, instrument, false))
+                    Observed::Between(first, view(other, instrument, false))
                 }
-                _ if observable.of_strut() => Sight::Strut,
-                _ => Sight::View(view(pose, instrument, observable.is_angle())),
+                _ if observable.of_strut() => Observed::Strut,
+                _ => Observed::View(view(pose, instrument, observable.is_angle())),
             });
         }
         let mut movers = vec![Vec::new(); design.machine.nominal.len()];

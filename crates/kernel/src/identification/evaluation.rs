@@ -1,6 +1,6 @@
 //! What the instruments read for given unknowns, and its derivatives; normal equations in one pass.
 
-use super::design::{Design, Prepared, Sight};
+use super::design::{Design, Observed, Prepared};
 use super::observation::{InstrumentView, Placed, Reading, StrutView, of_strut};
 use crate::batch::{Deviations, Rows, Samples, Sensitivity, first_order, forward_poses};
 use crate::dispatch::{Work, dispatch};
@@ -168,15 +168,15 @@ impl<'a> Evaluation<'a> {
                 continue;
             }
             let placed = &self.placed[observation.instrument];
-            if matches!(sight, Sight::Strut | Sight::Parameter) && last != observation.pose {
+            if matches!(sight, Observed::Strut | Observed::Parameter) && last != observation.pose {
                 joints = self.inputs(observation.pose, &mut parameters);
                 last = observation.pose;
             }
             let reading = match *sight {
-                Sight::View(view) => self.views[view].value(observation.observable, placed),
-                Sight::Between(from, to) => self.views[from].separation(&self.views[to]).0.value,
-                Sight::Parameter => parameters[observation.part],
-                Sight::Strut => {
+                Observed::View(view) => self.views[view].value(observation.observable, placed),
+                Observed::Between(from, to) => self.views[from].separation(&self.views[to]).0.value,
+                Observed::Parameter => parameters[observation.part],
+                Observed::Strut => {
                     let instrument = &design.instruments[observation.instrument];
                     let what = (observation.observable, observation.part);
                     let inputs = (parameters.as_slice(), joints);
@@ -381,10 +381,10 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
                     }
                 };
                 let reading = match prepared.sights[number] {
-                    Sight::View(view) => {
+                    Observed::View(view) => {
                         evaluation.views[view].reading(observation.observable, placed)
                     }
-                    Sight::Between(from, to) => {
+                    Observed::Between(from, to) => {
                         let (from, to) = (&evaluation.views[from], &evaluation.views[to]);
                         let (reading, to_other) = from.separation(to);
                         if let Some(other) = observation.other {
@@ -393,11 +393,11 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
                         }
                         reading
                     }
-                    Sight::Parameter => {
+                    Observed::Parameter => {
                         moved(observation.part, 1.0);
                         Reading::new(0.0)
                     }
-                    Sight::Strut => {
+                    Observed::Strut => {
                         let q =
                             *joints.get_or_insert_with(|| evaluation.inputs(pose, &mut parameters));
                         if strut.as_ref().is_none_or(|(index, _)| *index != observation.part) {

@@ -215,8 +215,20 @@ def _tried(
                 misfit = hypothesis.misfit
             except RequestError:
                 continue
+            if not (wanted is None or _changes(hypothesis, view)):
+                continue
             if misfit.redundancy >= REDUNDANT and misfit.size(hypothesis.trimmed) <= ALLOWED:
                 yield _Supposition(number, kind, hypothesis, view)
+
+
+def _changes(hypothesis: Hypothesis, view: View) -> bool:
+    """Whether the readings would be other ones by more than their noise, not only less certain."""
+    rows = hypothesis.supposed.rows
+    if rows.value.shape != view.own.value.shape:
+        return True
+    other = np.abs(rows.value - view.own.value) > view.own.uncertainty
+    moved = rows.joints is not view.own.joints
+    return moved or bool(other.mean() > 0.5)
 
 
 def _by_noise(explained: list[tuple[float, _Supposition]]) -> list[tuple[float, _Supposition]]:

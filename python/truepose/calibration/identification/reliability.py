@@ -18,6 +18,7 @@ from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.identification.data_snooping import UNCHECKED
 from truepose.calibration.identification.fit import Fit
 from truepose.calibration.identification.robust import OUTLIER
+from truepose.representation import Facts, Represented
 
 POWER = 3.1
 """Standard deviations by which an error must be beyond the limit to be named in 999 of 1000."""
@@ -26,8 +27,8 @@ DETECTED = OUTLIER + POWER
 """Size of an error, in standard deviations of its own residual, that is named."""
 
 
-@dataclass(frozen=True, eq=False)
-class ExternalReliability:
+@dataclass(frozen=True, eq=False, repr=False)
+class ExternalReliability(Represented):
     """Largest effect at the tool of a wrong reading that is not named, base frame.
 
     `position`, m, and `rotation`, rad: at the worst pose, of the worst reading; infinite where
@@ -39,6 +40,11 @@ class ExternalReliability:
     position: float
     rotation: float
     minimal_detectable_bias: Floats
+
+    def _facts(self) -> Facts:
+        yield "position", self.position
+        yield "rotation", self.rotation
+        yield "readings", len(self.minimal_detectable_bias)
 
 
 def external_reliability(fit: Fit, tool: Tool) -> ExternalReliability:

@@ -19,7 +19,7 @@ from truepose.calibration.identification.fit import Fit
 from truepose.calibration.residual_checks import drift, scale, step, target_offset, workspace
 from truepose.calibration.residual_checks._base import (
     ALARM,
-    Found,
+    Finding,
     Left,
     PatternKind,
     ResidualsView,
@@ -63,19 +63,19 @@ def residual_patterns(machine: Machine, fitted: Fit, tool: Tool) -> tuple[Suspic
     return tuple(suspected)
 
 
-def _likeliest(view: ResidualsView) -> tuple[str, Found] | None:
+def _likeliest(view: ResidualsView) -> tuple[str, Finding] | None:
     """What is least likely by chance, with its code."""
-    best: tuple[str, Found] | None = None
+    best: tuple[str, Finding] | None = None
     for kind in KINDS:
-        found = kind.inspect(view)
-        if found is None or found.pattern.probability > ALARM:
+        finding = kind.inspect(view)
+        if finding is None or finding.pattern.probability > ALARM:
             continue
-        if best is None or found.pattern.probability < best[1].pattern.probability:
-            best = kind.code, found
+        if best is None or finding.pattern.probability < best[1].pattern.probability:
+            best = kind.code, finding
     return best
 
 
-def _of_given_up(view: ResidualsView) -> tuple[str, Found] | None:
+def _of_given_up(view: ResidualsView) -> tuple[str, Finding] | None:
     """What explains the readings that the fit gave up, if anything does."""
     left = Left.with_given_up(view.fitted, view.number)
     if left is None:
@@ -86,17 +86,17 @@ def _of_given_up(view: ResidualsView) -> tuple[str, Found] | None:
     return best if explained else None
 
 
-def _said(view: ResidualsView, code: str, found: Found) -> Suspicion:
-    pattern = found.pattern
+def _said(view: ResidualsView, code: str, finding: Finding) -> Suspicion:
+    pattern = finding.pattern
     moved = f"which puts the tool up to {length_words(view, pattern.moved)} off"
     if not pattern.beyond:
         moved += ", within what is stated of it"
-    lines = tuple(int(view.data.lines[row]) for row in found.rows)
+    lines = tuple(int(view.data.lines[row]) for row in finding.rows)
     return Suspicion(
         code,
-        f"{view.instrument.name}: {found.words}, {moved}",
+        f"{view.instrument.name}: {finding.words}, {moved}",
         view.instrument.name,
-        rows=found.rows,
+        rows=finding.rows,
         lines=lines if all(lines) else (),
         refuses=pattern.beyond or view.fitted.birge > CONTRADICTED,
     )

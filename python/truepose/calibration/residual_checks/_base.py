@@ -334,7 +334,7 @@ WOULD_SHOW = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Finding:
     """A pattern, its `columns` (k, n), what is said of it, and the rows from which it is."""
 
     pattern: Pattern
@@ -349,4 +349,4 @@ class PatternKind:
 
     code: str
     doc: str
-    inspect: Callable[[ResidualsView], Found | None]
+    inspect: Callable[[ResidualsView], Finding | None]

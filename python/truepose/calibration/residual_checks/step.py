@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from truepose.calibration.residual_checks._base import Found, Pattern, PatternKind, ResidualsView
+from truepose.calibration.residual_checks._base import Finding, Pattern, PatternKind, ResidualsView
 from truepose.calibration.residual_checks.sizes import place_words
 
 LEAST_ROWS = 3
 """Rows on either side of a step: fewer are outliers."""
 
 
-def inspect(view: ResidualsView) -> Found | None:
+def inspect(view: ResidualsView) -> Finding | None:
     """The likeliest row from which on it stands elsewhere."""
     count = view.rows.size
     tests = count - 2 * LEAST_ROWS + 1
@@ -28,7 +28,7 @@ def inspect(view: ResidualsView) -> Found | None:
     where = view.named_rows(row - 1, row)
     words = f"it looks as if it was moved {where}, by {place_words(view, pattern.sizes)}"
     columns = np.where((view.place >= row)[:, np.newaxis], view.by_place, 0.0)
-    return Found(pattern, columns, words, (int(view.rows[row]),))
+    return Finding(pattern, columns, words, (int(view.rows[row]),))
 
 
 KIND = PatternKind("step", "an instrument was moved between two rows", inspect)

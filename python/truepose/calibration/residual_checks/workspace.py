@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from truepose.calibration.residual_checks._base import Found, Pattern, PatternKind, ResidualsView
+from truepose.calibration.residual_checks._base import Finding, Pattern, PatternKind, ResidualsView
 from truepose.calibration.residual_checks.sizes import length_words
 
 
-def inspect(view: ResidualsView) -> Found | None:
+def inspect(view: ResidualsView) -> Finding | None:
     """Polynomials of second degree in the tool's place, for each measured column by itself."""
     points = view.data.placements[view.data.row[view.own], :3]
     half = 0.5 * np.ptp(points, axis=0)
@@ -32,7 +32,7 @@ def inspect(view: ResidualsView) -> Found | None:
     lengths = bool(view.of_lengths[own].all())
     size = length_words(view, rms) if lengths else f"{rms:.2g}"
     words = f"its readings depend on the place as no unknown does, by {size} (rms)"
-    return Found(pattern, of_columns[:, [column]] * terms, words)
+    return Finding(pattern, of_columns[:, [column]] * terms, words)
 
 
 KIND = PatternKind("workspace-pattern", "residuals depend on the pose as no unknown does", inspect)

@@ -13,6 +13,10 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import Gate, HeldOut, assess
 from truepose.calibration.acceptance.decision import CONTRADICTED, MARGIN
+from truepose.calibration.acceptance.observability import (
+    project_out_instruments,
+    row_covariance,
+)
 from truepose.calibration.acceptance.tool_uncertainty import (
     Considered,
     Tool,
@@ -216,12 +220,7 @@ def calibrate(
         checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects = tool_effects(machine, unknowns, fitted.values, table)
     left_out = consider_covariance(machine, fitted, identify, table[effects.usable])
-    tool = Tool.of(
-        effects.effects,
-        tool_components(machine),
-        effects.positions,
-        commanded_components(machine),
-    )
+    tool = _relative_tool(machine, fitted, effects)
     if failure is None and not _refuse(suspected):
         if fitted.noise > CONTRADICTED:
             suspected += explained_otherwise(refit, fitted, HYPOTHESES)
@@ -242,14 +241,21 @@ def calibrate(
         effects.usable,
         seed,
         failure,
-        external_reliability(fitted, _judged_tool(tool, gate)),
+        external_reliability(fitted, tool),
     )
 
 
-def _judged_tool(tool: Tool, gate: Gate) -> Tool:
+def _relative_tool(machine: Machine, fitted: Fit, effects: ToolEffects) -> Tool:
     """What unknowns do at the tool, without what moves the machine as a whole."""
-    gauge = [direction.effects for direction in gate.directions if direction.kind == "gauge"]
-    return tool.relative(np.array(gauge).reshape(-1, tool.effects.shape[2]))
+    components, commanded = tool_components(machine), commanded_components(machine)
+    tool = Tool.of(effects.effects, components, effects.positions, commanded)
+    unknowns, n = fitted.unknowns, fitted.unknowns.n_machine
+    if unknowns.count == n:
+        return tool
+    rows = np.sqrt(fitted.weights)[:, np.newaxis] * fitted.jacobian / fitted.birge
+    sigma = np.sqrt(np.diagonal(unknowns.prior_covariance)[:n])
+    seen = row_covariance(project_out_instruments(rows, n, sigma))
+    return tool.relative(tool.sort(seen, with_gauge=True).gauge)
 
 
 def _refuse(suspected: Sequence[Suspicion]) -> bool:

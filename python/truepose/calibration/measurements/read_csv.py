@@ -372,7 +372,8 @@ class _Reading:
                         f"there is no column {', '.join(lacking)}",
                         found=", ".join(
                             column for column in columns if column.startswith(beginning)
-                        ),
+                        )
+                        or "no such column",
                         expected=", ".join(of_machine),
                     )
                 )

@@ -50,8 +50,9 @@ LEAST_GIVEN_UP = 4
 RESTORED = 0.8
 """Share of them that a pattern must explain."""
 
-COVERAGE = 2.0
-"""Standard uncertainties of the tool beyond which a pattern moves it farther than is stated."""
+COVERAGE = 1.0
+"""Standard uncertainties of the tool beyond which a pattern is too much of what is stated of it:
+with one half of that taken up by an error that is not noise, the rest does not cover the noise."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -226,9 +226,12 @@ def _changes(hypothesis: Hypothesis, view: View) -> bool:
     rows = hypothesis.supposed.rows
     if rows.value.shape != view.own.value.shape:
         return True
-    other = np.abs(rows.value - view.own.value) > view.own.uncertainty
-    moved = rows.joints is not view.own.joints
-    return moved or bool(other.mean() > 0.5)
+    if rows.joints is not view.own.joints:
+        return True
+    change = np.abs(rows.value - view.own.value)
+    changed = change > 0.0
+    beyond = change[changed] > view.own.uncertainty[changed]
+    return bool(beyond.size and beyond.mean() > 0.5)
 
 
 def _by_noise(explained: list[tuple[float, _Supposition]]) -> list[tuple[float, _Supposition]]:

@@ -13,13 +13,8 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import Gate, HeldOut, assess
 from truepose.calibration.acceptance.decision import CONTRADICTED, MARGIN
-from truepose.calibration.acceptance.observability import (
-    project_out_instruments,
-    row_covariance,
-)
 from truepose.calibration.acceptance.tool_uncertainty import (
     Considered,
-    Tool,
     commanded_components,
     tool_components,
 )
@@ -47,6 +42,7 @@ from truepose.calibration.identification.robust import Outlier, outliers
 from truepose.calibration.identification.tool_effects import (
     ToolEffects,
     candidates,
+    relative_tool,
     tool_effects,
     workspace_poses,
 )
@@ -220,7 +216,8 @@ def calibrate(
         checked = validate(machine, whole, fitted, folds=folds, seed=seed, robust=robust)
     effects = tool_effects(machine, unknowns, fitted.values, table)
     left_out = consider_covariance(machine, fitted, identify, table[effects.usable])
-    tool = _relative_tool(machine, fitted, effects)
+    rows = np.sqrt(fitted.weights)[:, np.newaxis] * fitted.jacobian / fitted.birge
+    tool, _ = relative_tool(machine, effects, rows, unknowns)
     if failure is None and not _refuse(suspected):
         if fitted.noise > CONTRADICTED:
             suspected += explained_otherwise(refit, fitted, HYPOTHESES)
@@ -243,19 +240,6 @@ def calibrate(
         failure,
         external_reliability(fitted, tool),
     )
-
-
-def _relative_tool(machine: Machine, fitted: Fit, effects: ToolEffects) -> Tool:
-    """What unknowns do at the tool, without what moves the machine as a whole."""
-    components, commanded = tool_components(machine), commanded_components(machine)
-    tool = Tool.of(effects.effects, components, effects.positions, commanded)
-    unknowns, n = fitted.unknowns, fitted.unknowns.n_machine
-    if unknowns.count == n:
-        return tool
-    rows = np.sqrt(fitted.weights)[:, np.newaxis] * fitted.jacobian / fitted.birge
-    sigma = np.sqrt(np.diagonal(unknowns.prior_covariance)[:n])
-    seen = row_covariance(project_out_instruments(rows, n, sigma))
-    return tool.relative(tool.sort(seen, with_gauge=True).gauge)
 
 
 def _refuse(suspected: Sequence[Suspicion]) -> bool:

@@ -230,6 +230,18 @@ class Tool:
         """(n_pose,) position and rotation of displacements (n_pose, n_component), m and rad."""
         return self._size(moved, POSITION), self._size(moved, ROTATION)
 
+    def displacement(
+        self, change: Floats, after: ToolUncertainty, coverage: float
+    ) -> tuple[float, bool]:
+        """m by which other unknowns (n,) move the tool at most.
+
+        And whether position or rotation moves by more than `coverage` standard uncertainties.
+        """
+        position, rotation = self.sizes(self.effects @ change[: self.effects.shape[2]])
+        beyond = (position > coverage * after.position).any()
+        beyond = beyond or (rotation > coverage * after.rotation).any()
+        return float(position.max(initial=0.0)), bool(beyond)
+
     def moves(self, direction: Floats, lengths: Floats) -> bool:
         """Whether a direction (n,) does more than a slight part of what unknowns do.
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.calibration.acceptance.observability import covariance_root
-from truepose.calibration.acceptance.tool_uncertainty import Tool, ToolUncertainty
+from truepose.calibration.acceptance.tool_uncertainty import Tool
 from truepose.calibration.data_checks._base import (
     ALLOWED,
     REDUNDANT,
@@ -143,8 +143,8 @@ def alternatives(
             continue
         if _loss(other, fitted.birge) < loss:
             better.setdefault(supposed.number, []).append((other.noise, supposed))
-        moved = _displacement(tool, after, other.values - fitted.values)
-        if moved > 0.0:
+        moved, beyond = tool.displacement(other.values - fitted.values, after, COVERAGE)
+        if beyond and moved > 0.0:
             open_.setdefault(supposed.number, []).append((supposed, moved))
     suspected = [_explanation(_by_noise(own), fitted) for own in better.values()]
     for number, own in open_.items():
@@ -187,10 +187,12 @@ def _plausible(
         rows = np.flatnonzero(data.instrument == number)
         few = rows[np.linspace(0, rows.size - 1, min(FEW_ROWS, rows.size)).round().astype(np.intp)]
         view = replace(_view(machine, data, number, few), readings_only=readings_only)
-        not_refuted = {supposed.hypothesis.words for supposed in _tried(view, number, kinds)}
-        if not_refuted:
+        supposed = list(_tried(view, number, kinds))
+        if few.size < rows.size and supposed:
+            words = {one.hypothesis.words for one in supposed}
             view = replace(_view(machine, data, number, rows), readings_only=readings_only)
-            yield from _tried(view, number, kinds, not_refuted)
+            supposed = list(_tried(view, number, kinds, words))
+        yield from (one for one in supposed if _changes(one.hypothesis, view))
 
 
 def _view(machine: Machine, data: Measurements, number: int, rows: Indices) -> View:
@@ -214,8 +216,6 @@ def _tried(
             try:
                 misfit = hypothesis.misfit
             except RequestError:
-                continue
-            if not (wanted is None or _changes(hypothesis, view)):
                 continue
             if misfit.redundancy >= REDUNDANT and misfit.size(hypothesis.trimmed) <= ALLOWED:
                 yield _Supposition(number, kind, hypothesis, view)
@@ -249,15 +249,6 @@ def _cost(fitted: Fit, noise: float) -> float:
     prior = Prior.of(fitted.unknowns, tolerances=fitted.use_prior)
     known = prior.rows @ (fitted.values - prior.mean)
     return _loss(fitted, noise) + float(known @ known)
-
-
-def _displacement(tool: Tool, after: ToolUncertainty, change: Floats) -> float:
-    """m: how far other values move the tool at most; 0 where that is within what is stated."""
-    moved = tool.effects @ change[: tool.effects.shape[2]]
-    position, rotation = tool.sizes(moved)
-    beyond = (position > COVERAGE * after.position).any()
-    beyond = beyond or (rotation > COVERAGE * after.rotation).any()
-    return float(position.max(initial=0.0)) if beyond else 0.0
 
 
 def _settling_row(

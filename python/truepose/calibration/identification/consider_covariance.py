@@ -21,19 +21,14 @@ import numpy as np
 from truepose.arrays import Floats, Indices
 from truepose.calibration.acceptance.observability import (
     covariance_root,
-    project_out_instruments,
-    row_covariance,
 )
 from truepose.calibration.acceptance.tool_uncertainty import (
     Considered,
-    Tool,
-    commanded_components,
-    tool_components,
 )
 from truepose.calibration.identification.equations import whitened
 from truepose.calibration.identification.fit import Fit
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
-from truepose.calibration.identification.tool_effects import tool_effects
+from truepose.calibration.identification.tool_effects import relative_tool, tool_effects
 from truepose.calibration.identification.unknowns import Unknowns, unknowns_of
 from truepose.errors import RequestError
 from truepose.machine import Machine
@@ -57,18 +52,9 @@ def consider_covariance(
     unidentified = np.setdiff1d(np.arange(count), identified)
     problem = IdentificationProblem(machine, fitted.measurements, every)
     rows = np.sqrt(fitted.weights)[:, np.newaxis] * whitened(problem, values) / fitted.birge
-    at = tool_effects(machine, every, values, poses)
-    tool = Tool.of(
-        at.effects, tool_components(machine), at.positions, commanded_components(machine)
-    )
+    effects = tool_effects(machine, every, values, poses)
+    tool, relative = relative_tool(machine, effects, rows, every)
     prior = np.asarray(every.prior_covariance, np.float64)[:count, :count]
-    sigma: Floats = np.sqrt(np.diagonal(prior))
-    relative = False
-    if every.count > count:
-        gauge = tool.sort(
-            row_covariance(project_out_instruments(rows, count, sigma)), with_gauge=True
-        ).gauge
-        relative, tool = len(gauge) > 0, tool.relative(gauge)
     none = np.zeros((0, count))
     exact = np.zeros((count, fitted.unknowns.n_machine))
     exact[identified[: exact.shape[1]]] = covariance_root(

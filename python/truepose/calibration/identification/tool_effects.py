@@ -10,6 +10,12 @@ from numpy.typing import ArrayLike
 from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import Candidate
+from truepose.calibration.acceptance.observability import project_out_instruments, row_covariance
+from truepose.calibration.acceptance.tool_uncertainty import (
+    Tool,
+    commanded_components,
+    tool_components,
+)
 from truepose.calibration.identification.fit import Fit
 from truepose.calibration.identification.problem import (
     IdentificationProblem,
@@ -96,6 +102,24 @@ def tool_effects(
     # Out of travel there is a pose as well, and an offset that is found moves the travel with it.
     usable = np.isin(placed, (OK, OUT_OF_TRAVEL)) & (status == OK)
     return ToolEffects(effects[usable], placements[usable, :3], usable)
+
+
+def relative_tool(
+    machine: Machine, effects: ToolEffects, rows: Floats, unknowns: Unknowns
+) -> tuple[Tool, bool]:
+    """The tool without what moves the machine as a whole in an instrument's frame; if that does.
+
+    `rows` (m, n): weighted derivatives of the readings that leave it open.
+    """
+    components, commanded = tool_components(machine), commanded_components(machine)
+    tool = Tool.of(effects.effects, components, effects.positions, commanded)
+    n = unknowns.n_machine
+    if unknowns.count == n:
+        return tool, False
+    sigma: Floats = np.sqrt(np.diagonal(unknowns.prior_covariance)[:n])
+    seen = row_covariance(project_out_instruments(rows, n, sigma))
+    gauge = tool.sort(seen, with_gauge=True).gauge
+    return tool.relative(gauge), len(gauge) > 0
 
 
 def _without_readings(

@@ -49,7 +49,7 @@ def residual_patterns(machine: Machine, fitted: Fit, tool: Tool) -> tuple[Suspic
     """The likeliest pattern of each instrument's residuals, and what cannot show in them.
 
     `tool`: effects of the machine's unknowns at the tool. A pattern refuses where it moves the tool
-    beyond what is stated of it, or is why the residuals are far larger than the noise.
+    by more than its standard uncertainty, or is why the residuals are far larger than the noise.
     """
     n = fitted.unknowns.n_machine
     after = tool.uncertainty(covariance_root(fitted.covariance[:n, :n]), np.zeros((0, n)))
@@ -103,7 +103,7 @@ def _said(view: ResidualsView, code: str, finding: Finding) -> Suspicion:
 
 
 def _rests_on_target(view: ResidualsView) -> list[Suspicion]:
-    """Where an error of the target would move the tool beyond the stated, and not be seen."""
+    """Where an error of the target would move the tool by much of the stated, and not be seen."""
     instrument = view.instrument
     if instrument.target_unknown or any(instrument.target_uncertainty):
         return []

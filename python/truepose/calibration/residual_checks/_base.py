@@ -291,12 +291,8 @@ class ResidualsView:
         return bool(fits.mean() >= RESTORED)
 
     def tool_moved(self, change: Floats) -> tuple[float, bool]:
-        """m by which other unknowns move the tool at most; whether that is beyond the stated."""
-        moved = self.tool.effects @ change[: self.tool.effects.shape[2]]
-        position, rotation = self.tool.sizes(moved)
-        beyond = (position > COVERAGE * self.after.position).any()
-        beyond = beyond or (rotation > COVERAGE * self.after.rotation).any()
-        return float(position.max(initial=0.0)), bool(beyond)
+        """m by which other unknowns move the tool at most; whether that is too much."""
+        return self.tool.displacement(change, self.after, COVERAGE)
 
     def hidden(self, columns: Floats, size: float) -> tuple[float, bool]:
         """m by which so large a column, not seen in the residuals, moves the tool; if beyond.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -318,6 +319,10 @@ def test_poses_and_conditions_of_a_part_are_refused(delta: Machine) -> None:
         with pytest.raises(RequestError) as refused:
             measurements_of(delta, gauge, values=values, uncertainty=1e-6, **others)  # type: ignore[arg-type]
         assert [p.code for p in refused.value.problems] == ["bad-measurements"]
+    biased = Instrument("gauge", "parameter", Frame(), bias_unknown=True)
+    with pytest.raises(RequestError) as refused:
+        measurements_of(delta, biased, values=values, uncertainty=1e-6)
+    assert [p.path for p in refused.value.problems] == ["instrument.bias_unknown"]
 
 
 def test_it_is_nothing_to_plan(delta: Machine) -> None:
@@ -326,3 +331,24 @@ def test_it_is_nothing_to_plan(delta: Machine) -> None:
     (problem,) = refused.value.problems
     assert problem.code == "plan-instrument"
     assert "without a pose" in problem.message
+
+
+def test_a_part_does_not_ask_where_the_machine_can_stand(delta: Machine) -> None:
+    """Joints at which it has no pose, in rows that need none, change no reading and no slope."""
+    data = joined(heights(delta, 8), measured(delta, dict.fromkeys(RODS, 1e-5), 1e-5))
+    unknowns = unknowns_of(delta, data)
+    at_home = IdentificationProblem(delta, data, unknowns)
+    joints = data.joints.copy()
+    joints[~data.posed] = [0.0, 9.0, 0.0]
+    nowhere = IdentificationProblem(delta, dataclasses.replace(data, joints=joints), unknowns)
+    values = np.full(unknowns.count, 1e-5)
+    assert not nowhere.status(values).any()
+    assert np.array_equal(nowhere.predict(values), at_home.predict(values))
+    assert np.array_equal(nowhere.jacobian(values), at_home.jacobian(values))
+    one = [problem.solve().values for problem in (nowhere, at_home)]
+    assert np.array_equal(one[0], one[1])
+    # Of a height it does ask.
+    joints[0] = [0.0, 9.0, 0.0]
+    failing = IdentificationProblem(delta, dataclasses.replace(data, joints=joints), unknowns)
+    assert np.isnan(failing.predict(values)[0])
+    assert failing.solve().ending == ("unreachable",)

@@ -232,3 +232,30 @@ def test_it_is_nothing_to_plan(delta: Machine) -> None:
         observed(delta, Instrument("bar", "separation", Frame(), uncertainty={"m": 1e-5}))
     (problem,) = refused.value.problems
     assert (problem.code, "between two" in problem.message) == ("plan-instrument", True)
+
+
+def test_a_second_pose_that_cannot_be_counts_as_the_first_does(delta: Machine) -> None:
+    """With weight the fit has no place for it; without, it is as if the row were not there."""
+    rods = [name for name in delta.parameters if name.endswith(".length")]
+    whole = made_measurements(
+        delta, "separation", poses_within(delta, 30, seed=3), values="nominal"
+    )
+    assert whole.other_joints is not None
+    whole = whole.with_values(whole.value + 1e-5 * np.sin(np.arange(30)))
+    others = whole.other_joints.copy()
+    others[4] = [0.0, 9.0, 0.0]
+    spoilt = dataclasses.replace(whole, other_joints=others)
+    unknowns = unknowns_of(delta, whole, rods)
+    problem = IdentificationProblem(delta, spoilt, unknowns)
+    none = np.zeros(unknowns.count)
+    assert np.flatnonzero(problem.status(none)).tolist() == [4]
+    assert np.flatnonzero(np.isnan(problem.predict(none))).tolist() == [4]
+    assert np.isnan(problem.jacobian(none)[4]).all()
+    assert problem.solve().ending == ("unreachable",)
+    weights = np.ones(30)
+    weights[4] = 0.0
+    without = problem.solve(weights=weights)
+    kept = whole.select(np.arange(30) != 4)
+    expected = IdentificationProblem(delta, kept, unknowns).solve()
+    assert without.ending == expected.ending
+    assert np.abs(without.values - expected.values).max() < 1e-12

@@ -29,6 +29,14 @@ pub struct Observation {
     pub bias: Option<usize>,
 }
 
+impl Observation {
+    /// The poses at which the platform must stand for it: none of a parameter, two of a separation.
+    pub fn stands_at(&self) -> impl Iterator<Item = usize> + use<> {
+        let first = (self.observable != Observable::Parameter).then_some(self.pose);
+        first.into_iter().chain(self.other)
+    }
+}
+
 /// A table of one row a pose, or one row for all.
 #[derive(Clone, Debug, Default)]
 pub struct Table {

@@ -1,6 +1,6 @@
 //! What the instruments read for given unknowns, and its derivatives; normal equations in one pass.
 
-use super::design::{Design, Observed, Prepared};
+use super::design::{Design, Observation, Observed, Prepared};
 use super::observation::{InstrumentView, Placed, Reading, StrutView, of_strut};
 use crate::batch::{Deviations, Rows, Samples, Sensitivity, first_order, forward_poses};
 use crate::dispatch::{Work, dispatch};
@@ -57,27 +57,38 @@ impl Normal {
 impl<'a> Evaluation<'a> {
     /// For a design.
     pub fn new(prepared: &'a Prepared) -> Self {
-        let Design { poses, starts, machine, .. } = &prepared.design;
+        let Design { poses, starts, machine, observations, .. } = &prepared.design;
         let width = machine.dof_count() * prepared.columns.len();
-        Evaluation {
+        let mut evaluation = Evaluation {
             prepared,
             deviations: Vec::new(),
             starts: starts.clone(),
             poses: vec![0.0; 7 * poses],
             status: vec![Status::Ok; *poses],
-            needed: vec![true; *poses],
+            needed: vec![false; *poses],
             placed: Vec::new(),
             views: Vec::new(),
             sensitivities: vec![0.0; poses * width],
-        }
+        };
+        evaluation.count_only(&vec![1.0; observations.len()]);
+        evaluation
     }
 
     /// Readings of weight zero do not count from now on: a pose of which no reading counts need not be solved.
     pub fn count_only(&mut self, weights: &[f64]) {
         self.needed.fill(false);
         for (observation, weight) in self.prepared.design.observations.iter().zip(weights) {
-            self.needed[observation.pose] |= *weight != 0.0;
+            if *weight != 0.0 {
+                for pose in observation.stands_at() {
+                    self.needed[pose] = true;
+                }
+            }
         }
+    }
+
+    /// Whether the platform could be placed wherever it must stand for a reading.
+    fn stands(&self, observation: &Observation) -> bool {
+        observation.stands_at().all(|pose| self.status[pose] == Status::Ok)
     }
 
     fn all_needed(&self) -> bool {
@@ -162,8 +173,7 @@ impl<'a> Evaluation<'a> {
         let mut joints: &[f64] = &[];
         let sights = &self.prepared.sights;
         for ((observation, sight), out) in design.observations.iter().zip(sights).zip(out) {
-            let unsolved = |pose: usize| self.status[pose] != Status::Ok;
-            if unsolved(observation.pose) || observation.other.is_some_and(unsolved) {
+            if !self.stands(observation) {
                 *out = f64::NAN;
                 continue;
             }
@@ -360,7 +370,8 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
         let mut parameters = Vec::new();
         for pose in 0..design.poses {
             let observed = prepared.of_pose[pose]..prepared.of_pose[pose + 1];
-            if observed.is_empty() || evaluation.status[pose] != Status::Ok {
+            let mut all = design.observations[observed.clone()].iter();
+            if observed.is_empty() || !all.all(|observation| evaluation.stands(observation)) {
                 continue;
             }
             evaluation.twists(pose, &mut twists);

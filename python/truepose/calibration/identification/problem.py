@@ -104,12 +104,16 @@ class IdentificationProblem(Represented):
         return self._kernel.predict(values)[0]
 
     def status(self, values: ArrayLike) -> np.ndarray:
-        """(n_row,) kernel status of each row's pose, of two that of the first that fails."""
+        """(n_row,) kernel status of each row's pose, of two that of the first that fails.
+
+        0 of what needs no pose.
+        """
         status: np.ndarray = self._kernel.predict(values)[1]
         of_rows = status[: self.measurements.n_row].copy()
         between = np.flatnonzero(self.measurements.between)
         second = status[self.measurements.n_row :]
         of_rows[between] = np.where(of_rows[between] == 0, second, of_rows[between])
+        of_rows[~self.measurements.posed] = 0
         return of_rows
 
     def jacobian(self, values: ArrayLike) -> Floats:

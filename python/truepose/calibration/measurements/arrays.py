@@ -207,6 +207,9 @@ class _Arguments:
         if self.instrument.kind not in REGISTRY:
             hint = did_you_mean(self.instrument.kind, REGISTRY)
             self.refuse("instrument.kind", self.instrument.kind, one_of(REGISTRY), hint)
+        without = self.instrument.kind in REGISTRY and not REGISTRY[self.instrument.kind].poses
+        if without and self.instrument.bias_unknown:
+            self.refuse("instrument.bias_unknown", "True", "False, of a measured parameter")
         reserved = reserved_names(self.machine)
         if not name_is_good(self.instrument.name, reserved):
             self.refuse("instrument.name", self.instrument.name, expected_name(reserved))

@@ -47,7 +47,8 @@ def observed(machine: Machine, instrument: Instrument) -> tuple[str, ...]:
             "a dimension of a part is measured without a pose: nothing is to choose",
             found=instrument.kind,
             expected=one_of(sorted(name for name, kind in REGISTRY.items() if kind.poses)),
-            hint="measure it at any time: its row joins those of the poses in one file",
+            hint="measure it at any time, its row joins those of the poses in one file; of a file "
+            "that declares others, too, name one of these: FILE.csv:NAME",
         )
     if kind.poses > 1:
         raise _refusal(
@@ -55,7 +56,8 @@ def observed(machine: Machine, instrument: Instrument) -> tuple[str, ...]:
             "a plan chooses poses one by one, and this reads between two",
             found=instrument.kind,
             expected=one_of(sorted(name for name, kind in REGISTRY.items() if kind.poses == 1)),
-            hint="plan poses with an instrument of another kind, and measure between those",
+            hint="plan poses with an instrument of another kind, and measure between those; of a "
+            "file that declares others, too, name one of these: FILE.csv:NAME",
         )
     readable = tuple(dict.fromkeys(kind.reads.values()))
     possible = tuple(name for name in readable if moved(name, machine.components))

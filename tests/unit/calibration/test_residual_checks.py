@@ -16,7 +16,8 @@ from made_measurements import made_measurements, poses_within
 from truepose.calibration.calibrate import Calibration, calibrate
 from truepose.calibration.data_checks import Suspicion
 from truepose.calibration.measurements import Measurements
-from truepose.calibration.residual_checks import CODES
+from truepose.calibration.observables import OBSERVABLES
+from truepose.calibration.residual_checks import CODES, scale
 from truepose.calibration.residual_checks._base import Left, ResidualsView
 from truepose.machine import Machine
 from truepose.probability.f_distribution import f_tail
@@ -124,6 +125,22 @@ def test_a_scale_is_named_with_its_sign(name: str, share: float) -> None:
     named = [each for each in answer.suspicions if each.code == "scale"]
     assert len(named) == 1
     assert ("too long" if share > 0.0 else "too short") in named[0].sentence
+
+
+@pytest.mark.parametrize("kind", ["pose", "position"])
+def test_a_scale_that_the_unknowns_nearly_take_up_has_its_size(kind: str) -> None:
+    """From 20 m away frame and machine take up all of a scale but a thousandth."""
+    m = machine("linear_delta")
+    made = made_measurements(m, kind, poses_within(m, ROWS, 3), frame="unknown", values="nominal")
+    far = elsewhere(made.instruments[0], [20.0, 8.0, 3.0], [0.0, 0.0, 0.0])
+    read = with_noise(made, shown(m, drawn(m, 3), made, far), 3)
+    lengths = made.observable <= OBSERVABLES.index("z")
+    answer = calibrate(m, read.with_values(np.where(lengths, read.value * 1.002, read.value)))
+    view = a_view("linear_delta", fitted_from=answer)
+    finding = scale.inspect(view)
+    assert finding is not None
+    assert [each.code for each in patterns(answer)] == ["scale"]
+    assert finding.pattern.sizes[0] == pytest.approx(2e-3, rel=0.1)
 
 
 def test_a_dependence_on_the_place_is_named() -> None:

@@ -7,7 +7,7 @@ whitened pattern,
 
     M = G^T G - G^T J C J^T G,    size = -M^-1 G^T r,    T = (G^T r)^T M^-1 (G^T r),
 
-and T over its degrees of freedom and the mean square that it leaves is compared with Fisher's F.
+J C J^T as Q Q^T, Q an orthonormal basis, and T over its degrees of freedom and the mean square that it leaves is compared with Fisher's F.
 What the machine's unknowns take for the pattern moves the tool by S C J^T G size.
 """
 
@@ -74,19 +74,21 @@ class Pattern:
 class Left:
     """What a fit leaves: `residual` (m,) over the stated uncertainties, and their `weights`.
 
-    `covariance` (n, n) of the unknowns as those state it, and `freedom` of the residuals.
+    `basis` (m, r): readings' part of an orthonormal basis of the fit's equations, `root` (n, r)
+    what the unknowns do along it: J root is `basis`, root root^T the covariance C as the stated
+    uncertainties have it. `freedom` of the residuals.
     """
 
     weights: Floats
     residual: Floats
-    covariance: Floats
+    basis: Floats
+    root: Floats
     freedom: float
 
     @classmethod
     def of(cls, fitted: Fit) -> Left:
         """As it was fitted."""
-        covariance = fitted.covariance / fitted.birge**2
-        return cls(fitted.weights, fitted.residual, covariance, fitted.freedom)
+        return replace(cls._with_weights(fitted, fitted.weights), freedom=fitted.freedom)
 
     @classmethod
     def with_given_up(cls, fitted: Fit, number: int) -> Left | None:
@@ -98,18 +100,28 @@ class Left:
         back = given_up(fitted, number)
         if back.sum() < LEAST_GIVEN_UP:
             return None
-        weights = np.where(back, 1.0, fitted.weights)
-        factor = np.sqrt(weights)[:, np.newaxis]
+        return cls._with_weights(fitted, np.where(back, 1.0, fitted.weights))
+
+    @classmethod
+    def _with_weights(cls, fitted: Fit, weights: Floats) -> Left:
+        """What other weights leave, to first order about the fit.
+
+        From an orthonormal basis: of a pattern that the unknowns take up but for a hundredth, the
+        difference of two products with a covariance would be rounding.
+        """
+        factor = np.sqrt(weights)
         known = Prior.of(fitted.unknowns, tolerances=fitted.use_prior)
         prior = Prior(fitted.birge * known.rows, known.mean)
-        slope = factor * fitted.jacobian
-        covariance = Equations.of(slope, prior, fitted.unknowns).covariance
+        slope = factor[:, np.newaxis] * fitted.jacobian
+        determined = Equations.of(slope, prior, fitted.unknowns).root
+        orthonormal, upper = np.linalg.qr(np.vstack([slope, prior.rows]) @ determined)
+        root = np.linalg.solve(upper.T, determined.T).T
         away = prior.rows @ (fitted.values - prior.mean)
-        step = -covariance @ (slope.T @ (factor[:, 0] * fitted.residual) + prior.rows.T @ away)
-        residual = fitted.residual + fitted.jacobian @ step
-        leverage = np.einsum("ij,jk,ik->i", slope, covariance, slope)
+        step = -root @ (orthonormal.T @ np.concatenate([factor * fitted.residual, away]))
+        basis = orthonormal[: factor.size]
+        leverage = np.sum(basis**2, axis=1)
         freedom = float(np.sum((1.0 - leverage)[weights > 0.0]))
-        return cls(weights, residual, covariance, freedom)
+        return cls(weights, fitted.residual + fitted.jacobian @ step, basis, root, freedom)
 
 
 def given_up(fitted: Fit, number: int) -> Flags:
@@ -164,8 +176,8 @@ class ResidualsView:
         return np.sqrt(self.left.weights[self.own])
 
     @cached_property
-    def _slope(self) -> Floats:
-        return self._factor[:, np.newaxis] * self.fitted.jacobian[self.own]
+    def _basis(self) -> Floats:
+        return self.left.basis[self.own]
 
     @cached_property
     def _left(self) -> Floats:
@@ -236,21 +248,21 @@ class ResidualsView:
         """The `columns` (k, n) in the residuals, one of so many `tests`; None where not seen."""
         whitened = self._factor[:, np.newaxis] * columns
         return self.pattern_of(
-            whitened.T @ whitened, self._slope.T @ whitened, whitened.T @ self._left, tests
+            whitened.T @ whitened, self._basis.T @ whitened, whitened.T @ self._left, tests
         )
 
     def steps(self, columns: Floats) -> Iterator[tuple[int, Floats, Floats, Floats]]:
-        """(row, squares, products with the unknowns', with the residuals) of columns from there on.
+        """(row, squares, products with the basis, with the residuals) of columns from there on.
 
         For every row but the first, added up from the last one.
         """
         whitened = self._factor[:, np.newaxis] * columns
         n = self.rows.size
         squares = np.zeros((n, columns.shape[1], columns.shape[1]))
-        products = np.zeros((n, self._slope.shape[1], columns.shape[1]))
+        products = np.zeros((n, self._basis.shape[1], columns.shape[1]))
         left = np.zeros((n, columns.shape[1]))
         np.add.at(squares, self.place, whitened[:, :, np.newaxis] * whitened[:, np.newaxis, :])
-        np.add.at(products, self.place, self._slope[:, :, np.newaxis] * whitened[:, np.newaxis, :])
+        np.add.at(products, self.place, self._basis[:, :, np.newaxis] * whitened[:, np.newaxis, :])
         np.add.at(left, self.place, whitened * self._left[:, np.newaxis])
         for table in (squares, products, left):
             table[:] = np.cumsum(table[::-1], axis=0)[::-1]
@@ -260,13 +272,12 @@ class ResidualsView:
     def pattern_of(
         self, squares: Floats, products: Floats, left: Floats, tests: int
     ) -> Pattern | None:
-        """The same from sums: G^T G (k, k), J^T G (n, k), G^T r (k,)."""
-        covariance = self.left.covariance
+        """The same from sums: G^T G (k, k), Q^T G (r, k), G^T r (k,); Q: basis of the equations."""
         length = np.sqrt(np.diagonal(squares))
         if not (length > 0.0).any():
             return None
         length = np.where(length > 0.0, length, 1.0)
-        normal = squares - products.T @ covariance @ products
+        normal = squares - products.T @ products
         values, vectors = np.linalg.eigh(normal / np.outer(length, length))
         seen = values > SEEN
         count = int(seen.sum())
@@ -278,12 +289,12 @@ class ResidualsView:
         mean = max(1.0, (self._squares - statistic) / spare)
         probability = min(1.0, tests * f_tail(statistic / count / mean, count, spare))
         sizes = -(vectors[:, seen] @ (along / values[seen])) / length
-        change = covariance @ (products @ sizes)
+        change = self.left.root @ (products @ sizes)
         return Pattern(sizes, probability, *self.tool_moved(change))
 
     def explains_given_up(self, pattern: Pattern, columns: Floats) -> bool:
         """Whether what was given up fits with `columns` (k, n) of a pattern's sizes."""
-        change = self.left.covariance @ (self._slope.T @ (self._factor * (columns @ pattern.sizes)))
+        change = self.left.root @ (self._basis.T @ (self._factor * (columns @ pattern.sizes)))
         slope = self.fitted.jacobian[self.own]
         left = self.left.residual[self.own] + columns @ pattern.sizes - slope @ change
         back = given_up(self.fitted, self.number)[self.own]
@@ -300,14 +311,13 @@ class ResidualsView:
         Of the columns (k, n) the one that does the most; 0 where all would be seen.
         """
         whitened = self._factor[:, np.newaxis] * columns
-        covariance = self.left.covariance
         worst, beyond = 0.0, False
         for column in whitened.T:
-            product = self._slope.T @ column
-            left = float(column @ column - product @ covariance @ product)
+            product = self._basis.T @ column
+            left = float(column @ column - product @ product)
             if left * size**2 >= WOULD_SHOW**2:
                 continue
-            moved, farther = self.tool_moved(covariance @ product * size)
+            moved, farther = self.tool_moved(self.left.root @ product * size)
             if moved > worst:
                 worst, beyond = moved, farther
         return worst, beyond

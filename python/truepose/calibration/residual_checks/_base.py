@@ -7,8 +7,9 @@ whitened pattern,
 
     M = G^T G - G^T J C J^T G,    size = -M^-1 G^T r,    T = (G^T r)^T M^-1 (G^T r),
 
-J C J^T as Q Q^T, Q an orthonormal basis, and T over its degrees of freedom and the mean square that it leaves is compared with Fisher's F.
-What the machine's unknowns take for the pattern moves the tool by S C J^T G size.
+J C J^T as Q Q^T, Q an orthonormal basis of the equations, and T over its degrees of freedom and the
+mean square that it leaves is compared with Fisher's F. What the machine's unknowns take for the
+pattern moves the tool by S C J^T G size.
 """
 
 from __future__ import annotations

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
 import numpy as np
@@ -68,6 +69,16 @@ def test_an_instrument_that_was_moved_is_named_with_its_row(name: str, kind: str
     assert not (answer.accepted and named[0].refuses)
     # It refuses where it is why the residuals are far off; below that the noise has grown with it.
     assert named[0].refuses or answer.fit.birge <= 5.0
+
+
+def test_the_row_is_that_of_all_rows_where_some_are_kept_from_the_fit() -> None:
+    data = bumped("hexapod", "position", 0.3e-3)
+    held_out = np.zeros(ROWS, np.bool_)
+    held_out[[1, 3, 8, 30]] = True
+    answer = calibrate(machine("hexapod"), dataclasses.replace(data, held_out=held_out))
+    (named,) = [each for each in patterns(answer) if each.code == "step"]
+    assert named.rows == (BUMPED_AT,)
+    assert f"between rows {BUMPED_AT} and {BUMPED_AT + 1}" in named.sentence
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -400,6 +400,11 @@ class View:
         poses: Floats = self.machine.kernel.pose_of(self.own.placements)[:, columns]
         return poses
 
+    def numbers(self, rows: Iterable[int]) -> tuple[int, ...]:
+        """Which they are of all that was measured, from 0."""
+        numbers = self.measurements.row_numbers
+        return tuple(int(numbers[row]) for row in rows)
+
     def lines(self, rows: Iterable[int]) -> tuple[int, ...]:
         """Their lines in the file; empty where there is none."""
         lines = tuple(int(self.measurements.lines[row]) for row in rows)
@@ -410,7 +415,7 @@ class View:
         indices = list(rows)
         lines = self.lines(indices)
         word = "line" if lines else "row"
-        numbers = [str(number) for number in (lines or [row + 1 for row in indices])]
+        numbers = [str(n) for n in (lines or [row + 1 for row in self.numbers(indices)])]
         shown = numbers[:6] + ([f"{len(numbers) - 6} more"] if len(numbers) > 6 else [])
         return f"{word}{'s' if len(numbers) > 1 else ''} {listed(shown)}"
 

@@ -361,7 +361,7 @@ def _explanation(explained: Sequence[tuple[float, _Supposition]], fitted: Fit | 
         f"with that mended one leaves {noise:.3g} times the stated uncertainties",
         view.instrument.name,
         hypothesis.where,
-        hypothesis.rows,
+        view.numbers(hypothesis.rows),
         view.lines(hypothesis.rows),
         before,
         noise,

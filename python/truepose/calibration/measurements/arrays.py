@@ -130,6 +130,7 @@ def joined(*several: Measurements) -> Measurements:
     ]
     first = np.cumsum([0, *(part.n_row for part in several)])[:-1].tolist()
     files = dict.fromkeys(part.file for part in several)
+    other_joints, other_placements = _second_poses(several)
     return Measurements(
         instruments=tuple(instruments.values()),
         joints=np.concatenate([part.joints for part in several]),
@@ -149,17 +150,18 @@ def joined(*several: Measurements) -> Measurements:
         lines=np.concatenate([part.lines for part in several]),
         file=", ".join(file for file in files if file),
         file_hash=", ".join(dict.fromkeys(part.file_hash for part in several if part.file_hash)),
-        **_second_poses(several),
+        other_joints=other_joints,
+        other_placements=other_placements,
     )
 
 
-def _second_poses(several: Sequence[Measurements]) -> dict[str, Floats]:
-    """Of all parts, where one has any; in the others the first poses again."""
+def _second_poses(several: Sequence[Measurements]) -> tuple[Floats | None, Floats | None]:
+    """Joints and placements of all parts where one has any; in others the first poses again."""
     if all(part.other_joints is None for part in several):
-        return {}
+        return None, None
     joints = [p.joints if p.other_joints is None else p.other_joints for p in several]
     placed = [p.placements if p.other_placements is None else p.other_placements for p in several]
-    return {"other_joints": np.concatenate(joints), "other_placements": np.concatenate(placed)}
+    return np.concatenate(joints), np.concatenate(placed)
 
 
 def _same_objects(conditions: Sequence[Condition]) -> tuple[Condition, ...]:

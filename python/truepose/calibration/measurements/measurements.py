@@ -45,7 +45,8 @@ class Measurements(Represented):
     (n_row,) which of `instruments` measured; `conditions` (n_row,), equal ones the same object;
     `held_out` (n_row,): kept from the fit; `lines` (n_row,) of the file, 0 where there is none.
     `other_joints` and `other_placements`: the second pose of rows that are between two, in the
-    others the first again; None where no row is.
+    others the first again; None where no row is. `numbers` (n_row,): of a selection, which rows of
+    all these are, from 0; None of all.
 
     Observations: `row` (n_observation,) of each, `observable`: its index in `OBSERVABLES`, `strut`:
     which, of a parameter which parameter, or -1; `value` and standard `uncertainty`, above zero.
@@ -67,6 +68,7 @@ class Measurements(Represented):
     file_hash: str = ""
     other_joints: Floats | None = None
     other_placements: Floats | None = None
+    numbers: Indices | None = None
 
     def _facts(self) -> Facts:
         yield "file", self.file or None
@@ -84,6 +86,11 @@ class Measurements(Represented):
     def n_observation(self) -> int:
         """How many numbers were measured."""
         return len(self.value)
+
+    @property
+    def row_numbers(self) -> Indices:
+        """(n_row,) by which people know the rows, from 0: among all that were measured."""
+        return np.arange(self.n_row) if self.numbers is None else self.numbers
 
     @property
     def posed(self) -> Flags:
@@ -122,6 +129,7 @@ class Measurements(Represented):
             lines=np.concatenate([self.lines, self.lines[rows]]),
             other_joints=None,
             other_placements=None,
+            numbers=np.concatenate([self.row_numbers, self.row_numbers[rows]]),
         )
 
     def observables(self, instrument: int) -> tuple[str, ...]:
@@ -161,6 +169,7 @@ class Measurements(Represented):
             uncertainty=self.uncertainty[kept],
             other_joints=_of_rows(self.other_joints, wanted),
             other_placements=_of_rows(self.other_placements, wanted),
+            numbers=self.row_numbers[wanted],
         )
 
     def of_instrument(self, instrument: int) -> tuple[Measurements, Indices]:

@@ -96,7 +96,7 @@ def _said(view: ResidualsView, code: str, finding: Finding) -> Suspicion:
         code,
         f"{view.instrument.name}: {finding.words}, {moved}",
         view.instrument.name,
-        rows=finding.rows,
+        rows=tuple(view.data.row_numbers[list(finding.rows)].tolist()),
         lines=lines if all(lines) else (),
         refuses=pattern.beyond or view.fitted.birge > CONTRADICTED,
     )

@@ -334,7 +334,8 @@ class ResidualsView:
         lines = self.data.lines[self.rows[[first, last]]]
         if lines.all():
             return f"between lines {lines[0]} and {lines[1]}"
-        return f"between rows {self.rows[first] + 1} and {self.rows[last] + 1}"
+        numbers = self.data.row_numbers[self.rows[[first, last]]] + 1
+        return f"between rows {numbers[0]} and {numbers[1]}"
 
 
 WOULD_SHOW = 5.0

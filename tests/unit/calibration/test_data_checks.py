@@ -349,10 +349,14 @@ def test_copied_command(name: str) -> None:
 
 
 def test_too_few_data() -> None:
-    data = good(machine("hexapod"), "position", frame="unknown", count=2)
-    found = first("hexapod", data)
-    assert found.code == "too-few-data"
-    assert "at least 1 more" in found.sentence
+    """What counts is rank: two points leave the turn about their line open, and their distance."""
+    one = first("hexapod", good(machine("hexapod"), "position", frame="unknown", count=1))
+    assert one.code == "too-few-data"
+    assert "3 readings, and 6 unknowns of the instrument itself, of which they determine 3" in (
+        one.sentence
+    )
+    two = good(machine("hexapod"), "position", frame="unknown", count=2)
+    assert "too-few-data" not in [each.code for each in suspicions(machine("hexapod"), two)]
 
 
 def test_absurd_uncertainty() -> None:

@@ -145,7 +145,7 @@ class Supposed:
         predicted = (rows.value - residual) / self.scale
         variances = [float(np.var(predicted[column == number])) for number in np.unique(column)]
         reach = math.sqrt(sum(variances))
-        redundancy = residual.size - placement.unknowns.count
+        redundancy = residual.size - placement.rank
         return Misfit(residual, residual / self.scale, column, reach, placement, redundancy)
 
 

@@ -19,19 +19,17 @@ SOME = 8
 
 
 def inspect_few(view: View) -> Iterator[Suspicion]:
-    """Fewer readings than the instrument's own unknowns need."""
-    instrument = view.instrument
-    unknown = sum(instrument.frame.unknown) + 3 * instrument.target_unknown
-    unknown += len(view.columns) * instrument.bias_unknown
-    count = view.observations.size
-    if count > unknown:
+    """Readings that say where the instrument stands, and nothing else."""
+    count, placement = view.observations.size, view.as_given.placement
+    if count > placement.rank:
         return
-    needed = unknown + 1 - count
+    unknown = placement.unknowns.count
     yield Suspicion(
         "too-few-data",
-        f"{instrument.name}: {count} readings, and {unknown} unknowns of the instrument itself: "
-        f"at least {needed} more before anything is said of the machine",
-        instrument.name,
+        f"{view.instrument.name}: {count} readings, and {unknown} unknowns of the instrument "
+        f"itself, of which they determine {placement.rank}: none is left to say anything of the "
+        "machine, measure more rows",
+        view.instrument.name,
         view.column_names,
     )
 
@@ -97,7 +95,9 @@ def last_digit(values: np.ndarray, unit: str) -> float | None:
     return None
 
 
-FEW = InspectionKind("too-few-data", "fewer readings than unknowns of the instrument", inspect_few)
+FEW = InspectionKind(
+    "too-few-data", "no reading is left that says anything of the machine", inspect_few
+)
 UNCERTAINTY = InspectionKind(
     "absurd-uncertainty", "an uncertainty far off the scatter", inspect_uncertainty
 )

@@ -9,7 +9,7 @@ change of the readings). That is the gauge rule; it holds for frames as for mach
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -341,8 +341,3 @@ def require_enough(
             else None,
         )
     )
-
-
-def names_of(unknowns: Unknowns, numbers: Sequence[int]) -> str:
-    """`length of strut 1, delta radius`."""
-    return ", ".join(unknowns.labels[number] for number in numbers)

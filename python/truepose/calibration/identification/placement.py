@@ -45,7 +45,8 @@ class Placement:
 
     `values` (n,): what was found of its `unknowns`, from there on. `residual` (k,): predicted less
     measured, over the uncertainty. `cost`: sum of their weighted squares, infinite where a reading
-    cannot be predicted. `settled`: whether the search ended at a least sum of squares.
+    cannot be predicted. `settled`: whether the search ended at a least sum of squares. `rank`: how
+    many directions of the unknowns the readings determine.
     """
 
     instrument: Instrument
@@ -54,6 +55,7 @@ class Placement:
     residual: Floats
     cost: float
     settled: bool
+    rank: int
 
     @property
     def frame(self) -> Frame:
@@ -189,10 +191,13 @@ class _Search:
         problem = self.problem(frame)
         (instrument,) = problem.measurements.instruments
         values = np.zeros(self.unknowns.count)
-        settled = True
+        settled, rank = True, 0
         if self.unknowns.count:
             known = Prior.of(self.unknowns)
-            gauge = Equations.of(whitened(problem, values), known, self.unknowns).gauge_rows()
+            slope = whitened(problem, values)
+            gauge = Equations.of(slope, known, self.unknowns).gauge_rows()
+            read = Equations.of(slope, Prior.none(self.unknowns.count), self.unknowns)
+            rank = int(read.seen.sum())
             solved = problem.solve(
                 prior=known.with_rows(gauge),
                 weights=self.weights,
@@ -204,7 +209,7 @@ class _Search:
         cost = self.cost(residual)
         exact = cost <= EXACT**2 * self.measurements.n_observation
         settled = np.isfinite(cost) and (settled or exact)
-        return Placement(instrument, self.unknowns, values, residual, cost, bool(settled))
+        return Placement(instrument, self.unknowns, values, residual, cost, bool(settled), rank)
 
     def best(self, starts: Iterable[Frame]) -> tuple[Placement | None, RequestError | None]:
         """The best from all starts, and what was wrong with one that could not be followed."""

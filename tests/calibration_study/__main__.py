@@ -173,7 +173,7 @@ def failures(kind: str, done: Sequence[Result]) -> dict[str, list[int]]:
     """Seeds of what should not be."""
     own = [each for each in done if each.kind == kind]
     found = {
-        "accepted, the tool beyond": [e.seed for e in own if e.accepted and e.moved],
+        "accepted, the tool beyond": [e.seed for e in own if e.accepted and e.beyond],
         "moved, not named first": [
             e.seed for e in own if kind != "none" and e.demanded and e.moved and not e.named
         ],
@@ -195,7 +195,7 @@ def _powers(rows: Sequence[Row], kinds: Iterable[str]) -> str:
             # Larger than anybody would make: the size is not the one asked for.
             own = [each for each in graded if math.isfinite(each.factor)]
             if own:
-                wrong = share(each.accepted and each.moved for each in own)
+                wrong = share(each.accepted and each.beyond for each in own)
                 shares = [share(e.mentioned for e in own), share(e.named for e in own), wrong]
                 cells = " | ".join(f"{100 * each:.0f} %" for each in shares)
                 lines.append(f"| {kind} | {grade:g} | {cells} |")

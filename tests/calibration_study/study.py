@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from calibration_study.blunders import FACTORS, KINDS, Kind, Measured, Spoilt
-from calibration_study.judge import Answer, answer_of, tools
+from calibration_study.judge import Answer, Tool, answer_of, tools
 from calibration_study.kinematics import NoRootError
 from calibration_study.truth import (
     FAMILIES,
@@ -32,6 +32,8 @@ ROWS = (14, 36)
 TRIES = 20
 INFORMATIVE = ("tracker", "known tracker", "pose")
 """Instruments that see enough for a yes; of the others good data may be refused for good reason."""
+HARMLESS = 0.1
+"""Of the stated 95 %: a blunder that changes the tool's distance by less does nothing to it."""
 CHANCE = 3.0
 """Standard errors of a share that are given to chance."""
 
@@ -41,7 +43,8 @@ class Result:
     """A set, and what became of it.
 
     `position`, `rotation`: how far the tool is off over the stated 95 %, at the headline's pose;
-    nan where there is no such freedom, or nothing was found. `ratio`: the worse of both.
+    nan where there is no such freedom, or nothing was found. `ratio`: the worse of both; `without`:
+    the same of the readings without the blunder, asked only where the tool is beyond.
     """
 
     kind: str
@@ -58,13 +61,13 @@ class Result:
     mentioned: bool
     position: float
     rotation: float
-    beyond: float
+    share_beyond: float
     seconds: float
+    without: float = math.nan
 
     @property
     def ratio(self) -> float:
-        both = [r for r in (self.position, self.rotation) if not math.isnan(r)]
-        return max(both) if both else math.nan
+        return worse(self.position, self.rotation)
 
     @property
     def demanded(self) -> bool:
@@ -72,9 +75,20 @@ class Result:
         return not KINDS[self.kind].graded or self.factor >= 1.0
 
     @property
-    def moved(self) -> bool:
+    def beyond(self) -> bool:
         """Whether the tool is farther off than stated, or cannot be told at all."""
         return not self.found or self.ratio > 1.0
+
+    @property
+    def moved(self) -> bool:
+        """Whether it is so for the blunder: heights all of the other sign turn their own frame."""
+        return self.beyond and not abs(self.ratio - self.without) < HARMLESS
+
+
+def worse(position: float, rotation: float) -> float:
+    """Of two ratios; nan where there is none."""
+    both = [ratio for ratio in (position, rotation) if not math.isnan(ratio)]
+    return max(both) if both else math.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,10 +170,9 @@ def result_of(drawn: DrawnSet) -> Result:
 
 def judged(drawn: DrawnSet, answer: Answer, seconds: float) -> Result:
     kind, spoilt = drawn.kind, drawn.spoilt
-    off = {} if answer.found is None else {t.quantity: t for t in tools(drawn.twin, answer.found)}
+    off = _off(drawn, answer)
     rows = answer.named_rows()
-    none = math.nan
-    return Result(
+    result = Result(
         kind=kind.name,
         seed=drawn.seed,
         family=drawn.twin.family,
@@ -173,11 +186,26 @@ def judged(drawn: DrawnSet, answer: Answer, seconds: float) -> Result:
         named=kind.is_named(answer.first, rows, spoilt),
         mentioned=kind.is_named(answer.first, rows, spoilt)
         or (bool(kind.words) and answer.mentions(kind.words)),
-        position=off["position"].ratio if "position" in off else none,
-        rotation=off["rotation"].ratio if "rotation" in off else none,
-        beyond=max((each.share_beyond for each in off.values()), default=none),
+        position=_ratio(off, "position"),
+        rotation=_ratio(off, "rotation"),
+        share_beyond=max((each.share_beyond for each in off.values()), default=math.nan),
         seconds=seconds,
     )
+    if not (result.found and result.beyond and kind.make is not KINDS["none"].make):
+        return result
+    mended = _off(drawn, answer_of(drawn.twin, drawn.write(spoilt.mended), drawn.judged))
+    return replace(result, without=worse(*(_ratio(mended, each) for each in QUANTITIES)))
+
+
+QUANTITIES = ("position", "rotation")
+
+
+def _off(drawn: DrawnSet, answer: Answer) -> dict[str, Tool]:
+    return {} if answer.found is None else {t.quantity: t for t in tools(drawn.twin, answer.found)}
+
+
+def _ratio(off: dict[str, Tool], quantity: str) -> float:
+    return off[quantity].ratio if quantity in off else math.nan
 
 
 @dataclass(frozen=True)
@@ -237,7 +265,7 @@ def rates(kind: str, every: Iterable[Result]) -> Rates:
         share(each.named for each in moved),
         share(each.named for each in own),
         share(not each.found for each in own),
-        share(each.moved for each in mine if each.accepted and not each.demanded),
+        share(each.beyond for each in mine if each.accepted and not each.demanded),
     )
 
 
@@ -251,5 +279,5 @@ def as_row(result: Result) -> dict[str, object]:
 
 def of_row(row: dict[str, Any]) -> Result:
     """Back again."""
-    numbers = {"factor", "size", "position", "rotation", "beyond", "seconds"}
+    numbers = {"factor", "size", "position", "rotation", "share_beyond", "seconds", "without"}
     return Result(**{name: float(v) if name in numbers else v for name, v in row.items()})

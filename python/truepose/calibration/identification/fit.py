@@ -9,36 +9,22 @@ change of the readings). That is the gauge rule; it holds for frames as for mach
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 
 from truepose.arrays import Flags, Floats
-from truepose.calibration.identification.approach import approach, rows_in_the_way
-from truepose.calibration.identification.data_snooping import FEW, given_up
-from truepose.calibration.identification.equations import (
-    EXACT,
-    FAINT,
-    SETTLED,
-    Equations,
-    no_fit,
-    whitened,
-    whitened_jacobian,
-)
+from truepose.calibration.identification.equations import Equations, whitened
 from truepose.calibration.identification.placement import Placements, place_instruments
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
-from truepose.calibration.identification.robust import LOSS_ROUNDS, noise_of, weights_of
+from truepose.calibration.identification.robust import LOSS_ROUNDS
+from truepose.calibration.identification.rounds import Rounds
 from truepose.calibration.identification.unknowns import Unknowns
 from truepose.calibration.measurements import Measurements
 from truepose.errors import Problem as Refused
 from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.representation import Facts, Represented
-
-SNOOPINGS = 10
-"""Most times that it is asked which readings to give up; two or three do."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -155,104 +141,30 @@ def fit(
     problem = IdentificationProblem(machine, standing.measurements, unknowns)
     as_filed = standing.as_filed(unknowns)
     prior = Prior.of(unknowns, tolerances=use_prior)
-    values = unknowns.prior_mean
-    slope = whitened(problem, values)
+    slope = whitened(problem, unknowns.prior_mean)
     equations = Equations.of(slope, prior, unknowns)
     require_enough(measurements, unknowns, equations, prior)
-    counted = np.ones(measurements.n_observation, np.bool_)
-    in_the_way, pardoned, given = np.zeros(measurements.n_row, np.bool_), False, 0
-    weights, scale, noise = np.ones(measurements.n_observation), 1.0, float("nan")
-    factor = weights
-    evaluations, same = 0, True
-    if robust:
-        near = approach(problem, prior.with_rows(equations.gauge_rows()), values, counted)
-        values, weights, evaluations = near.values, near.weights, near.evaluations
-        in_the_way = problem.status(values) != 0
-        counted = ~in_the_way[measurements.row]
-        weights = weights * counted
-    freed, left_out = np.empty((0, unknowns.count)), None
-    holds = _firmer_holds(_extent(machine, unknowns))
-    holding: Callable[[Equations], Floats] = Equations.gauge_rows
-    for _ in range(LOSS_ROUNDS):
-        held = prior.with_rows(holding(equations))
-        solved = problem.solve(prior=held, weights=weights / scale**2, start=values)
-        evaluations += solved.evaluations[0]
-        # Readings that fit to the last digit leave nothing that a step could be judged by.
-        exact = solved.cost[0] < EXACT**2 * measurements.n_observation
-        settled = solved.ending[0] in SETTLED or exact
-        jacobian = problem.jacobian(solved.values[0])
-        usable = settled and np.isfinite(jacobian[counted]).all()
-        if robust and not usable:
-            ahead = rows_in_the_way(problem, held, solved.values[0], weights / scale**2)
-            if ahead.any() and (in_the_way | ahead).sum() <= max(1, FEW * measurements.n_row):
-                in_the_way |= ahead
-                counted &= ~ahead[measurements.row]
-                weights = weights * counted
-                values = solved.values[0]
-                continue
-        if not (usable or same) and left_out is None:
-            # What the first solution begins to see is seen too little to be followed.
-            left_out = freed
-            equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
-            continue
-        if not usable and (firmer := next(holds, None)) is not None:
-            holding, faint = firmer
-            left_out = faint(equations)
-            equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
-            continue
-        if not settled:
-            raise no_fit(problem, f"it ended as {solved.ending[0]}", np.empty(0, np.intp))
-        values = solved.values[0]
-        residual = problem.residual(values)
-        slope = whitened_jacobian(problem, values, jacobian, counted)
-        # Rows that only the way there could not pass count again, once.
-        missing = problem.status(values) != 0
-        back = in_the_way & ~missing & (not pardoned)
-        pardoned |= bool(in_the_way.any())
-        in_the_way = (in_the_way | missing) & ~back
-        counted = (counted | back[measurements.row]) & ~in_the_way[measurements.row]
-        freed = equations.null_space * equations.scale
-        factor = np.sqrt(weights) / scale
-        equations = Equations.of(factor[:, np.newaxis] * slope, prior, unknowns, left_out)
-        covariance = equations.covariance
-        leverage = np.square(slope @ equations.root).sum(axis=1) * factor**2
-        residual = np.where(in_the_way[measurements.row], 0.0, residual)
-        noise = noise_of(weights * residual, float(np.sum((1.0 - leverage)[weights > 0.0])))
-        larger = max(1.0, noise) if np.isfinite(noise) else 1.0
-        changed = weights_of(residual / larger) * counted if robust else weights
-        # What nothing saw at the start may be seen where the machine really is.
-        same = len(equations.null_space) == len(freed)
-        if same and abs(larger / scale - 1.0) < 1e-3 and np.abs(changed - weights).max() < 1e-3:
-            root = equations.root
-            away = prior.rows @ (values - prior.mean)
-            judged = ~in_the_way[measurements.row]
-            kept = judged.copy()
-            if robust and given < SNOOPINGS:
-                kept[judged] = ~given_up(slope[judged], residual[judged], (prior.rows, away), root)
-                given += 1
-            if not robust or given == SNOOPINGS or np.array_equal(kept, counted):
-                break
-            counted = kept
-            changed = weights_of(residual / larger) * counted
-        weights, scale = changed, larger
+    extent = _extent(machine, unknowns)
+    rounds = Rounds(problem, prior, slope, equations, extent, robust=robust)
+    rounds.settle(LOSS_ROUNDS)
     return Fit(
         unknowns,
         problem.measurements,
-        values,
-        covariance,
-        slope,
-        residual,
+        rounds.values,
+        rounds.equations.covariance,
+        rounds.slope,
+        rounds.residual,
         problem.residual(as_filed),
-        weights,
+        rounds.weights,
         use_prior,
-        equations.null_space,
-        equations.scale,
-        np.clip(leverage, 0.0, 1.0),
+        rounds.equations.null_space,
+        rounds.equations.scale,
+        np.clip(rounds.leverage, 0.0, 1.0),
         as_filed,
         problem,
-        evaluations,
-        noise,
-        in_the_way,
+        rounds.evaluations,
+        rounds.noise,
+        rounds.in_the_way,
     )
 
 
@@ -293,20 +205,6 @@ def _extent(machine: Machine, unknowns: Unknowns) -> Floats:
     """(n,) what an unknown is small against: the machine's size, a radian; no end for others."""
     extents = {"m": machine.characteristic_length, "rad": 1.0}
     return np.array([extents.get(unit, np.inf) for unit in unknowns.units])
-
-
-Hold = tuple[Callable[[Equations], Floats], Callable[[Equations], Floats]]
-"""Of equations: the rows that hold what is not determined, and the directions that count as it."""
-
-
-def _firmer_holds(extent: Floats) -> Iterator[Hold]:
-    """What to try in turn where a search does not settle, the slightest change first."""
-    for own_scale in (True, False):
-        for share in FAINT:
-            yield (
-                partial(Equations.gauge_rows, extent=extent, own_scale=own_scale),
-                partial(Equations.faint, extent=extent, share=share),
-            )
 
 
 def require_enough(

@@ -91,6 +91,9 @@ SCHEMA: Schema = {
         ("observation",), "1", "residual after over its own standard deviation after the fit"
     ),
     "weight": Variable(("observation",), "1", "weight of the robust loss, 1 where it is full"),
+    "minimal_detectable_bias": Variable(
+        ("observation",), "observation", "size of an error of its own that is named"
+    ),
     "held_out_before": Variable(
         ("observation",),
         "1",
@@ -259,6 +262,9 @@ def _observation_values(calibration: Calibration) -> dict[str, Floats]:
         "normalised_after": after,
         "standardised": over_all(fit.standardised),
         "weight": over_all(fit.weights),
+        "minimal_detectable_bias": nothing
+        if calibration.external_reliability is None
+        else over_all(calibration.external_reliability.minimal_detectable_bias),
         "held_out_before": nothing if checked is None else checked.before,
         "held_out_after": nothing if checked is None else checked.after,
     }
@@ -408,6 +414,7 @@ def _attrs(calibration: Calibration) -> dict[str, str | int | float]:
         "relative": int(gate.relative),
         "position_within": gate.after.within[0],
         "rotation_within": gate.after.within[1],
+        **_reliability(calibration),
         "observations": fit.measurements.n_observation,
         "validation": "none" if checked is None else checked.kind,
         "folds": 0 if checked is None else checked.folds,
@@ -416,6 +423,13 @@ def _attrs(calibration: Calibration) -> dict[str, str | int | float]:
         attrs["rms_held_out_before"] = checked.rms_before
         attrs["rms_held_out_after"] = checked.rms_after
     return attrs
+
+
+def _reliability(calibration: Calibration) -> dict[str, float]:
+    reliability = calibration.external_reliability
+    if reliability is None:
+        return {}
+    return {"position_unnoticed": reliability.position, "rotation_unnoticed": reliability.rotation}
 
 
 def _said(reason: Reason) -> dict[str, str]:

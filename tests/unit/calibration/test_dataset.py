@@ -231,6 +231,20 @@ def test_the_headline_is_a_number_too() -> None:
     assert found.dataset.attrs["rotation_within"] == 0.0
 
 
+def test_what_might_go_unnoticed_is_a_number_too() -> None:
+    found = delta("positions")
+    said = found.external_reliability
+    assert said is not None
+    assert found.dataset.attrs["position_unnoticed"] == said.position > 0.0
+    assert found.dataset.attrs["rotation_unnoticed"] == said.rotation
+    bias = found.dataset["minimal_detectable_bias"].values
+    np.testing.assert_array_equal(bias, said.minimal_detectable_bias)
+    # Of a reading that the others check fully it is 7.6 of its standard deviations; of none less.
+    uncertainty = found.dataset["uncertainty"].values
+    assert (bias >= 7.6 * uncertainty).all()
+    assert np.isfinite(bias).any()
+
+
 def test_saving_is_refused_where_the_answer_is_no(tmp_path: Path) -> None:
     found = delta("heights", use_prior=False)
     path, original = tmp_path / "calibrated.toml", DATA / "delta_printer.toml"

@@ -13,6 +13,7 @@ from made_blunders import column, exchanged, good
 from truepose.calibration.calibrate import calibrate
 from truepose.calibration.data_checks import suspicions
 from truepose.calibration.dataset import verdict_of
+from truepose.calibration.identification import rounds
 from truepose.calibration.measurements import Measurements
 from truepose.errors import RequestError
 from truepose.machine import Machine
@@ -48,22 +49,34 @@ def in_another_order(data: Measurements) -> Measurements:
     return data.with_values(value)
 
 
-def test_columns_exchanged_are_a_no_also_where_no_machine_can_be_found() -> None:
+def with_columns_exchanged() -> Measurements:
     data = good(machine("linapod"), "position", seed=1, frame="unknown")
-    answer = calibrate(machine("linapod"), exchanged(data, column(data, "x"), column(data, "y")))
+    return exchanged(data, column(data, "x"), column(data, "y"))
+
+
+def test_columns_exchanged_are_a_no_also_where_no_machine_can_be_found() -> None:
+    answer = calibrate(machine("linapod"), with_columns_exchanged(), use_prior=False)
     assert answer.failure is not None
     assert answer.failure.code == "no-fit"
     assert not answer.accepted
     verdict = verdict_of(answer)
     assert verdict.startswith("No: the measurements look wrong. made: it looks as if the readings")
     assert "no machine was found that explains the measurements" in verdict
-    # Nothing was found, so that nothing is known better than before.
-    assert not answer.fit.values[: answer.fit.unknowns.n_machine].any()
-    assert answer.gate.before is not None
-    np.testing.assert_allclose(answer.gate.after.position, answer.gate.before.position, rtol=1e-9)
     assert answer.dataset.attrs["accepted"] == 0
     with pytest.raises(RequestError):
         answer.save("never.toml", original=MACHINES / "linapod.toml", date="2026-01-31", force=True)
+
+
+def test_where_no_machine_can_be_found_nothing_is_known_better(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Within tolerances a machine is found for exchanged columns too: the search is cut short."""
+    monkeypatch.setattr(rounds, "SETTLED", ())
+    answer = calibrate(machine("linapod"), with_columns_exchanged())
+    assert answer.failure is not None
+    assert not answer.fit.values[: answer.fit.unknowns.n_machine].any()
+    assert answer.gate.before is not None
+    np.testing.assert_allclose(answer.gate.after.position, answer.gate.before.position, rtol=1e-9)
 
 
 def test_angles_in_another_order_are_found_where_tolerances_hide_them(wide: Machine) -> None:

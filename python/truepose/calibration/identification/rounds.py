@@ -26,11 +26,14 @@ from truepose.calibration.identification.equations import (
 from truepose.calibration.identification.problem import IdentificationProblem, Prior, Solved
 from truepose.calibration.identification.robust import noise_of, weights_of
 
-SNOOPINGS = 9
+SNOOPINGS = 10
 """Most times that it is asked which readings to give up; two or three do."""
 
 SAME = 1e-3
 """A scale by this share, and weights by this much, are those of the round before."""
+
+FOLLOWED = 1.01
+"""The sum of squares, worked out afresh, is no larger than this times that of the search."""
 
 Hold = tuple[Callable[[Equations], Floats], Callable[[Equations], Floats]]
 """Of equations: the rows that hold what is not determined, and the directions that count as it."""
@@ -74,6 +77,7 @@ class Rounds:
         self._holding: Callable[[Equations], Floats] = Equations.gauge_rows
         if robust:
             self._approach()
+        self._begin = self.values
 
     def _approach(self) -> None:
         """The first steps, on which readings that are far off lead nowhere."""
@@ -96,12 +100,14 @@ class Rounds:
             )
             self.evaluations += solved.evaluations[0]
             jacobian = self._problem.jacobian(solved.values[0])
-            settled = self._settled(solved)
+            settled = self._settled(solved) and self._is_followed(held, solved)
             usable = settled and bool(np.isfinite(jacobian[self._counted]).all())
             if not usable and self._retreats(held, solved):
                 continue
             if not settled:
                 ending = f"it ended as {solved.ending[0]}"
+                if self._settled(solved):
+                    ending = "it ended in another assembly mode"
                 raise no_fit(self._problem, ending, np.empty(0, np.intp))
             self._arrive(solved.values[0], jacobian)
             if self._stays():
@@ -111,6 +117,17 @@ class Rounds:
         # Readings that fit to the last digit leave nothing that a step could be judged by.
         exact = solved.cost[0] < EXACT**2 * self._problem.measurements.n_observation
         return bool(solved.ending[0] in SETTLED or exact)
+
+    def _is_followed(self, held: Prior, solved: Solved) -> bool:
+        """Whether the machine found, assembled afresh, reads what the search ended with.
+
+        A search along what nothing determines may carry poses over into another assembly mode.
+        """
+        residual = self._problem.residual(solved.values[0])
+        known = np.isfinite(residual) & (self.weights > 0.0)
+        squares = (self.weights[known] / self.scale**2) @ residual[known] ** 2
+        away = held.rows @ (solved.values[0] - held.mean)
+        return bool(squares + away @ away <= FOLLOWED * solved.cost[0] + EXACT)
 
     def _retreats(self, held: Prior, solved: Solved) -> bool:
         """Whether something could be held or left out, of a search that cannot be used."""
@@ -124,6 +141,8 @@ class Rounds:
             self._left_out = faint(self.equations)
         else:
             return False
+        # From where none of it was free yet: what is held is held as the drawing has it.
+        self.values = self._begin
         self._set_equations()
         return True
 
@@ -169,16 +188,20 @@ class Rounds:
         changed = self._weighed(larger)
         # What nothing saw at the start may be seen where the machine really is.
         self._same = len(self.equations.null_space) == len(self._freed)
-        if (
+        stays = (
             self._same
             and abs(larger / self.scale - 1.0) < SAME
-            and np.abs(changed - self.weights).max() < SAME
-        ):
+            and bool(np.abs(changed - self.weights).max() < SAME)
+        )
+        # At once the first time: with many unknowns gross errors raise the scale round by round,
+        # until they no longer look like any.
+        if stays or not self._snooped:
             kept = self._snoop()
-            if kept is None or np.array_equal(kept, self._counted):
+            if stays and (kept is None or np.array_equal(kept, self._counted)):
                 return True
-            self._counted = kept
-            changed = self._weighed(larger)
+            if kept is not None:
+                self._counted = kept
+                changed = self._weighed(larger)
         self.weights, self.scale = changed, larger
         return False
 

@@ -394,7 +394,7 @@ def tool(result: xr.Dataset, units: ShownUnits) -> Table:
         note += " Where the machine as a whole stands in the instrument's frame is not in it."
     return Table(
         "tool",
-        "What that is worth at the tool",
+        "Uncertainty of the tool",
         ("", "worst before", "worst after", "rms before", "rms after", "after / before"),
         tuple(rows),
         note=note,
@@ -428,7 +428,7 @@ def warning_lines(result: xr.Dataset) -> Table | None:
     rows = [
         (f"{sentence(warning['sentence'])}.",) for warning in json_attribute(result, "warnings")
     ]
-    return Table("heed", "To heed", ("",), tuple(rows)) if rows else None
+    return Table("heed", "Warnings", ("",), tuple(rows)) if rows else None
 
 
 def next_measurement(result: xr.Dataset, units: ShownUnits) -> Table | None:

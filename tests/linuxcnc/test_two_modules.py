@@ -12,16 +12,21 @@ import truepose as tp
 from benchmarks.kinematics_host import NEEDED, available, compiled, the_host
 from build_machine import MACHINES
 from system_package import missing
+from truepose.controllers._prefix import LONGEST_PREFIX
+
+HAL_NAME_LEN = 47
+"""Characters of a name: LinuxCNC's hal.h."""
 
 
 def test_each_has_pins_of_its_own() -> None:
     if not available():
         missing(f"no LinuxCNC headers: apt-get install --no-install-recommends {NEEDED}")
-    host = the_host()
+    # The longest that there is: with it, names of pins are as long as HAL takes them.
+    host, right = the_host(), "right" + "t" * (LONGEST_PREFIX - 5)
     before = len(host.names)
     machines = {
         "left": tp.load(MACHINES / "planar_two_slider.toml"),
-        "right": tp.load(MACHINES / "linear_delta.toml"),
+        right: tp.load(MACHINES / "linear_delta.toml"),
     }
     with tempfile.TemporaryDirectory() as folder:
         modules = {}
@@ -32,7 +37,8 @@ def test_each_has_pins_of_its_own() -> None:
             modules[prefix] = host.load(compiled(source), len(machine.joints))
     names = host.names[before:]
     assert len(names) == len(set(names))
-    assert {name.partition(".")[0] for name in names} == {"left", "right"}
+    assert {name.partition(".")[0] for name in names} == {"left", right}
+    assert max(map(len, names)) <= HAL_NAME_LEN
 
     for name in names:
         if name.endswith("temperature"):
@@ -41,14 +47,14 @@ def test_each_has_pins_of_its_own() -> None:
     host.set("left.enable", 1.0)
     for _ in range(2000):
         host.run("left.update", CYCLE)
-        host.run("right.update", CYCLE)
-    assert host.get("left.fault") == host.get("right.fault") == 0.0
+        host.run(f"{right}.update", CYCLE)
+    assert host.get("left.fault") == host.get(f"{right}.fault") == 0.0
     assert abs(host.get("left.compensation-0")) > 1e-3
-    assert host.get("right.compensation-0") == 0.0
+    assert host.get(f"{right}.compensation-0") == 0.0
 
     # The right one is off: its joints are the nominal ones of its machine.
-    machine = machines["right"]
+    machine = machines[right]
     pose = machine.home[:3]
-    joints = modules["right"].inverse([*(pose / 1e-3).tolist(), 0.0, 0.0, 0.0])
+    joints = modules[right].inverse([*(pose / 1e-3).tolist(), 0.0, 0.0, 0.0])
     assert joints is not None
     assert np.abs(np.array(joints) * 1e-3 - machine.inverse(pose)).max() < 1e-12

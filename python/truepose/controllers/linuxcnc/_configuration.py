@@ -18,7 +18,7 @@ def ini_text(description: Description, box: Box, clamp: float) -> str:
     home = description.home / np.array([MILLIMETRE] * 3 + [DEGREE] * 3)
     home[[k for k in range(6) if k not in description.freedoms]] = 0.0
     return fill(
-        template(__package__, "ini.in"),
+        description.with_pins(template(__package__, "ini.in")),
         {
             "title": description.title,
             "version": version(),

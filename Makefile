@@ -11,6 +11,7 @@ REPORT := build/planar_two_slider.html
 MADE := $(VENV)/.made
 PACKAGE := $(VENV)/.package
 TOOLS := $(VENV)/.tools
+KLIPPER := build/klipper/.made
 
 RUST_SOURCES := Cargo.toml Cargo.lock rust-toolchain.toml $(shell find crates -name '*.rs' -o -name Cargo.toml)
 KERNEL := $(wildcard python/truepose/_kernel*.so)
@@ -55,6 +56,9 @@ test-python: package tools ## run the package's tests, of each sweep a member or
 .PHONY: test-python-all
 test-python-all: package tools ## run all of the package's tests
 	$(PYTEST)
+
+.PHONY: klipper
+klipper: $(KLIPPER) ## fetch and build Klipper's kinematics, with which tests compare, into build/klipper
 
 .PHONY: lint
 lint: lint-python lint-types lint-imports lint-rust ## check form, types and the direction of imports
@@ -139,6 +143,11 @@ $(PACKAGE): $(MADE) pyproject.toml requirements.lock $(RUST_SOURCES) $(if $(KERN
 
 .PHONY: kernel-missing
 kernel-missing:
+
+# Has an environment of its own: nothing of it comes into .venv.
+$(KLIPPER): $(MADE) tests/klipper/install.py tests/klipper/environment.txt tests/klipper/requirements.txt
+	$(BIN)/python tests/klipper/install.py $(dir $@)
+	@touch $@
 
 $(TOOLS): $(MADE) requirements.lock
 	$(BIN)/python -m pip install --quiet --requirement requirements.lock

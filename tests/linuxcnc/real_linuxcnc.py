@@ -319,3 +319,15 @@ def _to_its_end(command: Sequence[str], folder: Path, environment: Mapping[str, 
                 process.wait()
     text = log.read_text(errors="replace")
     return f"{text}\n(exit code {process.returncode})"
+
+
+def in_namespaces(folder: Path, inside: str, *arguments: str) -> str | None:
+    """The log of a shell script in namespaces of its own; None where there are none to be had.
+
+    `inside` gets `folder`, whose files every user may then write, and the `arguments`.
+    """
+    if not _namespaces():
+        return None
+    _give(folder)
+    command = [*_UNSHARE, "sh", "-c", inside, "sh", str(folder), *arguments]
+    return _to_its_end(command, folder, {"PATH": SYSTEM_PATH, "LANG": "C"})

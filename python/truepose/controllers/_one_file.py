@@ -27,15 +27,19 @@ def in_one_file(
     ending: str,
     comment: str,
     notes: Sequence[str] = (),
+    premises: Sequence[str] = (),
 ) -> Export:
     """The file `STEM_ENDING`; `comment` begins the lines of the heading and of the notes below it.
+
+    `premises`: under what the numbers mean what is stated, in the file and in the statement.
 
     Raises `RequestError`: controller-cannot, no-workspace, no-pose-left.
     """
     fitted = fit(machine, model)
-    lines = [f"{comment} {line}" for line in (*heading(machine, fitted, controller), *notes)]
+    above = (*heading(machine, fitted, controller), *premises, *notes)
+    lines = [f"{comment} {line}" for line in above]
     text = "\n".join([*lines, *model.block(fitted.printed), ""])
-    return Export({f"{stem(machine)}_{ending}": text}, fitted.statement(machine))
+    return Export({f"{stem(machine)}_{ending}": text}, (*fitted.statement(machine), *premises))
 
 
 __all__ = ["BlockModel", "in_one_file"]

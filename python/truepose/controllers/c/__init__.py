@@ -10,8 +10,11 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from truepose.controllers._export import Export, Option, geometry_compensated
-from truepose.controllers.c._program import Program, program_of
+from truepose.controllers._prefix import prefix_of, prefix_option
+from truepose.controllers.c._program import HEADERS, Program, program_of
 from truepose.machine import Machine
+
+WITHOUT = Option("", "error sources to leave out, by name, with commas between", dimension=None)
 
 
 class C:
@@ -20,18 +23,18 @@ class C:
     name: ClassVar[str] = "c"
     doc: ClassVar[str] = "C99 header and source: inverse, forward and compensated joints"
     options: ClassVar[Mapping[str, Option]] = {
-        "without": Option(
-            "", "error sources to leave out, by name, with commas between", dimension=None
-        )
+        "without": WITHOUT,
+        "prefix": prefix_option("without it, with the machine file's name"),
     }
 
     @classmethod
     def export(cls, machine: Machine, options: Mapping[str, float | str]) -> Export:
-        """Header and source, named as the machine file.
+        """Header and source, named as the machine file, or by `prefix`.
 
         Raises `RequestError` (controller-cannot, bad-option, no-workspace).
         """
-        program = program_of(machine, without=names_of(options["without"]))
+        prefix = prefix_of("c", options["prefix"], HEADERS)
+        program = program_of(machine, prefix, without=names_of(options["without"]))
         return Export(
             {f"{program.prefix}.h": program.header, f"{program.prefix}.c": program.source},
             (*program.statement, *geometry_compensated(machine)),
@@ -43,4 +46,4 @@ def names_of(listed: float | str) -> tuple[str, ...]:
     return tuple(name.strip() for name in str(listed).split(",") if name.strip())
 
 
-__all__ = ["C", "Program", "names_of", "program_of"]
+__all__ = ["WITHOUT", "C", "Program", "names_of", "program_of"]

@@ -25,7 +25,7 @@ OWN_STACK = 8192
 
 _FREEDOMS = "xyzabc"
 
-_HEADERS = ("assert", "complex", "errno", "fenv", "float", "limits", "math", "stdint", "tgmath")
+HEADERS = ("assert", "complex", "errno", "fenv", "float", "limits", "math", "stdint", "tgmath")
 """C's own headers that a file of the same name would hide from a program or from math.h."""
 
 _ACTING = " || ".join(f"wrench[{k}] != 0.0" for k in range(6))
@@ -77,7 +77,7 @@ def program_of(machine: Machine, prefix: str | None = None, without: Sequence[st
 def _name_of(machine: Machine) -> str:
     """The machine file's name as a C identifier."""
     name = re.sub(r"\W", "_", Path(machine.file).stem, flags=re.ASCII).lower()
-    usual = re.match(r"[a-z]", name) and name not in _HEADERS
+    usual = re.match(r"[a-z]", name) and name not in HEADERS
     return name if usual else f"machine_{name}"
 
 
@@ -113,6 +113,7 @@ class _Writer:
         source = "\n".join(
             [
                 f'#include "{self.prefix}.h"\n#include <math.h>\n',
+                self._filled("arithmetic"),
                 self._tables(),
                 *(self._function(name) for name in self._needed()),
                 *(self._filled(piece) for piece in pieces),

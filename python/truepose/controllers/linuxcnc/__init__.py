@@ -9,10 +9,11 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from truepose.controllers._export import Export, Option, geometry_compensated
-from truepose.controllers.c import C, names_of, program_of
+from truepose.controllers._prefix import prefix_of, prefix_option
+from truepose.controllers.c import WITHOUT, names_of, program_of
 from truepose.controllers.linuxcnc._compensation import SPARE, default_clamp
 from truepose.controllers.linuxcnc._configuration import hal_text, ini_text
-from truepose.controllers.linuxcnc._description import MILLIMETRE, Description
+from truepose.controllers.linuxcnc._description import MILLIMETRE, PINS, Description
 from truepose.controllers.linuxcnc._module import PREFIX, module_text
 from truepose.controllers.linuxcnc._safe_box import Box, safe_box
 from truepose.errors import Problem, RequestError
@@ -27,7 +28,8 @@ class LinuxCNC:
         "kinematics module for LinuxCNC 2.9 that compensates live, with INI and HAL"
     )
     options: ClassVar[Mapping[str, Option]] = {
-        **C.options,
+        "without": WITHOUT,
+        "prefix": prefix_option(f"without it, pins with {PINS}"),
         "clamp": Option(
             0.0,
             "most that a joint is corrected by; 0: three times the most over the workspace",
@@ -40,13 +42,16 @@ class LinuxCNC:
     def export(cls, machine: Machine, options: Mapping[str, float | str]) -> Export:
         """`truepose_NAME.c`, `.ini` and `.hal`, NAME that of the machine file.
 
+        With `prefix`, that in place of `truepose`: in the names of files, module and pins.
+
         Raises `RequestError`: controller-cannot, bad-option, no-workspace, and what the machine's
         C is refused for.
         """
         rate_limit = _positive("rate_limit", float(options["rate_limit"])) * MILLIMETRE
         asked = _not_negative("clamp", float(options["clamp"]))
         program = program_of(machine, PREFIX, names_of(options["without"]))
-        description = Description.of(machine, program)
+        pins = prefix_of("linuxcnc", options["prefix"]) or PINS
+        description = Description.of(machine, program, pins)
         clamp = asked if asked > 0.0 else default_clamp(description)
         box = safe_box(description, clamp)
         module = description.module

@@ -18,7 +18,7 @@ def ini_text(description: Description, box: Box, clamp: float) -> str:
     home = description.home / np.array([MILLIMETRE] * 3 + [DEGREE] * 3)
     home[[k for k in range(6) if k not in description.freedoms]] = 0.0
     return fill(
-        template(__package__, "ini.in"),
+        description.with_pins(template(__package__, "ini.in")),
         {
             "title": description.title,
             "version": version(),
@@ -73,17 +73,17 @@ def _joints(description: Description) -> Iterable[str]:
 def hal_text(description: Description, clamp: float, rate_limit: float) -> str:
     """The lines that load, order and connect the module. `clamp` in m, `rate_limit` in m/s."""
     temperatures = [
-        f"#net {name}  YOUR.SENSOR  => truepose.{name}-temperature   # {one_line(part)}"
+        f"#net {name}  YOUR.SENSOR  => {description.pins}.{name}-temperature   # {one_line(part)}"
         for name, part in zip(
             description.temperature_names, description.temperature_parts, strict=True
         )
     ]
     wrench = [
-        f"#net {WRENCHES[index]}  YOUR.SENSOR  => truepose.{WRENCHES[index]}"
+        f"#net {WRENCHES[index]}  YOUR.SENSOR  => {description.pins}.{WRENCHES[index]}"
         for index in description.wrenches
     ]
     return fill(
-        template(__package__, "hal.in"),
+        description.with_pins(template(__package__, "hal.in")),
         {
             "module": description.module,
             "title": description.title,

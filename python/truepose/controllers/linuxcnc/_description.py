@@ -24,8 +24,13 @@ DEGREE = math.pi / 180.0
 MOST_JOINTS = 9
 """LinuxCNC's axes are X Y Z A B C U V W; a machine has as many joints as commanded freedoms."""
 
+PINS = "truepose"
+"""What the names of pins begin with where no prefix is asked for, and in the templates always."""
+
 LONGEST_NAME = 40
 """HAL names have at most 47 characters."""
+
+_PIN = re.compile(rf"\b{PINS}(?=[.-])")
 
 WRENCHES = ("force-x", "force-y", "force-z", "moment-x", "moment-y", "moment-z")
 """Pins, in the order of a wrench."""
@@ -37,10 +42,12 @@ class Description:
 
     `units` (n_joint,): m or rad of one machine unit, mm or degree, of each joint. `arms`
     (n_joint,): by how many m a joint moves what it carries, per m or rad of its coordinate.
-    `temperature_parts`: parts whose temperature counts, in the order of the C.
+    `temperature_parts`: parts whose temperature counts, in the order of the C. `pins`: what the
+    names of pins begin with.
     """
 
     machine: Machine
+    pins: str
     module: str
     units: Floats
     arms: Floats
@@ -48,7 +55,7 @@ class Description:
     wrench_matters: bool
 
     @classmethod
-    def of(cls, machine: Machine, program: Program) -> Description:
+    def of(cls, machine: Machine, program: Program, pins: str = PINS) -> Description:
         """Raises `RequestError` (controller-cannot) where LinuxCNC has no place for it."""
         if len(machine.joints) > MOST_JOINTS:  # pragma: no cover - the kernel has six freedoms
             raise unsupported_machine(
@@ -61,12 +68,17 @@ class Description:
         turning = [drive.coordinate == "angle" for drive in machine.drives]
         return cls(
             machine,
-            f"truepose_{_stem(machine)}",
+            pins,
+            f"{pins}_{_stem(machine, LONGEST_NAME - len(pins) - 1)}",
             np.where(turning, DEGREE, MILLIMETRE),
             _arms(machine),
             program.temperature_parts,
             program.wrench_matters,
         )
+
+    def with_pins(self, text: str) -> str:
+        """A template or line in which names of pins and signals begin with `truepose`, renamed."""
+        return _PIN.sub(self.pins, text)
 
     @property
     def title(self) -> str:
@@ -120,11 +132,9 @@ class Description:
         return tuple(_pin(self.machine, part) for part in self.temperature_parts)
 
 
-def _stem(machine: Machine) -> str:
+def _stem(machine: Machine, longest: int) -> str:
     stem = re.sub(r"[^a-z0-9_]+", "_", Path(machine.file).stem.lower()).strip("_") or "machine"
-    if len(stem) + len("truepose_") > LONGEST_NAME:
-        stem = stem[: LONGEST_NAME - len("truepose_")].rstrip("_")
-    return stem
+    return stem[:longest].rstrip("_")
 
 
 def _pin(machine: Machine, part: str) -> str:

@@ -35,7 +35,7 @@ def module_text(description: Description, machine_c: str, clamp: float, rate_lim
     wrenches = description.wrenches
     condition = machine.condition
     return fill(
-        template(__package__, "module.c.in"),
+        description.with_pins(template(__package__, "module.c.in")),
         {
             "module": description.module,
             "title": description.title,

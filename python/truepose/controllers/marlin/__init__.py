@@ -7,7 +7,9 @@
 
 Two numbers say one thing twice: the mean of A, B and C is made 0; the highest adjustment is
 made `least` below 0, since Marlin leaves out one that is shorter than MIN_STEPS_PER_SEGMENT steps.
-The radius trims of single towers can be set in Configuration.h only and are taken to be 0. With a
+The radius trims of single towers can be set in Configuration.h only and are taken to be 0. The rod
+trims came with pull request 18423 (June 2020), hence with Marlin 2.0.6; in older ones B is the
+radius on which G33 probes (1.1; issue 19121) or nothing, and A and C are nothing. With a
 bed probe Marlin homes to H less the probe's z offset (M851 Z), which is what the option
 `probe_offset` is for. Facts: https://marlinfw.org/docs/gcode/M665.html and M666.html, and the
 behaviour of Marlin 2.1.
@@ -50,6 +52,16 @@ LENGTH_DIGITS, ANGLE_DIGITS = 5, 6
 """Decimals that are written; of lengths more where the characteristic one is below `SMALL`, m."""
 
 SMALL = 0.01
+
+PREMISES = (
+    "for Marlin 2.0.6 or newer, whose M503 shows M665 with A, B and C, rod trims: an older one "
+    "leaves A and C out, and may take B for the radius on which G33 probes",
+    "these must be 0 or off: DELTA_RADIUS_TRIM_TOWER (in Configuration.h), hotend offsets (M218), "
+    "skew (M852), bed levelling (M420 S0)",
+    "G33 replaces these numbers by its own",
+)
+"""What the letters, and what else the firmware may do to a position, depend on."""
+
 AXES, TRIMS = "XYZ", "ABC"
 
 
@@ -156,7 +168,9 @@ class Marlin:
         Raises `RequestError`: controller-cannot, bad-option, no-workspace, no-pose-left.
         """
         model = _Model(machine, options)
-        return in_one_file(machine, model, "Marlin", ending="marlin.gcode", comment=";")
+        return in_one_file(
+            machine, model, "Marlin", ending="marlin.gcode", comment=";", premises=PREMISES
+        )
 
 
 __all__ = ["Marlin"]

@@ -7,7 +7,8 @@
 
 H and the adjustments say one thing twice: the mean of the adjustments is made 0, as the
 firmware's own calibration does. Facts: https://docs.duet3d.com, M665 and M666, and the behaviour
-of RepRapFirmware 3; rods of different lengths need 2.03 or newer.
+of RepRapFirmware 2.03 to 3.6. Rods of different lengths came with 2.03; a firmware before that
+reads the first alone. M500 writes what it keeps with three decimals, the tilt with two.
 """
 
 from __future__ import annotations
@@ -41,6 +42,17 @@ LENGTH_DIGITS, ANGLE_DIGITS, TILT_DIGITS = 5, 6, 6
 """Decimals that are written; of lengths more where the characteristic one is below `SMALL`, m."""
 
 SMALL = 0.01
+
+PREMISES = (
+    "for RepRapFirmware 2.03 or newer, which takes a rod for each tower: an older one takes the "
+    "first for all",
+    "these must be 0 or off: axis skew (M556), height map (G29 S2), tool offsets (G10), "
+    "baby steps (M290 R0 S0)",
+    "keep them in config.g: M500 writes lengths to 0.001 mm and the tilt A B to 0.01 only, which "
+    "M501 takes instead; G30 with S replaces them by its own",
+)
+"""What the letters, and what else the firmware may do to a position, depend on."""
+
 AXES, TILTS = "XYZ", "AB"
 
 
@@ -112,7 +124,9 @@ class RepRap:
         Raises `RequestError`: controller-cannot, bad-option, no-workspace, no-pose-left.
         """
         model = _Model(machine, options)
-        return in_one_file(machine, model, "RepRapFirmware", ending="reprap.g", comment=";")
+        return in_one_file(
+            machine, model, "RepRapFirmware", ending="reprap.g", comment=";", premises=PREMISES
+        )
 
 
 __all__ = ["RepRap"]

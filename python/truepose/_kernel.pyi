@@ -569,7 +569,9 @@ class GcodeReader:
         units: "mm" or "inch" before the first G20 or G21; without it a length before these is
             refused.
         start: where the machine stands, by axis letter; axes not named are not known.
-        offsets: "G54" ... "G59", "G59.1" ... "G59.3" to offsets by axis letter; 0 where not named.
+        offsets: "G54" ... "G59", "G59.1" ... "G59.3" to offsets by axis letter, 0 where not named,
+            and "R" to the rotation about Z, degrees. A program that selects another is refused.
+        system: which of them is active at first; where it has no offset, machine coordinates hold.
         reference: "G28" and "G30" to the coordinates that they go to, by axis letter, where known.
         block_delete: whether lines that begin with / are left out; None refuses them.
         axes: letters of the axes that must be known at the end of every move, and at the start of
@@ -585,6 +587,7 @@ class GcodeReader:
         units: str | None = None,
         start: dict[str, float] | None = None,
         offsets: dict[str, dict[str, float]] | None = None,
+        system: str = "G54",
         reference: dict[str, dict[str, float]] | None = None,
         block_delete: bool | None = None,
         axes: str = "XYZ",
@@ -607,6 +610,7 @@ class GcodeCorrector:
         axes: letters of the axes that are corrected. The others are written where the program
             writes them, and go along on the programmed path.
         digits: decimals of mm and degrees, 0 to 8; inches have one more.
+        heading: a comment in a line of its own at the beginning, ASCII without parentheses.
     """
 
     def __new__(
@@ -617,10 +621,12 @@ class GcodeCorrector:
         units: str | None = None,
         start: dict[str, float] | None = None,
         offsets: dict[str, dict[str, float]] | None = None,
+        system: str = "G54",
         reference: dict[str, dict[str, float]] | None = None,
         block_delete: bool | None = None,
         axes: str = "XYZ",
         digits: int = 6,
+        heading: str | None = None,
     ) -> GcodeCorrector: ...
     def read(self, most_moves: int) -> GcodeMoves:
         """The next moves, at most so many; none behind the last.

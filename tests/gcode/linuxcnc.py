@@ -16,9 +16,11 @@ from system_package import missing
 from truepose import _kernel
 
 AXES = "XYZABCUVW"
+LETTERS = "XYZABCUVWR"
 SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
 SYSTEM_PYTHON = Path("/usr/bin/python3")
 SCRIPT = Path(__file__).with_name("linuxcnc_moves.py")
+NONE = (0.0,) * 9
 LINE, PLANE, FEED, END, CENTRE, TURNS, WIDTH = 0, 1, 2, slice(3, 12), slice(12, 14), 14, 15
 
 Offsets = Mapping[str, Sequence[float]]
@@ -46,11 +48,11 @@ def require() -> None:
 
 
 def parameters(offsets: Offsets) -> str:
-    """The offsets as LinuxCNC keeps them: numbered parameters, lengths in inches."""
+    """The offsets, and a tenth number, the rotation, as LinuxCNC keeps them; lengths in inches."""
     lines = []
     for system, name in enumerate(SYSTEMS):
         for axis, value in enumerate(offsets.get(name, ())):
-            inches = value if AXES[axis] in "ABC" else value / 25.4
+            inches = value if LETTERS[axis] in "ABCR" else value / 25.4
             lines.append(f"{5221 + 20 * system + axis}\t{inches!r}\n")
     return "".join(lines)
 
@@ -108,8 +110,10 @@ def ours(path: Path, offsets: Offsets, units: str | None = None) -> Outcome:
     reader = _kernel.GcodeReader(
         path,
         units=units,
-        start=dict(zip(AXES, offsets.get("G54", (0.0,) * 9), strict=True)),
-        offsets={name: dict(zip(AXES, values, strict=True)) for name, values in offsets.items()},
+        start=dict(zip(AXES, offsets.get("G54", (0.0,) * 9), strict=False)),
+        offsets={
+            name: dict(zip(LETTERS, offsets.get(name, NONE), strict=False)) for name in SYSTEMS
+        },
         reference={name: dict.fromkeys(AXES, 0.0) for name in ("G28", "G30")},
         block_delete=False,
         axes=AXES,

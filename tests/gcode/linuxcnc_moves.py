@@ -10,6 +10,7 @@ Each program gives a row (number of moves, line of the error or 0), then its mov
 axes, turns): mm and degrees, machine coordinates. What it says of an error goes to stderr.
 """
 
+import math
 import os
 import sys
 import tempfile
@@ -31,6 +32,7 @@ class Canon:
         self.line = 0
         self.plane = 1
         self.g5x = self.g92 = (0.0,) * 9
+        self.turn = 0.0
         self.moves = []
 
     def get_tool(self, pocket):
@@ -64,11 +66,17 @@ class Canon:
         self.g92 = offset
 
     def set_xy_rotation(self, angle):
-        if angle:
-            raise ValueError("a rotated coordinate system")
+        self.turn = math.radians(angle)
+
+    def _turned(self, x, y):
+        """X and Y after G92, turned: what the controller does before it adds the offset of G54."""
+        sine, cosine = math.sin(self.turn), math.cos(self.turn)
+        return (cosine * x - sine * y, sine * x + cosine * y) if self.turn else (x, y)
 
     def _end(self, position):
-        end = [p + a + b for p, a, b in zip(position, self.g5x, self.g92, strict=True)]
+        end = [p + b for p, b in zip(position, self.g92, strict=True)]
+        end[:2] = self._turned(*end[:2])
+        end = [p + a for p, a in zip(end, self.g5x, strict=True)]
         for axis in LENGTHS:
             end[axis] *= INCH
         return end
@@ -84,10 +92,10 @@ class Canon:
         position = [0.0] * 3
         for axis, value in zip(axes, (first, second, third), strict=True):
             position[axis] = value
-        centre = [
-            (value + self.g5x[axis] + self.g92[axis]) * INCH
-            for axis, value in zip(axes[:2], (centre_first, centre_second), strict=True)
-        ]
+        middle = [0.0] * 9
+        middle[axes[0]], middle[axes[1]] = centre_first, centre_second
+        middle = self._end(middle)
+        centre = [middle[axis] for axis in axes[:2]]
         self.moves.append([self.line, plane, 1, *self._end((*position, *others)), *centre, turns])
 
     def __getattr__(self, name):

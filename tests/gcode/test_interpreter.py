@@ -79,6 +79,30 @@ def test_random_programs_make_linuxcnc_s_moves(seed: int, tmp_path: Path) -> Non
         assert not wrong, f"{len(wrong)} of {count}:\n{wrong[0]}"
 
 
+def test_turned_systems_make_linuxcnc_s_moves(tmp_path: Path) -> None:
+    """The same programs, every system turned; what we do not take, and how much that is."""
+    linuxcnc.require()
+    turned = {name: [*values, 7.5 * (1 + k)] for k, (name, values) in enumerate(OFFSETS.items())}
+    turned["G54"] = [0.0] * 9 + [-33.0]
+    programs = Programs(SEED + 7, OFFSETS)
+    texts = [programs.program() for _ in range(2000)]
+    paths = written(texts, tmp_path)
+    compared = refused = 0
+    for text, path, theirs in zip(
+        texts, paths, linuxcnc.theirs(paths, tmp_path, turned), strict=True
+    ):
+        ours = linuxcnc.ours(path, turned)
+        if ours.error is not None:
+            refused += "turned coordinate system" in ours.error
+            assert theirs.error is not None or "turned coordinate system" in ours.error, text
+        elif theirs.error is None:
+            found = linuxcnc.difference(text, ours.moves, theirs.moves, turned)
+            assert found is None, f"{found}\n{text}"
+            compared += 1
+    assert compared > 300
+    assert refused > 30
+
+
 @pytest.mark.parametrize("kind", ["mutated", "soup"])
 def test_what_we_accept_linuxcnc_accepts_and_moves_alike(kind: str, tmp_path: Path) -> None:
     linuxcnc.require()

@@ -130,6 +130,26 @@ impl Block {
         word.letter == b'M' && codes::m_code(word.value).is_ok_and(|code| code.stops)
     }
 
+    /// Whether the word goes in front of the pieces of a block that is divided: an M code that acts before
+    /// the move, or a word that such a code takes.
+    pub fn precedes(word: &Word, words: &[Word]) -> bool {
+        let codes = words.iter().filter(|word| word.letter == b'M').filter_map(|word| {
+            let code = codes::m_code(word.value).ok()?;
+            code.precedes.then_some(code)
+        });
+        match word.letter {
+            b'M' => codes::m_code(word.value).is_ok_and(|code| code.precedes),
+            b'S' => codes.clone().any(|code| code.group == codes::SPINDLE),
+            b'T' => codes.clone().any(|code| code.group == codes::TOOL),
+            letter => codes.clone().any(|code| code.letters.contains(&letter)),
+        }
+    }
+
+    /// Whether the word is one of G54 to G59.3.
+    pub fn selects_offset(word: &Word) -> bool {
+        word.letter == b'G' && matches!(codes::g_code(word.value), Ok(GCode::Offset(_)))
+    }
+
     fn take_g(&mut self, words: &[Word], index: usize) -> LineResult<()> {
         let word = &words[index];
         let code = codes::g_code(word.value).map_err(|why| not_taken(word, why))?;

@@ -252,6 +252,8 @@ pub struct MCode {
     pub group: u8,
     /// The program stops or ends behind the block's move.
     pub stops: bool,
+    /// It acts before the block's move: of a block that is divided it goes in front of all pieces.
+    pub precedes: bool,
     /// The program ends.
     pub ends: bool,
     /// Letters that it may use.
@@ -260,29 +262,44 @@ pub struct MCode {
     pub needs: &'static [u8],
 }
 
+/// Group of M6 and M61.
+pub const TOOL: u8 = 6;
+
+/// Group of M3, M4, M5 and M19.
+pub const SPINDLE: u8 = 7;
+
 /// Most M codes in one block.
 pub const MOST_M_CODES: usize = 4;
 
 /// The M code of this number.
 pub fn m_code(value: f64) -> Result<MCode, NotTaken> {
-    let code = |group, letters, needs| MCode { group, stops: false, ends: false, letters, needs };
+    let code = |group, letters, needs| MCode {
+        group,
+        stops: false,
+        ends: false,
+        precedes: true,
+        letters,
+        needs,
+    };
     if value.fract() != 0.0 || !(0.0..=199.0).contains(&value) {
         return Err(("gcode-unknown-code", "this M code is not known", ""));
     }
     Ok(match value as u8 {
-        0 | 1 | 60 => MCode { stops: true, ..code(4, b"", b"") },
-        2 | 30 => MCode { stops: true, ends: true, ..code(4, b"", b"") },
-        3..=5 => code(7, b"$", b""),
-        6 => code(6, b"", b""),
+        0 | 1 | 60 => MCode { stops: true, precedes: false, ..code(4, b"", b"") },
+        2 | 30 => MCode { stops: true, ends: true, precedes: false, ..code(4, b"", b"") },
+        3..=5 => code(SPINDLE, b"$", b""),
+        6 => code(TOOL, b"", b""),
         7..=9 => code(8, b"", b""),
-        19 => code(7, b"RQP$", b"R"),
+        19 => code(SPINDLE, b"RQP$", b"R"),
         48 | 49 => code(9, b"", b""),
         51 => code(9, b"P$", b""),
         50 | 52 | 53 => code(9, b"P", b""),
-        61 => code(6, b"Q", b"Q"),
-        62..=65 => code(5, b"P", b"P"),
+        61 => code(TOOL, b"Q", b"Q"),
+        62 | 63 => MCode { precedes: false, ..code(5, b"P", b"P") },
+        64 | 65 => code(5, b"P", b"P"),
         66 => code(5, b"PELQ", b"PE"),
-        67 | 68 => code(5, b"EQ", b"E"),
+        67 => MCode { precedes: false, ..code(5, b"EQ", b"E") },
+        68 => code(5, b"EQ", b"E"),
         100..=199 => code(10, b"PQ", b""),
         70..=73 => {
             return Err(unsupported(

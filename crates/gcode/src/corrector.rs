@@ -59,6 +59,7 @@ pub struct Corrector<R, W> {
     moves: Vec<Move>,
     writer: Writer,
     out: Vec<u8>,
+    heading: Option<String>,
 }
 
 impl<R: Read, W: Write> Corrector<R, W> {
@@ -77,7 +78,15 @@ impl<R: Read, W: Write> Corrector<R, W> {
             moves: Vec::new(),
             writer,
             out: Vec::with_capacity(2 * FLUSH),
+            heading: None,
         }
+    }
+
+    /// With this comment in a line of its own at the beginning, behind a %; ASCII without parentheses.
+    #[must_use]
+    pub fn with_heading(mut self, text: &str) -> Self {
+        self.heading = Some(format!("({text})"));
+        self
     }
 
     /// The next moves, at most so many; none behind the last. What was read before must have been
@@ -196,6 +205,18 @@ impl<R: Read, W: Write> Corrector<R, W> {
             Next::End => return Ok(false),
         };
         let line = self.lines.bytes(range);
+        let words = line.trim_ascii();
+        let heading = if words.is_empty() { None } else { self.heading.take() };
+        let behind = words.first() == Some(&b'%');
+        let mut head = Vec::new();
+        if let Some(heading) = heading {
+            head.extend_from_slice(heading.as_bytes());
+            head.extend_from_slice(if line.ends_with(b"\r\n") { b"\r\n" } else { b"\n" });
+        }
+        if !behind {
+            self.text.extend_from_slice(&head);
+            self.before.text.end = self.text.len();
+        }
         let start = self.text.len();
         self.text.extend_from_slice(line);
         match self.interpreter.take(line)? {
@@ -225,6 +246,10 @@ impl<R: Read, W: Write> Corrector<R, W> {
                     self.before.at[axis] = to[axis];
                 }
             }
+        }
+        if behind && !head.is_empty() {
+            self.text.extend_from_slice(&head);
+            self.before.text.end = self.text.len();
         }
         Ok(true)
     }

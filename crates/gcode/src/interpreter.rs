@@ -6,15 +6,20 @@ use crate::codes::{FeedMode, GCode, Motion, Plane};
 use crate::lexer::{self, Word};
 use crate::moves::{Arc, Kind, Move};
 use crate::refusal::{Error, Fault, LineResult};
-use crate::settings::{AXES, AXIS_LETTERS, AxisSet, Position, Settings, UNKNOWN, Units, is_rotary};
+use crate::settings::{
+    AXES, AXIS_LETTERS, AxisSet, Position, Settings, UNKNOWN, Units, WorkOffset, in_turned_axes,
+    is_rotary,
+};
 
 /// How the coordinates of a block's axis words are meant.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
     /// Millimetres in a unit of X Y Z U V W words.
     pub scale: f64,
-    /// Added to absolute words, mm or degrees; zero under G53.
+    /// Added to absolute words, mm or degrees, in the axes of the coordinate system; zero under G53.
     pub offset: Position,
+    /// By which these axes are turned about Z, rad.
+    pub rotation: f64,
     pub incremental: bool,
     /// G53.
     pub machine: bool,
@@ -89,7 +94,7 @@ impl Interpreter {
             plane: Plane::Xy,
             incremental: false,
             absolute_centres: false,
-            system: 0,
+            system: settings.system,
             motion: None,
             feed: Feed { mode: FeedMode::PerMinute, rate: None, units: None },
             position: settings.start,
@@ -188,7 +193,7 @@ impl Interpreter {
         self.incremental = block.incremental.unwrap_or(self.incremental);
         self.absolute_centres = block.absolute_centres.unwrap_or(self.absolute_centres);
         if let Some(system) = block.offset {
-            self.system = usize::from(system);
+            self.select(usize::from(system), words)?;
         }
         self.ended |= block.ends;
         match block.once {
@@ -252,6 +257,19 @@ impl Interpreter {
         }
     }
 
+    fn select(&mut self, system: usize, words: &[Word]) -> LineResult<()> {
+        if self.settings.offsets[system].is_none() {
+            let word = words.iter().find(|word| Block::selects_offset(word)).unwrap_or(&words[0]);
+            let (at, end) = word.span();
+            let message = "a work offset, and nothing has said what it is";
+            return Err(Fault::new("gcode-no-offset", at, end, message)
+                .expected("an offset that was given")
+                .hint("give the offset that the controller has stored as a setting, or leave the code out"));
+        }
+        self.system = system;
+        Ok(())
+    }
+
     fn set_feed(&mut self, block: &Block, words: &[Word]) -> LineResult<()> {
         if let Some(mode) = block.feed_mode {
             self.feed = Feed { mode, rate: None, units: None };
@@ -300,13 +318,15 @@ impl Interpreter {
                     .hint("or give the units that the controller starts with as a setting"));
             }
         };
-        let offset = if machine { [0.0; AXES] } else { self.settings.offsets[self.system] };
-        Ok(Frame { scale, offset, incremental: self.incremental, machine })
+        let system = if machine { None } else { self.settings.offsets[self.system] };
+        let WorkOffset { origin, rotation } = system.unwrap_or(WorkOffset::NONE);
+        let offset = in_turned_axes(&origin, rotation);
+        Ok(Frame { scale, offset, rotation, incremental: self.incremental, machine })
     }
 
-    /// Where the block's axis words lead.
+    /// Where the block's axis words lead, in the axes of the coordinate system.
     fn target(&self, block: &Block, words: &[Word], frame: &Frame) -> LineResult<Position> {
-        let mut target = self.position;
+        let mut target = in_turned_axes(&self.position, frame.rotation);
         for axis in 0..AXES {
             let Some(word) = block.axis(words, axis) else { continue };
             let value = word.value * frame.unit(axis);
@@ -367,14 +387,16 @@ impl Interpreter {
         let frame = self.frame(block, words, machine)?;
         let target = self.target(block, words, &frame)?;
         self.check_known(block, words, &target, kind == Kind::Line)?;
+        let start = in_turned_axes(&self.position, frame.rotation);
         Ok(self.moved(
-            Move { line: self.line, kind, start: self.position, end: target, arc: None },
+            Move { line: self.line, kind, start, end: target, arc: None },
             frame,
             code,
             None,
         ))
     }
 
+    /// `motion`: in the axes of the coordinate system.
     fn moved(
         &mut self,
         motion: Move,
@@ -382,6 +404,14 @@ impl Interpreter {
         code: Motion,
         reference: Option<Position>,
     ) -> Action {
+        let stands =
+            motion.arc.is_none() && (0..2).all(|axis| motion.start[axis] == motion.end[axis]);
+        let mut motion = motion.in_turned_axes(-frame.rotation);
+        // What does not move does not move by rounding either.
+        motion.start = self.position;
+        if stands {
+            motion.end[..2].copy_from_slice(&self.position[..2]);
+        }
         self.position = motion.end;
         Action::Moves(Motions { motion, frame, code, feed: self.feed, reference })
     }
@@ -411,6 +441,13 @@ impl Interpreter {
             Action::Reference { axes: block.axes, to }
         } else {
             let frame = self.frame(block, words, false)?;
+            if frame.rotation != 0.0 {
+                let (at, end) = block.once_word(words).unwrap_or(&words[0]).span();
+                let message =
+                    "G28 and G30 over a point of a turned coordinate system cannot be corrected";
+                return Err(Fault::new("gcode-unsupported", at, end, message)
+                    .hint("write a G0 to that point, and G91 G28 with zeros behind it"));
+            }
             let end = self.target(block, words, &frame)?;
             self.check_known(block, words, &end, false)?;
             let start = self.position;
@@ -429,19 +466,21 @@ impl Interpreter {
         let target = self.target(block, words, &frame)?;
         self.check_known(block, words, &target, true)?;
         let plane = self.plane.axes();
+        if frame.rotation != 0.0 && self.plane != Plane::Xy {
+            let (at, end) =
+                block.motion_word(words).or(block.first_axis(words)).map_or((0, 0), Word::span);
+            let message =
+                "an arc in another plane than that of X and Y, in a turned coordinate system";
+            return Err(Fault::new("gcode-unsupported", at, end, message).hint("write it as lines"));
+        }
+        let start = in_turned_axes(&self.position, frame.rotation);
         for axis in plane {
             if self.position[axis].is_nan() || target[axis].is_nan() {
                 return Err(self.unknown(block, words, axis, target[axis].is_nan()));
             }
         }
-        let arc = self.arc(block, words, code, &frame, &target)?;
-        let motion = Move {
-            line: self.line,
-            kind: Kind::Arc,
-            start: self.position,
-            end: target,
-            arc: Some(arc),
-        };
+        let arc = self.arc(block, words, code, &frame, [&start, &target])?;
+        let motion = Move { line: self.line, kind: Kind::Arc, start, end: target, arc: Some(arc) };
         Ok(self.moved(motion, frame, code, None))
     }
 
@@ -451,7 +490,7 @@ impl Interpreter {
         words: &[Word],
         code: Motion,
         frame: &Frame,
-        target: &Position,
+        [start, target]: [&Position; 2],
     ) -> LineResult<Arc> {
         let plane = self.plane.axes();
         let on_plane = |position: &Position| plane.map(|axis| position[axis]);
@@ -464,7 +503,7 @@ impl Interpreter {
         }
         let arc = arc::Words {
             plane,
-            start: on_plane(&self.position),
+            start: on_plane(start),
             end: on_plane(target),
             clockwise: code == Motion::Clockwise,
             turns: turns(block, words)?,

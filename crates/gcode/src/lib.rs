@@ -26,4 +26,4 @@ pub use lexer::LONGEST_LINE;
 pub use moves::{Arc, Kind, Move};
 pub use reader::Reader;
 pub use refusal::{Error, Refusal};
-pub use settings::{AXES, AXIS_LETTERS, AxisSet, Position, Settings, UNKNOWN, Units};
+pub use settings::{AXES, AXIS_LETTERS, AxisSet, Position, Settings, UNKNOWN, Units, WorkOffset};

@@ -1,6 +1,6 @@
 //! Moves and the points of their paths.
 
-use crate::settings::{AXES, Position};
+use crate::settings::{AXES, Position, in_turned_axes};
 
 /// How a move is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +49,22 @@ pub struct Move {
 const STANDSTILL: f64 = 1e-9;
 
 impl Move {
+    /// The same in axes that are turned about Z by so much, rad; its arc, if any, in the plane of X and Y.
+    pub(crate) fn in_turned_axes(&self, angle: f64) -> Self {
+        if angle == 0.0 {
+            return self.clone();
+        }
+        let mut turned = self.clone();
+        turned.start = in_turned_axes(&self.start, angle);
+        turned.end = in_turned_axes(&self.end, angle);
+        if let Some(arc) = &mut turned.arc {
+            let mut centre = [0.0; AXES];
+            centre[..2].copy_from_slice(&arc.centre);
+            arc.centre.copy_from_slice(&in_turned_axes(&centre, angle)[..2]);
+        }
+        turned
+    }
+
     /// The point at a share of the path, 0 at its start and 1 at its end.
     pub fn point(&self, share: f64) -> Position {
         if share >= 1.0 {

@@ -56,7 +56,8 @@ impl Decimal {
         self.count as f64 / POWERS[self.digits as usize]
     }
 
-    /// Writes it: no exponent, no zeros at the end, never -0.
+    /// Writes it: no exponent, no zeros at the end, never -0, and always with its point: a number without
+    /// one counts in the smallest unit on some controls.
     pub fn write(self, out: &mut Vec<u8>) {
         let mut rest = self.count.unsigned_abs();
         let mut decimals = self.digits;
@@ -66,6 +67,10 @@ impl Decimal {
         }
         let mut text = [0_u8; 24];
         let mut at = text.len();
+        if decimals == 0 {
+            at -= 1;
+            text[at] = b'.';
+        }
         let mut place = 0;
         while rest > 0 || place <= decimals {
             if place == decimals && decimals > 0 {
@@ -124,18 +129,18 @@ mod tests {
     #[test]
     fn decimals_are_short_and_fixed() {
         for (value, digits, expected) in [
-            (0.0, 6, "0"),
-            (-0.0, 6, "0"),
-            (-0.000_000_4, 6, "0"),
+            (0.0, 6, "0."),
+            (-0.0, 6, "0."),
+            (-0.000_000_4, 6, "0."),
             (1.5, 6, "1.5"),
             (-1.5, 6, "-1.5"),
-            (100.0, 6, "100"),
+            (100.0, 6, "100."),
             (0.000_001, 6, "0.000001"),
             (-0.01, 6, "-0.01"),
             (123.456_789_4, 6, "123.456789"),
-            (7.0, 0, "7"),
-            (70.0, 0, "70"),
-            (999_999_999.0, 7, "999999999"),
+            (7.0, 0, "7."),
+            (70.0, 0, "70."),
+            (999_999_999.0, 7, "999999999."),
         ] {
             assert_eq!(written(value, digits), expected);
         }

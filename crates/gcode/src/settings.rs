@@ -68,6 +68,31 @@ impl Units {
     }
 }
 
+/// Where a coordinate system stands in machine coordinates: what G54 to G59.3 stand for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorkOffset {
+    /// Of its zero.
+    pub origin: Position,
+    /// By which it is turned about Z, rad: X and Y of a program, then the origin.
+    pub rotation: f64,
+}
+
+impl WorkOffset {
+    /// Machine coordinates themselves.
+    pub const NONE: WorkOffset = WorkOffset { origin: [0.0; AXES], rotation: 0.0 };
+}
+
+/// The position in axes that are turned about Z by so much: its X and Y there.
+pub fn in_turned_axes(position: &Position, angle: f64) -> Position {
+    let mut turned = *position;
+    if angle != 0.0 {
+        let (sin, cos) = angle.sin_cos();
+        turned[0] = cos * position[0] + sin * position[1];
+        turned[1] = cos * position[1] - sin * position[0];
+    }
+    turned
+}
+
 /// What holds before a program's first line, and what the controller has stored.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -75,8 +100,10 @@ pub struct Settings {
     pub units: Option<Units>,
     /// Where the machine stands.
     pub start: Position,
-    /// Offsets of G54 ... G59, G59.1 ... G59.3.
-    pub offsets: [Position; 9],
+    /// Offsets of G54 ... G59, G59.1 ... G59.3, as far as known: a program that selects another is refused.
+    pub offsets: [Option<WorkOffset>; 9],
+    /// Which of them is active at first; where its offset is not known, machine coordinates hold.
+    pub system: usize,
     /// Where G28 and G30 go, as far as known.
     pub reference: [Position; 2],
     /// Whether lines that begin with / are left out; without it they are refused.
@@ -90,7 +117,8 @@ impl Default for Settings {
         Settings {
             units: None,
             start: UNKNOWN,
-            offsets: [[0.0; AXES]; 9],
+            offsets: [None; 9],
+            system: 0,
             reference: [UNKNOWN; 2],
             block_delete: None,
             axes: AxisSet(0b111),

@@ -7,7 +7,7 @@ use crate::lexer::{LONGEST_LINE, Word};
 use crate::moves::Kind;
 use crate::number::Decimal;
 use crate::refusal::{Fault, LineResult};
-use crate::settings::{AXES, AXIS_LETTERS, AxisSet, Position, is_rotary};
+use crate::settings::{AXES, AXIS_LETTERS, AxisSet, Position, in_turned_axes, is_rotary};
 
 /// Decimals that coordinates are written with, at most 9.
 #[derive(Clone, Copy, Debug)]
@@ -85,8 +85,30 @@ impl Writer {
         }
     }
 
-    /// Writes the block as pieces that end at `points`.
+    /// Writes the block as pieces that end at `points`, machine coordinates.
     pub fn write(
+        &mut self,
+        source: &Source<'_>,
+        points: &[Position],
+        shares: &[f64],
+        out: &mut Vec<u8>,
+    ) -> LineResult<()> {
+        let rotation = source.motions.frame.rotation;
+        if rotation == 0.0 {
+            return self.write_in_axes(source, points, shares, out);
+        }
+        // In the axes in which the numbers are written, X and Y are each a word again.
+        let mut motions = source.motions.clone();
+        motions.motion = motions.motion.in_turned_axes(rotation);
+        let turned: Vec<_> = points.iter().map(|point| in_turned_axes(point, rotation)).collect();
+        self.position = in_turned_axes(&self.position, rotation);
+        let source = Source { motions: &motions, ..*source };
+        let result = self.write_in_axes(&source, &turned, shares, out);
+        self.position = in_turned_axes(&self.position, -rotation);
+        result
+    }
+
+    fn write_in_axes(
         &mut self,
         source: &Source<'_>,
         points: &[Position],
@@ -106,6 +128,9 @@ impl Writer {
         };
         let last = if source.line.ends_with(b"\n") { newline } else { b"" };
         let begin = out.len();
+        if plan.lines {
+            preceding_line(source, &plan, newline, out);
+        }
         let mut before = 0.0;
         for (piece, (point, share)) in points.iter().zip(shares).enumerate() {
             let feed = plan.time_rate.map(|rate| rate / (share - before));
@@ -387,6 +412,9 @@ impl Writer {
                 // Turns, unless another code of the block takes the word: then it was refused.
                 (None, b'P') if arc => remove_blanks(begin, out),
                 (None, b'M') if plan.lines && Block::stops(word) => remove_blanks(begin, out),
+                (None, _) if plan.lines && Block::precedes(word, words) => {
+                    remove_blanks(begin, out)
+                }
                 _ => out.extend_from_slice(&body[at..end]),
             }
             if index == anchor {
@@ -492,6 +520,23 @@ impl Writer {
             }
         }
         Ok(())
+    }
+}
+
+/// What acts before the move, as a block of its own: on some controls it would act behind the first piece.
+fn preceding_line(source: &Source<'_>, plan: &Plan, newline: &[u8], out: &mut Vec<u8>) {
+    let begin = out.len();
+    for word in source.words.iter().filter(|word| Block::precedes(word, source.words)) {
+        if out.len() > begin {
+            separate(plan.spaced, out);
+        } else if source.deletable {
+            out.push(b'/');
+        }
+        let (at, end) = word.span();
+        out.extend_from_slice(&source.line[at..end]);
+    }
+    if out.len() > begin {
+        out.extend_from_slice(newline);
     }
 }
 

@@ -1,7 +1,7 @@
 //! Blocks written anew, each case as the lines that come out.
 
 use truepose_gcode::{
-    AXES, AxisSet, Corrector, Digits, Error, Kind, Move, Position, Reader, Settings,
+    AXES, AxisSet, Corrector, Digits, Error, Kind, Move, Position, Reader, Settings, WorkOffset,
 };
 
 /// What becomes of one move: its number of pieces, and what is added to X Y Z A B C at the end of each.
@@ -14,7 +14,9 @@ fn settings(axes: &str) -> Settings {
         block_delete: Some(false),
         ..Settings::default()
     };
-    settings.offsets[1][0] = 100.0;
+    let mut origin = [0.0; AXES];
+    origin[0] = 100.0;
+    settings.offsets[1] = Some(WorkOffset { origin, rotation: 0.0 });
     settings
 }
 
@@ -65,26 +67,26 @@ fn what_does_not_change_keeps_its_bytes() {
 
 #[test]
 fn numbers_change_in_place_and_axes_are_added_behind_the_last() {
-    case("G21\nN10 g0 x1.50 (a) Y2 M3 ; b\n", "G21\nN10 g0 x1.5 (a) Y2 Z0.25 M3 ; b\n", UP);
-    case("G21\nN1G0X1Y2(c)\n", "G21\nN1G0X1.001Y2(c)\n", BESIDE);
+    case("G21\nN10 g0 x1.50 (a) Y2 M3 ; b\n", "G21\nN10 g0 x1.5 (a) Y2. Z0.25 M3 ; b\n", UP);
+    case("G21\nN1G0X1Y2(c)\n", "G21\nN1G0X1.001Y2.(c)\n", BESIDE);
     // Z stands right from the first block on.
-    case("G21 G0 X1\nX2\nX3 Z1\n", "G21 G0 X1 Z0.25\nX2\nX3 Z1.25\n", UP);
+    case("G21 G0 X1\nX2\nX3 Z1\n", "G21 G0 X1. Z0.25\nX2\nX3. Z1.25\n", UP);
 }
 
 #[test]
 fn divided_blocks_keep_their_words_in_the_first_piece_and_stops_in_the_last() {
     case(
         "G21 G1 X10 F100\r\nN5 X20 (c) M8 M0 S5 ; d\r\nM2\r\n",
-        "G21 G1 X5 F100\r\nX10\r\nN5 X15 (c) M8 S5 ; d\r\nX20 M0\r\nM2\r\n",
+        "G21 G1 X5. F100\r\nX10.\r\nM8\r\nN5 X15. (c) S5 ; d\r\nX20. M0\r\nM2\r\n",
         TWO,
     );
-    case("G21 G0 X2M30", "G21 G0 X1\nX2 M30", TWO);
-    case("G21 G0X2Y2\n/X4\n", "G21 G0X1Y1\nX2Y2\n/X3\n/X4\n", TWO);
+    case("G21 G0 X2M30", "G21 G0 X1.\nX2. M30", TWO);
+    case("G21 G0X2Y2\n/X4\n", "G21 G0X1.Y1.\nX2.Y2.\n/X3.\n/X4.\n", TWO);
 }
 
 #[test]
 fn inch_stays_inch() {
-    case("G20 G0 X1\nG21 X50.8\n", "G20 G0 X0.5\nX1\nG21 X38.1\nX50.8\n", TWO);
+    case("G20 G0 X1\nG21 X50.8\n", "G20 G0 X0.5\nX1.\nG21 X38.1\nX50.8\n", TWO);
     case("G20 G0 X1\n", "G20 G0 X1.0000394\n", BESIDE);
 }
 
@@ -107,7 +109,7 @@ fn increments_do_not_drift() {
 fn offsets_and_machine_coordinates_are_kept_apart() {
     case(
         "G21 G55 G0 X1\nG53 G0 X2\nG53 G1 X4 F1\n",
-        "G21 G55 G0 X-49.5\nX1\nG53 G0 X51.5\nG53 X2\nG53 G1 X3 F1\nG53 X4\n",
+        "G21 G55 G0 X-49.5\nX1.\nG53 G0 X51.5\nG53 X2.\nG53 G1 X3. F1\nG53 X4.\n",
         TWO,
     );
 }
@@ -116,18 +118,18 @@ fn offsets_and_machine_coordinates_are_kept_apart() {
 fn arcs_become_lines_and_the_motion_code_is_restored() {
     case(
         "G21 G2 X10 I5 F100 (c)\nX20 I5 J0 P1\nN7 G3 X10 R5\nG1 X0\n",
-        "G21 G1 X5 Y5 F100 (c)\nX10 Y0\nX15 Y5\nX20 Y0\nN7 G1 X15 Y5\nX10 Y0\nG1 X5\nX0\n",
+        "G21 G1 X5. Y5. F100 (c)\nX10. Y0.\nX15. Y5.\nX20. Y0.\nN7 G1 X15. Y5.\nX10. Y0.\nG1 X5.\nX0.\n",
         TWO,
     );
-    case("G21 G3 I5 F1\n", "G21 G1 X10 F1\nX0\n", TWO);
-    case("G21 G2 Z4 I5 F1 M0\n", "G21 G1 Z2 X10 F1\nX0 Z4 M0\n", TWO);
+    case("G21 G3 I5 F1\n", "G21 G1 X10. F1\nX0.\n", TWO);
+    case("G21 G2 Z4 I5 F1 M0\n", "G21 G1 Z2. X10. F1\nX0. Z4. M0\n", TWO);
 }
 
 #[test]
 fn inverse_time_is_shared_out() {
     case(
         "G21 G93 G1 X10 F2\nG2 X20 I5 F.5\nG0 X0 F3\n",
-        "G21 G93 G1 X5 F4\nX10 F4\nG1 X15 Y5 F1\nX20 Y0 F1\nG0 X10 F3\nX0\n",
+        "G21 G93 G1 X5. F4.\nX10. F4.\nG1 X15. Y5. F1.\nX20. Y0. F1.\nG0 X10. F3\nX0.\n",
         TWO,
     );
     case("G21 G93 G1 X10 F2.0\n", "G21 G93 G1 X10.001 F2.0\n", BESIDE);
@@ -138,12 +140,12 @@ fn references_take_only_their_own_axes() {
     // Z is corrected before G28, which must not take it away.
     case(
         "G21 G1 X1 F10\nG28 X5 M0\nG0 X0\nG1 X1\n",
-        "G21 G1 X1 Z0.25 F10\nG28 X5 M0\nG0 X0\nG1 X1\n",
+        "G21 G1 X1. Z0.25 F10\nG28 X5 M0\nG0 X0\nG1 X1\n",
         UP,
     );
     case(
         "G21 G1 X1 F10\nN3 G28 X5 M1\nG0 X0\n",
-        "G21 G1 X0.5 F10\nX1\nN3 G0 X3\nX5\nG28 X5 M1\nG0 X0\n",
+        "G21 G1 X0.5 F10\nX1.\nN3 G0 X3.\nX5.\nG28 X5. M1\nG0 X0\n",
         |motion| if motion.start[0].is_nan() { (1, [0.0; 6]) } else { (2, [0.0; 6]) },
     );
     case("G21 G91 G28 Z0\nG90 G0 Z1\n", "G21 G91 G28 Z0\nG90 G0 Z1\n", SAME);
@@ -167,7 +169,7 @@ fn references_take_only_their_own_axes() {
         .collect();
     corrector.write(&[1; 3], &points, &[1.0; 3]).unwrap();
     let written = String::from_utf8(corrector.finish().unwrap()).unwrap();
-    assert_eq!(written, "G21 G1 X1 F10\nG91 G0 X4 Z0.25\nG28 X0\nG1 X6\n");
+    assert_eq!(written, "G21 G1 X1 F10\nG91 G0 X4. Z0.25\nG28 X0\nG1 X6.\n");
 }
 
 #[test]
@@ -177,7 +179,7 @@ fn a_turn_keeps_its_time_where_the_correction_moves_the_tool() {
         let turns = motion.kind == Kind::Line && motion.stands_in_space();
         (1, [if turns { 0.002 } else { 0.0 }, 0.0, 0.0, 0.0, 0.0, 0.0])
     });
-    assert_eq!(written.unwrap(), "G21 G0 A0\nG1 G93 A10 X0.002 F10\nG94 F100 M0\nX5\n");
+    assert_eq!(written.unwrap(), "G21 G0 A0\nG1 G93 A10. X0.002 F10.\nG94 F100. M0\nX5\n");
     let at_feed: Pieces = |motion| {
         (1, [if motion.kind == Kind::Line { 0.002 } else { 0.0 }, 0.0, 0.0, 0.0, 0.0, 0.0])
     };
@@ -187,7 +189,7 @@ fn a_turn_keeps_its_time_where_the_correction_moves_the_tool() {
 
 #[test]
 fn axes_that_are_not_corrected_go_along() {
-    case("G21 G0 X2 A4 (a)\nA5.000\n", "G21 G0 X1 A2 (a)\nX2 A4\nA4.5\nA5\n", TWO);
+    case("G21 G0 X2 A4 (a)\nA5.000\n", "G21 G0 X1. A2. (a)\nX2. A4.\nA4.5\nA5.\n", TWO);
     case("G21 G0 X2 A4.00 (a)\n", "G21 G0 X2.001 A4.00 (a)\n", BESIDE);
 }
 
@@ -276,4 +278,80 @@ fn lines_are_bounded() {
     // Behind the end nobody looks.
     let program = format!("G21 G0 X1\nM2\n{}", "x".repeat(1 << 20));
     assert_eq!(corrected(&program, "XYZ", SAME).unwrap(), program);
+}
+
+#[test]
+fn what_acts_before_the_move_goes_in_front_of_the_pieces_with_its_words() {
+    case(
+        "G21 G0 X0\nG1 X10 F100 M3 S800 (a)\n/N7 X20 M66 P2 E1 L0 M8\nX30 T4 M6\nX40 M62 P1\nX50 M68 E2 Q5.5 M2\n",
+        "G21 G0 X0\nM3 S800\nG1 X5. F100 (a)\nX10.\n/M66 P2 E1 L0 M8\n/N7 X15.\n/X20.\nT4 M6\nX25.\nX30.\n\
+         X35. M62 P1\nX40.\nM68 E2 Q5.5\nX45.\nX50. M2\n",
+        |motion| (if motion.line == 1 { 1 } else { 2 }, [0.0; 6]),
+    );
+    // One block stays one: where it acts is the program's own business.
+    case("G21 G0 X1 M3 S5\n", "G21 G0 X1.001 M3 S5\n", BESIDE);
+}
+
+#[test]
+fn an_offset_that_nobody_gave_is_refused() {
+    let refused = |program: &str| match corrected(program, "XYZ", SAME) {
+        Err(Error::Refusal(refusal)) => (refusal.code, refusal.line, refusal.found.unwrap()),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(refused("G21 G0 X1\nG90 G56 X2\n"), ("gcode-no-offset", 2, "G56".to_owned()));
+    assert_eq!(refused("G21 G54\n"), ("gcode-no-offset", 1, "G54".to_owned()));
+    case("G21 G55 G0 X1\n", "G21 G55 G0 X1\n", SAME);
+}
+
+/// A quarter of a turn: what is written as X goes along the machine's Y.
+#[test]
+fn a_turned_coordinate_system_is_corrected_in_its_own_axes() {
+    let mut settings = settings("XYZ");
+    let mut origin = [0.0; AXES];
+    origin[..2].copy_from_slice(&[100.0, 50.0]);
+    settings.offsets[0] = Some(WorkOffset { origin, rotation: std::f64::consts::FRAC_PI_2 });
+    let program = "G21 G0 X10 Y0\nG1 X20 F9\nG2 X20 Y-10 I0 J-5\n";
+    let mut reader = Reader::new(program.as_bytes(), settings.clone());
+    let mut ends = Vec::new();
+    while let Some(motion) = reader.next_move().unwrap() {
+        ends.push([motion.end[0], motion.end[1], motion.point(0.5)[0], motion.point(0.5)[1]]);
+    }
+    let expected = [[100.0, 60.0], [100.0, 70.0], [110.0, 70.0]];
+    for (end, expected) in ends.iter().zip(expected) {
+        assert!((end[0] - expected[0]).abs() < 1e-12 && (end[1] - expected[1]).abs() < 1e-12);
+    }
+    // Clockwise about program (20, -5), machine (105, 70): over program (25, -5), machine (105, 75).
+    assert!((ends[2][2] - 105.0).abs() < 1e-12 && (ends[2][3] - 75.0).abs() < 1e-12);
+
+    let mut corrector = Corrector::new(program.as_bytes(), Vec::new(), settings, Digits::default());
+    let moves = corrector.read(9).unwrap().to_vec();
+    let points: Vec<Position> = moves
+        .iter()
+        .map(|motion| {
+            let mut point = motion.end;
+            point[0] += 0.25; // machine X: against the program's Y
+            point
+        })
+        .collect();
+    corrector.write(&[1; 3], &points, &[1.0; 3]).unwrap();
+    let written = String::from_utf8(corrector.finish().unwrap()).unwrap();
+    assert_eq!(written, "G21 G0 X10. Y-0.25\nG1 X20 F9\nG1 X20. Y-10.25\n");
+}
+
+#[test]
+fn a_heading_is_the_first_line_or_the_second_behind_a_percent() {
+    for (program, expected) in [
+        ("G21\nG0 X1\n", "(why)\nG21\nG0 X1\n"),
+        ("%\r\nG21 G0 X1\r\n%\r\n", "%\r\n(why)\r\nG21 G0 X1\r\n%\r\n"),
+        ("\nG21 G0 X1\n", "\n(why)\nG21 G0 X1\n"),
+        ("G21 G0 X1\n", "(why)\nG21 G0 X1\n"),
+    ] {
+        let mut corrector =
+            Corrector::new(program.as_bytes(), Vec::new(), settings("XYZ"), Digits::default())
+                .with_heading("why");
+        let points: Vec<Position> =
+            corrector.read(9).unwrap().iter().map(|motion| motion.end).collect();
+        corrector.write(&[1], &points, &[1.0]).unwrap();
+        assert_eq!(String::from_utf8(corrector.finish().unwrap()).unwrap(), expected);
+    }
 }

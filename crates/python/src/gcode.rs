@@ -10,7 +10,7 @@ use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use truepose_gcode::{
     AXES, AXIS_LETTERS, AxisSet, Corrector, Digits, Error, Move, Position, Reader, Refusal,
-    Settings, Units,
+    Settings, Units, WorkOffset,
 };
 
 use crate::arrays::{self, Array};
@@ -80,6 +80,7 @@ fn settings(
     units: Option<&str>,
     start: Option<Named>,
     offsets: Option<HashMap<String, Named>>,
+    active: &str,
     reference: Option<HashMap<String, Named>>,
     block_delete: Option<bool>,
     axes: &str,
@@ -98,12 +99,22 @@ fn settings(
     if let Some(start) = start {
         settings.start = position(&start, f64::NAN)?;
     }
-    for (name, offset) in offsets.unwrap_or_default() {
-        match SYSTEMS.iter().position(|system| *system == name) {
-            Some(system) => settings.offsets[system] = position(&offset, 0.0)?,
-            None => return refuse(format!("offsets: {name:?} is none of {}", SYSTEMS.join(" "))),
+    let system = |name: &str| match SYSTEMS.iter().position(|system| *system == name) {
+        Some(system) => Ok(system),
+        None => Err(PyValueError::new_err(format!(
+            "offsets: {name:?} is none of {}",
+            SYSTEMS.join(" ")
+        ))),
+    };
+    for (name, mut offset) in offsets.unwrap_or_default() {
+        let rotation = offset.remove("R").unwrap_or(0.0).to_radians();
+        if !rotation.is_finite() {
+            return refuse(format!("offsets: the rotation of {name} is not finite"));
         }
+        let origin = position(&offset, 0.0)?;
+        settings.offsets[system(&name)?] = Some(WorkOffset { origin, rotation });
     }
+    settings.system = system(active)?;
     for (name, place) in reference.unwrap_or_default() {
         let which = match name.as_str() {
             "G28" => 0,
@@ -226,17 +237,19 @@ pub struct GcodeReader {
 #[pymethods]
 impl GcodeReader {
     #[new]
-    #[pyo3(signature = (path, *, units=None, start=None, offsets=None, reference=None, block_delete=None, axes="XYZ"))]
+    #[pyo3(signature = (path, *, units=None, start=None, offsets=None, system="G54", reference=None, block_delete=None, axes="XYZ"))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python constructor")]
     fn new(
         path: PathBuf,
         units: Option<&str>,
         start: Option<Named>,
         offsets: Option<HashMap<String, Named>>,
+        system: &str,
         reference: Option<HashMap<String, Named>>,
         block_delete: Option<bool>,
         axes: &str,
     ) -> PyResult<Self> {
-        let settings = settings(units, start, offsets, reference, block_delete, axes)?;
+        let settings = settings(units, start, offsets, system, reference, block_delete, axes)?;
         Ok(GcodeReader { reader: Reader::new(File::open(path)?, settings) })
     }
 
@@ -276,7 +289,7 @@ impl GcodeCorrector {
 #[pymethods]
 impl GcodeCorrector {
     #[new]
-    #[pyo3(signature = (path, target, *, units=None, start=None, offsets=None, reference=None, block_delete=None, axes="XYZ", digits=6))]
+    #[pyo3(signature = (path, target, *, units=None, start=None, offsets=None, system="G54", reference=None, block_delete=None, axes="XYZ", digits=6, heading=None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python constructor")]
     fn new(
         path: PathBuf,
@@ -284,12 +297,14 @@ impl GcodeCorrector {
         units: Option<&str>,
         start: Option<Named>,
         offsets: Option<HashMap<String, Named>>,
+        system: &str,
         reference: Option<HashMap<String, Named>>,
         block_delete: Option<bool>,
         axes: &str,
         digits: u32,
+        heading: Option<&str>,
     ) -> PyResult<Self> {
-        let settings = settings(units, start, offsets, reference, block_delete, axes)?;
+        let settings = settings(units, start, offsets, system, reference, block_delete, axes)?;
         if digits > 8 {
             return Err(PyValueError::new_err(format!("digits: {digits} is not from 0 to 8")));
         }
@@ -297,7 +312,11 @@ impl GcodeCorrector {
         let input = File::open(path)?;
         // Opened and emptied only once the program itself could be opened.
         let output = OpenOptions::new().write(true).create(true).truncate(true).open(target)?;
-        Ok(GcodeCorrector { corrector: Some(Corrector::new(input, output, settings, digits)) })
+        let mut corrector = Corrector::new(input, output, settings, digits);
+        if let Some(text) = heading {
+            corrector = corrector.with_heading(text);
+        }
+        Ok(GcodeCorrector { corrector: Some(corrector) })
     }
 
     fn read(&mut self, py: Python<'_>, most_moves: usize) -> PyResult<GcodeMoves> {

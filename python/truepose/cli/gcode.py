@@ -28,9 +28,13 @@ if TYPE_CHECKING:
         "--output",
         "-o",
         metavar="FILE",
-        required=True,
         type=click.Path(path_type=Path),
         help="The corrected program; not the program itself.",
+    ),
+    click.option(
+        "--dry-run",
+        is_flag=True,
+        help="Only the proof: no program is written.",
     ),
     click.option(
         "--tolerance",
@@ -64,8 +68,16 @@ if TYPE_CHECKING:
         metavar="G54 x=..,y=..",
         type=(str, str),
         multiple=True,
-        help="Offset of a coordinate system, G54 to G59.3, that the controller has stored. May "
-        "be repeated.",
+        help="Offset of a coordinate system, G54 to G59.3, that the controller has stored; r is "
+        "its rotation about Z. May be repeated. A program that selects one that is not given is "
+        "refused.",
+    ),
+    click.option(
+        "--var",
+        "parameter_file",
+        metavar="FILE",
+        type=click.Path(path_type=Path),
+        help="LinuxCNC's parameter file (linuxcnc.var), which has all offsets.",
     ),
     click.option(
         "--block-delete",
@@ -100,11 +112,12 @@ if TYPE_CHECKING:
 def command(
     machine_file: Path,
     program: Path,
-    output: Path,
+    output: Path | None,
     settings: tuple[str, ...],
     form: str,
     tolerance: str | None,
     start: str | None,
+    dry_run: bool,
     offsets: tuple[tuple[str, str], ...],
     block_delete: str | None,
     **options: Any,
@@ -112,7 +125,8 @@ def command(
     """Correct a PROGRAM of G-code for the machine.
 
     Every block is given the pose that takes the actual machine where the program asks for, and
-    long moves and arcs are divided so that it also stays on the path between. The condition is
+    long moves and arcs are divided so that it also stays on the path between. A program that
+    selects no work offset is taken in machine coordinates. The condition is
     the file's; --set changes it. What was written is read back, driven through the actual
     machine, and compared with the program before and after. Exit code 1 where the error after is
     no smaller than before; nothing is written then, but with --force.
@@ -126,7 +140,10 @@ def command(
     from truepose.controllers.gcode import NoBetter, correct_program
     from truepose.files.writing import require_writable
 
-    require_writable(output, [output.suffix.lower()], [machine_file])
+    if (output is None) is not dry_run:
+        raise click.UsageError("give either --output FILE, or --dry-run for the proof alone")
+    if output is not None:
+        require_writable(output, [output.suffix.lower()], [machine_file])
     machine = truepose.load(machine_file, settings=settings)
     read = _Reading(machine)
     said = "" if tolerance is None else read.said(tolerance)
@@ -138,7 +155,7 @@ def command(
                 output,
                 tolerance=None if tolerance is None else read.length("--tolerance", tolerance),
                 start=read.position("--start", start or ""),
-                offsets={name: read.position("--offset", text) for name, text in offsets},
+                offsets={name: read.position("--offset", text, "abcr") for name, text in offsets},
                 block_delete=None if block_delete is None else block_delete == "on",
                 progress=report,
                 **options,
@@ -147,8 +164,9 @@ def command(
         _show(machine, no.proof, form, said, written=False)
         show_problems(no, as_json=False)
         return 1
-    _show(machine, proof, form, said, written=True)
-    note_written(output)
+    _show(machine, proof, form, said, written=output is not None)
+    if output is not None:
+        note_written(output)
     return 0
 
 
@@ -185,7 +203,7 @@ class _Reading:
         except ValueError:
             return text.strip()
 
-    def position(self, option: str, text: str) -> dict[str, float]:
+    def position(self, option: str, text: str, turning: str = "abc") -> dict[str, float]:
         """Coordinates by axis, m and rad, of "x=10,y=2 in". Raises `RequestError`."""
         offsets = {}
         for part in filter(None, (part_text.strip() for part_text in text.split(","))):
@@ -195,7 +213,7 @@ class _Reading:
                 raise self._refusal(option, part, "an axis and a coordinate, such as x=10")
             if axis in offsets:
                 raise self._refusal(option, part, "every axis once")
-            offsets[axis] = self._quantity(option, value, "angle" if axis in "abc" else "length")
+            offsets[axis] = self._quantity(option, value, "angle" if axis in turning else "length")
         return offsets
 
     def _quantity(self, option: str, text: str, dimension: str) -> float:
@@ -265,7 +283,8 @@ def _tables(machine: Machine, proof: Proof, said: str) -> Iterable[Table]:
             else "."
         )
     )
-    yield Table("proof", "Error of the tool, before and after", header, tuple(rows), 2, note)
+    title = f"Error of the tool, before and after; program {proof.coordinates}"
+    yield Table("proof", title, header, tuple(rows), 2, note)
 
 
 def _tolerance(machine: Machine, proof: Proof, said: str) -> str:
@@ -312,6 +331,7 @@ def _as_json(proof: Proof, *, written: bool) -> Mapping[str, object]:
         "tolerance": proof.tolerance,
         "tolerance_from": proof.tolerance_from.reason,
         "interpolation": proof.interpolation,
+        "coordinates": proof.coordinates,
         "start": proof.start,
         "approach_line": proof.approach,
         "moves": proof.moves,

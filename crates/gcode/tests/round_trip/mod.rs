@@ -2,13 +2,17 @@
 //! same moves. Shared by the tests and the fuzz target.
 
 use truepose_gcode::{
-    AXES, AxisSet, Corrector, Digits, Error, Kind, Move, Position, Reader, Settings, UNKNOWN, Units,
+    AXES, AxisSet, Corrector, Digits, Error, Kind, Move, Position, Reader, Settings, UNKNOWN,
+    Units, WorkOffset,
 };
 
 /// Settings out of one byte, and into how many pieces moves are divided.
 fn settings_of(byte: u8) -> (Settings, usize) {
     let mut settings = Settings::default();
-    settings.offsets[1] = [10.0, -20.5, 3.25, 45.0, 0.0, -90.0, 1.0, 2.0, 3.0];
+    let origin = [10.0, -20.5, 3.25, 45.0, 0.0, -90.0, 1.0, 2.0, 3.0];
+    settings.offsets = [Some(WorkOffset::NONE); 9];
+    settings.offsets[1] = Some(WorkOffset { origin, rotation: 0.0 });
+    settings.offsets[2] = Some(WorkOffset { origin, rotation: 0.5 });
     if byte & 1 == 0 {
         settings.start = [0.0; AXES];
     } else {

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -22,7 +23,7 @@ import numpy as np
 from truepose._kernel import GcodeCorrector, GcodeError, GcodeMoves, GcodeReader, threads
 from truepose.compensation.commands import ActualMachine
 from truepose.controllers.gcode import _refusals
-from truepose.controllers.gcode._axes import AXES, Axes, scale_of
+from truepose.controllers.gcode._axes import AXES, Axes
 from truepose.controllers.gcode.division import (
     CannotCorrect,
     Divided,
@@ -34,6 +35,7 @@ from truepose.controllers.gcode.division import (
 )
 from truepose.controllers.gcode.proof import Errors, Proof, Proving, improves
 from truepose.controllers.gcode.tolerance import MOST, PathTolerance, least_of, tolerance_for
+from truepose.controllers.gcode.work_offsets import Positions, WorkOffsets, named, work_offsets
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import one_of
 from truepose.files.writing import replacing, require_writable
@@ -57,23 +59,22 @@ Later moves may be off by more, which makes the tolerance smaller than it need b
 LEAST_PIECE = 1e-5
 """m: the shortest piece into which a move is divided."""
 
+LONGEST_NAME = 40
+"""Characters of the machine's name in a comment."""
+
 TURN = 5e-4
 """s: the longest that a thread waits for its turn while both divide and prove."""
 
 DIGITS = 6
 """Decimals of mm and degrees; inches have one more."""
 
-SYSTEMS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
-"""Coordinate systems that may be given an offset."""
-
 HINTS = {
+    "gcode-no-offset": "say what it is: --offset G54 x=..,y=.., or --var with LinuxCNC's parameter "
+    "file, or take the code out to be in machine coordinates",
     "gcode-no-units": "or say what holds at first: --units mm",
     "gcode-block-delete": "say what the operator's switch is: --block-delete on",
 }
 """What helps against problems of a program that an option solves."""
-
-Positions = Mapping[str, float]
-"""Coordinates by axis, x y z a b c u v w: m and rad."""
 
 Progress = Callable[[int, int], None]
 
@@ -91,24 +92,27 @@ class _Options:
     axes: str
     units: str | None
     start: dict[str, float]
-    offsets: dict[str, dict[str, float]]
+    offsets: WorkOffsets
     block_delete: bool | None
 
     def limits(self, tolerance: float) -> Limits:
         """What the division must hold."""
         return Limits(tolerance, min(LEAST_PIECE, tolerance), self.interpolation)
 
-    def corrector(self, program: Path, target: Path) -> GcodeCorrector:
-        """What reads a program and writes it anew."""
+    def corrector(self, program: Path, target: Path, machine: str) -> GcodeCorrector:
+        """What reads a program and writes it anew, for a machine of this name."""
+        name = "".join(c for c in machine if c.isascii() and c.isprintable() and c not in "()%")
         return GcodeCorrector(
             program,
             target,
             units=self.units,
             start=self.start,
-            offsets=self.offsets,
+            offsets=self.offsets.systems,
+            system=self.offsets.active,
             block_delete=self.block_delete,
             axes=self.axes,
             digits=self.digits,
+            heading=f"truepose for {name[:LONGEST_NAME].strip()}: {self.offsets.words}",
         )
 
     def reader(self, program: Path) -> GcodeReader:
@@ -117,7 +121,8 @@ class _Options:
             program,
             units=self.units,
             start=self.start,
-            offsets=self.offsets,
+            offsets=self.offsets.systems,
+            system=self.offsets.active,
             block_delete=self.block_delete,
             axes=self.axes,
         )
@@ -126,7 +131,7 @@ class _Options:
 def correct_program(
     machine: Machine,
     source: str | PathLike[str],
-    target: str | PathLike[str],
+    target: str | PathLike[str] | None,
     condition: Condition | None = None,
     *,
     tolerance: float | None = None,
@@ -134,6 +139,7 @@ def correct_program(
     units: str | None = None,
     start: Positions | None = None,
     offsets: Mapping[str, Positions] | None = None,
+    parameter_file: str | PathLike[str] | None = None,
     block_delete: bool | None = None,
     digits: int = DIGITS,
     force: bool = False,
@@ -146,10 +152,15 @@ def correct_program(
     at most 5 µm. `interpolation`: "pose" where the controller solves its nominal inverse all along
     a block, "either" where it may also drive its joints straight to the block's end. `units`: "mm"
     or "inch" before G20 or G21. `start`: where the machine stands at first, by axis, m and rad,
-    machine coordinates; default home. `offsets` of "G54" to "G59.3" likewise. `block_delete`:
-    whether lines that begin with / are left out. `digits`: decimals of mm and degrees. `force`:
-    write even what is no better than the program was. `progress` is called with lines done, and 0
-    for their unknown number in all.
+    machine coordinates; default home. `block_delete`: whether lines that begin with / are left out.
+    `digits`: decimals of mm and degrees. `force`: write even what is no better than the program
+    was. `target` None: nothing is written, only proven. `progress` is called with lines done, and
+    0 for their unknown number in all.
+
+    `offsets` of "G54" to "G59.3", by axis, m and rad, with r, the rotation about Z;
+    `parameter_file`: LinuxCNC's, which has them all. A program that selects one that is not known
+    is refused (gcode-no-offset); one that selects none is taken in machine coordinates, or in the
+    system that is active in the parameter file.
 
     What was written is read back and proven before it gets its name: see `Proof`. Raises
     `NoBetter`, a `RequestError` with that proof, where the error after is not less than the one
@@ -160,19 +171,29 @@ def correct_program(
     `TrueposeError` as `truepose.budget`.
     """
     require_known_controller(machine)
-    program, written = Path(source), Path(target)
+    program, written = Path(source), None if target is None else Path(target)
+    parameters = None if parameter_file is None else Path(parameter_file)
     axes = Axes(machine)
-    options = _options(axes, tolerance, interpolation, units, start, offsets, block_delete, digits)
-    _require_files(program, written)
+    options = _options(
+        axes,
+        tolerance,
+        interpolation,
+        units,
+        start,
+        (offsets, parameters),
+        block_delete,
+        digits,
+    )
+    _require_files(program, written, parameters)
     given = machine.condition if condition is None else condition
     required_sources(machine, given)
     actual = ActualMachine(machine, given)
     with _problems_of(program):
         allowed = _tolerance(actual, axes, program, options)
     division = Division(actual, axes, options.limits(allowed.value))
-    with replacing(written) as temporary, _problems_of(program):
+    with _written(written) as temporary, _problems_of(program):
         session = _Session(division, program, temporary, options, allowed)
-        proof = session.run(written, progress)
+        proof = session.run("" if written is None else str(written), progress)
         if not (proof.improves or force):
             raise _refusals.NoBetter(machine, proof)
         return proof
@@ -215,7 +236,7 @@ class _Session:
         self._reader = options.reader(program)
         self._writing = _Writing(division, program, temporary, options)
 
-    def run(self, target: Path, progress: Progress | None) -> Proof:
+    def run(self, target: str, progress: Progress | None) -> Proof:
         """Correct the whole program; `target` is what it will be called."""
         stand = self._start()
         count, approach = 0, None
@@ -265,7 +286,7 @@ class _Session:
                 failure, machine, division.axes, division.limits, moves, program
             ) from None
 
-    def _proof(self, target: Path, moves: int, approach: int | None) -> Proof:
+    def _proof(self, target: str, moves: int, approach: int | None) -> Proof:
         """The proof of what is written; `RequestError` (gcode-proof) if it breaks its promise."""
         machine, limits = self._division.actual.machine, self._division.limits
         proving = self._writing.proving
@@ -275,7 +296,8 @@ class _Session:
         proof = Proof(
             machine=machine.name,
             source=str(self._program),
-            target=str(target),
+            target=target,
+            coordinates=self._options.offsets.words,
             commanded=machine.commanded,
             tolerance=limits.chord,
             tolerance_from=self._allowed,
@@ -312,7 +334,8 @@ class _Writing:
     ) -> None:
         self.proving = Proving(division)
         self._temporary = temporary
-        self._corrector = options.corrector(program, temporary)
+        machine = division.actual.machine.name
+        self._corrector = options.corrector(program, temporary, machine)
         self._back = options.reader(temporary)
         self._waiting: list[tuple[Moves, Divided]] = []
 
@@ -358,6 +381,17 @@ class _Writing:
 
 
 @contextmanager
+def _written(target: Path | None) -> Iterator[Path]:
+    """A file that gets the target's name in the end; without a target it is gone then."""
+    if target is not None:
+        with replacing(target) as temporary:
+            yield temporary
+        return
+    with tempfile.TemporaryDirectory(prefix="truepose-") as folder:
+        yield Path(folder) / "corrected.ngc"
+
+
+@contextmanager
 def _quick_turns() -> Iterator[None]:
     """Let two threads of the interpreter take turns ten times as often.
 
@@ -398,7 +432,7 @@ def _problems_of(program: Path) -> Iterator[None]:
         ) from None
 
 
-def _require_files(program: Path, written: Path) -> None:
+def _require_files(program: Path, written: Path | None, parameters: Path | None) -> None:
     """Refuse what cannot be read or written before any work is done."""
     if not program.exists():
         raise _file_problem("file-missing", "there is no such program", program, "no such file")
@@ -408,14 +442,18 @@ def _require_files(program: Path, written: Path) -> None:
         raise _file_problem(
             "file-unreadable", "the program cannot be read", program, "no permission to read"
         )
-    if written.exists() and written.samefile(program):
-        raise _file_problem(
-            "output-is-input",
-            "the corrected program would write over the program",
-            written,
-            "the program itself",
-            "another file",
-        )
+    if written is None:
+        return
+    inputs = {"the program": program, "the parameter file": parameters}
+    for name, file in inputs.items():
+        if file is not None and written.exists() and written.samefile(file):
+            raise _file_problem(
+                "output-is-input",
+                f"the corrected program would write over {name}",
+                written,
+                f"{name} itself",
+                "another file",
+            )
     require_writable(written, [written.suffix.lower()])
 
 
@@ -431,7 +469,7 @@ def _options(
     interpolation: str,
     units: str | None,
     start: Positions | None,
-    offsets: Mapping[str, Positions] | None,
+    offsets: tuple[Mapping[str, Positions] | None, Path | None],
     block_delete: bool | None,
     digits: int,
 ) -> _Options:
@@ -456,14 +494,8 @@ def _options(
         refuse("unit", units, "mm or inch")
     if not (isinstance(digits, int) and 0 <= digits <= 8):
         refuse("number of digits", digits, "a whole number from 0 to 8")
-    begin = {**axes.home(), **_named(start or {}, "start", refuse)}
-    shifted = {
-        name.upper(): _named(offset, f"offset {name}", refuse)
-        for name, offset in (offsets or {}).items()
-    }
-    for name in shifted:
-        if name not in SYSTEMS:
-            refuse("offset", name, one_of(SYSTEMS))
+    begin = {**axes.home(), **named(start or {}, "start", refuse)}
+    shifted = work_offsets(axes.machine, *offsets, refuse)
     if problems:
         raise RequestError(*problems)
     return _Options(
@@ -478,20 +510,4 @@ def _options(
     )
 
 
-def _named(
-    position: Positions, what: str, refuse: Callable[[str, object, str], None]
-) -> dict[str, float]:
-    """Coordinates by the axes' letters, mm and degrees."""
-    coordinates = {}
-    for name, value in position.items():
-        letter = name.upper()
-        if len(letter) != 1 or letter not in AXES:
-            refuse(what, name, f"axes, {one_of(tuple(AXES.lower()))}")
-        elif not np.isfinite(value):
-            refuse(what, value, "finite coordinates, m and rad")
-        else:
-            coordinates[letter] = float(value) / scale_of(letter)
-    return coordinates
-
-
-__all__ = ["SYSTEMS", "Positions", "correct_program"]
+__all__ = ["Positions", "correct_program"]

@@ -57,9 +57,9 @@ class Proof(Represented):
     `before`, `after`: errors of the program as it was, and as it was written, in the actual
     machine; `improves`: whether it became better. `moves` of the program, `blocks` written for
     them, `points` compared. `tolerance`, m, where that is from, and `interpolation` for which it
-    holds. `approach`: the line of the first block, or None; it
-    begins where the machine is not corrected, and its path counts from its end on. `warnings`: why
-    there was nothing to correct, if so.
+    holds. `approach`: the line of the first block, or None; it begins where the machine is not
+    corrected, and its path counts from its end on. `warnings`: why there was nothing to correct, if
+    so. `coordinates`: which the program was taken to be in, in words.
     """
 
     machine: str
@@ -78,6 +78,7 @@ class Proof(Represented):
     after: Errors
     improves: bool
     warnings: tuple[str, ...] = ()
+    coordinates: str = ""
 
 
 def sizes(errors: Errors, length: float) -> tuple[float | None, float | None]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,6 @@ from pathlib import Path
 import pytest
 
 from command_line import PLANAR, call
-from truepose.cli._ending import DEFECT
 
 FULL = Path("/dev/full")
 NOT_WRITABLE = "error[output-not-writable]: what is printed cannot be written"
@@ -91,7 +91,7 @@ def test_a_defect(
 
     monkeypatch.setattr("truepose.load", fail)
     outcome = call(capsys, "check", PLANAR)
-    assert outcome.code == DEFECT == 70
+    assert outcome.code == 70
     assert outcome.out == ""
     assert f"this is a defect of truepose 0.1.0, not of your input: {what}" in outcome.err
     assert "in truepose/cli/_steps.py, line " in outcome.err
@@ -121,3 +121,31 @@ def test_no_memory(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.Monke
     outcome = call(capsys, "check", PLANAR)
     assert outcome.code == 2
     assert "not enough memory" in outcome.err
+
+
+def of_limited_files() -> None:
+    """No file may have more than 8 KiB: what a full disk is to who writes."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192))
+
+
+@pytest.mark.parametrize("ending", [".nc", ".json", ".csv"])
+def test_a_disk_that_is_full(ending: str, tmp_path: Path) -> None:
+    if ending == ".nc":
+        pytest.importorskip("h5netcdf")
+    file = tmp_path / f"out{ending}"
+    file.write_text("old")
+    run = subprocess.run(
+        [
+            *(sys.executable, "-c", "from truepose.cli import main; main()"),
+            *("budget", str(PLANAR), "-o", str(file)),
+        ],
+        capture_output=True, text=True, timeout=120, check=False, preexec_fn=of_limited_files,
+    )  # fmt: skip
+    assert run.returncode == 2
+    assert run.stderr.splitlines()[0].endswith(
+        "error[output-not-writable]: the output file could not be written"
+    )
+    assert "File too large" in run.stderr
+    assert len(run.stderr.splitlines()) == 3
+    assert [path.name for path in tmp_path.iterdir()] == [file.name]
+    assert file.read_text() == "old"

@@ -25,3 +25,21 @@ DEEPEST_NESTING = 50
 
 LONGEST_TOML = 4_000_000
 """Characters of a machine file, or of what a file of measurements states at its head."""
+
+LONGEST_MOVE = 10_000
+"""Characteristic lengths of the machine that the path of one move of a program is long."""
+
+MOST_PIECES = 500_000
+"""Pieces into which the moves of a program are cut that are divided together, some thousands."""
+
+MOST_TURNS = 1000
+"""Turns of one arc of a program."""
+
+MOST_THREADS = 1024
+"""Threads that share the work, however many are asked for."""
+
+MOST_SAMPLES = 10**9
+"""Samples at one pose."""
+
+LONGEST_NAME = 200
+"""Characters of the name of a machine or of a part."""

@@ -190,6 +190,75 @@ def test_a_quotient_is_two_quantities() -> None:
     assert read_quotient("10 arcsec / .5 deg", units) == pytest.approx(20 / 3600, rel=1e-14)
 
 
+PROGRAM = "G21 G90 G17 F1000\nG0 X200 Y150\nG1 X210\n{}\nM2\n"
+
+
+@pytest.mark.parametrize(
+    ("block", "options", "code", "sentence"),
+    [
+        ("G2 X210 Y150 I100000000 J0", [], "gcode-division", "628318531"),
+        ("G2 X210 Y150 I-10 J0 P100000", [], "gcode-bad-value", "from 1 to 1000"),
+        ("G2 X210 Y150 I-10 J0 P1001", [], "gcode-bad-value", "from 1 to 1000"),
+        ("G1 X220", ["--tolerance", "1e-30 m"], "bad-correction", "--digits"),
+        (
+            "G2 X210 Y150 I-20 J0 P1000",
+            ["--tolerance", "1e-10 m", "--digits", "8"],
+            "gcode-tolerance",
+            "at most 500,000 pieces",
+        ),
+    ],
+)
+def test_a_program(
+    block: str, options: list[str], code: str, sentence: str, tmp_path: Path
+) -> None:
+    program, out = tmp_path / "program.ngc", tmp_path / "out.ngc"
+    program.write_text(PROGRAM.format(block), "utf-8")
+    run = bounded("gcode", PLANAR, program, "-o", out, *options)
+    assert run.returncode == 2
+    assert f"error[{code}]" in run.stderr
+    assert sentence in run.stderr
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("a\\u0000b", "a control character, U+0000"),
+        ("a\\u001bb", "a control character, U+001B"),
+        ("a\\u0085b", "a control character, U+0085"),
+        ("a\\u2028b", "a line separator, U+2028"),
+        ("a\\nb", "a control character, U+000A"),
+        ("", "nothing"),
+        (" ", "nothing but spaces"),
+        ("a" * 201, "201 characters"),
+    ],
+)
+@pytest.mark.parametrize("key", ["machine.name", "strut.1.name"])
+def test_a_name(key: str, name: str, found: str) -> None:
+    import truepose
+
+    with pytest.raises(MachineFileError) as caught:
+        truepose.load(PLANAR, settings={key: f'"{name}"'})
+    problem = caught.value.problems[0]
+    assert (problem.code, problem.found) == ("bad-name", found)
+    assert truepose.load(PLANAR, settings={key: f'"{"ä" * 200}"'})
+
+
+def test_samples() -> None:
+    run = bounded("montecarlo", PLANAR, "--samples", "1e18")
+    assert run.returncode == 2
+    assert "error[bad-samples]" in run.stderr
+    assert "at most 1,000,000,000" in run.stderr
+
+
+def test_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TRUEPOSE_THREADS", "1000000")
+    run = bounded("check", PLANAR)
+    assert run.returncode == 2
+    assert "error[bad-setting]" in run.stderr
+    assert f"a whole number from 1 to {limits.MOST_THREADS}" in run.stderr
+
+
 def test_the_page_states_every_limit() -> None:
     rows = re.findall(
         r"^\| .+? \| (.+?) \| `([A-Z_]+)` \|", (ROOT / "docs" / "limits.md").read_text(), re.M

@@ -40,6 +40,7 @@ CATALOGUE: dict[str, str] = {
     "unknown-unit": "a unit that is not known, or text that is not a number with a unit",
     "wrong-dimension": "a quantity of another dimension than the key takes",
     "not-finite": "not a finite number",
+    "too-long": "text longer than any value of its kind",
     "too-large": "a number of no size that anything has, from a slip in an exponent",
     "not-positive": "zero or negative where only a positive quantity makes sense",
     "negative": "negative where only zero or more makes sense",

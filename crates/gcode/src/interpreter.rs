@@ -602,15 +602,15 @@ fn dwell(block: &Block, words: &[Word]) -> LineResult<()> {
     }
 }
 
-/// Most turns of one arc: beyond, its angle loses digits.
-const MOST_TURNS: f64 = 100_000.0;
+/// Most turns of one arc: a thread that is milled has some tens.
+const MOST_TURNS: f64 = 1000.0;
 
 fn turns(block: &Block, words: &[Word]) -> LineResult<i32> {
     let Some(word) = block.word(words, b'P') else { return Ok(1) };
     if word.value.fract() != 0.0 || !(1.0..=MOST_TURNS).contains(&word.value) {
         let (at, end) = word.span();
         let fault = Fault::new("gcode-bad-value", at, end, "this is no number of turns");
-        return Err(fault.expected("a whole number from 1 to 100000"));
+        return Err(fault.expected("a whole number from 1 to 1000"));
     }
     Ok(word.value as i32)
 }

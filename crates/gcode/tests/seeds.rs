@@ -36,6 +36,12 @@ fn seeds_keep_their_moves() {
     }
 }
 
+/// How many programs are made of the seeds: `TRUEPOSE_GCODE_MUTATIONS`, as 1000000, or some.
+fn mutations() -> usize {
+    let count = std::env::var("TRUEPOSE_GCODE_MUTATIONS");
+    count.map_or(100_000, |text| text.parse().expect("a number of programs"))
+}
+
 #[test]
 fn lines_of_seeds_in_any_order_keep_their_moves() {
     let lines: Vec<Vec<u8>> = seeds()
@@ -45,7 +51,7 @@ fn lines_of_seeds_in_any_order_keep_their_moves() {
         })
         .collect();
     let mut numbers = Numbers(1);
-    for _ in 0..100_000 {
+    for _ in 0..mutations() {
         let mut data = Vec::new();
         for _ in 0..1 + numbers.below(8) {
             data.extend_from_slice(&lines[numbers.below(lines.len())]);

@@ -31,6 +31,10 @@ fn threads(n: Option<usize>) -> PyResult<usize> {
         if count == 0 {
             return Err(pyo3::exceptions::PyValueError::new_err("at least one thread is needed"));
         }
+        if count > batch::MOST_THREADS {
+            let message = format!("at most {} threads share a batch", batch::MOST_THREADS);
+            return Err(pyo3::exceptions::PyValueError::new_err(message));
+        }
         batch::set_threads(count);
     }
     Ok(batch::threads())
@@ -68,7 +72,7 @@ fn threads_from_environment(py: Python<'_>) -> PyResult<()> {
     let Some(text) = std::env::var_os("TRUEPOSE_THREADS") else { return Ok(()) };
     let text = text.to_string_lossy();
     match text.trim().parse::<usize>() {
-        Ok(count) if count > 0 => {
+        Ok(count) if (1..=batch::MOST_THREADS).contains(&count) => {
             batch::set_threads(count);
             Ok(())
         }
@@ -76,7 +80,7 @@ fn threads_from_environment(py: Python<'_>) -> PyResult<()> {
             py,
             "TRUEPOSE_THREADS is no number of threads",
             &text,
-            "a whole number from 1 on",
+            &format!("a whole number from 1 to {}", batch::MOST_THREADS),
         )),
     }
 }

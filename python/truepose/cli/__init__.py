@@ -6,12 +6,15 @@ click and the thin command files, never numpy, the kernel or the report.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 import click
 
-from truepose.cli._guard import INTERRUPTED, GuardedGroup
+from truepose.cli._ending import INTERRUPTED, ending, refused_output
+from truepose.cli._guard import GuardedGroup
 
 COMMANDS: dict[str, str] = {
     "init": "truepose.cli.init",
@@ -59,24 +62,36 @@ def cli() -> None:
 
     Every command reads one machine file (TOML) and computes everything from it.
 
-    Exit code 0: done. 1: the command is a question and the answer is no. 2: bad input.
+    Exit code 0: done. 1: the command is a question and the answer is no. 2: bad input. 70: a
+    defect of this program.
     """
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line on `arguments` (default: those of the process) -> exit code."""
     try:
-        result = cli.main(args=arguments, prog_name="truepose", standalone_mode=False)
-    except click.ClickException as problem:
-        problem.show()
-        return 2  # click gives some of its own problems the code 1, which here means "no"
-    except click.Abort:
-        return INTERRUPTED
+        try:
+            result = cli.main(args=arguments, prog_name="truepose", standalone_mode=False)
+        except click.ClickException as problem:
+            problem.show()
+            return 2  # click gives some of its own problems the code 1, which here means "no"
+        except click.Abort:
+            return INTERRUPTED
+        sys.stdout.flush()
+    except BaseException as failure:
+        # A panic of the kernel is no Exception, but no wish to leave either.
+        if not isinstance(failure, Exception) and type(failure).__name__ != "PanicException":
+            raise
+        return ending(failure)
     return result if isinstance(result, int) else 0
 
 
 def main() -> None:
     """Entry point of the `truepose` program."""
+    if sys.stderr is None:  # closed by who calls us
+        sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
+    if sys.stdout is None:
+        sys.exit(refused_output("a standard output that is closed"))
     for stream in (sys.stdout, sys.stderr):
         # A terminal that has no µ shows a question mark, not a traceback.
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import importlib
-import os
 import sys
 from collections.abc import Mapping
 from typing import Any
 
 import click
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, as shells count it (128 + SIGINT)."""
-PIPE_CLOSED = 141
-"""Exit code when the reader of our output went away (128 + SIGPIPE)."""
-BAD_INPUT = 2
+from truepose.cli._ending import BAD_INPUT, INTERRUPTED, PipeClosedError
 
 
 class GuardedGroup(click.Group):
     """A click group whose commands are modules, each holding one `command`.
 
-    Problems of the user's input are printed without a traceback and give exit code 2; Ctrl-C and
-    a closed pipe end quietly with the codes that shells use.
+    Problems of the user's input are printed without a traceback and give exit code 2; Ctrl-C ends
+    with the code that shells use. What else fails is left to `ending`.
     """
 
     def __init__(self, *args: Any, modules: Mapping[str, str], **settings: Any) -> None:
@@ -51,18 +46,33 @@ class GuardedGroup(click.Group):
             raise click.UsageError(f"No such command '{args[0]}'.{hint}", ctx)
         return super().resolve_command(ctx, args)
 
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        """As click, which already prints help here."""
+        try:
+            return super().make_context(info_name, args, parent, **extra)
+        except BrokenPipeError as closed:
+            raise PipeClosedError from closed
+
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; every failure that is not a defect becomes an exit code."""
+        """Run the command; a problem of its input becomes an exit code."""
+        try:
+            return self._guarded(ctx)
+        except BrokenPipeError as closed:
+            raise PipeClosedError from closed
+
+    def _guarded(self, ctx: click.Context) -> Any:
         try:
             result = super().invoke(ctx)
             sys.stdout.flush()
         except KeyboardInterrupt:
             click.echo("Interrupted: no file was changed.", err=True)
             return INTERRUPTED
-        except BrokenPipeError:
-            # Python flushes stdout once more at exit; send that to nowhere.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return PIPE_CLOSED
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except Exception as failure:

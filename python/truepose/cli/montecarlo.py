@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from truepose.cli._guard import INTERRUPTED
+from truepose.cli._ending import INTERRUPTED
 from truepose.cli._options import (
     Request,
     WholeNumber,

@@ -34,9 +34,10 @@ MOST_PROBLEMS = 10
 """Problems of one kind in one column that are told one by one; the others are counted."""
 
 _KIND = FileKind("a data file (CSV)", ".csv")
-_HEADER = re.compile(r"\s*([^(\[]*?)\s*(?:\((.*)\)|\[(.*)\])?\s*\Z", re.DOTALL)
+_CLOSING = {"(": ")", "[": "]"}
 _LINE_END = re.compile(r"\r\n|\r|\n")
-_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+\Z")
+_DECIMAL_COMMA = re.compile(r"[+-]?\d++,\d++\Z")
+_NUMBER_AND_MORE = re.compile(r"[+-]?[\d.]++\s*+[^\d\s._]")
 
 
 @dataclass(frozen=True)
@@ -269,9 +270,7 @@ class _Reader:
         first: dict[str, str] = {}
         misspelt: set[str | None] = set()
         for at, cell in enumerate(header):
-            match = _HEADER.match(cell)
-            name = cell.strip() if match is None else match[1]
-            written = None if match is None else match[2] or match[3]
+            name, written = _name_and_unit(cell.strip())
             column = self.columns.get(name)
             if column is None:
                 known = list(self.columns)
@@ -414,7 +413,7 @@ class _Reader:
         hint = None
         if _DECIMAL_COMMA.match(cell):
             hint = "a decimal number has a point, not a comma"
-        elif re.match(r"[+-]?[\d.]+\s*[^\d\s._]", cell):
+        elif _NUMBER_AND_MORE.match(cell):
             hint = "a unit stands in the header, not with the number"
         self._refuse(
             Fault(
@@ -493,6 +492,14 @@ def cut_short(problems: Iterable[Problem]) -> list[Problem]:
             last = told.pop()
             told.append(replace(last, message=f"{last.message}, and in {more} more rows"))
     return told
+
+
+def _name_and_unit(header: str) -> tuple[str, str | None]:
+    """The name in a header's cell, and what stands in brackets behind it, if anything does."""
+    start = next((at for at, mark in enumerate(header) if mark in _CLOSING), None)
+    if start is None or not header.endswith(_CLOSING[header[start]]):
+        return header, None
+    return header[:start].rstrip(), header[start + 1 : -1] or None
 
 
 def _number(cell: str) -> float:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from truepose._kernel import toml_lines
 from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.text_file import FileKind, read_text
+from truepose.files.toml_text import TomlError, lines_of, parse_toml
 
 Key = tuple[str | int, ...]
 """Where a value stands: keys of tables and numbers of list items, from the top."""
@@ -157,39 +155,24 @@ def read(path: str | Path) -> Document:
     file = str(path)
     content, text = read_text(Path(path), _KIND)
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise MachineFileError(_not_toml(str(error), file, text)) from None
-    except RecursionError:
-        raise MachineFileError(
-            Problem("not-toml", "the file is nested too deeply", file, expected=_KIND.phrase)
-        ) from None
-    return Document(file, Path(path).name, hashlib.sha256(content).hexdigest(), data, _lines(text))
+        data = parse_toml(text)
+    except TomlError as error:
+        raise MachineFileError(_not_toml(error, file, text)) from None
+    file_hash = hashlib.sha256(content).hexdigest()
+    return Document(file, Path(path).name, file_hash, data, lines_of(text))
 
 
-def _lines(text: str) -> dict[Key, int]:
-    try:
-        return dict(toml_lines(text))
-    except ValueError:
-        # The two parsers differ in some corner of TOML. The file is still good, without lines.
-        return {}
-
-
-def _not_toml(reason: str, file: str, text: str) -> Problem:
-    """The place is at the end of tomllib's message: "(at line 3, column 5)"."""
-    match = re.search(r"\s*\(at (?:line (\d+), column \d+|end of document)\)\s*$", reason)
-    line, faulty = None, None
-    if match is not None:
-        reason = reason[: match.start()]
-        all_lines = text.splitlines()
-        line = int(match[1]) if match[1] else max(len(all_lines), 1)
-        faulty = all_lines[line - 1].strip()[:80] if line <= len(all_lines) else None
+def _not_toml(error: TomlError, file: str, text: str) -> Problem:
+    all_lines = text.split("\n")
+    found = None
+    if error.line is not None and error.line <= len(all_lines):
+        found = all_lines[error.line - 1].strip()[:80]
     return Problem(
         "not-toml",
-        f"the file is not TOML: {reason}",
+        f"the file is not TOML: {error.reason}",
         file,
-        line,
-        found=faulty or None,
+        error.line,
+        found=found or None,
         expected=_KIND.phrase,
     )
 

@@ -8,6 +8,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from truepose.errors import Fault
 from truepose.files.dimensions import FREEDOMS
+from truepose.files.limits import LONGEST_NAME
+from truepose.files.names import fault_of_name
 from truepose.files.quantity import refuse
 from truepose.files.units import shown_value
 
@@ -19,12 +21,13 @@ class FileTable(BaseModel):
 
 
 def _one_line(value: str) -> str:
-    if not value.strip() or "\n" in value:
+    wrong = fault_of_name(value)
+    if wrong is not None:
         refuse(
             Fault(
                 "bad-name",
-                "a name is one line that is not empty",
-                found=shown_value(value),
+                f"a name is one line that is not empty, of at most {LONGEST_NAME} characters",
+                found=wrong,
                 expected='a name, such as "1" or "left"',
             )
         )

@@ -16,8 +16,7 @@ from truepose.files.quantity import FileType
 from truepose.files.tolerance import Band, read_within
 from truepose.files.units import QuantityError, UnitSystem, shown_value
 
-_QUOTIENT = re.compile(r"\s*([^/]+?)\s*/\s*((?:\d|\.\d).*?)\s*\Z")
-"""One quantity over another: the divisor begins with a number."""
+_BEGINS_WITH_A_NUMBER = re.compile(r"\.?\d")
 
 
 def read_quotient(value: object, units: UnitSystem) -> float | None:
@@ -25,14 +24,14 @@ def read_quotient(value: object, units: UnitSystem) -> float | None:
 
     Raises `QuantityError`.
     """
-    match = _QUOTIENT.match(value) if isinstance(value, str) else None
-    if match is None:
+    parts = [part.strip() for part in value.split("/", 1)] if isinstance(value, str) else []
+    if len(parts) != 2 or not parts[0] or not _BEGINS_WITH_A_NUMBER.match(parts[1]):
         return None
     try:
-        above, below = (units.read(part, "length") for part in match.groups())
+        above, below = (units.read(part, "length") for part in parts)
     except QuantityError as error:
         try:
-            above, below = (units.read(part, "angle") for part in match.groups())
+            above, below = (units.read(part, "angle") for part in parts)
         except QuantityError:
             raise error from None
     if below == 0.0:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
@@ -10,6 +9,9 @@ from typing import Any
 
 from truepose.errors import Problem, RequestError
 from truepose.files.document import SEVERAL, Document, Key
+from truepose.files.limits import DEEPEST_NESTING, LONGEST_QUANTITY
+from truepose.files.toml_text import TomlError, parse_toml
+from truepose.files.units import shown_value
 
 _COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
@@ -28,9 +30,15 @@ def apply(
     """
     problems: list[Problem] = []
     for path, text in _pairs(settings, problems):
-        setting = f"{path}={text}"
+        setting = _shortened(f"{path}={text}")
         document.settings[path] = text
         try:
+            if path.count(".") >= DEEPEST_NESTING:
+                raise _LeadsNowhereError(
+                    "a key of too many parts",
+                    f"{path.count('.') + 1} parts",
+                    f"at most {DEEPEST_NESTING}",
+                )
             value = _value(text)
             for key in _targets(document, path.split("."), free_tables):
                 _write(document.data, key, value)
@@ -69,8 +77,8 @@ def _pairs(
             problems.append(
                 Problem(
                     "bad-setting",
-                    f"--set {setting}: not a key and a value",
-                    found=setting,
+                    f"--set {_shortened(setting)}: not a key and a value",
+                    found=_shortened(setting),
                     expected="key=value, such as strut.1.length=501",
                 )
             )
@@ -78,13 +86,21 @@ def _pairs(
         yield path, text.strip()
 
 
+def _shortened(setting: str) -> str:
+    return setting if len(setting) <= LONGEST_QUANTITY else setting[: LONGEST_QUANTITY - 3] + "..."
+
+
 def _value(text: str) -> Any:
     """The TOML value that `text` is, or the text itself."""
     if "\n" in text or "\r" in text:
         raise _LeadsNowhereError("a value is one line", "several lines", "one TOML value")
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        return parse_toml(f"value = {text}")["value"]
+    except TomlError as error:
+        if error.too_much:
+            raise _LeadsNowhereError(
+                f"a value that is not read: {error.reason}", shown_value(text), "one TOML value"
+            ) from None
         return text
 
 

@@ -67,8 +67,8 @@ _BANDS = ("band", "standard_deviation", "scale", "values", "data")
 _USUAL = {"standard_deviation": "normal", "scale": "student-t"}
 """Distribution of a tolerance that has the key and does not name one."""
 
-_PLUS_MINUS = re.compile(r"\s*(?:±|\+/?-)\s*(?=[\d.])")
-_CLASS = re.compile(r"\s*[A-Za-z]")
+_PLUS_MINUS = re.compile(r"\s*+(?:±|\+/?-)\s*+(?=[\d.])")
+_CLASS = re.compile(r"\s*+[A-Za-z]")
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ def designations(dimension: str = "length") -> tuple[str, ...]:
 
 def _normalised(designation: str) -> str:
     """ISO 2768-mK, iso 2768 m, "it 7": the same class however it is spaced and capitalised."""
-    text = re.sub(r"[\s_-]+", "", designation).upper()
+    text = re.sub(r"[\s_-]++", "", designation).upper()
     return re.sub(r"^ISO2768(1(?=[A-Z]))?", "ISO2768", text)
 
 

@@ -17,18 +17,23 @@ import numpy as np
 from truepose.arrays import Floats
 from truepose.errors import ReadingError
 from truepose.files.dimensions import DIMENSIONS, Dimension
+from truepose.files.limits import (
+    HIGHEST_POWER,
+    LARGEST_QUANTITY,
+    LONGEST_QUANTITY,
+    LONGEST_UNIT,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-_NUMBER = re.compile(
-    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf))\s*(.*?)\s*\Z"
-)
-_UNIT = re.compile(r"[A-Za-zµμ°%_²³⁻¹·*/^() 0-9-]{1,60}")
+# Repeats take all that they can and give nothing back (`++`), here and wherever text is a user's.
+_NUMBER = re.compile(r"[+-]?(?:(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?+|nan|inf)")
+_UNIT = re.compile(rf"[A-Za-zµμ°%_²³⁻¹·*/^() 0-9-]{{1,{LONGEST_UNIT}}}+")
 # pint evaluates whatever arithmetic a unit holds, so towers of powers and long digits stay outside.
-_TOO_MUCH = re.compile(
-    r"(?:\^|\*\*)\s*-?\s*\(|(?:\^|\*\*)\s*-?\s*\d+\s*(?:\^|\*\*)|\d{3}|[²³⁻¹]{3}"
-)
+_LONG_NUMBER = re.compile(r"\d{3}|\d_")
+_BRACKET_OR_POWER = re.compile(r"([()])|(\^|\*\*) *+(?:-? *+(\d{1,2}))?|⁻?([¹²³]++)")
+_RAISED = str.maketrans("¹²³", "123")
 _OFFSET_SCALES = {"degree_Celsius", "degree_Fahrenheit", "degree_Reaumur"}
 _RELATIVE_TEMPERATURE = "delta_degree"
 
@@ -36,9 +41,6 @@ _RELATIVE_TEMPERATURE = "delta_degree"
 class QuantityError(ReadingError):
     """A value that is not the quantity wanted."""
 
-
-LARGEST = 1e50
-"""Of any quantity, in SI units: beyond it, products and squares of quantities are no numbers."""
 
 FEW_DIGITS = 10
 """Significant digits of a number that somebody may have written."""
@@ -142,12 +144,13 @@ class UnitSystem:
             )
         if not math.isfinite(result):
             raise _not_finite(value, wanted)
-        if abs(result) > LARGEST:
+        if abs(result) > LARGEST_QUANTITY:
             raise QuantityError(
                 "too-large",
                 f"expected {wanted.phrase}, found a number far too large for any machine",
                 found=shown_value(value),
-                expected=f"a number of at most {LARGEST:g} in SI units: {_expected(wanted)}",
+                expected=f"a number of at most {LARGEST_QUANTITY:g} in SI units: "
+                f"{_expected(wanted)}",
             )
         return result
 
@@ -179,7 +182,15 @@ class UnitSystem:
         return None
 
     def _from_text(self, text: str, wanted: Dimension) -> float:
-        match = _NUMBER.match(text)
+        if len(text) > LONGEST_QUANTITY:
+            raise QuantityError(
+                "too-long",
+                f"expected {wanted.phrase}, found a text of {len(text)} characters",
+                found=shown_value(text),
+                expected=f"at most {LONGEST_QUANTITY} characters: {_expected(wanted)}",
+            )
+        plain = text.strip()
+        match = _NUMBER.match(plain)
         if match is None:
             raise QuantityError(
                 "unknown-unit",
@@ -187,7 +198,7 @@ class UnitSystem:
                 found=shown_value(text),
                 expected=_expected(wanted),
             )
-        number, unit_text = float(match[1]), match[2]
+        number, unit_text = float(match[0]), plain[match.end() :].strip()
         if not unit_text:
             return self._from_number(number, wanted)
         if unit_text.startswith("/"):
@@ -219,7 +230,15 @@ def unit_of(text: str, wanted: Dimension, *, found: str | None = None) -> FileUn
             expected=_expected(wanted),
             hint=_dimension_hint(unit, wanted),
         )
-    return _file_unit(text, unit, wanted)
+    result = _file_unit(text, unit, wanted)
+    if not 1.0 / LARGEST_QUANTITY <= result.scale <= LARGEST_QUANTITY:
+        raise QuantityError(
+            "too-large",
+            f"a unit of no size that anything has: {result.scale:g} in SI units",
+            found=found,
+            expected=f"a unit of {1.0 / LARGEST_QUANTITY:g} to {LARGEST_QUANTITY:g} in SI units",
+        )
+    return result
 
 
 @cache
@@ -232,12 +251,36 @@ def _registry() -> Any:
 @cache
 def _parsed(text: str) -> Any | None:
     """The pint unit, or None for text that is none."""
-    if not _UNIT.fullmatch(text) or _TOO_MUCH.search(text):
+    if not _UNIT.fullmatch(text) or _LONG_NUMBER.search(text) or _power(text) > HIGHEST_POWER:
         return None
     try:
         return _registry().parse_units(text)
     except Exception:  # pint lets the errors of Python's tokenizer and parser through
         return None
+
+
+def _power(text: str) -> float:
+    """The highest power in a unit's text, those of brackets multiplied: 6 of "(m^2)^3".
+
+    Infinite where what stands above is no plain number: "m^(2)", "m^2^3", "m^2³".
+    """
+    highest = [1]  # in each bracket that is open, the whole text first
+    base, base_end, power_end = 1, 0, 0  # the last bracket that closed; where it and a power end
+    for match in _BRACKET_OR_POWER.finditer(text):
+        bracket, sign, number, raised = match.groups()
+        if bracket == "(":
+            highest.append(1)
+        elif bracket:
+            base, base_end = highest.pop() if len(highest) > 1 else 1, match.end()
+            highest[-1] = max(highest[-1], base)
+        elif (sign and not number) or (power_end and not text[power_end : match.start()].strip()):
+            return math.inf
+        else:
+            of_bracket = base_end and not text[base_end : match.start()].strip()
+            by = int(number or raised.translate(_RAISED))
+            highest[-1] = max(highest[-1], by * (base if of_bracket else 1))
+            power_end = match.end()
+    return max(highest)
 
 
 def _is_relative(unit: Any) -> bool:
@@ -287,7 +330,7 @@ def _expected(wanted: Dimension) -> str:
 
 
 def _unit_hint(text: str, wanted: Dimension) -> str | None:
-    if re.match(r"[\d.,]", text):
+    if text[:1].isdecimal() or text[:1] in (".", ","):
         return "a decimal point is a point, and a number has no spaces or commas"
     if wanted.name == "temperature" and text.strip().upper() in {"C", "F", "CELSIUS"}:
         return 'write "degC" or "degF"'

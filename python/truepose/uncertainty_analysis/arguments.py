@@ -7,6 +7,7 @@ import operator
 import numpy as np
 
 from truepose.errors import Problem, RequestError
+from truepose.files.limits import MOST_SAMPLES
 
 SEEDS = 2**64
 """How many seeds there are."""
@@ -47,14 +48,24 @@ def required_digits(digits: int) -> int:
     )
 
 
-def required_samples(samples: int, least: int) -> int:
-    """The number of samples, at least `least`. Raises `RequestError` (bad-samples)."""
+def required_samples(samples: int, least: int, most: int = MOST_SAMPLES) -> int:
+    """The number of samples, from `least` to `most`. Raises `RequestError` (bad-samples)."""
     try:
         count = operator.index(samples)
     except TypeError:
         count = 0
-    if count >= least:
+    if least <= count <= most:
         return count
+    if count > most:
+        raise RequestError(
+            Problem(
+                "bad-samples",
+                "nobody waits for so many samples",
+                found=f"{samples:.3g}" if count < 1e300 else "a number of more than 300 digits",
+                expected=f"at most {most:,}",
+                hint="without the number there are as many as are needed",
+            )
+        )
     raise RequestError(
         Problem(
             "bad-samples",

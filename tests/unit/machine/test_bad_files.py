@@ -460,7 +460,7 @@ def test_a_file_that_is_not_utf8(content: bytes, line: int, found: str, tmp_path
         ("schema = 1\n[machine\n", 2, "[machine"),
         ('schema = "1', 1, 'schema = "1'),
         ("{}", 1, "{}"),
-        ("x = " + "[" * 5000, None, None),
+        ("x = " + "[" * 5000, 1, "x = " + "[" * 76),
     ],
 )
 def test_a_file_that_is_not_toml(

@@ -22,7 +22,7 @@ pub use inverse::inverses;
 pub use moved::moved_sensitivities;
 pub use samples::{Deviations, Rows, Samples};
 pub(crate) use threads::for_chunks;
-pub use threads::{set_threads, share_out, threads};
+pub use threads::{MOST_THREADS, set_threads, share_out, threads};
 
 /// Samples of one chunk.
 const CHUNK: usize = 256;

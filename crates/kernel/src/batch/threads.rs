@@ -8,9 +8,12 @@ use std::sync::{Arc, RwLock};
 
 static POOL: RwLock<Option<Arc<ThreadPool>>> = RwLock::new(None);
 
-/// Uses `count` threads from now on; at least one.
+/// Threads that share a batch, at most: more than any machine has cores.
+pub const MOST_THREADS: usize = 1024;
+
+/// Uses `count` threads from now on, from one to `MOST_THREADS`.
 pub fn set_threads(count: usize) {
-    let pool = ThreadPoolBuilder::new().num_threads(count.max(1)).build();
+    let pool = ThreadPoolBuilder::new().num_threads(count.clamp(1, MOST_THREADS)).build();
     // A machine that cannot start another thread works on with what it has.
     if let Ok(pool) = pool {
         *POOL.write().unwrap_or_else(|poisoned| poisoned.into_inner()) = Some(Arc::new(pool));

@@ -15,20 +15,19 @@ import csv
 import dataclasses
 import math
 import re
-import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
 
 import numpy as np
 
-from truepose._kernel import toml_lines
 from truepose.calibration.instruments import FRAME_FREEDOMS, REGISTRY, Frame, Instrument, Kind
 from truepose.calibration.instruments._base import Vector
 from truepose.calibration.observables import si_unit
 from truepose.errors import Fault, Problem
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.document import Document, Key
+from truepose.files.toml_text import TomlError, lines_of, parse_toml
 from truepose.files.units import QuantityError, UnitSystem, shown_value, type_phrase
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
@@ -36,8 +35,8 @@ from truepose.spatial import Quaternion, euler_to_quaternion
 
 LINE_END = re.compile(r"\r\n|\r|\n")
 _MARK = "#:"
-_PADDING = re.compile(r"[,;\t]{2,}\s*\Z")
-_NAME = re.compile(r"[A-Za-z0-9_-]+\Z")
+_PADDING = ",;\t"
+_NAME = re.compile(r"[A-Za-z0-9_-]++\Z")
 
 UNKNOWN = "unknown"
 
@@ -87,8 +86,15 @@ def separated(text: str) -> tuple[str, str]:
             continue
         table.append("")
         marked = plain.startswith(_MARK)
-        head.append(_PADDING.sub("", plain.removeprefix(_MARK)) if marked else "")
+        head.append(_without_padding(plain.removeprefix(_MARK)) if marked else "")
     return "\n".join(head), "\n".join(table)
+
+
+def _without_padding(line: str) -> str:
+    """The line without the empty cells, two or more, with which a spreadsheet fills its row."""
+    text = line.rstrip()
+    bare = text.rstrip(_PADDING)
+    return bare if len(text) - len(bare) >= 2 else line
 
 
 def _unquoted(line: str) -> str:
@@ -105,32 +111,24 @@ def read_header(head: str, file: str, name: str, reserved: frozenset[str]) -> He
     """Instruments from the head of the file; `reserved`: names that none of them may have."""
     header = Header()
     try:
-        data = tomllib.loads(head)
-        lines = dict(toml_lines(head))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        data = parse_toml(head)
+    except TomlError as error:
         header.problems.append(_not_toml(error, head, file))
         return header
-    except ValueError:
-        lines = {}  # the two parsers differ in some corner of TOML: good, without lines
-    _Reader(Document(file, name, "", data, lines), header, reserved).read()
+    _Reader(Document(file, name, "", data, lines_of(head)), header, reserved).read()
     return header
 
 
-def _not_toml(error: Exception, head: str, file: str) -> Problem:
-    if isinstance(error, RecursionError):
-        return Problem("not-toml", "the head is nested too deeply", file, expected="plain TOML")
-    reason = str(error)
-    match = re.search(r"\s*\(at (?:line (\d+), column \d+|end of document)\)\s*$", reason)
-    line, found = None, None
-    if match is not None:
-        reason = reason[: match.start()]
-        written = [number for number, text in enumerate(head.split("\n"), 1) if text]
-        line = int(match[1]) if match[1] else (written[-1] if written else None)
-        all_lines = head.split("\n")
-        found = all_lines[line - 1].strip()[:80] if line and line <= len(all_lines) else None
+def _not_toml(error: TomlError, head: str, file: str) -> Problem:
+    all_lines = head.split("\n")
+    line, found = error.line, None
+    if line is not None:
+        # The head has an empty line for every row of the table: the end is its last own one.
+        line = max((at for at in range(1, line + 1) if all_lines[at - 1]), default=line)
+        found = all_lines[line - 1].strip()[:80]
     return Problem(
         "not-toml",
-        f"the lines that begin with {_MARK} are not TOML: {reason}",
+        f"the lines that begin with {_MARK} are not TOML: {error.reason}",
         file,
         line,
         found=found or None,

@@ -33,7 +33,7 @@ from truepose.files.units import QuantityError, UnitSystem
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
 
-_WORD = re.compile(r"(?P<kind>[a-z-]+)(?::(?P<reads>[a-z.,]+))?=(?P<amounts>.+)\Z")
+_WORD = re.compile(r"(?P<kind>[a-z-]++)(?::(?P<reads>[a-z.,]++))?=(?P<amounts>.++)\Z")
 _FILE = FileKind("a file of measurements (CSV), of which only the head is read", ".csv")
 _EXPECTED = "KIND=UNCERTAINTY, such as position=10um, or a file of measurements that declares it"
 

@@ -28,7 +28,7 @@ from truepose.sources import REGISTRY
 _NAMES_A_FILE = ("table", "data", "poses", "temperature_log")
 """Keys whose value may be the name of a CSV file."""
 
-_NUMBER_AND_UNIT = re.compile(r"\s*[+-]?[\d.]+(?:[eE][+-]?\d+)?\s*(.*?)\s*\Z")
+_NUMBER = re.compile(r"[+-]?[\d.]++(?:[eE][+-]?\d++)?+")
 _LENGTH_TOLERANCE = "length_tolerance"
 _XYZ = "xyz"
 
@@ -109,9 +109,9 @@ class MachineText:
         Of the numbers next to it the one of few digits, else the one that is read nearest.
         """
         unit = None
-        match = _NUMBER_AND_UNIT.match(old) if isinstance(old, str) else None
-        if match is not None and match[1]:
-            unit = match[1]
+        match = _NUMBER.match(old.strip()) if isinstance(old, str) else None
+        if match is not None and match.end() < len(old.strip()):
+            unit = old.strip()[match.end() :].lstrip()
         elif dimension not in self._units.declared and dimension != "ratio":
             unit = DIMENSIONS[dimension].si
 

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from truepose.controllers.gcode._axes import AXES, Axes
-from truepose.controllers.gcode.division import TOO_SHORT, CannotCorrect, Limits, Moves
+from truepose.controllers.gcode._axes import AXES, MILLIMETRE, Axes
+from truepose.controllers.gcode.division import TOO_MANY, TOO_SHORT, CannotCorrect, Limits, Moves
 from truepose.controllers.gcode.proof import Proof, sizes
 from truepose.errors import Problem, RequestError
+from truepose.files.limits import LONGEST_MOVE, MOST_PIECES
 from truepose.machine import Machine
 from truepose.runs.poses import faults_text
 
@@ -37,6 +38,16 @@ def of_move(
             expected=f"within {machine.shown.small_length.text(limits.chord)}",
             hint="allow more with --tolerance; a jump like that is what play makes where the load "
             "of a drive or strut changes its sign",
+        )
+    if failure.status == TOO_MANY:
+        return _refusal(
+            "gcode-tolerance",
+            "this move, with those round it, would become more blocks than are written",
+            file,
+            line,
+            found=f"the program is off by {machine.shown.small_length.text(failure.off)} near {at}",
+            expected=f"at most {MOST_PIECES:,} pieces of the moves that are divided together",
+            hint="allow more with --tolerance, or give the move in parts",
         )
     why = faults_text(machine, machine.kernel.explain(failure.pose))
     status = failure.status.replace("_", " ")
@@ -84,6 +95,39 @@ def of_uncommanded_axis(axes: Axes, moves: Moves, file: Path) -> RequestError | 
         found=f"a move of {letter}",
         expected=f"moves of {', '.join(axes.names)} and of axes that are not the platform's",
         hint="what the platform does besides follows from its pose; take the word out",
+    )
+
+
+def of_long_move(machine: Machine, moves: Moves, file: Path) -> RequestError | None:
+    """The refusal of the first move whose path is longer than is looked at; None: there is none."""
+    longest = LONGEST_MOVE * machine.characteristic_length
+    places = np.flatnonzero(moves.length * MILLIMETRE > longest)
+    if not places.size:
+        return None
+    length = float(moves.length[places[0]]) * MILLIMETRE
+    return _refusal(
+        "gcode-division",
+        "the path of this move is longer than any that is divided",
+        file,
+        int(moves.line[places[0]]),
+        found=machine.shown.length.text(length),
+        expected=f"at most {machine.shown.length.text(longest)}, {LONGEST_MOVE:,} times the "
+        "characteristic length of the machine",
+        hint="look at the centre of the arc and at its number of turns (P)",
+    )
+
+
+def of_tolerance(machine: Machine, tolerance: float, least: float, digits: int) -> RequestError:
+    """The refusal of a tolerance, m, that the rounding of what is written exceeds by itself."""
+    shown = machine.shown.small_length
+    return RequestError(
+        Problem(
+            "bad-correction",
+            f"no program of {digits} digits keeps this tolerance: its rounding is larger",
+            found=f"{tolerance:g} m",
+            expected=f"at least {shown.text(least)}",
+            hint="allow more with --tolerance, or give more --digits",
+        )
     )
 
 
@@ -154,4 +198,12 @@ def of_start(machine: Machine, axes: Axes, failure: CannotCorrect) -> RequestErr
     )
 
 
-__all__ = ["NoBetter", "of_move", "of_proof", "of_start", "of_uncommanded_axis"]
+__all__ = [
+    "NoBetter",
+    "of_long_move",
+    "of_move",
+    "of_proof",
+    "of_start",
+    "of_tolerance",
+    "of_uncommanded_axis",
+]

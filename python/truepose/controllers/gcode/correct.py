@@ -34,7 +34,13 @@ from truepose.controllers.gcode.division import (
     Moves,
 )
 from truepose.controllers.gcode.proof import Errors, Proof, Proving, improves
-from truepose.controllers.gcode.tolerance import MOST, PathTolerance, least_of, tolerance_for
+from truepose.controllers.gcode.tolerance import (
+    MOST,
+    PathTolerance,
+    least_of,
+    rounding_of,
+    tolerance_for,
+)
 from truepose.controllers.gcode.work_offsets import Positions, WorkOffsets, named, work_offsets
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import one_of
@@ -204,6 +210,10 @@ def _tolerance(
 ) -> PathTolerance:
     """The tolerance that was asked for, or the one that follows from the error before."""
     if options.tolerance is not None:
+        division = Division(actual, axes, options.limits(options.tolerance))
+        least = rounding_of(division, options.digits)
+        if options.tolerance < least:
+            raise _refusals.of_tolerance(actual.machine, options.tolerance, least, options.digits)
         return PathTolerance(options.tolerance, "asked")
     reader = options.reader(program)
 
@@ -275,7 +285,9 @@ class _Session:
 
     def _divide(self, moves: Moves, stand: MachineState) -> Divided:
         division, program = self._division, self._program
-        refusal = _refusals.of_uncommanded_axis(division.axes, moves, program)
+        refusal = _refusals.of_uncommanded_axis(
+            division.axes, moves, program
+        ) or _refusals.of_long_move(division.actual.machine, moves, program)
         if refusal is not None:
             raise refusal
         try:

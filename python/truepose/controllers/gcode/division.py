@@ -30,6 +30,7 @@ from truepose.controllers.gcode._axes import MILLIMETRE, Axes
 from truepose.controllers.gcode._measure import Measure
 from truepose.controllers.gcode._pieces import Nodes, Pieces, SamplePoints, joined, selected
 from truepose.controllers.gcode._singularity_crossings import STEP, singularity_crossings
+from truepose.files.limits import MOST_PIECES
 from truepose.runs.displacement import ParameterDeviation
 from truepose.runs.poses import BLOCK, OK
 
@@ -60,8 +61,8 @@ UNKNOWN_PARTS = 8
 KEPT = 1 << 17
 """Points of a batch whose known deviations are kept for the proof; all others are computed anew."""
 
-TOO_SHORT = "too_short"
-"""Why a move cannot be corrected, beside the kernel's statuses: pieces below the least length."""
+TOO_SHORT, TOO_MANY = "too_short", "too_many"
+"""Why a move cannot be corrected, beside the kernel's statuses: pieces too short, or too many."""
 
 Interpolation = Literal["either", "pose"]
 
@@ -94,7 +95,7 @@ class Limits:
 class CannotCorrect(Exception):  # noqa: N818 - it is answered with a refusal, and no error itself
     """A move of the batch that cannot be corrected.
 
-    `move` and `share` say where on it; `status` is the kernel's, or `TOO_SHORT`; `pose`
+    `move` and `share` say where; `status` is the kernel's, `TOO_SHORT` or `TOO_MANY`; `pose`
     (n_commanded,), SI, the one that fails: of the program, or a command for it. `off`: by how
     much the tool would be off there, m.
     """
@@ -381,14 +382,9 @@ class _Batch:
         within = held[number]
         if within.any():
             known = known if within.all() else selected(known, within)
+            weight = good.weight[number][within]
             self.looked.append(
-                SamplePoints(
-                    end[within],
-                    t[within],
-                    good.weight[number][within],
-                    poses[within],
-                    self._keep(known),
-                )
+                SamplePoints(end[within], t[within], weight, poses[within], self._keep(known))
             )
         return np.asarray(worst)
 
@@ -415,9 +411,10 @@ class _Batch:
             wanted = np.ceil(np.sqrt(off / (AIMED_AT * self.limits.chord)))
         wanted = np.where(np.isfinite(off), np.clip(wanted, 2, MOST_PARTS), UNKNOWN_PARTS)
         parts = np.minimum(wanted, np.floor(pieces.size / self.limits.least)).astype(np.intp)
-        if (parts < 2).any():
-            at = int(np.argmax(parts < 2))
-            self._cannot_cut(int(pieces.end[at]), float(off[at]))
+        many = int(parts.sum()) > MOST_PIECES
+        if many or (parts < 2).any():
+            at = int(np.argmax(parts if many else parts < 2))
+            self._cannot_cut(int(pieces.end[at]), float(off[at]), TOO_MANY if many else TOO_SHORT)
         begin, end = pieces.begin, pieces.end
         move = nodes.move[end]
         from_share = np.where(nodes.move[begin] == move, nodes.share[begin], 0.0)
@@ -440,7 +437,7 @@ class _Batch:
         ends = np.where(place == parts[of] - 1, end[of], cut)
         return Pieces(begins, ends, size, size)
 
-    def _cannot_cut(self, end: int, off: float) -> NoReturn:
+    def _cannot_cut(self, end: int, off: float, why: str) -> NoReturn:
         """Raise `CannotCorrect` for the piece that ends at a node: by what its move passes."""
         nodes, move = self.nodes, int(self.nodes.move[end])
         share = np.linspace(0.0, 1.0, int(self._points_in(self.size[[move]])[0]) + 2)
@@ -449,7 +446,7 @@ class _Batch:
         raise CannotCorrect(
             move,
             float(nodes.share[end]),
-            "singular" if crossing.size else TOO_SHORT,
+            "singular" if crossing.size else why,
             nodes.asked[end],
             of_program=True,
             off=off,

@@ -62,8 +62,16 @@ class PathTolerance:
 def least_of(division: Division, digits: int) -> float:
     """The smallest tolerance, m, that rounding to `digits` decimals of mm and degrees leaves.
 
-    Half a last decimal on every axis, an angle times the characteristic length, is `ROUNDING` of
-    it. Inches, with a decimal more, are the coarser ones.
+    The rounding is `ROUNDING` of it.
+    """
+    return rounding_of(division, digits) / ROUNDING
+
+
+def rounding_of(division: Division, digits: int) -> float:
+    """How far rounding to `digits` decimals of mm and degrees takes a pose, m.
+
+    Half a last decimal on every axis, an angle times the characteristic length. Inches, with a
+    decimal more, are the coarser ones.
     """
     names = division.actual.machine.commanded
     linear = sum(name in "xyz" for name in names)
@@ -71,7 +79,7 @@ def least_of(division: Division, digits: int) -> float:
     half = 0.5 * 10.0**-digits
     length = division.actual.machine.characteristic_length
     off = half * (MILLIMETRE * INCH_DIGIT * np.sqrt(linear) + DEGREE * length * np.sqrt(angular))
-    return float(off) / ROUNDING
+    return float(off)
 
 
 def tolerance_for(division: Division, batches: Iterable[Moves], digits: int) -> PathTolerance:
@@ -149,5 +157,6 @@ __all__ = [
     "PathTolerance",
     "error_before",
     "least_of",
+    "rounding_of",
     "tolerance_for",
 ]

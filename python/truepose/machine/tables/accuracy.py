@@ -15,7 +15,9 @@ from truepose.files.units import QuantityError, UnitSystem, shown_value, type_ph
 from truepose.files.wording import did_you_mean
 from truepose.machine.workspace import WORST
 
-_PERCENTAGE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(%|percent)?\s*\Z")
+_PERCENTAGE = re.compile(
+    r"\s*+[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?+\s*+(?:%|percent)?\s*+\Z"
+)
 _EXPECTED = f'"{WORST}", or a coverage between 0 and 1, such as "95 %" or 0.95'
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -22,4 +23,7 @@ def write(result: Result, path: Path) -> None:
                 hint="pip install 'truepose[netcdf]'",
             )
         )
-    result.dataset.to_netcdf(path, engine="h5netcdf")
+    # In memory first: HDF5 leaves with a segmentation fault where a file cannot be written.
+    content = io.BytesIO()
+    result.dataset.to_netcdf(content, engine="h5netcdf")
+    path.write_bytes(content.getbuffer())

@@ -259,6 +259,13 @@ def test_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     assert f"a whole number from 1 to {limits.MOST_THREADS}" in run.stderr
 
 
+def test_threads_by_call() -> None:
+    import truepose
+
+    with pytest.raises(ValueError, match=f"at most {limits.MOST_THREADS} threads"):
+        truepose.threads(limits.MOST_THREADS + 1)
+
+
 def test_the_page_states_every_limit() -> None:
     rows = re.findall(
         r"^\| .+? \| (.+?) \| `([A-Z_]+)` \|", (ROOT / "docs" / "limits.md").read_text(), re.M

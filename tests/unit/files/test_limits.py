@@ -112,6 +112,16 @@ def test_a_header(header: str, tmp_path: Path) -> None:
     assert "error[unknown-column]" in run.stderr
 
 
+def test_a_header_of_many_cells() -> None:
+    columns = [Column("time", "time")]
+    found = read_table("log.csv", "log.csv", "time (s)" + "," * 2000 + "\n0\n", columns)
+    assert found.table is None
+    (problem,) = found.problems
+    assert (problem.code, problem.line, problem.found) == ("not-csv", 1, "2001 cells")
+    most = read_table("log.csv", "log.csv", "time (s)" + ",x" * 1999 + "\n0\n", columns)
+    assert {problem.code for problem in most.problems} == {"unknown-column", "ragged-row"}
+
+
 @pytest.mark.parametrize(
     ("header", "name", "unit"),
     [

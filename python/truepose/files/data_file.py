@@ -26,6 +26,7 @@ from truepose.arrays import Flags, Floats, Indices
 from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.document import Document, Key
+from truepose.files.limits import MOST_COLUMNS
 from truepose.files.text_file import FileKind, read_text
 from truepose.files.units import FileUnit, QuantityError, shown_value, unit_of
 from truepose.files.wording import counted, did_you_mean, nearest, one_of
@@ -184,6 +185,17 @@ class _Reader:
             return None
         (line, header), *body = rows
         if not self._separated_by_commas(line, header):
+            return None
+        if len(header) > MOST_COLUMNS:
+            self._refuse(
+                Fault(
+                    "not-csv",
+                    "the header has more cells than any table",
+                    found=counted(len(header), "cell"),
+                    expected=f"at most {MOST_COLUMNS}",
+                ),
+                line,
+            )
             return None
         placed = self._placed(line, header)
         even = [row for row in body if self._is_even(row, len(header))]

@@ -43,3 +43,6 @@ MOST_SAMPLES = 10**9
 
 LONGEST_NAME = 200
 """Characters of the name of a machine or of a part."""
+
+MOST_COLUMNS = 2000
+"""Columns of a data file or of a file of measurements."""

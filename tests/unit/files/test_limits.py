@@ -112,6 +112,16 @@ def test_a_header(header: str, tmp_path: Path) -> None:
     assert "error[unknown-column]" in run.stderr
 
 
+def test_a_header_of_many_cells() -> None:
+    columns = [Column("time", "time")]
+    found = read_table("log.csv", "log.csv", "time (s)" + "," * 2000 + "\n0\n", columns)
+    assert found.table is None
+    (problem,) = found.problems
+    assert (problem.code, problem.line, problem.found) == ("not-csv", 1, "2001 cells")
+    most = read_table("log.csv", "log.csv", "time (s)" + ",x" * 1999 + "\n0\n", columns)
+    assert {problem.code for problem in most.problems} == {"unknown-column", "ragged-row"}
+
+
 @pytest.mark.parametrize(
     ("header", "name", "unit"),
     [
@@ -257,6 +267,13 @@ def test_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     assert run.returncode == 2
     assert "error[bad-setting]" in run.stderr
     assert f"a whole number from 1 to {limits.MOST_THREADS}" in run.stderr
+
+
+def test_threads_by_call() -> None:
+    import truepose
+
+    with pytest.raises(ValueError, match=f"at most {limits.MOST_THREADS} threads"):
+        truepose.threads(limits.MOST_THREADS + 1)
 
 
 def test_the_page_states_every_limit() -> None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from truepose import errors
     from truepose._kernel import threads
     from truepose.calibration.calibrate import calibrate
+    from truepose.calibration.planning.plan import plan
     from truepose.compensation.compensate import compensate
     from truepose.controllers import export
     from truepose.controllers.gcode import correct_program
@@ -96,19 +97,21 @@ def load(path: str | Path, settings: Mapping[str, str] | Sequence[str] = ()) -> 
     return machine.load(path, settings=settings, registry=sources.REGISTRY)
 
 
-def __getattr__(name: str) -> Any:
-    if name in _WHERE:
-        value = getattr(import_module(_WHERE[name]), name)
-    elif name == "errors":
-        value = import_module("truepose.errors")
-    elif name == "__version__":
-        from truepose.version import version
+if not TYPE_CHECKING:  # type checkers know the names above, and refuse all others
 
-        value = version()
-    else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    globals()[name] = value
-    return value
+    def __getattr__(name: str) -> Any:
+        if name in _WHERE:
+            value = getattr(import_module(_WHERE[name]), name)
+        elif name == "errors":
+            value = import_module("truepose.errors")
+        elif name == "__version__":
+            from truepose.version import version
+
+            value = version()
+        else:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

@@ -25,6 +25,7 @@ from truepose.runs.poses import (
     Progress,
     of_band,
     of_correction,
+    required_machine,
 )
 from truepose.runs.quantities import quantities
 from truepose.runs.run import Run
@@ -88,6 +89,7 @@ def compensate(
     `truepose.budget`; `RequestError` (controller-unsaid, controller-contradicted) for a calibrated
     file of which it is not known with which geometry its controller works.
     """
+    required_machine(machine)
     require_known_controller(machine)
     return against_nominal(machine, poses, condition, progress=progress)
 

@@ -13,7 +13,7 @@ from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs import displacement
 from truepose.runs.dataset import Schema, Variable, label
-from truepose.runs.poses import BLOCK, OK, Progress
+from truepose.runs.poses import BLOCK, OK, Progress, required_machine
 from truepose.runs.run import Run
 from truepose.sources import PoseBlock, Thermal
 
@@ -49,6 +49,7 @@ def over_time(
     Raises `RequestError`: no-temperature-log, bad-times, outside-log, bad-poses, no-pose-left;
     `TrueposeError` (no-expansion) where a part is logged that does not say how it expands.
     """
+    required_machine(machine)
     given = machine.condition if condition is None else condition
     moments = _times(machine, given, times)
     thermal, parts = Thermal(requested=True), machine.parts

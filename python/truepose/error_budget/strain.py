@@ -30,6 +30,7 @@ from truepose.runs.dataset import Schema, Variable, label
 from truepose.runs.displacement import ParameterDeviation, sum_deviations
 from truepose.runs.poses import (
     Progress,
+    required_machine,
 )
 from truepose.runs.run import Run
 from truepose.sources import Clearance, Deviation, Elastic, Loads, PoseBlock, Source
@@ -88,6 +89,7 @@ def strain(
     Raises `RequestError`: nothing-strains where there are as many closures as freedoms; bad-poses,
     no-workspace, no-source, no-pose-left; `TrueposeError` as the sources do.
     """
+    required_machine(machine)
     if not machine.kernel.overconstrained:
         raise RequestError(_nothing_strains(machine))
     run = Run(machine, poses, condition, progress)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Annotated, Literal
+from unicodedata import category
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -20,6 +21,18 @@ class FileTable(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
+def unseen_character(name: str) -> str | None:
+    """The first control or format character of `name`, as "U+202E", if it has one.
+
+    Such characters write other text than is there to a terminal (ESC) or turn the order of what
+    follows (Unicode Standard Annex 9); categories Cc, Cf, Cs, Zl and Zp of the standard.
+    """
+    for character in name:
+        if category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
+            return f"U+{ord(character):04X}"
+    return None
+
+
 def _one_line(value: str) -> str:
     wrong = fault_of_name(value)
     if wrong is not None:
@@ -28,6 +41,16 @@ def _one_line(value: str) -> str:
                 "bad-name",
                 f"a name is one line that is not empty, of at most {LONGEST_NAME} characters",
                 found=wrong,
+                expected='a name, such as "1" or "left"',
+            )
+        )
+    unseen = unseen_character(value)
+    if unseen is not None:
+        refuse(
+            Fault(
+                "bad-name",
+                f"a name holds no character that is not seen, as {unseen} is not",
+                found=ascii(value),
                 expected='a name, such as "1" or "left"',
             )
         )

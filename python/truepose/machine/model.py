@@ -13,13 +13,15 @@ from numpy.typing import ArrayLike
 
 from truepose._kernel import STATUS
 from truepose._kernel import Machine as KernelMachine
-from truepose.arrays import Codes, Flags, Floats, Indices
+from truepose.arrays import Flags, Floats, Indices
 from truepose.errors import PoseError, Problem, RequestError
 from truepose.files.shown_units import ShownUnits, shown_units
 from truepose.files.units import FileUnit
 from truepose.files.wording import did_you_mean, one_of
+from truepose.machine.calls import OfJoints, OfPoses, OfWrenches, WithStatus
 from truepose.machine.compliances import compliances, end_compliances, known
 from truepose.machine.condition import DEFAULT_PART, Condition
+from truepose.machine.equality import equal
 from truepose.machine.parts import BODIES, Body, Drive, Guide, Strut, Vector
 from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.controller import Holds
@@ -28,8 +30,6 @@ from truepose.representation import Facts, Represented
 
 if TYPE_CHECKING:
     from truepose.machine.source_builder import ErrorSource
-
-WithStatus = tuple[Floats, Codes]
 
 _HANDED_THROUGH = (
     "forward",
@@ -99,12 +99,12 @@ class Machine(Represented):
     """Which geometry the nominal one is, that the controller works with: that of the drawing, or
     a calibrated one that was loaded into it. None where the file does not say."""
 
-    forward: Callable[..., Any] = field(init=False, repr=False)
-    inverse: Callable[..., Any] = field(init=False, repr=False)
-    sensitivity: Callable[..., Any] = field(init=False, repr=False)
-    jac_pose_joint: Callable[..., Any] = field(init=False, repr=False)
-    conditioning: Callable[..., Any] = field(init=False, repr=False)
-    forces: Callable[..., Any] = field(init=False, repr=False)
+    forward: OfJoints = field(init=False, repr=False)
+    inverse: OfPoses = field(init=False, repr=False)
+    sensitivity: OfPoses = field(init=False, repr=False)
+    jac_pose_joint: OfPoses = field(init=False, repr=False)
+    conditioning: OfPoses = field(init=False, repr=False)
+    forces: OfWrenches = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         for name in _MAPPINGS:
@@ -131,6 +131,22 @@ class Machine(Represented):
         for name in _MAPPINGS:
             state[name] = dict(state[name])
         return _restored, (state,)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both are the same machine in the same condition, as after pickling."""
+        if not isinstance(other, Machine):
+            return NotImplemented
+        return self is other or equal(self._compared(), other._compared())
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.file_hash))
+
+    def _compared(self) -> list[Any]:
+        """All that makes the machine, in a form that can be compared: the kernel's by its parts."""
+        others = [
+            getattr(self, each.name) for each in fields(self) if each.init and each.name != "kernel"
+        ]
+        return [self.kernel.__reduce__()[1], *others]
 
     @property
     def dof(self) -> tuple[str, ...]:
@@ -330,6 +346,11 @@ class Machine(Represented):
         Properties, condition and sources stay. Raises `RequestError` with every name that is none
         (unknown-parameter) and every value that is not finite, or not above zero where it must be.
         """
+        if not isinstance(values, Mapping):
+            raise TypeError(
+                "values are given by the names of parameters, {'strut.1.length': 0.5003}, "
+                f"not as {type(values).__name__}"
+            )
         problems = [
             problem
             for name, value in values.items()
@@ -341,7 +362,7 @@ class Machine(Represented):
         kernel = self.kernel.replace(changed)
         return replace(self, kernel=kernel, replaced={**self.replaced, **changed})
 
-    def _bad_value(self, name: str, value: float) -> Problem | None:
+    def _bad_value(self, name: str, value: object) -> Problem | None:
         if name not in self.parameters:
             return Problem(
                 "unknown-parameter",
@@ -353,6 +374,15 @@ class Machine(Represented):
                 hint=did_you_mean(name, self.parameters),
             )
         positive = name.endswith(_POSITIVE)
+        if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
+            return Problem(
+                "wrong-type",
+                f"{name} is set to what is no number",
+                self.file,
+                path=name,
+                found=repr(value),
+                expected="a number above zero, SI" if positive else "a finite number, SI",
+            )
         if np.isfinite(value) and (value > 0.0 or not positive):
             return None
         return Problem(

@@ -1,0 +1,12 @@
+"""The page of a report says to the browser that it loads nothing from elsewhere."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+
+def test_policy_stands_before_all_that_it_governs() -> None:
+    page = files("truepose.reporting").joinpath("page.html.jinja").read_text(encoding="utf-8")
+    policy = page.index("Content-Security-Policy")
+    assert "default-src 'none'" in page[policy : page.index("<title>")]
+    assert policy < min(page.index("<style>"), page.index("<script>"), page.index("<link"))

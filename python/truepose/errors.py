@@ -188,6 +188,7 @@ CATALOGUE: dict[str, str] = {
     "gcode-shared-word": "a word that two codes of its block use",
     "gcode-missing-word": "a word that a code needs is not there",
     "gcode-bad-value": "a word with a number that its code cannot take",
+    "gcode-no-offset": "a work offset that nobody has given",
     "gcode-no-units": "a length before G20 or G21 says what it is",
     "gcode-no-motion": "an axis word where no motion is active",
     "gcode-no-feed": "a move at feed before a feed rate is given",

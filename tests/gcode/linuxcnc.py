@@ -162,7 +162,7 @@ def without_standstill(moves: Moves, start: Sequence[float]) -> Moves:
 
 def difference(text: str, mine: Moves, reference: Moves, offsets: Offsets) -> str | None:
     """What differs between our moves and LinuxCNC's by more than 1e-9 mm; None if nothing does."""
-    start = offsets.get("G54", (0.0,) * 9)
+    start = offsets.get("G54", NONE)[:9]
     mine = without_standstill(mine, start)
     reference = without_standstill(without_references(text, reference), start)
     if len(mine) != len(reference):

@@ -19,23 +19,30 @@ mod sampling;
 mod toml_lines;
 
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyInt, PyTuple};
 use truepose_kernel::Status;
 use truepose_kernel::batch::{self, InstructionSet};
 
 /// Sets (where a number is given) and returns the number of threads that share a batch.
 #[pyfunction]
 #[pyo3(signature = (n=None))]
-fn threads(n: Option<usize>) -> PyResult<usize> {
-    if let Some(count) = n {
-        if count == 0 {
-            return Err(pyo3::exceptions::PyValueError::new_err("at least one thread is needed"));
+fn threads(n: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
+    if let Some(given) = n {
+        match given.extract::<usize>() {
+            Ok(count) if (1..=batch::MOST_THREADS).contains(&count) => batch::set_threads(count),
+            Ok(count) if count > 0 => {
+                let message = format!("at most {} threads share a batch", batch::MOST_THREADS);
+                return Err(pyo3::exceptions::PyValueError::new_err(message));
+            }
+            _ if given.is_instance_of::<PyInt>() => {
+                let message = format!("at least one thread is needed, not {given}");
+                return Err(pyo3::exceptions::PyValueError::new_err(message));
+            }
+            _ => {
+                let message = "the number of threads is a whole number from 1 on";
+                return Err(pyo3::exceptions::PyTypeError::new_err(message));
+            }
         }
-        if count > batch::MOST_THREADS {
-            let message = format!("at most {} threads share a batch", batch::MOST_THREADS);
-            return Err(pyo3::exceptions::PyValueError::new_err(message));
-        }
-        batch::set_threads(count);
     }
     Ok(batch::threads())
 }

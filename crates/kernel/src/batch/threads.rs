@@ -6,7 +6,13 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
-static POOL: RwLock<Option<Arc<ThreadPool>>> = RwLock::new(None);
+/// The pool in use and the process that started its threads.
+struct Started {
+    process: u32,
+    pool: Arc<ThreadPool>,
+}
+
+static POOL: RwLock<Option<Started>> = RwLock::new(None);
 
 /// Threads that share a batch, at most: more than any machine has cores.
 pub const MOST_THREADS: usize = 1024;
@@ -16,26 +22,39 @@ pub fn set_threads(count: usize) {
     let pool = ThreadPoolBuilder::new().num_threads(count.clamp(1, MOST_THREADS)).build();
     // A machine that cannot start another thread works on with what it has.
     if let Ok(pool) = pool {
-        *POOL.write().unwrap_or_else(|poisoned| poisoned.into_inner()) = Some(Arc::new(pool));
+        let started = Started { process: std::process::id(), pool: Arc::new(pool) };
+        let mut slot = POOL.write().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let before = slot.replace(started);
+        // A fork copies no thread but its own: to end the parent's would wait on their locks.
+        if let Some(before) = before.filter(|before| before.process != std::process::id()) {
+            std::mem::forget(before);
+        }
     }
 }
 
-/// The pool in use; by default a thread per core.
-fn pool() -> Arc<ThreadPool> {
-    if let Some(pool) = &*POOL.read().unwrap_or_else(|poisoned| poisoned.into_inner()) {
-        return Arc::clone(pool);
-    }
-    set_threads(std::thread::available_parallelism().map_or(1, |count| count.get()));
+/// The pool that this process started, if there is one, or else how many threads its parent used.
+fn started() -> Result<Arc<ThreadPool>, Option<usize>> {
     match &*POOL.read().unwrap_or_else(|poisoned| poisoned.into_inner()) {
-        Some(pool) => Arc::clone(pool),
-        None => Arc::new(
-            ThreadPoolBuilder::new()
-                .use_current_thread()
-                .num_threads(1)
-                .build()
-                .expect("a pool of the current thread starts no thread"),
-        ),
+        Some(started) if started.process == std::process::id() => Ok(Arc::clone(&started.pool)),
+        Some(started) => Err(Some(started.pool.current_num_threads())),
+        None => Err(None),
     }
+}
+
+/// The pool in use; by default a thread per core, after a fork as many as before it.
+fn pool() -> Arc<ThreadPool> {
+    let before = match started() {
+        Ok(pool) => return pool,
+        Err(before) => before,
+    };
+    set_threads(
+        before
+            .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |count| count.get())),
+    );
+    started().unwrap_or_else(|_| {
+        let alone = ThreadPoolBuilder::new().use_current_thread().num_threads(1).build();
+        Arc::new(alone.expect("a pool of the current thread starts no thread"))
+    })
 }
 
 /// The number of threads in use.

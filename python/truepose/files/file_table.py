@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from typing import Annotated, Literal
-from unicodedata import category
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -21,36 +20,15 @@ class FileTable(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-def unseen_character(name: str) -> str | None:
-    """The first control or format character of `name`, as "U+202E", if it has one.
-
-    Such characters write other text than is there to a terminal (ESC) or turn the order of what
-    follows (Unicode Standard Annex 9); categories Cc, Cf, Cs, Zl and Zp of the standard.
-    """
-    for character in name:
-        if category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp"):
-            return f"U+{ord(character):04X}"
-    return None
-
-
 def _one_line(value: str) -> str:
     wrong = fault_of_name(value)
     if wrong is not None:
         refuse(
             Fault(
                 "bad-name",
-                f"a name is one line that is not empty, of at most {LONGEST_NAME} characters",
+                "a name is one line that is not empty, of at most "
+                f"{LONGEST_NAME} characters, all of which are seen",
                 found=wrong,
-                expected='a name, such as "1" or "left"',
-            )
-        )
-    unseen = unseen_character(value)
-    if unseen is not None:
-        refuse(
-            Fault(
-                "bad-name",
-                f"a name holds no character that is not seen, as {unseen} is not",
-                found=ascii(value),
                 expected='a name, such as "1" or "left"',
             )
         )

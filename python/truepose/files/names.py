@@ -6,9 +6,15 @@ import unicodedata
 
 from truepose.files.limits import LONGEST_NAME
 
-_BAD = {"Cc": "a control character", "Cs": "half a character", "Zl": "a line separator"}
-_BAD["Zp"] = _BAD["Zl"]
-"""Categories of Unicode that no name has."""
+_BAD = {
+    "Cc": "a control character",
+    "Cf": "a character that is not seen",
+    "Cs": "half a character",
+    "Zl": "a line separator",
+    "Zp": "a line separator",
+}
+"""Categories of Unicode that no name has: on a terminal they write other text than stands there, or
+turn its order (Unicode Standard Annex 9)."""
 
 
 def fault_of_name(name: str) -> str | None:

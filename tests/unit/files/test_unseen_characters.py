@@ -23,8 +23,8 @@ def test_name_with_what_is_not_seen(tmp_path: Path, code: int) -> None:
         truepose.load(file)
     (problem,) = raised.value.problems
     assert problem.code == "bad-name"
-    assert f"U+{code:04X}" in problem.message
     assert problem.found is not None
+    assert f"U+{code:04X}" in problem.found
     assert problem.found.isprintable()
 
 

@@ -15,6 +15,7 @@ from command_line import call
 from gcode import linuxcnc
 from truepose.compensation.commands import actual_poses
 from truepose.controllers.gcode._axes import Axes
+from truepose.controllers.gcode.work_offsets import SYSTEMS, read_parameters
 from truepose.errors import RequestError
 from truepose.machine import Machine
 
@@ -96,6 +97,9 @@ def test_the_parameter_file_says_the_same(tmp_path: Path) -> None:
     texts = [target.read_text("utf-8").splitlines() for target in targets]
     assert texts[0][1:] == texts[1][1:]
     assert one.after == other.after
+    assert other.coordinates == (
+        "work offsets in mm and deg: G55 X250 Y180 R20, others of linuxcnc.var 0; G55 first"
+    )
     # Without a word the system that is active in the file holds.
     bare = program(tmp_path, PROGRAM.replace(" G55", ""))
     tp.correct_program(hot, bare, targets[0], parameter_file=file)
@@ -149,6 +153,7 @@ def test_a_dry_run_is_the_proof_without_the_file(
     done = call(capsys, *command, "--dry-run", "--tolerance", "5 mm")
     assert (done.code, done.codes) == (1, ["gcode-no-better"])
     assert call(capsys, *command, "--dry-run", "--output", target).code == 2
+    assert call(capsys, *command, "--dry-run", "--force").code == 2
     assert call(capsys, *command).code == 2
 
 
@@ -180,3 +185,15 @@ def test_the_parameter_file_is_not_written_over(tmp_path: Path) -> None:
     with pytest.raises(RequestError) as refused:
         tp.correct_program(machine(), program(tmp_path), None, parameter_file=tmp_path / "none")
     assert [problem.code for problem in refused.value.problems] == ["file-missing"]
+    with pytest.raises(RequestError) as refused:
+        tp.correct_program(machine(), program(tmp_path), None, parameter_file=tmp_path)
+    assert [problem.code for problem in refused.value.problems] == ["file-unreadable"]
+
+
+def test_many_offsets_are_named_by_their_systems_and_their_file(tmp_path: Path) -> None:
+    path = tmp_path / "linuxcnc.var"
+    numbers = [5221 + 20 * system + axis for system in range(9) for axis in range(3)]
+    path.write_text("".join(f"{n} {n / 7:.6f}\n" for n in numbers), encoding="ascii")
+    known = read_parameters(path, machine())
+    assert len(known.words) <= 200
+    assert known.words == f"work offsets of linuxcnc.var, {' '.join(SYSTEMS)}; G54 first"

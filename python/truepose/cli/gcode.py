@@ -142,6 +142,8 @@ def command(
 
     if (output is None) is not dry_run:
         raise click.UsageError("give either --output FILE, or --dry-run for the proof alone")
+    if dry_run and options["force"]:
+        raise click.UsageError("--force writes a program, and --dry-run writes none")
     if output is not None:
         require_writable(output, [output.suffix.lower()], [machine_file])
     machine = truepose.load(machine_file, settings=settings)

@@ -31,8 +31,8 @@ G92_IN_FORCE, G92 = 5210, 5211
 MOST_BYTES = 1 << 20
 """Of a parameter file: LinuxCNC's has some ten thousand."""
 
-LONGEST = 200
-"""Characters of a comment."""
+LONGEST, LONGEST_NAME = 200, 40
+"""Characters of what is said in a comment, and of a file's name in it."""
 
 Positions = Mapping[str, float]
 """Coordinates by axis, x y z a b c u v w, m and rad; of an offset also r, rad."""
@@ -44,28 +44,36 @@ Refuse = Callable[[str, object, str], None]
 class WorkOffsets:
     """`systems`: by name, coordinates by letter, mm and degrees; `active`: which holds at first.
 
-    A program that selects another is refused; before any is selected the active one holds, and
-    where nothing is known of that, machine coordinates.
+    `file`: the name of the controller's, where that says them. A program that selects another
+    system is refused; before any is selected the active one holds, and where nothing is known of
+    that, machine coordinates.
     """
 
     systems: dict[str, dict[str, float]] = field(default_factory=dict)
     active: str = "G54"
+    file: str = ""
 
     @property
     def words(self) -> str:
         """What is taken for granted, for people and for the written program's first comment."""
         if not self.systems:
             return "in machine coordinates, no work offset"
+        names = sorted(self.systems, key=SYSTEMS.index)
         shown = []
-        for name in sorted(self.systems, key=SYSTEMS.index):
-            offset = self.systems[name]
-            moved = [f"{letter}{value:.6g}" for letter, value in offset.items() if value]
-            shown.append(f"{name} {' '.join(moved) or '0'}")
+        for name in names:
+            moved = [f"{axis}{value:.6g}" for axis, value in self.systems[name].items() if value]
+            if moved or not self.file:
+                shown.append(f"{name} {' '.join(moved) or '0'}")
+        if self.file:
+            shown.append(f"others of {self.file} 0")
         first = (
             f"{self.active} first" if self.active in self.systems else "machine coordinates first"
         )
         text = f"work offsets in mm and deg: {', '.join(shown)}; {first}"
-        return text if len(text) <= LONGEST else f"work offsets as they were given; {first}"
+        if len(text) <= LONGEST:
+            return text
+        whence = f"of {self.file}" if self.file else "as they were given"
+        return f"work offsets {whence}, {' '.join(names)}; {first}"
 
 
 def work_offsets(
@@ -85,7 +93,7 @@ def work_offsets(
             refuse("offset", name, one_of(SYSTEMS))
             continue
         systems[name.upper()] = named(offset, f"offset {name}", refuse, rotation=True)
-    return WorkOffsets(systems, known.active)
+    return WorkOffsets(systems, known.active, known.file)
 
 
 def named(
@@ -134,17 +142,19 @@ def read_parameters(path: Path, machine: Machine) -> WorkOffsets:
             for axis, letter in enumerate(AXES)
         }
         systems[name] = {**offset, ROTATION: values.get(first + TURN, 0.0)}
-    return WorkOffsets(systems, SYSTEMS[int(active) - 1])
+    name = "".join(c for c in path.name if c.isascii() and c.isprintable() and c not in "()%")
+    return WorkOffsets(systems, SYSTEMS[int(active) - 1], name[:LONGEST_NAME])
 
 
 def _lines(path: Path) -> Iterator[tuple[int, float]]:
     if not path.is_file():
+        there = path.exists()
         raise RequestError(
             Problem(
-                "file-missing",
-                "there is no such parameter file",
+                "file-unreadable" if there else "file-missing",
+                "this is no parameter file" if there else "there is no such parameter file",
                 file=str(path),
-                found="no file",
+                found="a folder, a device or a pipe" if there else "no file",
                 expected="the file that PARAMETER_FILE of LinuxCNC's INI names",
             )
         )

@@ -62,6 +62,7 @@ def calibration(machine: Any, poses: Array, *, accepted: bool = True, rows: int 
         "normalised_after": residual / sigma,
         "standardised": residual / sigma,
         "weight": np.ones(measured),
+        "minimal_detectable_bias": 8.0 * sigma,
         "held_out_before": 11.0 * residual / sigma,
         "held_out_after": 1.1 * residual / sigma,
         "tool_before": np.outer(3.0 * tool, np.ones(len(machine.components))),

@@ -14,7 +14,7 @@ import truepose as tp
 from build_machine import machine_files
 from calibration_under_test import CalibrationUnderTest, kinds_for
 from sweeps import one_a_machine, thinned
-from truepose.calibration.identification.fit import SETTLED
+from truepose.calibration.identification.equations import SETTLED
 from truepose.calibration.identification.problem import Prior
 
 SETS = 1000

@@ -30,7 +30,7 @@ def test_positions_are_accepted_and_the_tables_say_what_was_found(capsys: Captur
     done = calibrate(capsys, POSITIONS)
     assert (done.code, done.err) == (0, "")
     assert done.out.startswith("Yes: the tool's position becomes known to within 18 µm")
-    for title in ("What was found", "Measurements against the machine", "worth at the tool"):
+    for title in ("What was found", "Measurements against the machine", "Uncertainty of the tool"):
         assert title in done.out
     for absent in ("What could not be determined", "Recommended next", "do not fit"):
         assert absent not in done.out

@@ -123,8 +123,9 @@ def test_a_file_that_fails_takes_the_others_with_it(
     given = controllers.Export({"one.h": "whole", "two.c": "\udc80 is no text"})
     monkeypatch.setattr(controllers, "export", lambda *_: given)
     (tmp_path / "one.h").write_text("of before")
-    with pytest.raises(UnicodeEncodeError):
-        call(capsys, "export", "c", PLANAR, "-o", str(tmp_path))
+    outcome = call(capsys, "export", "c", PLANAR, "-o", str(tmp_path))
+    assert outcome.code == 70
+    assert "UnicodeEncodeError" in outcome.err
     assert [path.name for path in tmp_path.iterdir()] == ["one.h"]
     assert (tmp_path / "one.h").read_text() == "of before"
 

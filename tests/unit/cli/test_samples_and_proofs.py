@@ -192,7 +192,7 @@ def interrupted(function: str, *arguments: str) -> tuple[int, str, str]:
 
 def test_ctrl_c_in_the_middle_of_sampling_gives_the_result_so_far(tmp_path: Path) -> None:
     output = tmp_path / "found.json"
-    asked = ["montecarlo", str(PLANAR), *FEW, "--samples", "1e12", "--output", str(output)]
+    asked = ["montecarlo", str(PLANAR), *FEW, "--samples", "1e9", "--output", str(output)]
     code, shown, errors = interrupted("monte_carlo", *asked)
     assert code == 130, errors
     assert "Traceback" not in errors
@@ -203,7 +203,7 @@ def test_ctrl_c_in_the_middle_of_sampling_gives_the_result_so_far(tmp_path: Path
     samples = np.array(document["variables"]["samples"]["values"])
     assert samples.size == 2
     assert (samples > 0).all()
-    assert (samples < 1e12).all()
+    assert (samples < 1e9).all()
 
 
 @pytest.mark.parametrize(

@@ -542,6 +542,15 @@ class GcodeMoves:
         In mm of X Y Z; where these stand still of U V W; where those do too in degrees of A B C.
         """
     @property
+    def speed(self) -> _Floats:
+        """At which F asks the tool to go, in units of `length` a second, (n,).
+
+        Infinite for a rapid, NaN where the program does not say it (G95).
+        """
+    @property
+    def stops(self) -> NDArray[np.bool_]:
+        """Whether G61 or G61.1 holds, (n,)."""
+    @property
     def plane(self) -> NDArray[np.uint8]:
         """17, 18 or 19 for an arc, else 0, (n,)."""
     @property
@@ -611,6 +620,8 @@ class GcodeCorrector:
             writes them, and go along on the programmed path.
         digits: decimals of mm and degrees, 0 to 8; inches have one more.
         heading: a comment in a line of its own at the beginning, ASCII without parentheses.
+        path_mode: a block, G64 with its P, that is put in front of the pieces of a block that ends
+            in an exact stop (G61, G61.1): only its last piece ends in one then.
     """
 
     def __new__(
@@ -627,6 +638,7 @@ class GcodeCorrector:
         axes: str = "XYZ",
         digits: int = 6,
         heading: str | None = None,
+        path_mode: str | None = None,
     ) -> GcodeCorrector: ...
     def read(self, most_moves: int) -> GcodeMoves:
         """The next moves, at most so many; none behind the last.

@@ -64,6 +64,8 @@ def lines(points: ArrayLike, kind: int | list[int] = LINE) -> Moves:
         end,
         np.sqrt(np.nansum(np.square(end - start)[:, :3], axis=1)),
         lambda index, share: start[index] + (end - start)[index] * share[:, np.newaxis],
+        np.ones(count),
+        np.zeros(count, np.bool_),
     )
 
 
@@ -82,7 +84,14 @@ def arc(centre: ArrayLike, radius: float, start: float, sweep: float, rise: floa
     ends = points(None, np.array([0.0, 1.0]))
     length = math.hypot(radius * sweep, rise)
     return Moves(
-        np.array([1]), np.array([ARC], np.uint8), ends[:1], ends[1:], np.array([length]), points
+        np.array([1]),
+        np.array([ARC], np.uint8),
+        ends[:1],
+        ends[1:],
+        np.array([length]),
+        points,
+        np.ones(1),
+        np.zeros(1, np.bool_),
     )
 
 
@@ -292,6 +301,8 @@ def test_where_the_controller_goes_by_itself_it_is_not_corrected() -> None:
         ends,
         np.concatenate([first.length, second.length]),
         lambda index, share: ends[index] + (ends - starts)[index] * (share[:, np.newaxis] - 1.0),
+        np.ones(3),
+        np.zeros(3, np.bool_),
     )
     found = divided(machine, moves, "pose")
     assert found.begins_corrected.tolist() == [False, False, True]

@@ -1,6 +1,6 @@
 //! The words of one line, each checked for being used once and by one code.
 
-use crate::codes::{self, FeedMode, GCode, MCode, MOST_M_CODES, Motion, NotTaken};
+use crate::codes::{self, FeedMode, GCode, MCode, MOST_M_CODES, Motion, NotTaken, PathMode};
 use crate::lexer::Word;
 use crate::refusal::{Fault, LineResult};
 use crate::settings::{AXES, AXIS_LETTERS, AxisSet, Units};
@@ -25,7 +25,7 @@ pub struct Block {
     pub offset: Option<u8>,
     /// The code of group 0.
     pub once: Option<GCode>,
-    path_blending: bool,
+    pub path_mode: Option<PathMode>,
     surface_speed: bool,
     m_codes: [Option<(MCode, u8)>; MOST_M_CODES],
     pub ends: bool,
@@ -52,7 +52,7 @@ impl Block {
             feed_mode: None,
             offset: None,
             once: None,
-            path_blending: false,
+            path_mode: None,
             surface_speed: false,
             m_codes: [None; MOST_M_CODES],
             ends: false,
@@ -150,6 +150,11 @@ impl Block {
         word.letter == b'G' && matches!(codes::g_code(word.value), Ok(GCode::Offset(_)))
     }
 
+    /// Whether the word is G61, G61.1 or G64.
+    pub fn is_path_mode(word: &Word) -> bool {
+        word.letter == b'G' && matches!(codes::g_code(word.value), Ok(GCode::Path(_)))
+    }
+
     fn take_g(&mut self, words: &[Word], index: usize) -> LineResult<()> {
         let word = &words[index];
         let code = codes::g_code(word.value).map_err(|why| not_taken(word, why))?;
@@ -169,7 +174,7 @@ impl Block {
             GCode::AbsoluteCentres(mode) => self.absolute_centres = Some(mode),
             GCode::Feed(mode) => self.feed_mode = Some(mode),
             GCode::Offset(system) => self.offset = Some(system),
-            GCode::Path { blending } => self.path_blending = blending,
+            GCode::Path(mode) => self.path_mode = Some(mode),
             GCode::Spindle { surface_speed } => self.surface_speed = surface_speed,
             GCode::NoCutterCompensation | GCode::NoToolLength | GCode::Retract => {}
             GCode::Dwell
@@ -255,7 +260,7 @@ impl Block {
             .count();
         users += usize::from(letter == b'D' && self.surface_speed);
         users += usize::from(letter == b'P' && self.once == Some(GCode::Dwell));
-        users += usize::from(matches!(letter, b'P' | b'Q') && self.path_blending);
+        users += usize::from(matches!(letter, b'P' | b'Q') && self.blends());
         let arc = matches!(letter, b'P' | b'R') && self.motion.is_none_or(Motion::is_arc);
         match users {
             0 if !arc => Err(unused(word)),
@@ -264,10 +269,15 @@ impl Block {
         }
     }
 
+    /// G64.
+    fn blends(&self) -> bool {
+        self.path_mode == Some(PathMode::Blending)
+    }
+
     /// Whether a code that is not an arc takes the letter.
     pub fn taken_elsewhere(&self, letter: u8) -> bool {
         self.m_codes.iter().flatten().any(|(code, _)| code.letters.contains(&letter))
-            || (letter == b'P' && (self.once == Some(GCode::Dwell) || self.path_blending))
+            || (letter == b'P' && (self.once == Some(GCode::Dwell) || self.blends()))
     }
 }
 

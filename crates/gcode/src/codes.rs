@@ -23,10 +23,7 @@ pub enum GCode {
     /// G28.1 (0) or G30.1 (1).
     StoreReference(u8),
     MachineCoordinates,
-    /// G61, G61.1; or G64, which takes P and Q.
-    Path {
-        blending: bool,
-    },
+    Path(PathMode),
     /// G96 (takes D and S) or G97.
     Spindle {
         surface_speed: bool,
@@ -88,6 +85,32 @@ impl Plane {
     }
 }
 
+/// How a controller goes from one block into the next.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PathMode {
+    /// G61: through the end of every block, which it cannot do at speed round a corner.
+    ExactPath,
+    /// G61.1: it stops at the end of every block.
+    ExactStop,
+    /// G64, which takes P and Q: it cuts corners.
+    Blending,
+}
+
+impl PathMode {
+    /// Whether the tool stands still at the end of a block.
+    pub fn stops(self) -> bool {
+        self != PathMode::Blending
+    }
+
+    pub(crate) fn word(self) -> &'static [u8] {
+        match self {
+            PathMode::ExactPath => b"G61",
+            PathMode::ExactStop => b"G61.1",
+            PathMode::Blending => b"G64",
+        }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FeedMode {
     /// G93.
@@ -117,7 +140,7 @@ impl GCode {
             GCode::AbsoluteCentres(_) => 6,
             GCode::Feed(_) => 7,
             GCode::Offset(_) => 8,
-            GCode::Path { .. } => 9,
+            GCode::Path(_) => 9,
             GCode::Spindle { .. } => 10,
             GCode::NoCutterCompensation => 11,
             GCode::NoToolLength => 12,
@@ -162,8 +185,9 @@ pub fn g_code(value: f64) -> Result<GCode, NotTaken> {
         530 => GCode::MachineCoordinates,
         number @ (540 | 550 | 560 | 570 | 580 | 590) => GCode::Offset((number / 10 - 54) as u8),
         number @ (591..=593) => GCode::Offset((number - 591 + 6) as u8),
-        610 | 611 => GCode::Path { blending: false },
-        640 => GCode::Path { blending: true },
+        610 => GCode::Path(PathMode::ExactPath),
+        611 => GCode::Path(PathMode::ExactStop),
+        640 => GCode::Path(PathMode::Blending),
         800 => GCode::NoMotion,
         900 => GCode::Incremental(false),
         910 => GCode::Incremental(true),

@@ -89,6 +89,14 @@ impl<R: Read, W: Write> Corrector<R, W> {
         self
     }
 
+    /// With this block, G64 with its P, in front of the pieces of a block that the program wants to end in an
+    /// exact stop (G61, G61.1): only its last piece ends in one.
+    #[must_use]
+    pub fn with_path_mode(mut self, block: &str) -> Self {
+        self.writer.blend_pieces(block);
+        self
+    }
+
     /// The next moves, at most so many; none behind the last. What was read before must have been
     /// written.
     ///

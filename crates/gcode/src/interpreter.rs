@@ -2,7 +2,8 @@
 
 use crate::arc;
 use crate::block::{self, Block, LARGEST};
-use crate::codes::{FeedMode, GCode, Motion, Plane};
+use crate::codes::{FeedMode, GCode, Motion, PathMode, Plane};
+use crate::feed::Feed;
 use crate::lexer::{self, Word};
 use crate::moves::{Arc, Kind, Move};
 use crate::refusal::{Error, Fault, LineResult};
@@ -30,16 +31,6 @@ impl Frame {
     pub fn unit(&self, axis: usize) -> f64 {
         if is_rotary(axis) { 1.0 } else { self.scale }
     }
-}
-
-/// The feed at which a block moves.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Feed {
-    pub mode: FeedMode,
-    /// F as it was given last, in the units then.
-    pub rate: Option<f64>,
-    /// Units when it was given.
-    pub units: Option<Units>,
 }
 
 /// The effect of a line on the position, and what is needed to rewrite it.
@@ -76,6 +67,7 @@ pub struct Interpreter {
     system: usize,
     motion: Option<Motion>,
     feed: Feed,
+    path_mode: Option<PathMode>,
     position: Position,
     reference: [Position; 2],
     /// Lines are inside of % ... %.
@@ -97,6 +89,7 @@ impl Interpreter {
             system: settings.system,
             motion: None,
             feed: Feed { mode: FeedMode::PerMinute, rate: None, units: None },
+            path_mode: None,
             position: settings.start,
             reference: settings.reference,
             percent: false,
@@ -195,6 +188,7 @@ impl Interpreter {
         if let Some(system) = block.offset {
             self.select(usize::from(system), words)?;
         }
+        self.path_mode = block.path_mode.or(self.path_mode);
         self.ended |= block.ends;
         match block.once {
             Some(GCode::Dwell) => dwell(block, words)?,
@@ -388,12 +382,7 @@ impl Interpreter {
         let target = self.target(block, words, &frame)?;
         self.check_known(block, words, &target, kind == Kind::Line)?;
         let start = in_turned_axes(&self.position, frame.rotation);
-        Ok(self.moved(
-            Move { line: self.line, kind, start, end: target, arc: None },
-            frame,
-            code,
-            None,
-        ))
+        Ok(self.moved(Move::new(self.line, kind, start, target, None), frame, code, None))
     }
 
     /// `motion`: in the axes of the coordinate system.
@@ -412,6 +401,8 @@ impl Interpreter {
         if stands {
             motion.end[..2].copy_from_slice(&self.position[..2]);
         }
+        motion.speed = self.feed.speed(&motion, self.units);
+        motion.path_mode = self.path_mode;
         self.position = motion.end;
         Action::Moves(Motions { motion, frame, code, feed: self.feed, reference })
     }
@@ -451,7 +442,7 @@ impl Interpreter {
             let end = self.target(block, words, &frame)?;
             self.check_known(block, words, &end, false)?;
             let start = self.position;
-            let motion = Move { line: self.line, kind: Kind::Rapid, start, end, arc: None };
+            let motion = Move::new(self.line, Kind::Rapid, start, end, None);
             self.moved(motion, frame, Motion::Rapid, Some(to))
         };
         for axis in named {
@@ -480,7 +471,7 @@ impl Interpreter {
             }
         }
         let arc = self.arc(block, words, code, &frame, [&start, &target])?;
-        let motion = Move { line: self.line, kind: Kind::Arc, start, end: target, arc: Some(arc) };
+        let motion = Move::new(self.line, Kind::Arc, start, target, Some(arc));
         Ok(self.moved(motion, frame, code, None))
     }
 

@@ -11,6 +11,7 @@ mod arc;
 mod block;
 mod codes;
 mod corrector;
+mod feed;
 mod interpreter;
 mod lexer;
 mod lines;
@@ -20,7 +21,9 @@ mod reader;
 mod refusal;
 mod settings;
 mod writer;
+mod written_lines;
 
+pub use codes::PathMode;
 pub use corrector::{Corrector, Digits};
 pub use lexer::LONGEST_LINE;
 pub use moves::{Arc, Kind, Move};

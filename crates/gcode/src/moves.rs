@@ -1,5 +1,6 @@
 //! Moves and the points of their paths.
 
+use crate::codes::PathMode;
 use crate::settings::{AXES, Position, in_turned_axes};
 
 /// How a move is made.
@@ -43,12 +44,28 @@ pub struct Move {
     pub end: Position,
     /// The circle that it follows.
     pub arc: Option<Arc>,
+    /// At which F asks the tool to go, in units of [`length`](Self::length) a second: infinite for a
+    /// rapid, NaN where the program does not say it (G95).
+    pub speed: f64,
+    /// How the controller goes on behind it, if the program has said so.
+    pub path_mode: Option<PathMode>,
 }
 
 /// A length below which axes do not move, mm or degrees: rounding of sums of program words.
 const STANDSTILL: f64 = 1e-9;
 
 impl Move {
+    /// A move of which nobody has said how fast it is and how it goes on.
+    pub(crate) fn new(
+        line: u64,
+        kind: Kind,
+        start: Position,
+        end: Position,
+        arc: Option<Arc>,
+    ) -> Self {
+        Move { line, kind, start, end, arc, speed: f64::NAN, path_mode: None }
+    }
+
     /// The same in axes that are turned about Z by so much, rad; its arc, if any, in the plane of X and Y.
     pub(crate) fn in_turned_axes(&self, angle: f64) -> Self {
         if angle == 0.0 {
@@ -103,12 +120,21 @@ impl Move {
             return square.sqrt();
         }
         for axes in [0..3, 6..9, 3..6] {
-            let length = axes.map(|axis| self.square(axis)).sum::<f64>().sqrt();
+            let length = self.distance(axes);
             if length > STANDSTILL {
                 return length;
             }
         }
         0.0
+    }
+
+    /// Whether its length is one of A B C alone, in degrees.
+    pub(crate) fn turns_only(&self) -> bool {
+        self.arc.is_none() && [0..3, 6..9].into_iter().all(|axes| self.distance(axes) <= STANDSTILL)
+    }
+
+    fn distance(&self, axes: std::ops::Range<usize>) -> f64 {
+        axes.map(|axis| self.square(axis)).sum::<f64>().sqrt()
     }
 
     /// Whether none of X Y Z moves: F then refers to other axes.

@@ -1,13 +1,16 @@
 //! One block rewritten: in place where that is possible, else in several lines.
 
 use crate::block::{Block, LARGEST};
-use crate::codes::{FeedMode, Motion};
+use crate::codes::{FeedMode, Motion, PathMode};
 use crate::interpreter::Motions;
-use crate::lexer::{LONGEST_LINE, Word};
+use crate::lexer::Word;
 use crate::moves::Kind;
 use crate::number::Decimal;
 use crate::refusal::{Fault, LineResult};
 use crate::settings::{AXES, AXIS_LETTERS, AxisSet, Position, in_turned_axes, is_rotary};
+use crate::written_lines::{
+    check_lengths, own_line, preceding_line, remove_blanks, separate, without_end,
+};
 
 /// Decimals that coordinates are written with, at most 9.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +49,8 @@ pub struct Writer {
     motion: Option<Motion>,
     corrected: AxisSet,
     digits: Digits,
+    /// The block that stands in front of pieces between which the controller is not to stop.
+    blending: Option<Vec<u8>>,
 }
 
 /// How one block becomes lines.
@@ -66,13 +71,20 @@ struct Plan {
     back_to: Option<f64>,
     /// More than one line is written.
     lines: bool,
+    /// Pieces are blended, and this mode is put in front of the last.
+    exact: Option<PathMode>,
     /// Words are set apart by blanks.
     spaced: bool,
 }
 
 impl Writer {
     pub fn new(start: Position, corrected: AxisSet, digits: Digits) -> Self {
-        Writer { position: start, motion: None, corrected, digits }
+        Writer { position: start, motion: None, corrected, digits, blending: None }
+    }
+
+    /// Pieces of a block that ends in an exact stop are blended as this block says, all but the last.
+    pub fn blend_pieces(&mut self, block: &str) {
+        self.blending = Some(block.as_bytes().to_vec());
     }
 
     /// Text went out untouched: it may have set a motion code or taken axes somewhere.
@@ -129,7 +141,10 @@ impl Writer {
         let last = if source.line.ends_with(b"\n") { newline } else { b"" };
         let begin = out.len();
         if plan.lines {
-            preceding_line(source, &plan, newline, out);
+            preceding_line(source, plan.spaced, newline, out);
+        }
+        if let (Some(block), Some(_)) = (&self.blending, plan.exact) {
+            own_line(source, block, newline, out);
         }
         let mut before = 0.0;
         for (piece, (point, share)) in points.iter().zip(shares).enumerate() {
@@ -140,6 +155,9 @@ impl Writer {
                 self.first_line(source, &plan, &target, feed, out)?;
             } else {
                 out.extend_from_slice(newline);
+                if let (Some(mode), true) = (plan.exact, piece + 1 == points.len()) {
+                    own_line(source, mode.word(), newline, out);
+                }
                 self.further_line(source, &plan, &target, feed, out)?;
             }
         }
@@ -259,6 +277,9 @@ impl Writer {
         });
         let lines = divided || apart || retimed;
         let plan = Plan {
+            exact: motion
+                .path_mode
+                .filter(|mode| divided && mode.stops() && self.blending.is_some()),
             replaced,
             named,
             motion: needed,
@@ -411,6 +432,9 @@ impl Writer {
                 (None, b'I' | b'J' | b'K' | b'R') if arc => remove_blanks(begin, out),
                 // Turns, unless another code of the block takes the word: then it was refused.
                 (None, b'P') if arc => remove_blanks(begin, out),
+                (None, b'G') if plan.exact.is_some() && Block::is_path_mode(word) => {
+                    remove_blanks(begin, out)
+                }
                 (None, b'M') if plan.lines && Block::stops(word) => remove_blanks(begin, out),
                 (None, _) if plan.lines && Block::precedes(word, words) => {
                     remove_blanks(begin, out)
@@ -523,23 +547,6 @@ impl Writer {
     }
 }
 
-/// What acts before the move, as a block of its own: on some controls it would act behind the first piece.
-fn preceding_line(source: &Source<'_>, plan: &Plan, newline: &[u8], out: &mut Vec<u8>) {
-    let begin = out.len();
-    for word in source.words.iter().filter(|word| Block::precedes(word, source.words)) {
-        if out.len() > begin {
-            separate(plan.spaced, out);
-        } else if source.deletable {
-            out.push(b'/');
-        }
-        let (at, end) = word.span();
-        out.extend_from_slice(&source.line[at..end]);
-    }
-    if out.len() > begin {
-        out.extend_from_slice(newline);
-    }
-}
-
 impl Plan {
     fn adds(&self, axis: usize) -> bool {
         self.replaced.contains(axis) && !self.named.contains(axis)
@@ -564,24 +571,6 @@ fn is_motion(word: &Word) -> bool {
     word.letter == b'G' && matches!(word.value, 0.0 | 1.0 | 2.0 | 3.0)
 }
 
-fn without_end(line: &[u8]) -> &[u8] {
-    let line = line.strip_suffix(b"\n").unwrap_or(line);
-    line.strip_suffix(b"\r").unwrap_or(line)
-}
-
-fn separate(spaced: bool, out: &mut Vec<u8>) {
-    if spaced {
-        out.push(b' ');
-    }
-}
-
-/// Takes the blanks in front of a word that is left out with it.
-fn remove_blanks(begin: usize, out: &mut Vec<u8>) {
-    while out.len() > begin && matches!(out.last(), Some(b' ' | b'\t')) {
-        out.pop();
-    }
-}
-
 fn fault_of(source: &Source<'_>, code: &'static str, message: String) -> Box<Fault> {
     let word = source.words.iter().find(|word| AXIS_LETTERS.contains(&word.letter));
     let (at, end) = word.or(source.words.first()).map_or((0, 0), Word::span);
@@ -604,13 +593,4 @@ fn check_shares(source: &Source<'_>, shares: &[f64]) -> LineResult<()> {
     }
     let message = "the shares of this block's pieces do not rise from above 0 to 1".to_owned();
     Err(fault_of(source, "gcode-division", message))
-}
-
-fn check_lengths(written: &[u8]) -> LineResult<()> {
-    if written.split(|byte| *byte == b'\n').all(|line| line.len() <= LONGEST_LINE) {
-        return Ok(());
-    }
-    let message = format!("corrected, this line gets longer than {LONGEST_LINE} bytes");
-    let fault = Fault::new("gcode-line-too-long", 0, 0, message);
-    Err(fault.hint("put its comment on a line of its own"))
 }

@@ -1,7 +1,8 @@
 //! Blocks written anew, each case as the lines that come out.
 
 use truepose_gcode::{
-    AXES, AxisSet, Corrector, Digits, Error, Kind, Move, Position, Reader, Settings, WorkOffset,
+    AXES, AxisSet, Corrector, Digits, Error, Kind, Move, PathMode, Position, Reader, Settings,
+    WorkOffset,
 };
 
 /// What becomes of one move: its number of pieces, and what is added to X Y Z A B C at the end of each.
@@ -21,8 +22,13 @@ fn settings(axes: &str) -> Settings {
 }
 
 fn corrected(program: &str, axes: &str, pieces: Pieces) -> Result<String, Error> {
-    let mut corrector =
-        Corrector::new(program.as_bytes(), Vec::new(), settings(axes), Digits::default());
+    written(
+        Corrector::new(program.as_bytes(), Vec::new(), settings(axes), Digits::default()),
+        pieces,
+    )
+}
+
+fn written(mut corrector: Corrector<&[u8], Vec<u8>>, pieces: Pieces) -> Result<String, Error> {
     loop {
         let moves = corrector.read(3)?.to_vec();
         if moves.is_empty() {
@@ -353,5 +359,59 @@ fn a_heading_is_the_first_line_or_the_second_behind_a_percent() {
             corrector.read(9).unwrap().iter().map(|motion| motion.end).collect();
         corrector.write(&[1], &points, &[1.0]).unwrap();
         assert_eq!(String::from_utf8(corrector.finish().unwrap()).unwrap(), expected);
+    }
+}
+
+#[test]
+fn blended_pieces_end_in_the_exact_stop_that_their_block_asks_for() {
+    let blended = |program: &str, pieces: Pieces| {
+        let corrector =
+            Corrector::new(program.as_bytes(), Vec::new(), settings("XYZ"), Digits::default());
+        written(corrector.with_path_mode("G64 P0.002"), pieces).unwrap()
+    };
+    assert_eq!(
+        blended("G21 G61.1\r\nG1 X10 F100\r\nG61 X20\r\nG64 X30\r\n", TWO),
+        "G21 G61.1\r\nG64 P0.002\r\nG1 X5. F100\r\nG61.1\r\nX10.\r\n\
+         G64 P0.002\r\n X15.\r\nG61\r\nX20.\r\nG64 X25.\r\nX30.\r\n"
+    );
+    // A code before the move comes first; lines of a block that may be left out are left out with it.
+    let program = "G21 G61\nG1 X10 F1 M8 M0\n";
+    assert_eq!(blended(program, TWO), "G21 G61\nM8\nG64 P0.002\nG1 X5. F1\nG61\nX10. M0\n");
+    assert_eq!(
+        blended("G21 G61\n/G1 X10 F1\n", TWO),
+        "G21 G61\n/G64 P0.002\n/G1 X5. F1\n/G61\n/X10.\n"
+    );
+    // What is not divided stays as it is, and so does all of it where nobody asks.
+    assert_eq!(blended("G21 G61 G0 X10\n", SAME), "G21 G61 G0 X10\n");
+    case("G21 G61 G1 X10 F1\n", "G21 G61 G1 X5. F1\nX10.\n", TWO);
+}
+
+#[test]
+fn moves_tell_their_speed_and_whether_the_tool_stops_behind_them() {
+    let program = "G21 G94 G0 X10\nG61 G1 X20 F600\nG20 X1\nG61.1 G93 X2 F30\nG64 G94 A90 F60\n\
+                   G95 X3 F1\nG94 F10 G21 X4\n";
+    let mut reader = Reader::new(program.as_bytes(), settings("XYZ"));
+    let mut told = Vec::new();
+    while let Some(motion) = reader.next_move().unwrap() {
+        told.push((motion.speed, motion.path_mode));
+    }
+    let expected = [
+        (f64::INFINITY, None),
+        (10.0, Some(PathMode::ExactPath)),
+        // F was given in mm.
+        (10.0, Some(PathMode::ExactPath)),
+        // The inch takes a thirtieth of a minute.
+        (25.4 / 2.0, Some(PathMode::ExactStop)),
+        // Degrees.
+        (1.0, Some(PathMode::Blending)),
+        (f64::NAN, Some(PathMode::Blending)),
+        // F is read before G21 of its block.
+        (254.0 / 60.0, Some(PathMode::Blending)),
+    ];
+    assert_eq!(told.len(), expected.len());
+    for ((speed, mode), (expected_speed, expected_mode)) in told.into_iter().zip(expected) {
+        let same = speed == expected_speed || (speed.is_nan() && expected_speed.is_nan());
+        assert!(same || (speed - expected_speed).abs() < 1e-12, "{speed} for {expected_speed}");
+        assert_eq!(mode, expected_mode);
     }
 }

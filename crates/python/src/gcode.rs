@@ -9,8 +9,8 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use truepose_gcode::{
-    AXES, AXIS_LETTERS, AxisSet, Corrector, Digits, Error, Move, Position, Reader, Refusal,
-    Settings, Units, WorkOffset,
+    AXES, AXIS_LETTERS, AxisSet, Corrector, Digits, Error, Move, PathMode, Position, Reader,
+    Refusal, Settings, Units, WorkOffset,
 };
 
 use crate::arrays::{self, Array};
@@ -177,6 +177,17 @@ impl GcodeMoves {
     }
 
     #[getter]
+    fn speed<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        PyArray1::from_iter(py, self.moves.iter().map(|motion| motion.speed))
+    }
+
+    #[getter]
+    fn stops<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        let stops = |motion: &Move| motion.path_mode.is_some_and(PathMode::stops);
+        PyArray1::from_iter(py, self.moves.iter().map(stops))
+    }
+
+    #[getter]
     fn plane<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u8>> {
         let plane = |motion: &Move| match motion.arc.map(|arc| arc.plane[0]) {
             None => 0,
@@ -289,7 +300,7 @@ impl GcodeCorrector {
 #[pymethods]
 impl GcodeCorrector {
     #[new]
-    #[pyo3(signature = (path, target, *, units=None, start=None, offsets=None, system="G54", reference=None, block_delete=None, axes="XYZ", digits=6, heading=None))]
+    #[pyo3(signature = (path, target, *, units=None, start=None, offsets=None, system="G54", reference=None, block_delete=None, axes="XYZ", digits=6, heading=None, path_mode=None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of a Python constructor")]
     fn new(
         path: PathBuf,
@@ -303,6 +314,7 @@ impl GcodeCorrector {
         axes: &str,
         digits: u32,
         heading: Option<&str>,
+        path_mode: Option<&str>,
     ) -> PyResult<Self> {
         let settings = settings(units, start, offsets, system, reference, block_delete, axes)?;
         if digits > 8 {
@@ -315,6 +327,9 @@ impl GcodeCorrector {
         let mut corrector = Corrector::new(input, output, settings, digits);
         if let Some(text) = heading {
             corrector = corrector.with_heading(text);
+        }
+        if let Some(block) = path_mode {
+            corrector = corrector.with_path_mode(block);
         }
         Ok(GcodeCorrector { corrector: Some(corrector) })
     }

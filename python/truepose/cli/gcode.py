@@ -92,6 +92,18 @@ if TYPE_CHECKING:
         help="Decimals of mm and degrees; inches get one more.",
     ),
     click.option(
+        "--path-mode",
+        metavar="G64 P..",
+        help="How pieces of a divided block are joined that ends in an exact stop (G61, G61.1): "
+        "written in front of them, and the program's own mode in front of the last. In the "
+        "program's units. Without it the tool stops after every piece.",
+    ),
+    click.option(
+        "--acceleration",
+        metavar="ACCELERATION",
+        help="Of the tool, for the time that exact stops take. Default: 1000 mm/s^2.",
+    ),
+    click.option(
         "--force",
         is_flag=True,
         help="Write the program even if its error is no smaller than before.",
@@ -120,6 +132,7 @@ def command(
     dry_run: bool,
     offsets: tuple[tuple[str, str], ...],
     block_delete: str | None,
+    acceleration: str | None,
     **options: Any,
 ) -> int:
     """Correct a PROGRAM of G-code for the machine.
@@ -138,6 +151,7 @@ def command(
     from truepose.cli._progress import progress
     from truepose.cli._steps import note_written
     from truepose.controllers.gcode import NoBetter, correct_program
+    from truepose.controllers.gcode.exact_stops import ACCELERATION
     from truepose.files.writing import require_writable
 
     if (output is None) is not dry_run:
@@ -159,6 +173,11 @@ def command(
                 start=read.position("--start", start or ""),
                 offsets={name: read.position("--offset", text, "abcr") for name, text in offsets},
                 block_delete=None if block_delete is None else block_delete == "on",
+                acceleration=(
+                    ACCELERATION
+                    if acceleration is None
+                    else read.acceleration("--acceleration", acceleration)
+                ),
                 progress=report,
                 **options,
             )
@@ -175,10 +194,9 @@ def command(
 def _show(machine: Machine, proof: Proof, form: str, said: str, *, written: bool) -> None:
     """Print what was found, whether or not a program was written; `said`: the tolerance asked."""
     from truepose.cli._show import show_tables
-    from truepose.runs.controller_geometry import CODE
 
-    for sentence in proof.warnings:
-        click.echo(f"warning[{CODE}]: {sentence}", err=True)
+    for warning in proof.warnings:
+        click.echo(f"warning[{warning['code']}]: {warning['sentence']}", err=True)
     if form == "json":
         json.dump(_as_json(proof, written=written), sys.stdout, indent=1, ensure_ascii=False)
         sys.stdout.write("\n")
@@ -197,6 +215,10 @@ class _Reading:
     def length(self, option: str, text: str) -> float:
         """M. Raises `RequestError` (bad-correction)."""
         return self._quantity(option, text, "length")
+
+    def acceleration(self, option: str, text: str) -> float:
+        """m/s^2. Raises `RequestError` (bad-correction)."""
+        return self._quantity(option, text, "acceleration")
 
     def said(self, text: str) -> str:
         """A length as it was asked for, a bare number with the unit of the file."""
@@ -220,6 +242,7 @@ class _Reading:
 
     def _quantity(self, option: str, text: str, dimension: str) -> float:
         from truepose.errors import ReadingError
+        from truepose.files.dimensions import DIMENSIONS
 
         try:
             try:
@@ -227,7 +250,7 @@ class _Reading:
             except ValueError:
                 return self._units.read(text, dimension)
         except ReadingError as failure:
-            expected = failure.expected or f"a {dimension}"
+            expected = failure.expected or DIMENSIONS[dimension].phrase
             raise self._refusal(option, failure.found or text, expected) from None
 
     @staticmethod
@@ -284,6 +307,12 @@ def _tables(machine: Machine, proof: Proof, said: str) -> Iterable[Table]:
             if proof.approach is not None
             else "."
         )
+        + (
+            f"\nPieces joined by {proof.path_mode}: by what it lets a tool leave its path, in the "
+            "program's units, the tool may be off more."
+            if proof.path_mode is not None
+            else ""
+        )
     )
     title = f"Error of the tool, before and after; program {proof.coordinates}"
     yield Table("proof", title, header, tuple(rows), 2, note)
@@ -310,7 +339,6 @@ def _scaled(value: float, unit: Shown) -> str:
 
 def _as_json(proof: Proof, *, written: bool) -> Mapping[str, object]:
     """The proof for programs, m and rad; the start in the program's own mm and degrees."""
-    from truepose.runs.controller_geometry import CODE
 
     def of(errors: Errors) -> dict[str, object]:
         answer: dict[str, object] = {}
@@ -324,12 +352,19 @@ def _as_json(proof: Proof, *, written: bool) -> Mapping[str, object]:
             }
         return answer
 
+    stops = proof.exact_stops
     return {
         "command": "gcode",
         "machine": proof.machine,
         "program": proof.source,
         "corrected_program": proof.target,
-        "units": {"position": "m", "orientation": "rad", "start": "mm, deg"},
+        "units": {
+            "position": "m",
+            "orientation": "rad",
+            "start": "mm, deg",
+            "feed_time": "s",
+            "acceleration": "m/s^2",
+        },
         "tolerance": proof.tolerance,
         "tolerance_from": proof.tolerance_from.reason,
         "interpolation": proof.interpolation,
@@ -342,6 +377,12 @@ def _as_json(proof: Proof, *, written: bool) -> Mapping[str, object]:
         "before": of(proof.before),
         "after": of(proof.after),
         "improves": proof.improves,
-        "warnings": [{"code": CODE, "sentence": sentence} for sentence in proof.warnings],
+        "path_mode": proof.path_mode,
+        "exact_stops": {
+            "before": {"stops": stops.before, "feed_time": stops.seconds_before},
+            "after": {"stops": stops.after, "feed_time": stops.seconds_after},
+            "acceleration": stops.acceleration,
+        },
+        "warnings": list(proof.warnings),
         "written": written,
     }

@@ -60,7 +60,13 @@ def test_the_same_for_programs(
     assert found["after"]["orientation"] is None
     assert found["tolerance"] == pytest.approx(5e-6)
     assert (found["moves"], found["blocks"]) == (proof.moves, proof.blocks)
-    assert found["units"] == {"position": "m", "orientation": "rad", "start": "mm, deg"}
+    assert found["units"] == {
+        "position": "m",
+        "orientation": "rad",
+        "start": "mm, deg",
+        "feed_time": "s",
+        "acceleration": "m/s^2",
+    }
 
 
 def test_orientation_has_rows_where_there_is_one(

@@ -33,6 +33,12 @@ from truepose.controllers.gcode.division import (
     MachineState,
     Moves,
 )
+from truepose.controllers.gcode.exact_stops import (
+    ACCELERATION,
+    CountedStops,
+    ExactStops,
+    is_blending,
+)
 from truepose.controllers.gcode.proof import Errors, Proof, Proving, improves
 from truepose.controllers.gcode.tolerance import (
     MOST,
@@ -100,6 +106,8 @@ class _Options:
     start: dict[str, float]
     offsets: WorkOffsets
     block_delete: bool | None
+    path_mode: str | None
+    acceleration: float
 
     def limits(self, tolerance: float) -> Limits:
         """What the division must hold."""
@@ -118,6 +126,7 @@ class _Options:
             block_delete=self.block_delete,
             axes=self.axes,
             digits=self.digits,
+            path_mode=self.path_mode,
             heading=f"truepose for {name[:LONGEST_NAME].strip()}: {self.offsets.words}",
         )
 
@@ -148,6 +157,8 @@ def correct_program(
     parameter_file: str | PathLike[str] | None = None,
     block_delete: bool | None = None,
     digits: int = DIGITS,
+    path_mode: str | None = None,
+    acceleration: float = ACCELERATION,
     force: bool = False,
     progress: Progress | None = None,
 ) -> Proof:
@@ -159,9 +170,11 @@ def correct_program(
     a block, "either" where it may also drive its joints straight to the block's end. `units`: "mm"
     or "inch" before G20 or G21. `start`: where the machine stands at first, by axis, m and rad,
     machine coordinates; default home. `block_delete`: whether lines that begin with / are left out.
-    `digits`: decimals of mm and degrees. `force`: write even what is no better than the program
-    was. `target` None: nothing is written, only proven. `progress` is called with lines done, and
-    0 for their unknown number in all.
+    `digits`: decimals of mm and degrees. `path_mode`, such as "G64 P0.002", in the program's units:
+    how pieces of a block are joined that ends in an exact stop (G61, G61.1). `acceleration`, m/s^2,
+    of the tool: for the time that exact stops take, see `ExactStops`. `force`: write even what is
+    no better than the program was. `target` None: nothing is written, only proven. `progress` is
+    called with lines done, and 0 for their unknown number in all.
 
     `offsets` of "G54" to "G59.3", by axis, m and rad, with r, the rotation about Z;
     `parameter_file`: LinuxCNC's, which has them all. A program that selects one that is not known
@@ -189,6 +202,8 @@ def correct_program(
         (offsets, parameters),
         block_delete,
         digits,
+        path_mode,
+        acceleration,
     )
     _require_files(program, written, parameters)
     given = machine.condition if condition is None else condition
@@ -245,6 +260,12 @@ class _Session:
         self._allowed = allowed
         self._reader = options.reader(program)
         self._writing = _Writing(division, program, temporary, options)
+        length = division.actual.machine.characteristic_length
+        self._stops = CountedStops(
+            options.acceleration,
+            options.acceleration / length,
+            blended=options.path_mode is not None,
+        )
 
     def run(self, target: str, progress: Progress | None) -> Proof:
         """Correct the whole program; `target` is what it will be called."""
@@ -259,6 +280,7 @@ class _Session:
                 count += len(moves.line)
                 divided = self._divide(moves, stand)
                 stand = divided.stand
+                self._stops.add(moves, divided)
                 if task is not None:
                     task.result()
                 if threads() > 1:
@@ -305,6 +327,7 @@ class _Session:
         before, after = proving.errors()
         length = machine.characteristic_length
         least = least_of(self._division, self._options.digits)
+        stops = self._stops.found()
         proof = Proof(
             machine=machine.name,
             source=str(self._program),
@@ -322,7 +345,9 @@ class _Session:
             points=proving.points,
             before=before,
             after=after,
-            warnings=_warnings(machine, before),
+            warnings=_warnings(machine, before, stops),
+            exact_stops=stops,
+            path_mode=self._options.path_mode,
         )
         for worst, unit in ((after.position, 1.0), (after.orientation, length)):
             if worst is not None and not worst.value * unit <= limits.chord:
@@ -330,12 +355,15 @@ class _Session:
         return proof
 
 
-def _warnings(machine: Machine, before: Errors) -> tuple[str, ...]:
-    """What to know of a program that was right before."""
+def _warnings(machine: Machine, before: Errors, stops: ExactStops) -> tuple[dict[str, str], ...]:
+    """What to know of a program that was right before, or that stands still more often now."""
+    warnings = []
     known = [worst.value for worst in (before.position, before.orientation) if worst is not None]
-    if not known or max(known) >= ROUNDING:
-        return ()
-    return (nothing_to_correct(machine)["sentence"],)
+    if known and max(known) < ROUNDING:
+        warnings.append(nothing_to_correct(machine))
+    if stops.after > stops.before:
+        warnings.append(stops.warning())
+    return tuple(warnings)
 
 
 class _Writing:
@@ -421,7 +449,16 @@ def _moves_of(moves: GcodeMoves) -> Moves | None:
     """The moves as arrays, each made once; None behind the last."""
     if not len(moves):
         return None
-    return Moves(moves.line, moves.kind, moves.start, moves.end, moves.length, moves.points)
+    return Moves(
+        moves.line,
+        moves.kind,
+        moves.start,
+        moves.end,
+        moves.length,
+        moves.points,
+        moves.speed,
+        moves.stops,
+    )
 
 
 @contextmanager
@@ -484,6 +521,8 @@ def _options(
     offsets: tuple[Mapping[str, Positions] | None, Path | None],
     block_delete: bool | None,
     digits: int,
+    path_mode: str | None,
+    acceleration: float,
 ) -> _Options:
     """The options in the interpreter's form. Raises `RequestError`, all problems at once."""
     problems: list[Problem] = []
@@ -506,6 +545,10 @@ def _options(
         refuse("unit", units, "mm or inch")
     if not (isinstance(digits, int) and 0 <= digits <= 8):
         refuse("number of digits", digits, "a whole number from 0 to 8")
+    if path_mode is not None and not is_blending(path_mode):
+        refuse("path mode", path_mode, "G64 with P above zero, and Q where wanted: G64 P0.002")
+    if not (np.isfinite(acceleration) and acceleration > 0.0):
+        refuse("acceleration", acceleration, "an acceleration above zero, m/s^2")
     begin = {**axes.home(), **named(start or {}, "start", refuse)}
     shifted = work_offsets(axes.machine, *offsets, refuse)
     if problems:
@@ -519,6 +562,8 @@ def _options(
         begin,
         shifted,
         block_delete,
+        path_mode,
+        acceleration,
     )
 
 

@@ -34,7 +34,7 @@ from truepose.files.limits import MOST_PIECES
 from truepose.runs.displacement import ParameterDeviation
 from truepose.runs.poses import BLOCK, OK
 
-RAPID = 0
+RAPID, LINE = 0, 1
 
 SPACING = 1.0 / 64.0
 """Greatest distance of two points at which a path is looked at, in characteristic lengths.
@@ -72,7 +72,9 @@ class Moves:
     """Some moves of a program, as the interpreter gives them: mm and degrees, machine coordinates.
 
     `line` (n,), from 1; `kind` (n,) 0 rapid, 1 line, 2 arc; `start`, `end` (n, 9); `length` (n,)
-    of the path; `points(index (k,), share (k,))`: the points (k, 9) of moves at shares of theirs.
+    of the path; `points(index (k,), share (k,))`: the points (k, 9) of moves at shares of theirs;
+    `speed` (n,), of `length` a second, infinite for a rapid and NaN in G95; `stops` (n,): G61 or
+    G61.1 holds.
     """
 
     line: NDArray[np.int64]
@@ -81,6 +83,8 @@ class Moves:
     end: Floats
     length: Floats
     points: Callable[[NDArray[np.int64], Floats], Floats]
+    speed: Floats
+    stops: Flags
 
 
 @dataclass(frozen=True)

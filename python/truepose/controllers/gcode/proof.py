@@ -21,6 +21,7 @@ import numpy as np
 from truepose.arrays import Floats
 from truepose.controllers.gcode._measure import Measure
 from truepose.controllers.gcode.division import Divided, Division, Moves, PathPoints
+from truepose.controllers.gcode.exact_stops import ExactStops
 from truepose.controllers.gcode.tolerance import UNFELT, PathTolerance
 from truepose.representation import Represented
 
@@ -58,8 +59,10 @@ class Proof(Represented):
     machine; `improves`: whether it became better. `moves` of the program, `blocks` written for
     them, `points` compared. `tolerance`, m, where that is from, and `interpolation` for which it
     holds. `approach`: the line of the first block, or None; it begins where the machine is not
-    corrected, and its path counts from its end on. `warnings`: why there was nothing to correct, if
-    so. `coordinates`: which the program was taken to be in, in words.
+    corrected, and its path counts from its end on. `warnings`, each a code and a sentence: why
+    there was nothing to correct, and what exact stops take. `path_mode`: how the
+    pieces of a block are joined, which is on top of `after`. `coordinates`: which the program was
+    taken to be in, in words.
     """
 
     machine: str
@@ -77,7 +80,9 @@ class Proof(Represented):
     before: Errors
     after: Errors
     improves: bool
-    warnings: tuple[str, ...] = ()
+    exact_stops: ExactStops
+    path_mode: str | None = None
+    warnings: tuple[dict[str, str], ...] = ()
     coordinates: str = ""
 
 

@@ -14,6 +14,7 @@ CATALOGUE: dict[str, str] = {
     # the file as such
     "file-missing": "the machine file, or a data file, is not there",
     "file-is-directory": "a directory was given where a file is wanted",
+    "file-too-large": "the file is larger than any of its kind",
     "file-unreadable": "the file is there but cannot be read",
     "not-utf8": "the file is not UTF-8 text",
     "not-toml": "the file is not TOML",
@@ -131,7 +132,8 @@ CATALOGUE: dict[str, str] = {
     "output-not-writable": "the output cannot be written",
     "extra-missing": "an optional package that this needs is not installed",
     "output-ending": "the ending of the output file is not one that can be written",
-    "output-is-input": "the output would write over the machine file",
+    "output-is-input": "the output would write over a file that is read",
+    "output-twice": "two outputs of one command are the same file",
     "output-exists": "a new file is wanted where there is one already",
     "machine-file-changed": "a machine file that is not the one that was read",
     "no-witness": "a witness is wanted where no machine exceeds the accuracy asked",

@@ -10,7 +10,8 @@ use crate::lines::{Lines, Next};
 use crate::moves::Move;
 use crate::refusal::Error;
 use crate::settings::{AXES, AxisSet, Position, Settings};
-use crate::writer::{Source, Writer};
+use crate::writer::Writer;
+use crate::written_lines::Source;
 
 pub use crate::writer::Digits;
 

@@ -9,7 +9,7 @@ use crate::number::Decimal;
 use crate::refusal::{Fault, LineResult};
 use crate::settings::{AXES, AXIS_LETTERS, AxisSet, Position, in_turned_axes, is_rotary};
 use crate::written_lines::{
-    check_lengths, own_line, preceding_line, remove_blanks, separate, without_end,
+    Source, check_lengths, own_line, preceding_line, remove_blanks, separate, without_end,
 };
 
 /// Decimals that coordinates are written with, at most 9.
@@ -34,14 +34,6 @@ const FEED_DIGITS: u32 = 9;
 
 /// A difference beyond half the last decimal, and beyond the rounding of computing it, counts.
 const HALF: f64 = 0.5 + 1e-6;
-
-/// The block to be written and its effect.
-pub struct Source<'a> {
-    pub line: &'a [u8],
-    pub words: &'a [Word],
-    pub deletable: bool,
-    pub motions: &'a Motions,
-}
 
 /// The state that the written program leaves a controller in.
 pub struct Writer {

@@ -1,9 +1,17 @@
 //! Bytes of the lines that a block becomes.
 
 use crate::block::Block;
-use crate::lexer::LONGEST_LINE;
+use crate::interpreter::Motions;
+use crate::lexer::{LONGEST_LINE, Word};
 use crate::refusal::{Fault, LineResult};
-use crate::writer::Source;
+
+/// The block to be written and its effect.
+pub struct Source<'a> {
+    pub line: &'a [u8],
+    pub words: &'a [Word],
+    pub deletable: bool,
+    pub motions: &'a Motions,
+}
 
 /// A line that belongs to the block, and is left out with it.
 pub fn own_line(source: &Source<'_>, text: &[u8], newline: &[u8], out: &mut Vec<u8>) {

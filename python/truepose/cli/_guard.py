@@ -61,8 +61,11 @@ class GuardedGroup(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; a problem of its input becomes an exit code."""
+        from truepose.files.one_run import one_run
+
         try:
-            return self._guarded(ctx)
+            with one_run():
+                return self._guarded(ctx)
         except BrokenPipeError as closed:
             raise PipeClosedError from closed
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +26,21 @@ class Request:
     strict: bool = False
     require_accuracy: bool = False
     witness: Path | None = None
+
+
+class OutputFile(click.Path):
+    """A file, or a folder, that the command writes: the same as no other, and no input."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """The path, once it is noted what it is asked for with."""
+        from truepose.files.one_run import will_write
+
+        path = Path(os.fsdecode(super().convert(value, param, ctx)))
+        will_write(path, value if param is None else param.opts[0])
+        return path
 
 
 def _note_format(context: click.Context, _: click.Parameter, value: str) -> str:
@@ -63,7 +79,7 @@ def output_option_of(endings: str) -> Callable[[Command], Command]:
         "-o",
         "output",
         metavar="FILE",
-        type=click.Path(path_type=Path),
+        type=OutputFile(),
         help=f"Also write the result to FILE; its ending chooses the form: {endings}.",
     )
 
@@ -85,7 +101,7 @@ witness_option = click.option(
     "--witness",
     "witness",
     metavar="FILE.toml",
-    type=click.Path(path_type=Path),
+    type=OutputFile(),
     help="Where the accuracy asked is NOT met: write the machine that exceeds it, as a machine "
     "file at its pose.",
 )

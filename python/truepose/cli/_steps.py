@@ -20,7 +20,7 @@ from truepose.cli._show import show_answers, show_tables
 from truepose.compensation.compensate import against_nominal
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import counted
-from truepose.files.writing import require_writable
+from truepose.files.writing import replacing, require_writable, written_together
 from truepose.reporting import formats
 from truepose.reporting.accuracy import gains, told
 from truepose.reporting.display import nearest_middle, pose_text, where_highest
@@ -29,7 +29,7 @@ from truepose.reporting.study import Study, warnings_of
 from truepose.reporting.tables import Table
 from truepose.runs.poses import faults_text, reason_text
 from truepose.verdict import witness_file
-from truepose.verdict.answer import NOT_MET, STATES
+from truepose.verdict.answer import BEFORE, NOT_MET, STATES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,20 +158,32 @@ def deliver(
     result: Result,
     tables: Iterable[Table | None],
     answers: Sequence[Answer] = (),
+    *,
+    witness_of: str = BEFORE,
+    beside: Sequence[tuple[Path, str]] = (),
 ) -> None:
-    """Write the output file if one is asked for, and print the result in the format asked.
+    """Write the files that are asked for, and print the result in the format asked.
 
-    For people the `answers` come first.
+    For people the `answers` come first. `witness_of`: the state whose witness is written;
+    `beside`: other files, and their texts. Raises `RequestError` (no-witness) at the end, where
+    that is asked for and there is none.
     """
-    if request.output is not None:
-        formats.write(result, request.output)
+    with written_together():
+        if request.output is not None:
+            formats.write(result, request.output)
+        written = write_witness(request, answers, witness_of)
+        for path, text in beside:
+            with replacing(path) as temporary:
+                temporary.write_text(text, encoding="utf-8", newline="\n")
     if request.format == "table":
         show_answers(told(result.machine, answers), gains(answers))
         show_tables(table for table in tables if table is not None)
     else:
         sys.stdout.writelines(formats.text(result, f".{request.format}"))
-    if request.output is not None:
-        note_written(request.output)
+    note_written(request.output, request.witness if written else None)
+    note_written(*(path for path, _ in beside))
+    if not written:
+        raise no_witness(answers, witness_of)
 
 
 def write_witness(request: Request, answers: Sequence[Answer], state: str) -> bool:
@@ -186,7 +198,6 @@ def write_witness(request: Request, answers: Sequence[Answer], state: str) -> bo
         if answer.state == state and answer.answer == NOT_MET and answer.example is not None:
             example, original = answer.example, request.machine_file
             witness_file.write_witness(example.machine, example, path, original=original)
-            note_written(path)
             return True
     return False
 
@@ -239,9 +250,10 @@ def report_page() -> ModuleType:
     return page
 
 
-def note_written(path: Path) -> None:
-    """Say on stderr which file was written, so that stdout stays what was asked for."""
-    click.echo(f"wrote {path}", err=True)
+def note_written(*paths: Path | None) -> None:
+    """Say on stderr which files were written, so that stdout stays what was asked for."""
+    for path in filter(None, paths):
+        click.echo(f"wrote {path}", err=True)
 
 
 def refuse_left_out(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from truepose.cli._options import (
+    OutputFile,
     Request,
     format_option,
     machine_argument,
@@ -81,7 +82,7 @@ class _Day(click.ParamType):  # type: ignore[type-arg]
     click.option(
         "--machine-output",
         metavar="CALIBRATED.toml",
-        type=_FILE,
+        type=OutputFile(),
         help="Write the calibrated machine file; needs --date.",
     ),
     click.option("--date", type=_Day(), metavar="YYYY-MM-DD", help="The day of the measurements."),
@@ -105,7 +106,7 @@ class _Day(click.ParamType):  # type: ignore[type-arg]
     click.option(
         "--report",
         metavar="PAGE.html",
-        type=_FILE,
+        type=OutputFile(),
         help="Write a page with the calibration's figures and tables too.",
     ),
     set_option,
@@ -227,22 +228,24 @@ def _folded(text: str) -> str:
 def _write_files(asked: _Options, calibration: Calibration, result: Result) -> None:
     """All files that are asked for, before anything is printed: a reader may stop reading."""
     from truepose.cli._steps import note_written
+    from truepose.files.writing import written_together
     from truepose.reporting import formats
 
-    if asked.request.output is not None:
-        formats.write(result, asked.request.output)
-        note_written(asked.request.output)
-    if asked.page is not None:
-        _write_page(asked.request, result.machine, result.dataset, asked.page)
-    if asked.machine_output is not None:
-        _write_machine(asked, calibration)
+    with written_together():
+        if asked.request.output is not None:
+            formats.write(result, asked.request.output)
+        if asked.page is not None:
+            _write_page(asked.request, result.machine, result.dataset, asked.page)
+        machine = None if asked.machine_output is None else _write_machine(asked, calibration)
+    note_written(
+        asked.request.output, asked.page, None if machine is None else asked.machine_output
+    )
 
 
-def _write_machine(asked: _Options, calibration: Calibration) -> None:
+def _write_machine(asked: _Options, calibration: Calibration) -> Machine | None:
     """The calibrated file, unless the answer is no and nobody forces it."""
     from truepose.calibration.dataset import verdict_of
     from truepose.calibration.result.save import save
-    from truepose.cli._steps import note_written
 
     assert asked.machine_output is not None
     assert asked.date is not None
@@ -252,7 +255,7 @@ def _write_machine(asked: _Options, calibration: Calibration) -> None:
             "with the warning inside.",
             err=True,
         )
-        return
+        return None
     written = save(
         calibration,
         asked.machine_output,
@@ -261,13 +264,13 @@ def _write_machine(asked: _Options, calibration: Calibration) -> None:
         controller_holds=asked.controller_holds or "drawing",
         force=asked.force,
     )
-    note_written(asked.machine_output)
     said = () if written.calibration is None else written.calibration.warning
     for line in said:
         if line != verdict_of(calibration):  # that is printed as the answer
             click.echo(f"Warning, inside the file too: {line}.", err=True)
     if not calibration.accepted:
         click.echo("The answer is NO: the file was forced, and says so inside.", err=True)
+    return written
 
 
 def _write_page(request: Request, machine: Machine, dataset: Any, page: Path) -> None:
@@ -279,4 +282,3 @@ def _write_page(request: Request, machine: Machine, dataset: Any, page: Path) ->
     study = replace(_steps.study_of(request, machine), calibration=dataset)
     text = request.machine_file.read_text(encoding="utf-8")
     _steps.report_page().write(study, page, text)
-    _steps.note_written(page)

@@ -41,7 +41,7 @@ def command(**options: Any) -> int:
     """
     from truepose.cli import _steps
     from truepose.errors import RequestError
-    from truepose.files.writing import replacing
+    from truepose.files.writing import replacing, written_together
     from truepose.reporting import inputs
     from truepose.reporting.accuracy import gains, told
     from truepose.reporting.study import warnings_of
@@ -66,7 +66,13 @@ def command(**options: Any) -> int:
             if [problem.code for problem in error.problems] != ["no-pose-left"]:
                 raise
     kept = met(answers, BEFORE) is not False
-    written = _steps.write_witness(request, answers, AFTER if kept else BEFORE)
+    with written_together():
+        written = _steps.write_witness(request, answers, AFTER if kept else BEFORE)
+        if request.output is not None:
+            form = request.output.suffix.lower().removeprefix(".")
+            with replacing(request.output) as temporary:
+                text = _text(form, machine, check, answers, warnings)
+                temporary.write_text(text + "\n", encoding="utf-8")
     if request.format == "table":
         from truepose.cli._show import show_answers, show_tables
 
@@ -74,12 +80,7 @@ def command(**options: Any) -> int:
         show_tables(_tables(machine, check, answers))
     else:
         click.echo(_text(request.format, machine, check, answers, warnings))
-    if request.output is not None:
-        form = request.output.suffix.lower().removeprefix(".")
-        with replacing(request.output) as temporary:
-            text = _text(form, machine, check, answers, warnings)
-            temporary.write_text(text + "\n", encoding="utf-8")
-        _steps.note_written(request.output)
+    _steps.note_written(request.output, request.witness if written else None)
     if not written:
         raise _steps.no_witness(answers, AFTER if kept else BEFORE)
     return int(not kept)

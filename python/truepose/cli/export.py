@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from pathlib import Path
 
 import click
 
-from truepose.cli._options import set_option, takes
+from truepose.cli._options import OutputFile, set_option, takes
 
 
 @click.command("export")
@@ -33,7 +32,7 @@ from truepose.cli._options import set_option, takes
         "-o",
         "folder",
         metavar="FOLDER",
-        type=click.Path(path_type=Path),
+        type=OutputFile(),
         help="Write the files into FOLDER, which is made where it is not there. Without it they "
         "are printed.",
     ),
@@ -63,7 +62,7 @@ def command(
     from truepose.cli._steps import note_written
     from truepose.controllers import controller as adapter_of
     from truepose.controllers import export
-    from truepose.files.writing import replacing, require_folder
+    from truepose.files.writing import replacing, require_folder, written_together
 
     adapter_of(controller)
     if folder is not None:
@@ -78,12 +77,11 @@ def command(
             click.echo(text, nl=not text.endswith("\n"))
     else:
         require_folder(folder, result.files)
-        with ExitStack() as files:  # all of them are written before any takes its place
+        with written_together():
             for name, text in result.files.items():
-                temporary = files.enter_context(replacing(folder / name))
-                temporary.write_text(text, encoding="utf-8")
-        for name in result.files:
-            note_written(folder / name)
+                with replacing(folder / name) as temporary:
+                    temporary.write_text(text, encoding="utf-8")
+        note_written(*(folder / name for name in result.files))
     for line in result.statement:
         click.echo(line, err=folder is None)
     return 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from truepose.cli._options import _note_format, machine_argument, set_option, takes
+from truepose.cli._options import OutputFile, _note_format, machine_argument, set_option, takes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         "--output",
         "-o",
         metavar="FILE",
-        type=click.Path(path_type=Path),
+        type=OutputFile(),
         help="The corrected program; not the program itself.",
     ),
     click.option(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from truepose.cli._options import format_option, takes
+from truepose.cli._options import OutputFile, format_option, takes
 
 if TYPE_CHECKING:
     from truepose.machine.library import LibraryMachine
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         "-o",
         "output",
         metavar="FILE.toml",
-        type=click.Path(path_type=Path),
+        type=OutputFile(),
         help="Where the file goes; by default beside you, named KIND.toml.",
     ),
     format_option,

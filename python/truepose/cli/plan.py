@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from truepose.cli._options import (
+    OutputFile,
     Request,
     WholeNumber,
     format_option,
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from truepose.errors import Problem
     from truepose.machine import Machine
 
-_FILE = click.Path(path_type=Path)
 _PER = {"s": 1.0, "min": 60.0}
 _INSTRUMENT = (
     "position=10um, coordinate:z=10um, distance=2um: a kind and the standard uncertainty of its "
@@ -82,13 +82,13 @@ _INSTRUMENT = (
     click.option(
         "--program",
         metavar="FILE",
-        type=_FILE,
+        type=OutputFile(),
         help="Also write a measuring program (G-code) that dwells at every pose.",
     ),
     click.option(
         "--template",
         metavar="FILE.csv",
-        type=_FILE,
+        type=OutputFile(),
         help="Also write a file of measurements with all but the readings filled in.",
     ),
     click.option(
@@ -155,18 +155,15 @@ def command(
             seed=seed,
             progress=report,
         )
-    text = None
+    beside = []
     if program is not None:
-        text = program_text(
+        moves = program_text(
             machine, planned.poses, instruments=planned.instruments, dwell=seconds, feed=speed
         )
-    form = (
-        template_text(machine, planned.poses, planned.instruments) if template is not None else None
-    )
-    _steps.deliver(request, Result("plan", machine, planned.dataset), planning.tables(planned))
-    if request.format == "table":
-        for sentence in planning.sentences(planned):
-            click.echo(sentence)
+        beside.append((program, moves))
+    if template is not None:
+        beside.append((template, template_text(machine, planned.poses, planned.instruments)))
+    sentences: list[str] = []
     for other in compared:
         with progress("comparison", "instruments") as report:
             comparison = compare_instruments(
@@ -178,11 +175,14 @@ def command(
                 seed=seed,
                 progress=report,
             )
-        for sentence in planning.compared(comparison):
-            # Beside data for programs a sentence goes where people look.
-            click.echo(sentence, err=request.format != "table")
-    _write(program, text)
-    _write(template, form)
+        sentences += planning.compared(comparison)
+    result = Result("plan", machine, planned.dataset)
+    _steps.deliver(request, result, planning.tables(planned), beside=beside)
+    if request.format == "table":
+        sentences = [*planning.sentences(planned), *sentences]
+    for sentence in sentences:
+        # Beside data for programs a sentence goes where people look.
+        click.echo(sentence, err=request.format != "table")
     return 0
 
 
@@ -200,17 +200,6 @@ def _instruments(machine: Machine, texts: tuple[str, ...]) -> tuple[Instrument, 
     if problems:
         raise RequestError(*problems)
     return distinct(machine, tuple(instruments))
-
-
-def _write(path: Path | None, text: str | None) -> None:
-    from truepose.cli._steps import note_written
-    from truepose.files.writing import replacing
-
-    if path is None or text is None:
-        return
-    with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
-    note_written(path)
 
 
 def _seconds(machine: Machine, text: str) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from truepose.cli._options import (
+    OutputFile,
     Request,
     accuracy_option,
     machine_argument,
@@ -26,7 +27,7 @@ from truepose.cli._options import (
         "-o",
         "output",
         metavar="FILE.html",
-        type=click.Path(path_type=Path),
+        type=OutputFile(),
         help="Where the page goes; by default beside you, named after the machine file.",
     ),
     click.option(

@@ -23,6 +23,9 @@ MOST_DIGITS = 400
 DEEPEST_NESTING = 50
 """Lists and tables in each other, and parts of one dotted key, of a TOML file."""
 
+LARGEST_FILE = 100_000_000
+"""Bytes of a file that is read whole: every one but programs of G-code."""
+
 LONGEST_TOML = 4_000_000
 """Characters of a machine file, or of what a file of measurements states at its head."""
 

@@ -7,6 +7,9 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from truepose.errors import MachineFileError, Problem
+from truepose.files.limits import LARGEST_FILE
+from truepose.files.one_run import reads
+from truepose.files.writing import kind_of, standing_for
 
 
 @dataclass(frozen=True)
@@ -20,11 +23,16 @@ class FileKind:
 def read_text(path: Path, kind: FileKind) -> tuple[bytes, str]:
     """Bytes and UTF-8 text of a file, without a byte order mark.
 
-    Raises `MachineFileError` (file-missing, file-is-directory, file-unreadable, not-utf8).
+    Inside of a set of files that is being written, one of these is read as it will be. Raises
+    `MachineFileError` (file-missing, file-is-directory, file-unreadable, file-too-large, not-utf8),
+    `RequestError` (output-is-input) for a file that this run is to write.
     """
     file = str(path)
+    stands = standing_for(path)
+    if stands == path:
+        reads(path)
     try:
-        content = path.read_bytes()
+        content = _content(stands)
     except (FileNotFoundError, NotADirectoryError):
         raise MachineFileError(_missing(path, kind)) from None
     except IsADirectoryError:
@@ -42,6 +50,26 @@ def read_text(path: Path, kind: FileKind) -> tuple[bytes, str]:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise MachineFileError(_unreadable(file, reason)) from None
     return content, _decoded(content, file)
+
+
+def _content(path: Path) -> bytes:
+    """All of it; of a pipe what comes, for `LARGEST_FILE` may never come to an end."""
+    kind = kind_of(path.stat().st_mode)
+    if kind in ("a device", "a socket"):
+        raise MachineFileError(_unreadable(str(path), kind))
+    with path.open("rb") as file:
+        content = file.read(LARGEST_FILE + 1)
+    if len(content) > LARGEST_FILE:
+        raise MachineFileError(
+            Problem(
+                "file-too-large",
+                f"{path} is too large",
+                str(path),
+                found=f"more than {LARGEST_FILE // 1_000_000} MB",
+                expected=f"at most {LARGEST_FILE // 1_000_000} MB",
+            )
+        )
+    return content
 
 
 def _unreadable(file: str, reason: str) -> Problem:

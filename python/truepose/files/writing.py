@@ -1,14 +1,22 @@
-"""Write a file whole or not at all."""
+"""Write a file, or several that belong together, whole or not at all.
+
+What is written has a temporary name beside its target until all of it is on the disk; then the
+files take their names, one directly after the other. So after a failure, Ctrl-C or a lost process
+each file is the old one or the new one.
+"""
 
 from __future__ import annotations
 
 import os
 import secrets
+import stat
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 
 from truepose.errors import Fault, RequestError
+from truepose.files.one_run import require_not_read
 from truepose.files.wording import one_of
 
 
@@ -51,16 +59,7 @@ def require_writable(path: Path, endings: Collection[str], inputs: Collection[Pa
             ),
             path,
         )
-    if path.is_dir():
-        raise _refusal(
-            Fault(
-                "output-not-writable",
-                "the output path is a folder",
-                found="a folder",
-                expected="a file name",
-            ),
-            path,
-        )
+    _require_ordinary(path)
     if not os.access(folder, os.W_OK | os.X_OK):
         raise _refusal(
             Fault(
@@ -118,16 +117,7 @@ def require_folder(path: Path, names: Collection[str] = ()) -> None:
             path,
         )
     for name in names:
-        if (path / name).is_dir():
-            raise _refusal(
-                Fault(
-                    "output-not-writable",
-                    "a folder stands where a file is to be written",
-                    found="a folder",
-                    expected="a file, or a name that is free",
-                ),
-                path / name,
-            )
+        _require_ordinary(path / name)
 
 
 @contextmanager
@@ -135,15 +125,172 @@ def replacing(path: Path) -> Iterator[Path]:
     """A temporary file beside `path` that takes its place when the block ends well.
 
     The block writes to the path it is given. On any failure, Ctrl-C included, the temporary file
-    is removed and what stood at `path` is unchanged. Raises `RequestError` (code
-    `output-not-writable`) when the system refuses.
+    is removed and what stood at `path` is unchanged. Mode and owner of what stood there are kept.
+    Inside `written_together` it takes its place with the others. Raises `RequestError` (codes
+    `output-not-writable`; `output-is-input` where this run has read it).
     """
-    target = Path(os.path.realpath(path))  # a link stays a link; its target is replaced
-    # The ending is kept: some writers choose their form by it.
-    temporary = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    with written_together() as files, _refused(path):
+        try:
+            yield files.temporary(path)
+        except BaseException:
+            files.leave_out(path)
+            raise
+
+
+class FileSet:
+    """Files that are being written: the temporary one of each, by its target, links followed."""
+
+    def __init__(self) -> None:
+        self._temporary: dict[Path, Path] = {}
+        self._asked: dict[Path, Path] = {}
+
+    def temporary(self, path: Path) -> Path:
+        """Where to write what will be `path`; what was written for it before in the set is gone."""
+        require_not_read(path)
+        _require_ordinary(path)
+        target = _target(path)
+        # The ending is kept: some writers choose their form by it.
+        name = f".{target.stem}.{secrets.token_hex(4)}{target.suffix}"
+        self._drop(target)
+        self._temporary[target], self._asked[target] = target.with_name(name), path
+        return self._temporary[target]
+
+    def standing_for(self, path: Path) -> Path:
+        """Where the content of `path` is: with the name it has as yet, if it is of the set."""
+        return self._temporary.get(_target(path), path)
+
+    def take_places(self) -> None:
+        """All files get their names. Raises `RequestError` (output-not-writable)."""
+        for target, temporary in self._temporary.items():
+            with _refused(self._asked[target]):
+                _on_disk(temporary, os.O_RDWR)
+                _take_over(temporary, target)
+        for target, temporary in self._temporary.items():
+            with _refused(self._asked[target]):
+                temporary.replace(target)
+        for folder in {target.parent for target in self._temporary}:
+            with suppress(OSError):  # not every file system can
+                _on_disk(folder, os.O_RDONLY)
+
+    def leave_out(self, path: Path) -> None:
+        """Write nothing to `path` after all."""
+        self._drop(_target(path))
+
+    def remove(self) -> None:
+        """No temporary file stays."""
+        for target in list(self._temporary):
+            self._drop(target)
+
+    def _drop(self, target: Path) -> None:
+        self._asked.pop(target, None)
+        temporary = self._temporary.pop(target, None)
+        if temporary is not None:
+            with suppress(OSError):
+                temporary.unlink()
+
+
+_SET: ContextVar[FileSet | None] = ContextVar("files that are written together", default=None)
+
+
+@contextmanager
+def written_together() -> Iterator[FileSet]:
+    """Files that are written inside by `replacing` take their places when the block ends well.
+
+    All of them, or on any failure none; a set inside of another is part of that.
+    """
+    outer = _SET.get()
+    if outer is not None:
+        yield outer
+        return
+    files = FileSet()
+    token = _SET.set(files)
     try:
-        yield temporary
-        temporary.replace(target)
+        yield files
+        files.take_places()
+    finally:
+        _SET.reset(token)
+        files.remove()
+
+
+def standing_for(path: Path) -> Path:
+    """Where to read `path`: in a set that is being written, what was written for it."""
+    files = _SET.get()
+    return path if files is None else files.standing_for(path)
+
+
+def _target(path: Path) -> Path:
+    """A link stays a link; what it points to is replaced."""
+    return Path(os.path.realpath(path))
+
+
+def _require_ordinary(path: Path) -> None:
+    """Refuse a target that is no ordinary file, or that may not be changed."""
+    try:
+        state = path.stat()
+    except OSError:
+        return
+    kind = kind_of(state.st_mode)
+    if kind is not None:
+        raise _refusal(
+            Fault(
+                "output-not-writable",
+                f"the output path is {kind}",
+                found=kind,
+                expected="a file name",
+            ),
+            path,
+        )
+    # Whoever may do everything is not stopped by the mode; it still says what is meant.
+    if not state.st_mode & 0o222 or not os.access(path, os.W_OK):
+        raise _refusal(
+            Fault(
+                "output-not-writable",
+                "the output file is there and may not be changed",
+                found="a file that is read-only",
+                expected="a file that may be written, or another name",
+                hint=f"chmod u+w {path}",
+            ),
+            path,
+        )
+
+
+def kind_of(mode: int) -> str | None:
+    """What something is that is no ordinary file, by its mode."""
+    kinds = (
+        (stat.S_ISDIR, "a folder"),
+        (stat.S_ISFIFO, "a pipe"),
+        (stat.S_ISSOCK, "a socket"),
+        (stat.S_ISCHR, "a device"),
+        (stat.S_ISBLK, "a device"),
+    )
+    return next((name for is_kind, name in kinds if is_kind(mode)), None)
+
+
+def _take_over(temporary: Path, target: Path) -> None:
+    """Give a file the mode and the owner of the one whose place it takes."""
+    try:
+        old = target.stat()
+    except FileNotFoundError:
+        return
+    new = temporary.stat()
+    if (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
+        os.chown(temporary, old.st_uid, old.st_gid)
+    temporary.chmod(stat.S_IMODE(old.st_mode))
+
+
+def _on_disk(path: Path, how: int) -> None:
+    handle = os.open(path, how)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+@contextmanager
+def _refused(path: Path) -> Iterator[None]:
+    """What the system refuses, as a problem of the output."""
+    try:
+        yield
     except OSError as failure:
         raise _refusal(
             Fault(
@@ -154,9 +301,6 @@ def replacing(path: Path) -> Iterator[Path]:
             ),
             path,
         ) from failure
-    finally:
-        with suppress(OSError):
-            temporary.unlink()
 
 
 def _refusal(fault: Fault, path: Path) -> RequestError:

@@ -104,7 +104,7 @@ def test_witness_and_output_are_two_files(
 ) -> None:
     file = tmp_path / name
     outcome = call(capsys, "check", PLANAR, "--witness", file, "--output", file)
-    assert (outcome.code, outcome.codes, outcome.out) == (2, ["output-ending"], "")
+    assert (outcome.code, outcome.codes, outcome.out) == (2, ["output-twice"], "")
     assert not file.exists()
 
 

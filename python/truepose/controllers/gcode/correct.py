@@ -49,8 +49,9 @@ from truepose.controllers.gcode.tolerance import (
 )
 from truepose.controllers.gcode.work_offsets import Positions, WorkOffsets, named, work_offsets
 from truepose.errors import Problem, RequestError
+from truepose.files.one_run import reads
 from truepose.files.wording import one_of
-from truepose.files.writing import replacing, require_writable
+from truepose.files.writing import kind_of, replacing, require_writable
 from truepose.machine import Condition, Machine
 from truepose.runs.controller_geometry import (
     ROUNDING,
@@ -487,6 +488,10 @@ def _require_files(program: Path, written: Path | None, parameters: Path | None)
         raise _file_problem("file-missing", "there is no such program", program, "no such file")
     if program.is_dir():
         raise _file_problem("file-is-directory", "the program is a folder", program, "a folder")
+    # It is read more than once.
+    if (kind := kind_of(program.stat().st_mode)) is not None:
+        raise _file_problem("file-unreadable", f"the program is {kind}", program, kind)
+    reads(program)
     if not os.access(program, os.R_OK):
         raise _file_problem(
             "file-unreadable", "the program cannot be read", program, "no permission to read"

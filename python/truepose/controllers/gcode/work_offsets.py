@@ -15,6 +15,7 @@ from pathlib import Path
 
 from truepose.controllers.gcode._axes import AXES, DEGREE, LINEAR, MILLIMETRE, scale_of
 from truepose.errors import Problem, RequestError
+from truepose.files.one_run import reads
 from truepose.files.wording import one_of
 from truepose.machine import Machine
 
@@ -158,6 +159,7 @@ def _lines(path: Path) -> Iterator[tuple[int, float]]:
                 expected="the file that PARAMETER_FILE of LinuxCNC's INI names",
             )
         )
+    reads(path)
     try:
         with path.open("rb") as file:
             text = file.read(MOST_BYTES + 1)

@@ -1,0 +1,33 @@
+"""Commands are killed at random moments: every file whole, and files of one command of one run.
+
+`python -m kills` (tests/kills) does the same hundreds of times, over all commands that write.
+"""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from kills import COMMANDS, Kills
+from sweeps import thinned
+from truepose.cli import COMMANDS as ALL
+
+TEN = ["plan", "budget", "gcode", "export linuxcnc", "calibrate"]
+"""Twice each: at any moment, and while the files take their places."""
+
+
+@pytest.mark.parametrize("name", thinned(TEN))
+def test_killed_at_any_moment(name: str, tmp_path: Path) -> None:
+    kills = Kills(name, tmp_path)
+    chance = random.Random(name)  # noqa: S311
+    for aimed in (False, True):
+        killed = kills.one(chance, aimed=aimed)
+        assert not killed.half, killed
+        assert not killed.mixed, killed
+
+
+def test_every_command_that_writes_is_killed() -> None:
+    writes_the_same_way = {"compare", "over-time", "strain"}  # their one file by `deliver`
+    assert {name.split()[0] for name in COMMANDS} == set(ALL) - writes_the_same_way

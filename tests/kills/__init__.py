@@ -79,6 +79,9 @@ main()
 """
 """The command line, which tells a pipe when its files are about to take their places."""
 
+PATH = os.pathsep.join(str(Path(folder).resolve()) for folder in sys.path if folder)
+"""The same truepose as here, whatever the folder."""
+
 MOMENTS = 20e-3
 """s after that within which a command is killed."""
 
@@ -176,7 +179,7 @@ class Kills:
             [sys.executable, "-c", TELLING, *COMMANDS[self.name], *more],
             cwd=folder,
             pass_fds=(tells,),
-            env=os.environ | {"TELLS": str(tells)},
+            env=os.environ | {"TELLS": str(tells), "PYTHONPATH": PATH},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

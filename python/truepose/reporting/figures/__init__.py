@@ -32,6 +32,7 @@ from truepose.reporting.figures import (
     tornado,
     workspace_maps,
 )
+from truepose.reporting.figures._text import as_text
 from truepose.reporting.study import Study
 
 FIGURES: tuple[ModuleType, ...] = (
@@ -81,6 +82,6 @@ def draw(study: Study) -> Iterator[DrawnFigure]:
             name=module.__name__.rpartition(".")[2],
             title=module.TITLE,
             caption=module.caption(study),
-            figure=module.figure(study),
+            figure=as_text(module.figure(study)),
             needs=needed,
         )

@@ -77,11 +77,11 @@ def map_trace(
                 "coloraxis": scale,
             },
             hovertemplate=f"{first} %{{x:.2f}}, {second} %{{y:.2f}}, {third} %{{z:.2f}}"
-            f"<br>%{{marker.color:.2f}} {unit}<extra></extra>",
+            f"\n%{{marker.color:.2f}} {unit}<extra></extra>",
             showlegend=False,
         )
     first, second = places.axes
-    hover = f"{first} %{{x:.2f}}, {second} %{{y:.2f}}<br>"
+    hover = f"{first} %{{x:.2f}}, {second} %{{y:.2f}}\n"
     across, down = np.unique(points[:, 0]), np.unique(points[:, 1])
     if len(across) > 1 and len(down) > 1 and len(across) * len(down) == len(points):
         # Places are sorted by the first axis, then by the second.

@@ -46,7 +46,7 @@ def figure(study: Study) -> go.Figure:
             x=places,
             y=places,
             z=small(values),
-            customdata=np.array([[f"{one}<br>{other}" for one in names] for other in names]),
+            customdata=np.array([[f"{one}\n{other}" for one in names] for other in names]),
             zmin=-1.0,
             zmax=1.0,
             colorscale=SCALE,
@@ -59,7 +59,7 @@ def figure(study: Study) -> go.Figure:
                 "y": 1.02,
                 "yanchor": "bottom",
             },
-            hovertemplate="%{customdata}<br>%{z:.3f}<extra></extra>",
+            hovertemplate="%{customdata}\n%{z:.3f}<extra></extra>",
         )
     )
     size = min(max(16 * len(names), 340), 760)

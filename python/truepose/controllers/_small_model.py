@@ -9,6 +9,7 @@ it is printed. `printed` are the numbers as they stand in the controller's file,
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,8 +126,12 @@ def quantities(machine: Machine, text: str, dimension: str) -> list[float]:
 
 
 def stem(machine: Machine) -> str:
-    """The machine file's name without its ending, with which the names of files begin."""
-    return Path(machine.file).stem
+    """The machine file's name without its ending, with which the names of files begin.
+
+    In letters, digits, points and dashes that every system and shell takes as they are.
+    """
+    plain = re.sub(r"[^A-Za-z0-9.-]+", "_", Path(machine.file).stem)
+    return plain.strip("_.-") or "machine"
 
 
 __all__ = [

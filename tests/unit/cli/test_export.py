@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -138,3 +139,19 @@ def test_what_is_written_is_what_the_api_gives(
     files = controllers.export(tp.load(PLANAR), "pose-map", {"count": "3"}).files
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == files
     assert any(json.loads(text) for name, text in files.items() if name.endswith(".json"))
+
+
+@pytest.mark.parametrize(
+    "controller", ["c", "linuxcnc", "linuxcnc-lineardelta", "klipper", "marlin", "pose-map"]
+)
+def test_names_of_files_are_plain(
+    controller: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    machine = tmp_path / "-1a b;$(x)<u>é.toml"
+    machine.write_bytes((MACHINES / "linear_delta.toml").read_bytes())
+    done = call(capsys, "export", controller, machine, "-o", tmp_path / "out")
+    assert done.code == 0, done.err
+    written = [path.name for path in (tmp_path / "out").iterdir()]
+    assert written
+    for name in written:
+        assert re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]*", name), name

@@ -14,7 +14,7 @@ corrected = tp.compensate(m, poses)
 
 for index in range(len(poses)):
     row = corrected.isel(pose=index)
-    change = 1e6 * (row["joint"].values - row["joint_nominal"].values)
+    change = 1e6 * (row["joint_corrected"].values - row["joint_nominal"].values)
     print("command", np.round(1e3 * poses[index], 3), "change of joints, µm", np.round(change, 2))
 
 # Known errors are gone; unknown bands remain, at most the bound (to first order).

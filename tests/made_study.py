@@ -264,7 +264,7 @@ def _study(machine: Any, poses: Array) -> Study:
     }
     budget = _dataset(data, coords, attrs)
     remaining: dict[str, tuple[tuple[str, ...], Any, str]] = {
-        "joint": (("pose", "joint"), machine.kernel.place(poses)[0] + 1e-4, "m"),
+        "joint_corrected": (("pose", "joint"), machine.kernel.place(poses)[0] + 1e-4, "m"),
         "joint_nominal": data["joint_nominal"],
         "residual_lower": (("pose", "component"), -half.sum(axis=1), "m"),
         "residual_upper": (("pose", "component"), half.sum(axis=1), "m"),
@@ -273,8 +273,7 @@ def _study(machine: Any, poses: Array) -> Study:
         "second_order": (("pose", "component"), 1e-3 * half.sum(axis=1), "m"),
         "linear_maximum": (("pose", "quantity"), _sizes(half.sum(axis=1)), "m"),
     }
-    kept = {name: coords[name] for name in coords if name not in ("source", "joint")}
-    kept["joint_name"] = ("joint", list(machine.joints))
+    kept = {name: coords[name] for name in coords if name != "source"}
     compensation = _dataset(remaining, kept, attrs)
     return Study(
         machine,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+
+from truepose.errors import ArgumentError
 
 Floats = NDArray[np.float64]
 """Numbers, in SI units where they have one."""
@@ -16,3 +18,17 @@ Flags = NDArray[np.bool_]
 
 Codes = NDArray[np.uint8]
 """Codes of the kernel, such as the status of a pose (`truepose._kernel.STATUS`)."""
+
+
+def real_numbers(name: str, value: ArrayLike) -> Floats:
+    """The argument `name` as an array of real numbers, in its own shape.
+
+    Raises `ArgumentError` (bad-argument) for what is none, and for numbers that are masked.
+    """
+    try:
+        given = np.asarray(value)
+    except (TypeError, ValueError):
+        given = np.asarray(None)
+    if given.dtype.kind not in "fiub" or np.ma.is_masked(value):
+        raise ArgumentError.of(name, value, "an array of real numbers")
+    return given.astype(np.float64, copy=False)

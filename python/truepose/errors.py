@@ -116,6 +116,7 @@ CATALOGUE: dict[str, str] = {
     "bad-seed": "a seed of random numbers that is no whole number from 0 to 2^64 - 1",
     "nothing-varies": "shares of a variance are wanted, but no deviation has a band",
     "nothing-strains": "internal forces are wanted of a machine with as many closures as freedoms",
+    "bad-argument": "an argument of a call in Python is of another kind or shape",
     "bad-poses": "the poses given are not finite numbers of the right shape",
     "bad-region": "a region of the workspace that cannot be read, or is none",
     "region-out-of-reach": "a region with poses that the machine cannot be commanded to",
@@ -344,6 +345,27 @@ class MachineFileError(TrueposeError):
 
 class RequestError(TrueposeError):
     """What was asked of a good machine file is wrong: a setting, an option, poses, an output."""
+
+
+class ArgumentError(RequestError, TypeError, ValueError):
+    """An argument of a call is of another kind or shape than the call takes (bad-argument)."""
+
+    @classmethod
+    def of(cls, name: str, value: object, expected: str) -> ArgumentError:
+        """That `name` is no such thing as is expected."""
+        return cls(wrong_argument(name, value, expected))
+
+
+def wrong_argument(name: str, value: object, expected: str) -> Problem:
+    """The problem that the argument `name` is not what is expected."""
+    shown = repr(value) if isinstance(value, str | int | float | None) else ""
+    found = f"{shown[:60]}, of type " if shown else "something of type "
+    return Problem(
+        "bad-argument",
+        f"{name} is not what this call takes",
+        found=f"{found}{type(value).__name__}",
+        expected=expected,
+    )
 
 
 class PoseError(ValueError):

@@ -61,7 +61,7 @@ def used(twin: Twin, found: Calibration, folder: Path) -> list[Used]:
     poses = np.asarray(found.poses[found.usable], float)
     results = []
     ways: dict[str, Callable[[], Floats]] = {
-        "compensate": lambda: tp.compensate(machine, poses)["joint"].values,
+        "compensate": lambda: tp.compensate(machine, poses)["joint_corrected"].values,
         "gcode": lambda: _joints(twin, _program(machine, twin, poses, folder)),
         "pose-map": lambda: _joints(twin, _mapped(machine, twin, poses)),
     }

@@ -89,7 +89,7 @@ def by_compensation(use: InUse, file: Machine, folder: Path) -> Commanded:
     """The drawing's joints, and what compensation adds to those of its file."""
     found = tp.compensate(file, use.poses)
     assert found.sizes["pose"] == len(use.poses)
-    added = found["joint"].values - found["joint_nominal"].values
+    added = found["joint_corrected"].values - found["joint_nominal"].values
     return use.poses, use.drawing.inverse(use.poses) + added
 
 

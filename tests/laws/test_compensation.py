@@ -52,7 +52,7 @@ def test_with_exact_knowledge_nothing_remains(machine: MachineUnderTest) -> None
 def test_where_nothing_is_known_nothing_is_corrected(machine: MachineUnderTest) -> None:
     band = MadeSource("band", random_deviation(loaded(machine), machine.seed, shift=False))
     found = tp.compensate(with_sources(loaded(machine), band), machine.poses)
-    assert np.abs(found["joint"] - found.joint_nominal).max() < ROUNDING
+    assert np.abs(found["joint_corrected"] - found.joint_nominal).max() < ROUNDING
     errors = tp.budget(with_sources(loaded(machine), band), machine.poses)
     assert np.abs(found.residual_lower - errors.error_lower.sel(source="band")).max() < 1e-12
     assert np.abs(found.residual_upper - errors.error_upper.sel(source="band")).max() < 1e-12
@@ -84,7 +84,7 @@ def test_what_remains_is_within_the_bound(
     found = tp.compensate(with_sources(tool, MadeSource("s", deviation)), machine.poses)
     poses = found.pose.values
     placements = machine.placed[1][poses]
-    joints = found["joint"].values
+    joints = found["joint_corrected"].values
     if not has_majorant(tool):
         assert not found.proven.any()
         assert np.isnan(found.second_order).all()

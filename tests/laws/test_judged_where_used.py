@@ -131,7 +131,7 @@ def test_corrected_commands_of_known_deviations_lead_there(tmp_path: Path) -> No
     every = np.arange(len(written.parameters))
     assert corrected.sizes["pose"] > 10
     for at in np.asarray(corrected["pose"])[::7]:
-        joints = np.asarray(corrected["joint"].sel(pose=at))
+        joints = np.asarray(corrected["joint_corrected"].sel(pose=at))
         error, status = written.kernel.displacement(
             np.tile(joints, (len(moved), 1)),
             np.tile(written.kernel.placement_of(poses[at : at + 1]), (len(moved), 1)),

@@ -216,7 +216,9 @@ def commands_are_the_same(machine: MachineUnderTest) -> None:
     case = Turned(machine)
     first = tp.compensate(case.one, case.poses)
     second = tp.compensate(case.other, case.other_poses)
-    assert_close(second["joint"].values, first["joint"].values, "corrected joints", 1e-11)
+    assert_close(
+        second["joint_corrected"].values, first["joint_corrected"].values, "corrected joints", 1e-11
+    )
     before, after = first.residual_middle, second.residual_middle
     assert_close(whole(after), case.vectors(before), "residual")
 

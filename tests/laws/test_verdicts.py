@@ -142,7 +142,7 @@ def test_the_paper_s_machine_has_the_numbers_of_an_enumeration() -> None:
     shift = two_slider.LENGTH * (1.1e-5 * 15.0 + tensions / (area * modulus))
     ends = np.array(list(itertools.product((-BAND, BAND), repeat=2)))
     nominal = machine.inverse(poses)
-    corrected = tp.compensate(machine)["joint"].values
+    corrected = tp.compensate(machine)["joint_corrected"].values
     found = {}
     for state, joints in ((BEFORE, nominal), (AFTER, corrected)):
         errors = [

@@ -186,4 +186,4 @@ class Rig:
         )
         result = tp.compensate(self.machine, poses * self.units, condition)
         assert result.sizes["pose"] == len(poses)
-        return np.asarray(result["joint"].values / self.joint_units)
+        return np.asarray(result["joint_corrected"].values / self.joint_units)

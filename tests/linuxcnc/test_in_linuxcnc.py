@@ -126,7 +126,7 @@ class Study:
             temperature={"default": reference, **kelvin}, force=force, moment=(0.0, 0.0, 0.0)
         )
         result = tp.compensate(machine, np.asarray(pose) * self.units, condition)
-        return np.asarray(result["joint"].values[0]) * 1e3
+        return np.asarray(result["joint_corrected"].values[0]) * 1e3
 
     def words(self, pose: Sequence[float]) -> str:
         """`X1.0 Y2.0`."""

@@ -111,7 +111,7 @@ def test_tables_of_the_highest(row: str) -> None:
 
 def test_compensated_joints() -> None:
     expected = metres(OUTPUTS["joints_compensated_mm"])
-    assert np.abs(compensation()["joint"].values - expected).max() < LENGTH
+    assert np.abs(compensation()["joint_corrected"].values - expected).max() < LENGTH
 
 
 @pytest.mark.parametrize("edge", ["upper", "lower"])
@@ -143,9 +143,9 @@ def test_half_the_tolerance_range_remains() -> None:
     half_range = 0.3e-3 * np.abs(sensitivity[:, :, lengths]).sum(axis=-1)
     assert np.allclose(compensation().bound.values, half_range, rtol=1e-3)
     # Exactly, of the struts as long as they are, from the corrected carriages to the tool.
-    carriages = np.zeros((*compensation()["joint"].shape, 2))
+    carriages = np.zeros((*compensation()["joint_corrected"].shape, 2))
     carriages[:, 1, 0] = 0.6
-    carriages[:, :, 1] = compensation()["joint"].values
+    carriages[:, :, 1] = compensation()["joint_corrected"].values
     struts = machine().poses()[:, np.newaxis] - carriages
     struts /= np.linalg.norm(struts, axis=2, keepdims=True)
     half_range = 0.3e-3 * np.abs(np.linalg.inv(struts)).sum(axis=-1)

@@ -27,7 +27,7 @@ def test_threads_by_call() -> None:
     try:
         assert truepose.threads(3) == 3
         assert truepose.threads() == 3
-        with pytest.raises(ValueError, match="at least one"):
+        with pytest.raises(ValueError, match="from 1 to 1024"):
             truepose.threads(0)
     finally:
         truepose.threads(before)

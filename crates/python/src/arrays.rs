@@ -1,11 +1,13 @@
 //! Arrays in and out: any real dtype and layout in, C-contiguous float64 out.
 
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyDict;
 use truepose_kernel::batch::Rows;
+
+use crate::failure::argument_error;
 
 /// An array of results.
 pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
@@ -30,16 +32,16 @@ impl<'py> Input<'py> {
         let array = contiguous(object, what)?;
         let shape = array.shape();
         let Some((&width, leading)) = shape.split_last() else {
-            let message =
-                format!("{what}: a single number has no rows; give an array (..., {})", widths[0]);
-            return Err(PyValueError::new_err(message));
+            let message = format!("{what}: a single number has no rows");
+            let expected = format!("an array (..., {})", widths[0]);
+            return Err(argument_error(&message, "shape ()", &expected));
         };
         if !widths.contains(&width) {
             let expected: Vec<String> =
                 widths.iter().map(|width| format!("(..., {width})")).collect();
-            let message =
-                format!("{what}: found shape {shape:?}, expected {}", expected.join(" or "));
-            return Err(PyValueError::new_err(message));
+            let message = format!("{what}: this is no shape of the argument");
+            let expected = format!("an array {}", expected.join(" or "));
+            return Err(argument_error(&message, &format!("shape {shape:?}"), &expected));
         }
         let (leading, count) = (leading.to_vec(), leading.iter().product());
         Ok(Input { array, leading, width, count, what })
@@ -62,10 +64,12 @@ impl<'py> Input<'py> {
         } else if self.count == count {
             Ok(Rows::each(self.data(), self.width))
         } else {
-            let (what, found) = (self.what, self.count);
-            let message =
-                format!("{what}: found {found} rows for {count} samples, expected {count} or 1");
-            Err(PyValueError::new_err(message))
+            let message = format!("{}: these are not as many rows as samples", self.what);
+            Err(argument_error(
+                &message,
+                &format!("{} rows for {count} samples", self.count),
+                &format!("{count} or 1"),
+            ))
         }
     }
 
@@ -80,7 +84,7 @@ fn contiguous<'py>(
     object: &Bound<'py, PyAny>,
     what: &str,
 ) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
-    if let Ok(array) = object.cast::<PyArrayDyn<f64>>()
+    if let Ok(array) = object.cast_exact::<PyArrayDyn<f64>>()
         && array.is_c_contiguous()
     {
         return Ok(array.readonly());
@@ -88,12 +92,22 @@ fn contiguous<'py>(
     let py = object.py();
     static ASARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let asarray = ASARRAY.import(py, "numpy", "ascontiguousarray")?;
-    let array = asarray.call1((object,))?;
+    let refused = |found: String| {
+        let message = format!("{what}: expected real numbers");
+        Err(argument_error(&message, &found, "an array of real numbers"))
+    };
+    let Ok(array) = asarray.call1((object,)) else {
+        return refused(format!("something of type {}", object.get_type().name()?));
+    };
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if !["f", "i", "u", "b"].contains(&kind.as_str()) {
-        let message =
-            format!("{what}: expected real numbers, found dtype {}", array.getattr("dtype")?);
-        return Err(PyTypeError::new_err(message));
+        return refused(format!("dtype {}", array.getattr("dtype")?));
+    }
+    // A masked array says which of its numbers do not count, which an array of them cannot.
+    if let Ok(mask) = object.getattr("mask")
+        && mask.call_method0("any").is_ok_and(|any| any.is_truthy().unwrap_or(true))
+    {
+        return refused("a masked array with numbers that do not count".to_owned());
     }
     // ascontiguousarray makes a scalar an array of one; keep it a scalar for the shape's message.
     let shape_source =

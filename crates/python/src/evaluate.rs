@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use truepose_kernel::Status;
 use truepose_kernel::batch::{self, Deviations, Rows, Samples};
 use truepose_kernel::kinematics::{self, Obstacle};
-use truepose_kernel::machine::indices_of;
+use truepose_kernel::machine::{FREEDOMS, indices_of};
 use truepose_kernel::spatial::Pose;
 
 /// Joints and poses of commands, with their status.
@@ -20,6 +20,13 @@ pub struct Placed {
     pub joints: Vec<f64>,
     pub poses: Vec<f64>,
     pub status: Vec<Status>,
+}
+
+/// Rows that were given to a call, of which one may fail.
+#[derive(Clone, Copy)]
+pub enum Given<'a, 'py> {
+    Commands(&'a Input<'py>),
+    Joints(&'a Input<'py>),
 }
 
 impl Machine {
@@ -139,7 +146,7 @@ impl Machine {
                 *status = inverse;
             }
         }
-        self.answer(py, out, &commands.leading, &status, want_status, Some(commands))
+        self.answer(py, out, &commands.leading, &status, want_status, Given::Commands(commands))
     }
 
     /// The result with its status, or one error for all failing poses.
@@ -150,7 +157,7 @@ impl Machine {
         leading: &[usize],
         status: &[Status],
         want_status: bool,
-        commands: Option<&Input<'_>>,
+        given: Given<'_, '_>,
     ) -> PyResult<Bound<'py, PyAny>> {
         if want_status {
             return (result, codes(py, leading, status)?).into_bound_py_any(py);
@@ -159,23 +166,35 @@ impl Machine {
             None => Ok(result.into_any()),
             Some(index) => {
                 let count = status.iter().filter(|&&status| status != Status::Ok).count();
-                let reason = match commands {
-                    Some(commands) => {
-                        let width = commands.width;
-                        self.reason(
-                            &commands.data()[index * width..(index + 1) * width],
-                            status[index],
-                        )
-                    }
-                    None => plain_reason(status[index]).to_owned(),
-                };
+                let reason = self.reason(given, index, status[index]);
                 Err(pose_error(py, count, index, status[index].name(), reason))
             }
         }
     }
 
-    fn reason(&self, command: &[f64], status: Status) -> String {
+    /// Why the row at this index fails.
+    fn reason(&self, given: Given<'_, '_>, index: usize, status: Status) -> String {
         let machine = &self.inner;
+        let (input, names): (_, Vec<String>) = match given {
+            Given::Commands(poses) => {
+                let all = poses.width == self.components();
+                let freedoms = if all { &machine.dof } else { &machine.commanded };
+                (
+                    poses,
+                    indices_of(freedoms).into_iter().map(|at| FREEDOMS[at].to_owned()).collect(),
+                )
+            }
+            Given::Joints(joints) => {
+                let names =
+                    machine.drives.iter().map(|drive| format!("the joint of {}", drive.name));
+                (joints, names.collect())
+            }
+        };
+        let command = &input.data()[index * input.width..(index + 1) * input.width];
+        if let Some(at) = command.iter().position(|number| !number.is_finite()) {
+            return format!("{} is {}, which is no finite number", names[at], command[at]);
+        }
+        let Given::Commands(_) = given else { return plain_reason(status).to_owned() };
         let pose = kinematics::commanded_pose(machine, command);
         let parts: Vec<String> = kinematics::obstacles(machine, &machine.nominal, &pose)
             .into_iter()

@@ -36,14 +36,30 @@ pub fn pose_error(
     }
 }
 
+/// A `truepose.errors.ArgumentError`, which is a TypeError and a ValueError too.
+pub fn argument_error(message: &str, found: &str, expected: &str) -> PyErr {
+    Python::attach(|py| raised(py, "ArgumentError", "bad-argument", message, found, expected))
+}
+
 /// A `truepose.errors.RequestError` of code bad-setting.
 pub fn request_error(py: Python<'_>, message: &str, found: &str, expected: &str) -> PyErr {
+    raised(py, "RequestError", "bad-setting", message, found, expected)
+}
+
+fn raised(
+    py: Python<'_>,
+    class: &str,
+    code: &str,
+    message: &str,
+    found: &str,
+    expected: &str,
+) -> PyErr {
     let raised = py.import("truepose.errors").and_then(|module| {
         let parts = PyDict::new(py);
         parts.set_item("found", found)?;
         parts.set_item("expected", expected)?;
-        let problem = module.getattr("Problem")?.call(("bad-setting", message), Some(&parts))?;
-        module.getattr("RequestError")?.call1((problem,))
+        let problem = module.getattr("Problem")?.call((code, message), Some(&parts))?;
+        module.getattr(class)?.call1((problem,))
     });
     match raised {
         Ok(error) => PyErr::from_value(error),

@@ -27,20 +27,21 @@ use truepose_kernel::batch::{self, InstructionSet};
 #[pyfunction]
 #[pyo3(signature = (n=None))]
 fn threads(n: Option<&Bound<'_, PyAny>>) -> PyResult<usize> {
+    let expected = format!("a whole number from 1 to {}", batch::MOST_THREADS);
+    let refused = |found: &str| {
+        failure::argument_error("so many threads cannot share a batch", found, &expected)
+    };
     if let Some(given) = n {
         match given.extract::<usize>() {
             Ok(count) if (1..=batch::MOST_THREADS).contains(&count) => batch::set_threads(count),
             Ok(count) if count > 0 => {
-                let message = format!("at most {} threads share a batch", batch::MOST_THREADS);
-                return Err(pyo3::exceptions::PyValueError::new_err(message));
+                return Err(refused(&given.to_string()));
             }
             _ if given.is_instance_of::<PyInt>() => {
-                let message = format!("at least one thread is needed, not {given}");
-                return Err(pyo3::exceptions::PyValueError::new_err(message));
+                return Err(refused(&given.to_string()));
             }
             _ => {
-                let message = "the number of threads is a whole number from 1 on";
-                return Err(pyo3::exceptions::PyTypeError::new_err(message));
+                return Err(refused(&format!("something of type {}", given.get_type().name()?)));
             }
         }
     }

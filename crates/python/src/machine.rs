@@ -2,6 +2,7 @@
 
 use crate::arrays::{Array, Input, filled, output};
 use crate::description::description;
+use crate::evaluate::Given;
 use crate::failure::{KernelError, kernel_error};
 use crate::quantity::Quantity;
 use crate::samples::{BLOCK, in_blocks_into, with_codes, write_coordinates};
@@ -157,7 +158,7 @@ impl Machine {
         let placed = self.placed(py, &commands, &Deviations::NONE)?;
         let width = self.inner.drives.len();
         let out = filled(py, &commands.leading, &[width], &placed.joints)?;
-        self.answer(py, out, &commands.leading, &placed.status, status, Some(&commands))
+        self.answer(py, out, &commands.leading, &placed.status, status, Given::Commands(&commands))
     }
 
     /// (..., n_joint) -> (..., n_dof); start: (..., n_dof) or (..., n_commanded), default home.
@@ -209,7 +210,7 @@ impl Machine {
                 }
             })?
         };
-        self.answer(py, out, &joints.leading, &codes, status, None)
+        self.answer(py, out, &joints.leading, &codes, status, Given::Joints(&joints))
     }
 
     /// (..., n_commanded) -> (..., n_component, n_parameter).
@@ -264,7 +265,7 @@ impl Machine {
                 };
             }
         })?;
-        self.answer(py, out, &commands.leading, &placed.status, status, Some(&commands))
+        self.answer(py, out, &commands.leading, &placed.status, status, Given::Commands(&commands))
     }
 
     /// Strut tensions (N), (..., n_closure), under a wrench (..., 6) on the tool.

@@ -55,6 +55,7 @@ from truepose.calibration.residual_checks import residual_patterns
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.representation import Facts, Represented
+from truepose.runs.arguments import checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -154,6 +155,7 @@ class Calibration(Represented):
         return dataset_of(self)
 
 
+@checked
 def calibrate(
     machine: Machine,
     data: Measurements | str | Path,

@@ -13,6 +13,7 @@ from truepose.compensation.corrected import corrected_deviations
 from truepose.compensation.remainder import Remainder
 from truepose.error_budget.largest import largest
 from truepose.machine import Condition, Machine
+from truepose.runs.arguments import checked
 from truepose.runs.controller_geometry import (
     ROUNDING,
     nothing_to_correct,
@@ -25,7 +26,6 @@ from truepose.runs.poses import (
     Progress,
     of_band,
     of_correction,
-    required_machine,
 )
 from truepose.runs.quantities import quantities
 from truepose.runs.run import Run
@@ -35,7 +35,7 @@ from truepose.sources import Deviation, PoseBlock, Source
 _ALL = ("pose", "component")
 
 SCHEMA: Schema = {
-    "joint": Variable(("pose", "joint"), "joint", "joint coordinate, corrected command"),
+    "joint_corrected": Variable(("pose", "joint"), "joint", "joint coordinate, corrected command"),
     "joint_nominal": Variable(("pose", "joint"), "joint", "joint coordinate, nominal command"),
     "residual_lower": Variable(
         _ALL, "component", "error of the corrected command, all lengths at their lower ends"
@@ -64,6 +64,7 @@ SCHEMA: Schema = {
 }
 
 
+@checked
 def compensate(
     machine: Machine,
     poses: ArrayLike | None = None,
@@ -89,7 +90,6 @@ def compensate(
     `truepose.budget`; `RequestError` (controller-unsaid, controller-contradicted) for a calibrated
     file of which it is not known with which geometry its controller works.
     """
-    required_machine(machine)
     require_known_controller(machine)
     return against_nominal(machine, poses, condition, progress=progress)
 
@@ -115,7 +115,7 @@ def against_nominal(
         values, followed, edges = _correct(machine, block, run.sources, deviations, remainder)
         run.fill(block, values, shifted, *map(of_correction, followed), *map(of_band, edges))
     dataset = run.dataset(coords=quantity_coords(machine))
-    moved = np.abs(dataset["joint"] - dataset["joint_nominal"]).max()
+    moved = np.abs(dataset["joint_corrected"] - dataset["joint_nominal"]).max()
     if max(moved, np.abs(dataset["residual_middle"]).max()) < ROUNDING:
         dataset.attrs["warnings"] = json.dumps([nothing_to_correct(machine)])
     return dataset
@@ -139,7 +139,7 @@ def _correct(
     kinds = list(quantities(machine.components).values())
     bounds = remainder.bound(after, variables, middle, effects)
     values = {
-        "joint": after.joints,
+        "joint_corrected": after.joints,
         "joint_nominal": block.joints,
         "residual_middle": middle,
         "bound": np.maximum(*variables.domain.reach(effects)),

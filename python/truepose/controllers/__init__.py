@@ -13,6 +13,7 @@ from truepose.controllers._export import Controller, Export, Option, options_of
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
+from truepose.runs.arguments import checked
 
 REGISTRY: dict[str, str] = {
     "c": "truepose.controllers.c:C",
@@ -44,6 +45,7 @@ def controller(name: str) -> type[Controller]:
     return adapter
 
 
+@checked
 def export(machine: Machine, name: str, options: Mapping[str, str] | Sequence[str] = ()) -> Export:
     """What the controller `name` is to be given for `machine` in the file's condition.
 

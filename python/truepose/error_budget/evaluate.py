@@ -17,6 +17,7 @@ from truepose.error_budget.guide_loads import GuideLoads
 from truepose.error_budget.largest import largest, lengths
 from truepose.machine import Condition, Machine
 from truepose.runs import displacement, percent
+from truepose.runs.arguments import checked
 from truepose.runs.dataset import Schema, Variable, label, quantity_coords
 from truepose.runs.first_order import effects_at, rows_of
 from truepose.runs.poses import OK, Progress, of_band
@@ -115,6 +116,7 @@ _HIGHEST = {
 }
 
 
+@checked
 def budget(
     machine: Machine,
     poses: ArrayLike | None = None,

@@ -12,8 +12,9 @@ from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs import displacement
+from truepose.runs.arguments import checked
 from truepose.runs.dataset import Schema, Variable, label
-from truepose.runs.poses import BLOCK, OK, Progress, required_machine
+from truepose.runs.poses import BLOCK, OK, Progress
 from truepose.runs.run import Run
 from truepose.sources import PoseBlock, Thermal
 
@@ -31,6 +32,7 @@ _FILLED: Schema = {
 }
 
 
+@checked
 def over_time(
     machine: Machine,
     poses: ArrayLike | None = None,
@@ -49,7 +51,6 @@ def over_time(
     Raises `RequestError`: no-temperature-log, bad-times, outside-log, bad-poses, no-pose-left;
     `TrueposeError` (no-expansion) where a part is logged that does not say how it expands.
     """
-    required_machine(machine)
     given = machine.condition if condition is None else condition
     moments = _times(machine, given, times)
     thermal, parts = Thermal(requested=True), machine.parts

@@ -26,11 +26,11 @@ from truepose.error_budget import worst
 from truepose.error_budget.comparison import Highest
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.arguments import checked
 from truepose.runs.dataset import Schema, Variable, label
 from truepose.runs.displacement import ParameterDeviation, sum_deviations
 from truepose.runs.poses import (
     Progress,
-    required_machine,
 )
 from truepose.runs.run import Run
 from truepose.sources import Clearance, Deviation, Elastic, Loads, PoseBlock, Source
@@ -71,6 +71,7 @@ _OF_LOADS = (Elastic, Loads)
 """Deflections under load. They always fit, to first order; here the loads act themselves."""
 
 
+@checked
 def strain(
     machine: Machine,
     poses: ArrayLike | None = None,
@@ -89,7 +90,6 @@ def strain(
     Raises `RequestError`: nothing-strains where there are as many closures as freedoms; bad-poses,
     no-workspace, no-source, no-pose-left; `TrueposeError` as the sources do.
     """
-    required_machine(machine)
     if not machine.kernel.overconstrained:
         raise RequestError(_nothing_strains(machine))
     run = Run(machine, poses, condition, progress)

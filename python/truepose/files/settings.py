@@ -7,11 +7,13 @@ from difflib import get_close_matches
 from fnmatch import fnmatchcase
 from typing import Any
 
-from truepose.errors import Problem, RequestError
+from truepose.errors import ArgumentError, Problem, RequestError
 from truepose.files.document import SEVERAL, Document, Key
 from truepose.files.limits import DEEPEST_NESTING, LONGEST_QUANTITY
 from truepose.files.toml_text import TomlError, parse_toml
 from truepose.files.units import shown_value
+
+_SETTINGS = 'settings, such as ["condition.temperature=30"], or a dict of them'
 
 _COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
@@ -64,11 +66,22 @@ class _LeadsNowhereError(Exception):
         self.message, self.found, self.expected, self.hint = message, found, expected, hint
 
 
+def require_settings(settings: object) -> None:
+    """Raise `ArgumentError` (bad-argument) for what are no settings."""
+    fits = isinstance(settings, Mapping) or (
+        isinstance(settings, Sequence)
+        and not isinstance(settings, str)
+        and all(isinstance(setting, str) for setting in settings)
+    )
+    if not fits:
+        raise ArgumentError.of("settings", settings, _SETTINGS)
+
+
 def _pairs(
     settings: Mapping[str, str] | Sequence[str], problems: list[Problem]
 ) -> Iterable[tuple[str, str]]:
     if isinstance(settings, Mapping):
-        yield from ((path.strip(), str(text)) for path, text in settings.items())
+        yield from ((str(path).strip(), str(text)) for path, text in settings.items())
         return
     for setting in settings:
         path, equals, text = setting.partition("=")

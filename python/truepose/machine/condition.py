@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ValidationError
 
-from truepose.arrays import Floats
-from truepose.errors import Problem, RequestError
+from truepose.arrays import Floats, real_numbers
+from truepose.errors import ArgumentError, Problem, RequestError
 from truepose.files.units import UnitSystem, default_units, shown_value
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine.parts import Vector, is_body
@@ -51,7 +51,7 @@ class Envelope:
     normal: Vector | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.force) and self.force >= 0.0):
+        if not (_finite(self.force) and self.force >= 0.0):
             raise _bad("envelope", str(self.force), "a force of zero or more, N")
         if self.normal is None:
             return
@@ -103,14 +103,17 @@ class Condition:
     source_tables: tuple[BaseModel, ...] = ()
 
     def __post_init__(self) -> None:
+        for name in _MAPPINGS:
+            if not isinstance(getattr(self, name), Mapping):
+                raise _bad(name, repr(getattr(self, name)), "values by the paths of parts")
         temperatures = {
             "reference_temperature": self.reference_temperature,
             "temperature": self.default_temperature,
             **self.part_temperatures,
         }
         for name, value in temperatures.items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise _bad(name, str(value), "a temperature above absolute zero, K")
+            if not (_finite(value) and value > 0.0):
+                raise _bad(str(name), str(value), "a temperature above absolute zero, K")
         vectors = {
             "force": self.force,
             "moment": self.moment,
@@ -118,14 +121,13 @@ class Condition:
             **{f"gradient.{part}": gradient for part, gradient in self.gradients.items()},
         }
         for name, vector in vectors.items():
-            if len(vector) != 3 or not all(math.isfinite(component) for component in vector):
-                raise _bad(name, str(vector), "three finite components")
+            _vector(name, vector)
         for part, gradient in self.gradients.items():
-            if part.startswith(_ALONG) and any(gradient[1:]):
+            if str(part).startswith(_ALONG) and any(gradient[1:]):
                 raise _bad(f"gradient.{part}", str(gradient), "one number, along itself, K/m")
-        if not (math.isfinite(self.gravity) and self.gravity >= 0.0):
+        if not (_finite(self.gravity) and self.gravity >= 0.0):
             raise _bad("gravity", str(self.gravity), "an acceleration of zero or more, m/s^2")
-        if self.time is not None and not math.isfinite(self.time):
+        if self.time is not None and not _finite(self.time):
             raise _bad("time", str(self.time), "a finite time, s")
         for name in _MAPPINGS:
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
@@ -139,6 +141,8 @@ class Condition:
 
         (n,) at `times` (n,), s, where it comes from the log; else one number.
         """
+        if not isinstance(part, str):
+            raise ArgumentError.of("part", part, "the path of a part, such as strut.1")
         log = self.temperature_log
         if part in self.part_temperatures:
             return self.part_temperatures[part]
@@ -223,19 +227,23 @@ class Condition:
             if DEFAULT_PART in temperature and self.temperature_log is not None:
                 # What a condition names goes before the log, and so does its default.
                 changes["temperature_log"] = self.temperature_log.without(DEFAULT_PART)
-            changes["default_temperature"] = float(
-                temperature.get(DEFAULT_PART, self.default_temperature)
+            changes["default_temperature"] = _number(
+                "temperature", temperature.get(DEFAULT_PART, self.default_temperature)
             )
             changes["part_temperatures"] = dict(self.part_temperatures) | {
-                part: float(value) for part, value in temperature.items() if part != DEFAULT_PART
+                part: _number(f"temperature.{part}", value)
+                for part, value in temperature.items()
+                if part != DEFAULT_PART
             }
         elif temperature is not None:
             changes |= {
-                "default_temperature": float(temperature),
+                "default_temperature": _number("temperature", temperature),
                 "part_temperatures": {},
                 "temperature_log": None,
             }
         if gradient is not None:
+            if not isinstance(gradient, Mapping):
+                raise _bad("gradient", repr(gradient), "gradients by the paths of parts")
             changes["gradients"] = dict(self.gradients) | {
                 part: _along(part, value) for part, value in gradient.items()
             }
@@ -245,16 +253,22 @@ class Condition:
             ("gravity", gravity),
         ):
             if number is not None:
-                changes[name] = float(number)
+                changes[name] = _number(name, number)
         for name, vector in (("force", force), ("moment", moment), ("acceleration", acceleration)):
             if vector is not None:
                 changes[name] = _vector(name, vector)
         if temperature_log is not None:
             changes["temperature_log"] = temperature_log
         if envelope is not None:
-            given = envelope if isinstance(envelope, Envelope) else Envelope(float(envelope))
+            given = (
+                envelope
+                if isinstance(envelope, Envelope)
+                else Envelope(_number("envelope", envelope))
+            )
             changes["envelope"] = given if given.force > 0.0 else None
         if source_keys is not None:
+            if not isinstance(source_keys, Mapping):
+                raise _bad("source_keys", repr(source_keys), "values by key")
             changes["source_tables"] = self._with_source_keys(source_keys)
         return dataclasses.replace(self, **changes)  # type: ignore[arg-type]
 
@@ -282,18 +296,38 @@ class Condition:
             object.__setattr__(self, name, MappingProxyType(getattr(self, name)))
 
 
+def _finite(value: object) -> bool:
+    """Whether it is a number, and a finite one."""
+    try:
+        return math.isfinite(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def _number(name: str, value: object) -> float:
+    """A finite number. Raises `RequestError` (bad-condition)."""
+    if not _finite(value) or isinstance(value, str | bytes):
+        raise _bad(name, str(value), "a finite number")
+    return float(value)  # type: ignore[arg-type]
+
+
 def _along(part: str, value: float | Sequence[float]) -> Vector:
     if isinstance(value, (int, float)):
         if is_body(part):
             raise _bad(f"gradient.{part}", str(value), "three numbers, along its axes, K/m")
-        return (float(value), 0.0, 0.0)
+        return (_number(f"gradient.{part}", value), 0.0, 0.0)
     return _vector(f"gradient.{part}", value)
 
 
 def _vector(name: str, values: Sequence[float]) -> Vector:
-    if len(values) != 3:
+    """Three finite numbers. Raises `RequestError` (bad-condition)."""
+    try:
+        given = real_numbers(name, values)
+    except ArgumentError:
+        given = np.empty(0)
+    if given.shape != (3,) or not np.isfinite(given).all():
         raise _bad(name, str(values), "three finite components")
-    x, y, z = (float(value) for value in values)
+    x, y, z = given.tolist()
     return (x, y, z)
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from os import PathLike
 from pathlib import Path
 
 from pydantic import BaseModel
 
-from truepose.errors import Fault, MachineFileError, Problem
+from truepose.errors import ArgumentError, Fault, MachineFileError, Problem
 from truepose.files.data_file import DataFiles
 from truepose.files.document import Document, read
-from truepose.files.settings import apply
+from truepose.files.settings import apply, require_settings
 from truepose.files.units import shown_value
 from truepose.machine import build_kernel, build_parts, build_workspace, checks, validation
 from truepose.machine.condition import Condition
@@ -41,8 +42,11 @@ def load(
     `["strut.1.length=501"]`. `registry`: the error sources that may read keys of the file.
 
     Raises `MachineFileError` with every problem of the file, `RequestError` for a setting that
-    leads nowhere.
+    leads nowhere, `ArgumentError` for a path or settings of another kind.
     """
+    if not isinstance(path, str | PathLike):
+        raise ArgumentError.of("path", path, "the name of a machine file")
+    require_settings(settings)
     document = read(path)
     owned = owners(source.tables for source in registry)
     share_each(document, settings, owned.free_tables)

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from truepose._kernel import STATUS
 from truepose._kernel import Machine as KernelMachine
-from truepose.arrays import Flags, Floats, Indices
-from truepose.errors import PoseError, Problem, RequestError
+from truepose.arrays import Flags, Floats, Indices, real_numbers
+from truepose.errors import ArgumentError, PoseError, Problem, RequestError
 from truepose.files.shown_units import ShownUnits, shown_units
 from truepose.files.units import FileUnit
 from truepose.files.wording import did_you_mean, one_of
@@ -265,7 +265,9 @@ class Machine(Represented):
         `lengths` (n, n_strut): present length of each strut, m. The first n_strut columns are the
         struts' lengths. In series along the limb; 0, rigid, where the file says nothing.
         """
-        given = np.atleast_2d(np.asarray(lengths, np.float64))
+        given = np.atleast_2d(real_numbers("lengths", lengths))
+        if given.ndim != 2 or given.shape[1] != len(self.struts):
+            raise ArgumentError.of("lengths", lengths, f"an array (n, {len(self.struts)})")
         return compliances(self.kernel, self.drives, self.struts, given)
 
     @property
@@ -301,7 +303,7 @@ class Machine(Represented):
         self, block: Callable[..., WithStatus], poses: ArrayLike, status: bool
     ) -> Floats | WithStatus:
         self._require_stiffness()
-        given = np.asarray(poses)
+        given = real_numbers("poses", poses)
         # The public inverse checks the poses, and raises for those that it cannot use.
         self.kernel.inverse(given, status=status)
         leading, size = given.shape[:-1], len(self.components)
@@ -347,9 +349,10 @@ class Machine(Represented):
         (unknown-parameter) and every value that is not finite, or not above zero where it must be.
         """
         if not isinstance(values, Mapping):
-            raise TypeError(
-                "values are given by the names of parameters, {'strut.1.length': 0.5003}, "
-                f"not as {type(values).__name__}"
+            raise ArgumentError.of(
+                "values",
+                values,
+                "values by the names of parameters, such as {'strut.1.length': 0.5003}",
             )
         problems = [
             problem
@@ -401,6 +404,8 @@ class Machine(Represented):
 
     def check_condition(self, condition: Condition) -> None:
         """Raise `RequestError` (unknown-part) with every part that the machine does not have."""
+        if not isinstance(condition, Condition):
+            raise ArgumentError.of("condition", condition, "a truepose.Condition")
         known_parts = self.parts
         problems = [
             Problem(

@@ -127,7 +127,7 @@ def assemble(
     values, units = {**rows.arrays, **(over_all or {})}, _units(machine)
     data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
-        **_machine_coords(machine, schema),
+        **_machine_coords(machine),
         **_pose_coords(machine, rows, poses),
         **_left_out_coords(machine, poses, left_out),
         **(coords or {}),
@@ -217,9 +217,7 @@ def _units(machine: Machine) -> dict[str, Sequence[str]]:
     }
 
 
-def _machine_coords(machine: Machine, schema: Schema) -> dict[str, xr.Variable]:
-    # xarray makes a variable that is named as one of its dims the coordinate of that name.
-    joint = "joint" if "joint" not in schema else "joint_name"
+def _machine_coords(machine: Machine) -> dict[str, xr.Variable]:
     return {
         "component": label(
             "component",
@@ -227,7 +225,7 @@ def _machine_coords(machine: Machine, schema: Schema) -> dict[str, xr.Variable]:
             "component of a small displacement of the tool point and a rotation vector, base frame",
         ),
         "component_units": label("component", component_units(machine), "unit of the component"),
-        joint: label("joint", list(machine.joints), "actuated joint"),
+        "joint": label("joint", list(machine.joints), "actuated joint"),
         "joint_units": label("joint", joint_units(machine), "unit of the joint coordinate"),
         "closure": label("closure", list(machine.closures), "closure, named by its strut or guide"),
     }

@@ -50,14 +50,6 @@ REASONS = (*STATUS, BAND, *(f"{CORRECTION}{name}" for name in STATUS))
 """Why a pose may be left out: a kernel status, or what a command found that looked further."""
 
 
-def required_machine(given: object) -> None:
-    """Raise `TypeError` where something else, such as a file's name, is given for a machine."""
-    if not isinstance(given, Machine):
-        raise TypeError(
-            f"a machine is wanted, as truepose.load returns it, not {type(given).__name__}"
-        )
-
-
 def requested_poses(machine: Machine, poses: ArrayLike | None) -> Floats:
     """(n, n_commanded) poses of a run, SI: those given, in any leading shape, or the file's.
 

@@ -30,7 +30,6 @@ from truepose.runs.poses import (
     is_path,
     no_pose_left,
     requested_poses,
-    required_machine,
     required_sources,
 )
 from truepose.runs.variables import Variables, variables_at
@@ -58,7 +57,6 @@ class Run(PoseRun):
 
         Raises `RequestError`: bad-poses, no-workspace, no-source, unknown-part.
         """
-        required_machine(machine)
         given = machine.condition if condition is None else condition
         table = requested_poses(machine, poses)
         self.sources = required_sources(machine, given) if sources is None else tuple(sources)

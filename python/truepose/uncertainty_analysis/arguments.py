@@ -12,6 +12,12 @@ from truepose.files.limits import MOST_SAMPLES
 SEEDS = 2**64
 """How many seeds there are."""
 
+DIGITS = 1
+"""Significant digits of a standard uncertainty that are made stable where nobody says how many.
+
+A second one takes a hundred times as many samples.
+"""
+
 MOST_DIGITS = range(1, 7)
 """Significant digits of a standard uncertainty that can be asked for."""
 
@@ -28,7 +34,7 @@ def required_probability(probability: float) -> float:
             found=f"{probability}",
             expected="a number between 0 and 1, such as 0.95",
             hint=f"{probability:g} % is {probability / 100:g}"
-            if fine and probability > 1
+            if fine and 1 < probability < 1e6
             else None,
         )
     )

@@ -19,6 +19,7 @@ from truepose.arrays import Floats
 from truepose.error_budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.arguments import checked
 from truepose.runs.dataset import Schema, Variable, quantity_coords
 from truepose.runs.first_order import ExactError, first_order
 from truepose.runs.poses import (
@@ -64,6 +65,7 @@ CLOSE = 1.01
 """and until the sizes lie at most this above what is reached."""
 
 
+@checked
 def bounds(
     machine: Machine,
     poses: ArrayLike | None = None,

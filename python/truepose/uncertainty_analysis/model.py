@@ -235,12 +235,13 @@ def _callable(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _inputs(inputs: Mapping[str, Input]) -> dict[str, Input]:
     """The inputs by name, checked to be some."""
-    if not isinstance(inputs, Mapping) or not inputs:
+    given = isinstance(inputs, Mapping)
+    if not given or not inputs:
         raise RequestError(
             Problem(
                 "no-input",
                 "a function needs inputs that are uncertain",
-                found="nothing" if not inputs else f"something of type {type(inputs).__name__}",
+                found="nothing" if given else f"something of type {type(inputs).__name__}",
                 expected='inputs by name, such as {"x": tp.Input.normal(1.0, 0.1)}',
             )
         )

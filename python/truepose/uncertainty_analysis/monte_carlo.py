@@ -25,6 +25,7 @@ from truepose._kernel import Study, Tallies
 from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.arguments import checked
 from truepose.runs.dataset import (
     Schema,
     Variable,
@@ -42,6 +43,7 @@ from truepose.runs.run import Run, in_parts
 from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.arguments import (
+    DIGITS,
     required_digits,
     required_probability,
     required_samples,
@@ -147,7 +149,7 @@ def monte_carlo(
     probability: float = 0.95,
     *,
     condition: Condition | None = None,
-    digits: int = 2,
+    digits: int = DIGITS,
     sampling: Literal["random", "sobol"] = "random",
     progress: Progress | None = None,
 ) -> xr.Dataset: ...
@@ -163,12 +165,13 @@ def monte_carlo(
     *,
     inputs: Mapping[str, Input] | None = None,
     correlation: Correlation = None,
-    digits: int = 2,
+    digits: int = DIGITS,
     sampling: Literal["random", "sobol"] = "random",
     progress: Progress | None = None,
 ) -> xr.Dataset: ...
 
 
+@checked
 def monte_carlo(
     model: Machine | Callable[..., Any],
     poses: Any = None,
@@ -179,7 +182,7 @@ def monte_carlo(
     condition: Condition | None = None,
     inputs: Mapping[str, Input] | None = None,
     correlation: Correlation = None,
-    digits: int = 2,
+    digits: int = DIGITS,
     sampling: Literal["random", "sobol"] = "random",
     progress: Progress | None = None,
 ) -> xr.Dataset:

@@ -29,6 +29,7 @@ from numpy.typing import ArrayLike
 from truepose.arrays import Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.arguments import checked
 from truepose.runs.dataset import Schema, Variable, component_units, label
 from truepose.runs.poses import BAND, REASONS, Progress
 from truepose.runs.quantities import quantities
@@ -115,6 +116,7 @@ def shares(
 ) -> xr.Dataset: ...
 
 
+@checked
 def shares(
     model: Machine | Callable[..., Any],
     poses: Any = None,

@@ -23,6 +23,7 @@ from truepose.arrays import Floats, Indices
 from truepose.error_budget.evaluate import FEW
 from truepose.error_budget.propagation import combine, coverage_factor
 from truepose.machine import Condition, Machine
+from truepose.runs.arguments import checked
 from truepose.runs.dataset import (
     Schema,
     Variable,
@@ -167,6 +168,7 @@ def uncertainty(
 ) -> xr.Dataset: ...
 
 
+@checked
 def uncertainty(
     model: Machine | Callable[..., Any],
     poses: Any = None,

@@ -25,6 +25,7 @@ from truepose.error_budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.probability.domain import Domain
+from truepose.runs.arguments import checked
 from truepose.runs.dataset import (
     Schema,
     Variable,
@@ -80,6 +81,7 @@ def worst_case(
 ) -> xr.Dataset: ...
 
 
+@checked
 def worst_case(
     model: Machine | Callable[..., Any],
     poses: Any = None,

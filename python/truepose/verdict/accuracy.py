@@ -21,6 +21,7 @@ from truepose._kernel import STATUS
 from truepose.arrays import Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
+from truepose.runs.arguments import checked
 from truepose.runs.poses import OK, Progress
 from truepose.runs.quantities import quantities
 from truepose.runs.variables import Variables
@@ -49,6 +50,7 @@ REMAINDER = "the linear maximum and its proven remainder"
 ENGINE = "the proof engine"
 
 
+@checked
 def accuracy(
     machine: Machine,
     poses: ArrayLike | None = None,

@@ -28,7 +28,11 @@ def farthest(corrected: bool) -> tuple[float, list[list[float]]]:
     machine = truepose.load(PLANAR)
     poses = machine.poses()
     known = elongations(machine, poses)
-    joints = truepose.compensate(machine)["joint"].values if corrected else machine.inverse(poses)
+    joints = (
+        truepose.compensate(machine)["joint_corrected"].values
+        if corrected
+        else machine.inverse(poses)
+    )
     sizes = np.stack(
         [
             np.linalg.norm(tool(carriages(joints), LENGTH + known + end, poses) - poses, axis=1)

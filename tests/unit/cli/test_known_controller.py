@@ -178,7 +178,7 @@ def test_what_shows_a_machine_asks_nothing(files: Path) -> None:
     former, now = tp.load(files / "former_drawing.toml"), tp.load(files / "drawing.toml")
     poses = now.poses()[:3]
     ours, known = against_nominal(former, poses), tp.compensate(now, poses)
-    assert np.array_equal(ours["joint"], known["joint"])
+    assert np.array_equal(ours["joint_corrected"], known["joint_corrected"])
 
 
 @pytest.mark.parametrize(

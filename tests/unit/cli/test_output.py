@@ -111,8 +111,11 @@ def test_csv_of_the_compensation_has_the_corrected_joints(
     )
     expected = truepose.compensate(truepose.load(PLANAR))
     assert len(rows) == expected.sizes["pose"]
-    found = [[float(row["joint_d1 [mm]"]), float(row["joint_d2 [mm]"])] for row in rows]
-    np.testing.assert_allclose(found, expected["joint"].values * 1e3, rtol=1e-15)
+    found = [
+        [float(row["joint_corrected_d1 [mm]"]), float(row["joint_corrected_d2 [mm]"])]
+        for row in rows
+    ]
+    np.testing.assert_allclose(found, expected["joint_corrected"].values * 1e3, rtol=1e-15)
 
 
 @pytest.mark.filterwarnings("ignore")  # of h5py and xarray about each other

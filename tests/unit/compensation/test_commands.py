@@ -65,7 +65,7 @@ def test_the_nominal_controller_then_sets_the_corrected_joints(path: Path) -> No
     compensated = tp.compensate(machine, poses, condition)
     assert compensated.attrs["poses_left_out"] == 0
     scale = np.maximum(np.abs(joints), machine.characteristic_length)
-    assert (np.abs(joints - compensated["joint"].values) / scale).max() < ROUNDING
+    assert (np.abs(joints - compensated["joint_corrected"].values) / scale).max() < ROUNDING
     reached, status = actual_of_joints(machine, joints, condition)
     assert (status == OK).all()
     assert measured(machine, reached, poses) < ROUNDING

@@ -30,7 +30,7 @@ def test_an_asymmetric_band_is_half_of_it_correctable(machine: tp.Machine) -> No
     found = tp.compensate(with_sources(machine, lengths(machine, shift=TAKEN, half=HALF)), POSE)
     # Longer struts: the carriages go up by what the slope asks for.
     height = np.sqrt((0.5 + TAKEN) ** 2 - 0.3**2)
-    assert np.allclose(found["joint"], 0.2 + height, rtol=0, atol=1e-15)
+    assert np.allclose(found["joint_corrected"], 0.2 + height, rtol=0, atol=1e-15)
     assert np.allclose(found.joint_nominal, 0.6, rtol=0, atol=1e-15)
     for name, length in (("lower", 0.5 + TAKEN - HALF), ("upper", 0.5 + TAKEN + HALF)):
         expected = height - np.sqrt(length**2 - 0.3**2)
@@ -79,7 +79,7 @@ def test_sources_add_in_shift_and_bound(machine: tp.Machine) -> None:
     apart = [tp.compensate(with_sources(machine, source)) for source in (one, two)]
     # Each at its own shift: the slopes of the struts differ by a part in a thousand.
     assert np.allclose(both.bound, apart[0].bound + apart[1].bound, rtol=1e-3)
-    moved = [found["joint"] - found.joint_nominal for found in (both, *apart)]
+    moved = [found["joint_corrected"] - found.joint_nominal for found in (both, *apart)]
     assert np.allclose(moved[0], moved[1] + moved[2], atol=1e-9)
     # d1 goes back by what its scale is out, exactly.
     assert np.allclose(moved[2], [-2e-4, 0.0], atol=1e-15)
@@ -87,7 +87,7 @@ def test_sources_add_in_shift_and_bound(machine: tp.Machine) -> None:
 
 def test_the_law_over_the_whole_box_of_the_file(machine: tp.Machine) -> None:
     found = tp.compensate(machine)
-    shift = found["joint"].values
+    shift = found["joint_corrected"].values
     columns = machine.kernel.length_parameters
     errors = tp.budget(machine)
     sensitivity = machine.sensitivity(machine.poses())[:, :, columns]

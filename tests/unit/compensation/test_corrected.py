@@ -44,11 +44,11 @@ def test_a_periodic_error_is_that_of_the_joints_commanded(
     plain: tp.Machine, periodic: tp.Machine
 ) -> None:
     found = tp.compensate(periodic)
-    joints = found["joint"].values
+    joints = found["joint_corrected"].values
     assert np.abs(joints - found.joint_nominal.values).max() > 3e-4
     assert np.abs(found.residual_middle.values).max() < 1e-15
     # By hand: the screws bring the carriages to where those of the machine without it are.
-    without = tp.compensate(plain)["joint"].values
+    without = tp.compensate(plain)["joint_corrected"].values
     assert np.abs(joints + wave(joints) - without).max() < 1e-15
     # With the error of the nominal joints most of a micrometre would be left.
     at_nominal = without - wave(found.joint_nominal.values)
@@ -61,7 +61,7 @@ def test_what_is_known_by_the_program_is_known_by_the_command(periodic: tp.Machi
     asked, status = corrected_poses(periodic, poses)
     assert not status.any()
     joints = periodic.inverse(asked)
-    assert np.abs(joints - tp.compensate(periodic)["joint"].values).max() < 1e-14
+    assert np.abs(joints - tp.compensate(periodic)["joint_corrected"].values).max() < 1e-14
     # The actual machine is the one at the pose that it comes to, there the one asked for.
     reached, status = actual_of_joints(periodic, joints, near=poses)
     assert not status.any()
@@ -78,7 +78,7 @@ def test_loads_and_lengths_stay_those_of_the_nominal_command(plain: tp.Machine) 
 
     machine = with_sources(plain, MadeSource("s", of_block=of_block))
     found = tp.compensate(machine)
-    joints = found["joint"].values[:, 0]
+    joints = found["joint_corrected"].values[:, 0]
     # q + 1 mm + q / 100 is where the nominal carriage would be.
     assert np.abs(1.01 * joints + 1e-3 - found.joint_nominal.values[:, 0]).max() < 1e-13
     assert len(seen) > 2

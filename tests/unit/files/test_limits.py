@@ -272,7 +272,7 @@ def test_threads(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_threads_by_call() -> None:
     import truepose
 
-    with pytest.raises(ValueError, match=f"at most {limits.MOST_THREADS} threads"):
+    with pytest.raises(ValueError, match=f"a whole number from 1 to {limits.MOST_THREADS}"):
         truepose.threads(limits.MOST_THREADS + 1)
 
 

@@ -14,10 +14,22 @@ PLANAR = Path(__file__).parents[3] / "machines" / "planar_two_slider.toml"
 
 
 @pytest.mark.parametrize(
-    "call", [truepose.budget, truepose.compensate, truepose.over_time, truepose.strain]
+    "call",
+    [
+        truepose.accuracy,
+        truepose.bounds,
+        truepose.budget,
+        truepose.compensate,
+        truepose.over_time,
+        truepose.strain,
+        lambda file: truepose.calibrate(file, file),
+        lambda file: truepose.correct_program(file, file, None),
+        lambda file: truepose.export(file, "c"),
+        lambda file: truepose.plan(file, (), 5),
+    ],
 )
 def test_file_in_place_of_a_machine(call: Any) -> None:
-    with pytest.raises(TypeError, match=r"a machine is wanted, as truepose\.load returns it"):
+    with pytest.raises(TypeError, match=r"a machine, as truepose\.load returns it"):
         call(str(PLANAR))
 
 

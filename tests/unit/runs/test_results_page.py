@@ -125,7 +125,6 @@ def test_the_dataset_has_what_the_page_says(title: str, name: str) -> None:
     named = section("Coordinates")
     for key in set(dataset.coords) - set(variables):
         generic = re.sub(r"^(pose|left_out)_(x|y|z|a|b|c)$", r"\1_F", str(key))
-        generic = "joint" if generic == "joint_name" else generic
         assert ", ".join(dataset[key].dims) == named[generic][0]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 import truepose as tp
 from build_machine import MACHINES
 from machine_texts import HEXAPOD, PLANAR, edited, load_text
+from truepose.cli.montecarlo import command
 from truepose.errors import RequestError
 from truepose.machine import Machine
 from truepose.runs.first_order import ExactError
@@ -235,7 +237,7 @@ def test_as_many_as_are_needed() -> None:
     """Stable to two digits of the deviation, against a run of many more samples."""
     machine = load("hexapod")
     pose = machine.poses()[:2]
-    found = tp.monte_carlo(machine, pose, seed=3)
+    found = tp.monte_carlo(machine, pose, seed=3, digits=2)
     assert found.attrs["digits"] == 2
     count = int(found.samples[0])
     assert (found.samples == count).all()
@@ -498,3 +500,11 @@ def test_sobol_points_without_their_package(monkeypatch: pytest.MonkeyPatch) -> 
     machine = load("planar_two_slider")
     code = code_of(tp.monte_carlo, machine, machine.poses()[:1], 1024, sampling="sobol")
     assert code == "extra-missing"
+
+
+def test_digits_have_one_default() -> None:
+    """The command and the function stop at the same number of samples."""
+    option = next(each for each in command.params if each.name == "digits")
+    assert option.default == inspect.signature(tp.monte_carlo).parameters["digits"].default == 1
+    machine = load("planar_two_slider")
+    assert tp.monte_carlo(machine, machine.poses()[:1]).attrs["digits"] == 1

@@ -318,7 +318,7 @@ def test_the_corrected_command_is_a_state_like_any(tmp_path: Path) -> None:
     machine = load_text(tmp_path, PLANAR)
     (block, every), *_ = states(machine, POSE)
     remaining = tp.compensate(machine, POSE)
-    corrected = dataclasses.replace(block, joints=np.asarray(remaining.joint))
+    corrected = dataclasses.replace(block, joints=np.asarray(remaining.joint_corrected))
     before = coverage(machine, [(block, every)], "position", P)
     after = coverage(machine, [(corrected, every)], "position", P)
     # What is left is the band of strut 1, uniform, to first order.

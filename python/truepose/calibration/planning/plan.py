@@ -35,10 +35,11 @@ from truepose.calibration.planning.exchange import (
 )
 from truepose.calibration.planning.poses import Placed, short_way, workspace_poses
 from truepose.calibration.planning.readings import planned, whitened
-from truepose.errors import Problem, RequestError
+from truepose.errors import ArgumentError, Problem, RequestError
 from truepose.files.wording import one_of
 from truepose.machine import Condition, Machine
 from truepose.representation import Facts, Represented
+from truepose.runs.arguments import checked
 from truepose.runs.dataset import (
     Variable,
     commanded_units,
@@ -131,6 +132,7 @@ class Plan(Represented):
         return _dataset(self)
 
 
+@checked
 def plan(
     machine: Machine,
     instrument: Instrument | Iterable[Instrument],
@@ -200,6 +202,18 @@ def plan(
     )
 
 
+def _instruments(given: Instrument | Iterable[Instrument]) -> tuple[Instrument, ...]:
+    """One or some. Raises `ArgumentError` for what are none."""
+    try:
+        found = (given,) if isinstance(given, Instrument) else tuple(given)
+    except TypeError:
+        found = (given,)  # type: ignore[assignment]
+    for each in found:
+        if not isinstance(each, Instrument):
+            raise ArgumentError.of("instrument", each, "a truepose.calibration.Instrument, or some")
+    return found
+
+
 class Field:
     """What a plan chooses from: the candidate poses, what would be read there, and the workspace.
 
@@ -218,9 +232,7 @@ class Field:
         identify: Iterable[str] = (),
     ) -> None:
         self.machine = machine
-        self.instruments = (
-            (instrument,) if isinstance(instrument, Instrument) else tuple(instrument)
-        )
+        self.instruments = _instruments(instrument)
         if candidates is None:
             offered = Placed(machine, workspace_poses(machine), of_file=True)
             over = offered
@@ -407,7 +419,9 @@ def _dataset(plan: Plan) -> xr.Dataset:
         return data_variable(Variable(dims, unit, meaning), values, units)
 
     data = {
-        "joint": variable(("pose", "joint"), plan.joints, "joint", "commanded joints"),
+        "joint_nominal": variable(
+            ("pose", "joint"), plan.joints, "joint", "joint coordinate, nominal command"
+        ),
         "rank": variable(
             ("pose",), plan.rank, "1", "place, from 1, in the order in which poses buy most"
         ),
@@ -428,7 +442,7 @@ def _dataset(plan: Plan) -> xr.Dataset:
     labels = {
         "pose": label("pose", np.arange(n_pose), "number of the pose in the order of measuring"),
         "count": label("count", np.arange(n_pose + 1), "poses measured, in the order of rank"),
-        "joint_name": label("joint", list(machine.joints), "actuated joint"),
+        "joint": label("joint", list(machine.joints), "actuated joint"),
         "joint_units": label("joint", units["joint"], "unit of the joint coordinate"),
         "sought": label("sought", list(unknowns.names), "what is to be found"),
         "sought_units": label("sought", units["sought"], "unit of the unknown"),

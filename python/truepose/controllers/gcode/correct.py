@@ -53,6 +53,7 @@ from truepose.files.one_run import reads
 from truepose.files.wording import one_of
 from truepose.files.writing import kind_of, replacing, require_writable
 from truepose.machine import Condition, Machine
+from truepose.runs.arguments import checked
 from truepose.runs.controller_geometry import (
     ROUNDING,
     nothing_to_correct,
@@ -144,6 +145,7 @@ class _Options:
         )
 
 
+@checked
 def correct_program(
     machine: Machine,
     source: str | PathLike[str],

@@ -399,13 +399,29 @@ def test_enable_and_disable_fade(planar: Rig) -> None:
     assert not planar.get("fault")
 
 
-@pytest.mark.parametrize("useless", [0.0, -1.0, np.nan])
-def test_a_rate_limit_of_nothing_holds_everything(planar: Rig, useless: float) -> None:
-    before = planar.inverse(planar.home)
-    planar.set("rate-limit", useless)
+@pytest.mark.parametrize(
+    ("rate", "code"), [(0.0, 0), (-0.0, 0), (-1e-12, 16), (-1.0, 16), (np.nan, 16), (np.inf, 16)]
+)
+def test_a_rate_limit_that_is_none_holds_everything(planar: Rig, rate: float, code: int) -> None:
+    """Zero may be meant, and is no fault; what is no rate is one, for as long as it stands there."""
     planar.celsius({FIRST: 45.0})
+    planar.update(50)  # on the way
+    before = planar.inverse(planar.home)
+    planar.set("rate-limit", rate)
+    planar.celsius({FIRST: 47.0})
     planar.update(1000)
     assert np.array_equal(planar.inverse(planar.home), before)
+    assert planar.get("fault-code") == code
+    assert planar.get("fault") == (code > 0)
+    planar.set("enable", 0)
+    planar.update(1000)
+    assert np.array_equal(planar.inverse(planar.home), before)
+    planar.set("enable", 1)
+    planar.set("rate-limit", 1.0)
+    planar.update()
+    assert planar.get("fault-code") == 0
+    step = np.abs(planar.inverse(planar.home) - before).max()
+    assert 0.9 * RATE < step < RATE * (1 + 1e-9)
 
 
 def test_kinematics_are_a_function_of_the_pose_between_updates(planar: Rig) -> None:

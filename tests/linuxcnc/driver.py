@@ -48,6 +48,25 @@ class Driver:
         self.until(lambda: all(stat.homed[: self.joints]))
         self.mdi("G21 G90 G17 G64 P0.005")
 
+    def rehome(self, label):
+        """Home all joints where they stand, in joint mode, and say whether LinuxCNC did."""
+        self.joint_mode()
+        self.drain()
+        before = len(self.errors)
+        command.home(-1)
+        command.wait_complete()
+        self.until(lambda: not any(self.homing()) and all(stat.homed[: self.joints]))
+        self.wait(30)
+        self.drain()
+        self.readings[label] = {"refused": self.errors[before:]}
+
+    def homing(self):
+        return [stat.joint[number]["homing"] for number in range(self.joints)]
+
+    def until_pin(self, pin, value):
+        """Until a pin has that value."""
+        self.until(lambda: hal.get_value(pin) == value)
+
     def mdi(self, text):
         command.mode(linuxcnc.MODE_MDI)
         command.wait_complete()

@@ -23,6 +23,9 @@ TEMPERATURES = (-40.0, 120.0)
 PLAUSIBLE_LOADS = 10.0
 """A force or moment is plausible up to so many times that of the machine file."""
 
+HOMING_TOLERANCE = 1e-3
+"""mm from HOME at which a joint may be homed again: what feedback at rest is off, and no more."""
+
 SETTLED = 1e-12
 """How well the forward solution's pose gives the joints back, in sizes of the machine."""
 
@@ -57,6 +60,7 @@ def module_text(description: Description, machine_c: str, clamp: float, rate_lim
             "wrench": "".join(f"{index}, " for index in wrenches),
             "rate_limit": exact(_millimetres(rate_limit)),
             "clamp": exact(_millimetres(clamp)),
+            "homing_tolerance": exact(HOMING_TOLERANCE),
             "temperature_min": exact(TEMPERATURES[0]),
             "temperature_max": exact(TEMPERATURES[1]),
             "temperature_slew": exact(0.0),

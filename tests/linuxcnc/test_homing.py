@@ -31,7 +31,7 @@ MOTORS = [f"joint.{number}.motor-pos-cmd" for number in range(JOINTS)]
 
 
 def steps(home: str) -> list[Step]:
-    """Homing while compensated, faded in joint mode, faded at home, and with nothing to refuse it."""
+    """Homing while compensated, faded in joint mode, faded at home, and where nothing refuses."""
 
     def read(label: str) -> Step:
         return {"do": "read", "label": label, "pins": [*OFFSETS, *MOTORS, "truepose.faded"]}

@@ -13,7 +13,7 @@ from truepose.controllers._prefix import prefix_of, prefix_option
 from truepose.controllers.c import WITHOUT, names_of, program_of
 from truepose.controllers.linuxcnc._compensation import SPARE, default_clamp
 from truepose.controllers.linuxcnc._configuration import hal_text, ini_text
-from truepose.controllers.linuxcnc._description import MILLIMETRE, PINS, Description
+from truepose.controllers.linuxcnc._description import HELD, MILLIMETRE, PINS, Description
 from truepose.controllers.linuxcnc._module import PREFIX, module_text
 from truepose.controllers.linuxcnc._safe_box import Box, safe_box
 from truepose.errors import Problem, RequestError
@@ -84,8 +84,20 @@ def _statement(
         f"compensation of a joint: at most {clamp / MILLIMETRE:.6g} mm ({reason}), "
         f"at most {rate_limit / MILLIMETRE:.6g} mm/s",
         f"axis limits, mm and degrees: {extent} ({size}; {box.checked} poses checked)",
+        *_axes_that_do_not_move(description),
         f"{description.module}.c includes LinuxCNC's headers: it is under GPL-2.0-or-later",
     ]
+
+
+def _axes_that_do_not_move(description: Description) -> list[str]:
+    commanded = description.machine.commanded
+    held = [name for name, held in zip(commanded, description.held, strict=True) if held]
+    reasons = (
+        (description.locked, "locked: {}, for the machine has no such freedom"),
+        (held, f"locked: {{}}, for the workspace holds it within {HELD:g} mm or degrees"),
+        (description.following, "not commanded: {}, which the others make"),
+    )
+    return [text.format(", ".join(names)) for names, text in reasons if names]
 
 
 def _positive(option: str, value: float) -> float:

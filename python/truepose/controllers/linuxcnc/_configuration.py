@@ -7,7 +7,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from truepose.controllers._template import exact, fill, one_line, template
-from truepose.controllers.linuxcnc._description import DEGREE, MILLIMETRE, WRENCHES, Description
+from truepose.controllers.linuxcnc._description import (
+    DEGREE,
+    HELD,
+    MILLIMETRE,
+    WRENCHES,
+    Description,
+)
 from truepose.controllers.linuxcnc._safe_box import Box
 from truepose.version import version
 
@@ -25,6 +31,7 @@ def ini_text(description: Description, box: Box, clamp: float) -> str:
             "file": one_line(machine.file.replace("\\", "/").rpartition("/")[2]),
             "module": description.module,
             "n_joint": str(len(machine.joints)),
+            "absent": "".join(_absent(description)),
             "coordinates": " ".join(name.upper() for name in machine.commanded),
             "home": " ".join(_clean(value) for value in home),
             "checked": str(box.checked),
@@ -40,13 +47,34 @@ def ini_text(description: Description, box: Box, clamp: float) -> str:
     )
 
 
+def _absent(description: Description) -> Iterable[str]:
+    """Why axes are not among COORDINATES."""
+    if description.locked:
+        yield f"# No axis {_listed(description.locked)}: the machine has no such freedom, locked.\n"
+    if description.following:
+        following = _listed(description.following)
+        yield f"# No axis {following}: not commanded, follows from the others.\n"
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name.upper() for name in names)
+
+
 def _axes(description: Description, box: Box) -> Iterable[str]:
     units = description.pose_units
-    for name, low, high in zip(
-        description.machine.commanded, box.low / units, box.high / units, strict=True
+    for name, low, high, held in zip(
+        description.machine.commanded,
+        box.low / units,
+        box.high / units,
+        description.held,
+        strict=True,
     ):
         unit = "mm" if name in "xyz" else "degrees"
         yield f"\n[AXIS_{name.upper()}]"
+        if held:
+            centre = _short(round(0.5 * (low + high), 9))
+            yield f"# Axis {name.upper()} is locked at {centre} {unit}: the machine file's"
+            yield f"# workspace holds it within {HELD:g}, which is left for rounding and corrections."
         yield f"MIN_LIMIT = {_short(low)}"
         yield f"MAX_LIMIT = {_short(high)}"
         yield f"# MAX_VELOCITY =\n# MAX_ACCELERATION =\n# {unit} per s, per s^2"

@@ -77,6 +77,10 @@ def _pin_table(description: Description) -> Iterable[str]:
         yield f" *   {f'{name}-temperature':<22} in   degrees Celsius of {one_line(part)}"
     commanded = " ".join(FREEDOMS[index] for index in description.freedoms)
     yield f" *   (commanded: {commanded}; loads: {', '.join(_loads(description))})"
+    if description.locked:
+        yield f" *   (locked, the machine has no such freedom: {' '.join(description.locked)})"
+    if description.following:
+        yield f" *   (not commanded, made by the others: {' '.join(description.following)})"
 
 
 def _loads(description: Description) -> list[str]:

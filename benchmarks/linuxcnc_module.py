@@ -15,7 +15,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.kinematics_host import NEEDED, PACKAGED, Host, Module, available, compiled
+from benchmarks.kinematics_host import (
+    NEEDED,
+    PACKAGED,
+    Host,
+    Module,
+    available,
+    compiled,
+    parameters_of,
+)
 from benchmarks.rows import Row
 from benchmarks.timing import require_agreement
 
@@ -51,9 +59,10 @@ def _measure(folder: Path) -> list[Row]:
 
     for file, text in export(tp.load(FILE), "linuxcnc").files.items():
         (folder / file).write_text(text)
+    source = next(folder.glob("*.c"))
     host = Host(folder)
     theirs = host.load(PACKAGED / "genhexkins.so", 6)
-    ours = host.load(compiled(next(folder.glob("*.c"))), 6)
+    ours = host.load(compiled(source), 6, parameters_of(source.read_text()))
     _require_same_joints(ours, theirs)
     _heat_and_load(host)
     rows = []

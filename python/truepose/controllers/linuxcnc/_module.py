@@ -32,8 +32,13 @@ SETTLED = 1e-12
 _WIDTH = 100
 
 
-def module_text(description: Description, machine_c: str, clamp: float, rate_limit: float) -> str:
-    """The whole module. `clamp` in m; `rate_limit` in m/s; `machine_c` with prefix `PREFIX`."""
+def module_text(
+    description: Description, machine_c: str, clamp: float, rate_limit: float, mark: str
+) -> str:
+    """The whole module. `clamp` in m; `rate_limit` in m/s; `machine_c` with prefix `PREFIX`.
+
+    `mark`: the hash of the export.
+    """
     machine = description.machine
     wrenches = description.wrenches
     condition = machine.condition
@@ -41,6 +46,7 @@ def module_text(description: Description, machine_c: str, clamp: float, rate_lim
         description.with_pins(template(__package__, "module.c.in")),
         {
             "module": description.module,
+            "hash": mark,
             "title": description.title,
             "version": version(),
             "file": one_line(machine.file.replace("\\", "/").rpartition("/")[2]),

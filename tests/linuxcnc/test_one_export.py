@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
-from module_under_test import clean, exported
+from module_under_test import exported
 from real_linuxcnc import required, run
 
 import truepose as tp
@@ -23,12 +23,6 @@ PLACES = {
     "ini": rf"KINEMATICS = \w+ ini={HASH}\n",
     "hal": rf"loadrt \[KINS\]KINEMATICS hal={HASH}\n",
 }
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _cleaned() -> Iterator[None]:
-    yield
-    clean()
 
 
 def hashes(files: Mapping[str, str]) -> set[str]:
@@ -60,27 +54,37 @@ def test_whatever_changes_an_export_changes_its_hash(tmp_path: Path) -> None:
     assert len({the_hash(files) for files in exports}) == len(exports)
 
 
-@pytest.mark.parametrize("wrong", ["ini", "hal"])
-@pytest.mark.parametrize("given", [None, "", "00000000", "{}0", "ini={}"])
-def test_the_module_does_not_start_with_another_hash(
-    wrong: str, given: str | None, tmp_path: Path
-) -> None:
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The module, compiled, and its hash."""
     if not available():
         missing(f"no LinuxCNC headers: apt-get install --no-install-recommends {NEEDED}")
     files = exported(tp.load(MACHINES / f"{MACHINE}.toml"))
-    own = the_hash(files)
-    source = tmp_path / "kins.c"
+    source = tmp_path_factory.mktemp("module") / "kins.c"
     source.write_text(files["c"])
-    library = compiled(source)
+    return compiled(source), the_hash(files)
+
+
+def started(library: Path, parameters: Mapping[str, str], folder: Path) -> None:
+    """Load a copy, which is another library to the loader: in it no parameter is set."""
+    copy = folder / f"copy{len(list(folder.iterdir()))}.so"
+    shutil.copy(library, copy)
+    the_host().load(copy, 2, parameters)
+
+
+@pytest.mark.parametrize("wrong", ["ini", "hal"])
+@pytest.mark.parametrize("given", [None, "", "00000000", "{}0", "ini={}"])
+def test_the_module_does_not_start_with_another_hash(
+    library: tuple[Path, str], wrong: str, given: str | None, tmp_path: Path
+) -> None:
+    module, own = library
     parameters = {"ini": own, "hal": own}
-    # A copy is another library to the loader, in which no parameter is set.
-    shutil.copy(library, tmp_path / "copy.so")
-    the_host().load(tmp_path / "copy.so", 2, parameters)
+    started(module, parameters, tmp_path)
     del parameters[wrong]
     if given is not None:
         parameters[wrong] = given.format(own)
     with pytest.raises(OSError, match="does not start"):
-        the_host().load(library, 2, parameters)
+        started(module, parameters, tmp_path)
 
 
 @pytest.mark.parametrize(("wrong", "name"), [("hal", "HAL"), ("ini", "INI")])

@@ -7,10 +7,11 @@ halcompile makes runs unchanged: its public entry points, its pins and its funct
 from __future__ import annotations
 
 import ctypes
+import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -25,6 +26,13 @@ _FLAGS = ["-O2", "-shared", "-fPIC", "-DRTAPI", "-DUSPACE", f"-I{HEADERS}"]
 def available() -> bool:
     """Whether the system has LinuxCNC's headers, halcompile and a C compiler."""
     return HEADERS.is_dir() and all(shutil.which(name) for name in ("halcompile", "gcc"))
+
+
+def parameters_of(source: str) -> dict[str, str]:
+    """With what an exported module is loaded: the hash that its INI and HAL file state."""
+    found = re.search(r'#define HASH "(\w+)"', source)
+    assert found
+    return {"ini": found[1], "hal": found[1]}
 
 
 def _program(name: str) -> str:
@@ -108,9 +116,11 @@ class Host:
         """Call an exported function once, as a thread of that period, ns, does."""
         assert self._library.host_run(function.encode(), period) == 0, function
 
-    def load(self, module: Path, n_joint: int) -> Module:
-        """Load a kinematics module and start it."""
-        return Module(self._library, module, n_joint)
+    def load(
+        self, module: Path, n_joint: int, parameters: Mapping[str, str] | None = None
+    ) -> Module:
+        """Load a kinematics module with the parameters of its `loadrt`, and start it."""
+        return Module(self._library, module, n_joint, parameters or {})
 
     def _require(self, name: str) -> None:
         if not self._library.host_type(name.encode()):
@@ -127,11 +137,18 @@ def the_host() -> Host:
 class Module:
     """One module's public entry points. Poses are x y z a b c, in the module's units."""
 
-    def __init__(self, host: ctypes.CDLL, path: Path, n_joint: int) -> None:
+    def __init__(
+        self, host: ctypes.CDLL, path: Path, n_joint: int, parameters: Mapping[str, str]
+    ) -> None:
         self._host = host
         self._library = ctypes.CDLL(str(path))
         self._n_joint = n_joint
         self._flags = (ctypes.c_ulong(), ctypes.c_ulong())
+        self._parameters = {name: value.encode() for name, value in parameters.items()}
+        for name, value in self._parameters.items():  # by the address that rtapi_app asks for
+            place = ctypes.c_void_p.in_dll(self._library, f"rtapi_info_address_{name}").value
+            assert place is not None
+            ctypes.c_char_p.from_address(place).value = value
         if self._library.rtapi_app_main() != 0:
             raise OSError(f"{path.name} does not start")
 

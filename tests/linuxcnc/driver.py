@@ -30,6 +30,7 @@ class Driver:
         self.joints, self.axes = joints, axes
         self.readings, self.errors = {}, []
         self.sampling = None
+        self.patience = 30.0  # s
 
     def step(self, do, **given):
         getattr(self, do)(**given)
@@ -48,11 +49,85 @@ class Driver:
         self.until(lambda: all(stat.homed[: self.joints]))
         self.mdi("G21 G90 G17 G64 P0.005")
 
+    def rehome(self, label):
+        """Home all joints where they stand, in joint mode, and say whether LinuxCNC did."""
+        self.joint_mode()
+        self.drain()
+        before = len(self.errors)
+        command.home(-1)
+        command.wait_complete()
+        self.until(lambda: not any(self.homing()) and all(stat.homed[: self.joints]))
+        self.wait(30)
+        self.drain()
+        self.readings[label] = {"refused": self.errors[before:]}
+        del self.errors[before:]
+
+    def homing(self):
+        return [stat.joint[number]["homing"] for number in range(self.joints)]
+
+    def power(self, cycles):
+        """Off, and on again after so many cycles."""
+        command.state(linuxcnc.STATE_OFF)
+        command.wait_complete()
+        self.until(lambda: stat.task_state != linuxcnc.STATE_ON)
+        self.wait(cycles)
+        command.state(linuxcnc.STATE_ON)
+        command.wait_complete()
+        self.until(lambda: stat.task_state == linuxcnc.STATE_ON)
+        self.world_mode()
+
+    def jog_axis(self, axis, velocity, cycles):
+        """Along an axis of the tool for so many cycles, or to its limit."""
+        command.mode(linuxcnc.MODE_MANUAL)
+        command.wait_complete()
+        command.teleop_enable(1)
+        command.wait_complete()
+        self.until(lambda: stat.motion_mode == linuxcnc.TRAJ_MODE_TELEOP)
+        number = "XYZABCUVW".index(axis)
+        command.jog(linuxcnc.JOG_CONTINUOUS, False, number, velocity)
+        self.wait(cycles)
+        command.jog(linuxcnc.JOG_STOP, False, number)
+        command.wait_complete()
+        self.world_mode()
+        self.until(lambda: stat.inpos)
+
+    def jog_joint(self, joint, velocity, distance):
+        """There and back, joint by joint."""
+        self.joint_mode()
+        for sign in (1, -1):
+            command.jog(linuxcnc.JOG_INCREMENT, True, joint, velocity, sign * distance)
+            self.wait(20)
+            self.until(lambda: stat.joint[joint]["inpos"] and stat.inpos)
+        self.world_mode()
+
+    def series(self, steps, cycles):
+        """The steps one after another, over again, until so many cycles have passed.
+
+        Stops at a machine that has tripped, and at the first message of LinuxCNC.
+        """
+        self.patience = 120.0
+        start, done = self.cycle(), 0
+        while self.cycle() - start < cycles:
+            given = steps[done % len(steps)]
+            self.step(**given)
+            done += 1
+            self.drain()
+            stat.poll()
+            if self.errors or stat.task_state != linuxcnc.STATE_ON:
+                raise RuntimeError(f"tripped at step {done}, {given}: {self.errors}")
+            if done % 1000 == 0:
+                print(f"{done} steps, {(self.cycle() - start) / 60e3:.1f} min", flush=True)
+        self.readings["series"] = {"steps": done, "cycles": self.cycle() - start}
+
+    def until_pin(self, pin, value):
+        """Until a pin has that value."""
+        self.until(lambda: hal.get_value(pin) == value)
+
     def mdi(self, text):
         command.mode(linuxcnc.MODE_MDI)
         command.wait_complete()
         command.mdi(text)
-        if command.wait_complete(20.0) == -1:
+        if command.wait_complete(self.patience) == -1:
             raise RuntimeError("not done in time: " + text)
         self.until(lambda: stat.inpos and stat.interp_state == linuxcnc.INTERP_IDLE)
 
@@ -170,13 +245,13 @@ class Driver:
         self.readings["still running"] = stat.interp_state != linuxcnc.INTERP_IDLE
         self.until(lambda: stat.interp_state == linuxcnc.INTERP_IDLE and stat.inpos)
 
-    def until(self, true, seconds=30.0):
+    def until(self, true):
         start = time.monotonic()
         while True:
             stat.poll()
             if true():
                 return
-            if time.monotonic() - start > seconds:
+            if time.monotonic() - start > self.patience:
                 raise RuntimeError("waited in vain")
             time.sleep(0.002)
 

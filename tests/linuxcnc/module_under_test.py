@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import truepose as tp
-from benchmarks.kinematics_host import NEEDED, available, compiled, the_host
+from benchmarks.kinematics_host import NEEDED, available, compiled, parameters_of, the_host
 from system_package import missing
 from truepose.controllers._export import options_of
 from truepose.controllers.linuxcnc import LinuxCNC
@@ -65,12 +65,13 @@ class Rig:
         if not available():
             missing(f"no LinuxCNC headers: apt-get install --no-install-recommends {NEEDED}")
         self.machine = tp.load(file)
-        library = _compiled(change(_source(file, tuple(options.items()))))
+        source = change(_source(file, tuple(options.items())))
+        library = _compiled(source)
         # A copy is another library to the loader: with a state of its own.
         copy = Path(tempfile.mkdtemp(dir=_folder())) / "kins.so"
         shutil.copy(library, copy)
         self.host = the_host()
-        self.module = self.host.load(copy, len(self.machine.joints))
+        self.module = self.host.load(copy, len(self.machine.joints), parameters_of(source))
         self.columns = ["xyzabc".index(name) for name in self.machine.commanded]
         self.units = np.where(np.array(self.columns) < 3, 1e-3, DEGREE)
         turning = [drive.coordinate == "angle" for drive in self.machine.drives]

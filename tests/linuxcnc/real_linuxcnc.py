@@ -146,11 +146,13 @@ def run(
     joints: int,
     programs: Mapping[str, str] | None = None,
     hal: str = "",
+    time_limit: float = TIME_LIMIT,
 ) -> Run:
     """Compile the exported module, start LinuxCNC with the exported snippets, and do the steps.
 
     `files` are those of the export; `hal` is added after the connections that every run has:
-    `limit3` drives with finite speed and acceleration, and the sampler. Fails with LinuxCNC's log.
+    `limit3` drives with finite speed and acceleration, and the sampler. `time_limit`, s, is that of
+    the whole run. Fails with LinuxCNC's log.
     """
     module = next(name for name in files if name.endswith(".c")).removesuffix(".c")
     (folder / "modules").mkdir()
@@ -174,7 +176,7 @@ def run(
     (folder / "plan.json").write_text(json.dumps(plan))
     shutil.copy(DRIVER, folder)
     (folder / "driver.py").chmod(0o755)
-    log = _linuxcnc(folder, module)
+    log = _linuxcnc(folder, module, time_limit)
     report = folder / "report.json"
     assert report.exists(), f"LinuxCNC did not come to its end:\n{log}"
     found = json.loads(report.read_text())
@@ -244,7 +246,7 @@ def _nml() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _linuxcnc(folder: Path, module: str) -> str:
+def _linuxcnc(folder: Path, module: str, time_limit: float) -> str:
     """Run LinuxCNC in the folder to its end, and return its log."""
     environment = {
         key: value
@@ -254,12 +256,14 @@ def _linuxcnc(folder: Path, module: str) -> str:
     if _namespaces():
         _give(folder)
         inside = _INSIDE.format(modules=MODULES, uid=NOBODY)
-        return _to_its_end([*_UNSHARE, "sh", "-c", inside, "sh", str(folder)], folder, environment)
+        command = [*_UNSHARE, "sh", "-c", inside, "sh", str(folder)]
+        return _to_its_end(command, folder, environment, time_limit)
     with _alone(), _installed(folder, module) as place:
         environment["HOME"] = str(place)
         as_nobody = ["setpriv", "--reuid", str(NOBODY), "--regid", str(NOBODY), "--clear-groups"]
         start = ["linuxcnc", str(place / "machine.ini")]
-        return _to_its_end([*as_nobody, *start] if os.geteuid() == 0 else start, place, environment)
+        command = [*as_nobody, *start] if os.geteuid() == 0 else start
+        return _to_its_end(command, place, environment, time_limit)
 
 
 @contextmanager
@@ -296,7 +300,12 @@ def _give(folder: Path) -> None:
         os.chown(path, NOBODY, NOBODY)
 
 
-def _to_its_end(command: Sequence[str], folder: Path, environment: Mapping[str, str]) -> str:
+def _to_its_end(
+    command: Sequence[str],
+    folder: Path,
+    environment: Mapping[str, str],
+    time_limit: float = TIME_LIMIT,
+) -> str:
     log = folder / "log.txt"
     with log.open("w") as output:
         process = subprocess.Popen(
@@ -309,7 +318,7 @@ def _to_its_end(command: Sequence[str], folder: Path, environment: Mapping[str, 
             start_new_session=True,
         )
         try:
-            process.wait(TIME_LIMIT)
+            process.wait(time_limit)
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGTERM)  # LinuxCNC's script catches it and cleans up
             try:

@@ -70,7 +70,7 @@ def changed(tmp_path: Path, *changes: tuple[str, str]) -> Machine:
 def test_home_and_limits(stem: str) -> None:
     machine = tp.load(MACHINES / f"{stem}.toml")
     ini = sections(files_of(machine)["ini"])
-    assert ini["KINS"]["KINEMATICS"] == f"truepose_{stem}"
+    assert ini["KINS"]["KINEMATICS"].partition(" ")[0] == f"truepose_{stem}"
     assert int(ini["KINS"]["JOINTS"]) == len(machine.joints)
     assert ini["TRAJ"]["COORDINATES"].lower().split() == list(machine.commanded)
     units = [np.pi / 180 if drive.coordinate == "angle" else 1e-3 for drive in machine.drives]
@@ -160,6 +160,47 @@ def test_an_axis_that_the_workspace_holds_has_a_little_room() -> None:
     poses = machine.poses()
     asked = np.degrees(np.abs(corrected_poses(machine, poses)[0] - poses)[:, 5].max())
     assert 2.0 * asked < float(c["MAX_LIMIT"]) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("stem", "locked", "held", "following"),
+    [
+        ("planar_two_slider", "Z, A, B, C", None, None),
+        ("hexapod", None, "Axis C is locked at 0 degrees", None),
+        ("overconstrained", "Z, A, B", None, "C"),
+        ("linear_delta", None, None, "A, B, C"),
+        ("hexapod_all_sources", None, None, None),
+    ],
+)
+def test_an_axis_that_does_not_move_says_why(
+    stem: str, locked: str | None, held: str | None, following: str | None
+) -> None:
+    machine = tp.load(MACHINES / f"{stem}.toml")
+    others = ",".join(source.name for source in machine.sources if source.name not in IN_MODULES)
+    export = LinuxCNC.export(machine, options_of(LinuxCNC, machine, {"without": others}))
+    ini = next(text for name, text in export.files.items() if name.endswith(".ini"))
+    c = next(text for name, text in export.files.items() if name.endswith(".c"))
+    told = {
+        "No axis {}: the machine has no such freedom": locked,
+        "No axis {}: not commanded": following,
+        "{}: the machine file's": held,
+    }
+    for text, names in told.items():
+        assert (text.partition("{}")[2] in ini) == (names is not None), text
+        assert names is None or text.format(names) in ini
+    # In the section of its axis, whose limits are the room that it has.
+    assert held is None or re.search(r"\[AXIS_C\]\n# Axis C is locked", ini)
+    # And in what the export says, and in the module's head.
+    said = [line for line in export.statement if line.startswith(("locked: ", "not commanded: "))]
+    assert [line.partition(", for")[0] for line in said if line.startswith("locked")] == [
+        f"locked: {names}" for names in ((locked or "").lower(), "c" if held else "") if names
+    ]
+    assert any(line.startswith("not commanded") for line in said) == (following is not None)
+    head = c.partition("*/")[0]
+    assert ("(locked, the machine has no such freedom: " in head) == (locked is not None)
+    # Every one of the six axes is commanded, or said to be missing.
+    absent = [name for text in (locked, following) if text for name in text.lower().split(", ")]
+    assert sorted([*machine.commanded, *absent]) == sorted("xyzabc")
 
 
 def test_a_home_that_leaves_no_room_for_the_clamp_is_refused(tmp_path: Path) -> None:

@@ -399,13 +399,115 @@ def test_enable_and_disable_fade(planar: Rig) -> None:
     assert not planar.get("fault")
 
 
-@pytest.mark.parametrize("useless", [0.0, -1.0, np.nan])
-def test_a_rate_limit_of_nothing_holds_everything(planar: Rig, useless: float) -> None:
-    before = planar.inverse(planar.home)
-    planar.set("rate-limit", useless)
+@pytest.mark.parametrize(
+    ("rate", "code"), [(0.0, 0), (-0.0, 0), (-1e-12, 16), (-1.0, 16), (np.nan, 16), (np.inf, 16)]
+)
+def test_a_rate_limit_that_is_none_holds_everything(planar: Rig, rate: float, code: int) -> None:
+    """Zero may be meant, and is no fault; what is no rate is one, as long as it stands there."""
     planar.celsius({FIRST: 45.0})
+    planar.update(50)  # on the way
+    before = planar.inverse(planar.home)
+    planar.set("rate-limit", rate)
+    planar.celsius({FIRST: 47.0})
     planar.update(1000)
     assert np.array_equal(planar.inverse(planar.home), before)
+    assert planar.get("fault-code") == code
+    assert planar.get("fault") == (code > 0)
+    planar.set("enable", 0)
+    planar.update(1000)
+    assert np.array_equal(planar.inverse(planar.home), before)
+    planar.set("enable", 1)
+    planar.set("rate-limit", 1.0)
+    planar.update()
+    assert planar.get("fault-code") == 0
+    step = np.abs(planar.inverse(planar.home) - before).max()
+    assert 0.9 * RATE < step < RATE * (1 + 1e-9)
+
+
+def test_fade_takes_the_compensation_out_and_puts_it_back(planar: Rig) -> None:
+    nominal = planar.nominal(planar.home[np.newaxis])[0]
+    planar.celsius({FIRST: 45.0})
+    planar.update(1000)
+    full = planar.inverse(planar.home)
+    assert not planar.get("faded")
+    cycles = int(np.abs(full - nominal).max() / RATE)
+    for fade, goal in ((1, nominal), (0, full)):
+        joints = [planar.inverse(planar.home)]
+        planar.set("fade", fade)
+        for _ in range(cycles + 10):
+            planar.update()
+            joints.append(planar.inverse(planar.home))
+            # It is out when it is out to the last digit, and not before.
+            assert planar.get("faded") == np.array_equal(planar.compensation, [0.0, 0.0])
+        steps = np.abs(np.diff(joints, axis=0)).max(axis=1)
+        assert steps.max() < RATE * (1 + 1e-9)
+        assert steps[: cycles - 1].min() > 0.99 * RATE
+        assert joints[-1] == pytest.approx(goal, abs=JOINT)
+    assert planar.get("fault-code") == 0
+
+
+def test_fade_goes_before_enable_and_waits_for_neither_sensors_nor_time(planar: Rig) -> None:
+    planar.celsius({FIRST: 45.0})
+    planar.update(1000)
+    planar.set("fade", 1)
+    planar.celsius({FIRST: np.nan})  # a fault keeps temperatures, and not the share
+    planar.update(1000)
+    assert planar.get("faded")
+    planar.set("enable", 0)
+    planar.update(1000)
+    planar.set("enable", 1)
+    planar.update(1000)
+    assert planar.get("faded")
+    planar.set("rate-limit", np.nan)  # everything is kept: it does not come back
+    planar.set("fade", 0)
+    planar.update(1000)
+    assert planar.get("faded")
+
+
+def test_it_is_faded_from_the_start() -> None:
+    made = rig(PLANAR)
+    assert made.get("faded")
+    made.update()
+    assert made.get("faded")
+
+
+@pytest.mark.parametrize("stem", thinned([PLANAR, "3rrr", "rotary_delta", HEXAPOD], QUICK))
+def test_homing_again_is_refused_where_it_would_shift_the_zero(stem: str) -> None:
+    made = rig(stem)
+    made.connect()
+    home = made.nominal(made.home[np.newaxis])[0]
+    # Each part another: all by as much would hardly turn the arms of some.
+    rise = {pin: 21.0 + 3.0 * number for number, pin in enumerate(made.parts)}
+
+    def refused(joints: np.ndarray) -> bool:
+        assert made.forward(joints, made.home) is not None
+        made.update()
+        return bool(made.get("homing-inhibit"))
+
+    elsewhere = made.nominal(made.poses(1))[0]
+    assert not refused(elsewhere)  # nothing is homed, and there is no zero to shift
+    made.set("homed", 1)
+    assert refused(elsewhere)
+    assert not refused(home)
+    for joint in range(len(home)):
+        arm = _arm(made, joint)
+        for off in (-1.0, 1.0):  # 0.001 mm, here and at the end of the arm of one that turns
+            beside = home.copy()
+            beside[joint] += off * 0.99e-3 / arm
+            assert not refused(beside)
+            beside[joint] += off * 0.02e-3 / arm
+            assert refused(beside)
+    made.celsius(rise)
+    made.set("enable", 1)
+    made.let_go()
+    assert refused(home), "compensated"
+    made.set("fade", 1)
+    made.update(2)
+    assert not refused(home)
+    compensated = made.corrected(made.home[np.newaxis], rise)[0]
+    assert refused(compensated), "faded out while the joints stood, as in joint mode"
+    made.set("homing-tolerance", np.nan)
+    assert refused(home)
 
 
 def test_kinematics_are_a_function_of_the_pose_between_updates(planar: Rig) -> None:

@@ -13,7 +13,7 @@ import real_linuxcnc
 from module_under_test import CYCLE, exported
 
 import truepose as tp
-from benchmarks.kinematics_host import NEEDED, available, compiled, the_host
+from benchmarks.kinematics_host import NEEDED, available, compiled, parameters_of, the_host
 from build_machine import MACHINES
 from system_package import missing
 from truepose.controllers._prefix import LONGEST_PREFIX
@@ -37,8 +37,10 @@ def test_each_has_pins_of_its_own() -> None:
         for prefix, machine in machines.items():
             source = Path(folder) / prefix / "kins.c"
             source.parent.mkdir()
-            source.write_text(exported(machine, prefix=prefix)["c"])
-            modules[prefix] = host.load(compiled(source), len(machine.joints))
+            text = exported(machine, prefix=prefix)["c"]
+            source.write_text(text)
+            library = compiled(source)
+            modules[prefix] = host.load(library, len(machine.joints), parameters_of(text))
     names = host.names[before:]
     assert len(names) == len(set(names))
     assert {name.partition(".")[0] for name in names} == {"left", right}
@@ -65,8 +67,8 @@ def test_each_has_pins_of_its_own() -> None:
 
 
 # Motion with both modules, run for a while; what `getp` prints are lines of a number each.
-_HAL = """loadrt {first}_linear_delta
-loadrt {second}_linear_delta
+_HAL = """loadrt {first}_linear_delta {first_hash}
+loadrt {second}_linear_delta {second_hash}
 loadrt homemod
 loadrt tpmod
 loadrt motmod servo_period_nsec=1000000 num_joints=3
@@ -98,9 +100,12 @@ def test_linuxcnc_asks_the_module_loaded_first(tmp_path: Path) -> None:
     real_linuxcnc.required()
     machine = tp.load(MACHINES / "linear_delta.toml")
     (tmp_path / "modules").mkdir()
+    hashes = {}
     for prefix in ("left", "right"):
         source = tmp_path / f"{prefix}_linear_delta.c"
-        source.write_text(exported(machine, prefix=prefix)["c"])
+        text = exported(machine, prefix=prefix)["c"]
+        source.write_text(text)
+        hashes[prefix] = " ".join(f"{key}={value}" for key, value in parameters_of(text).items())
         subprocess.run(
             ["/usr/bin/halcompile", "--compile", source.name],
             cwd=tmp_path,
@@ -111,7 +116,8 @@ def test_linuxcnc_asks_the_module_loaded_first(tmp_path: Path) -> None:
         source.with_suffix(".so").rename(tmp_path / "modules" / f"{source.stem}.so")
     for first, second in (("left", "right"), ("right", "left")):
         name = f"{first}.hal"
-        (tmp_path / name).write_text(_HAL.format(first=first, second=second))
+        words = {"first_hash": hashes[first], "second_hash": hashes[second]}
+        (tmp_path / name).write_text(_HAL.format(first=first, second=second, **words))
         log = real_linuxcnc.in_namespaces(tmp_path, _INSIDE, name)
         if log is None:
             pytest.skip("two modules are loaded in namespaces only")

@@ -201,6 +201,12 @@ def test_the_linuxcnc_module_refuses_them_too(tmp_path: Path) -> None:
     )
 
 
+def _hash_of(module: str) -> str:
+    found = re.search(r'#define HASH "(\w+)"', module)
+    assert found
+    return found[1]
+
+
 def test_pins_and_module_of_linuxcnc(tmp_path: Path) -> None:
     machine = load_text(tmp_path, PLANAR)
     stem = Path(machine.file).stem
@@ -209,11 +215,15 @@ def test_pins_and_module_of_linuxcnc(tmp_path: Path) -> None:
     assert set(files) == {name.replace("truepose_", "left_") for name in plain}
     assert set(files) == {f"left_{stem}.{ending}" for ending in ("c", "ini", "hal")}
     assert f'hal_init("left_{stem}")' in files[f"left_{stem}.c"]
-    assert f"KINEMATICS = left_{stem}\n" in files[f"left_{stem}.ini"]
+    own, other = _hash_of(files[f"left_{stem}.c"]), _hash_of(plain[f"truepose_{stem}.c"])
+    assert own != other
+    assert f"KINEMATICS = left_{stem} ini={own}\n" in files[f"left_{stem}.ini"]
     for name, text in files.items():
         assert not re.search(r"truepose[.-]\w", text), name
         as_ever = plain[name.replace("left_", "truepose_")]
-        assert text == re.sub(rf"truepose(?=[.-]|_{stem})", "left", as_ever)
+        renamed = re.sub(rf"truepose(?=[.-]|_{stem})", "left", as_ever)
+        # Another export, and so another hash.
+        assert text == renamed.replace(other, own)
     pins = "".join(text for name, text in files.items() if not name.endswith("ini"))
     assert re.search(r"\bleft\.update\b", pins)
     assert re.search(r"\bleft\.strut-0-temperature\b", pins)

@@ -7,24 +7,32 @@ from collections.abc import Iterable
 import numpy as np
 
 from truepose.controllers._template import exact, fill, one_line, template
-from truepose.controllers.linuxcnc._description import DEGREE, MILLIMETRE, WRENCHES, Description
+from truepose.controllers.linuxcnc._description import (
+    DEGREE,
+    HELD,
+    MILLIMETRE,
+    WRENCHES,
+    Description,
+)
 from truepose.controllers.linuxcnc._safe_box import Box
 from truepose.version import version
 
 
-def ini_text(description: Description, box: Box, clamp: float) -> str:
-    """Sections KINS, TRAJ, AXIS and JOINT, mm and degrees. `clamp` in m."""
+def ini_text(description: Description, box: Box, clamp: float, mark: str) -> str:
+    """Sections KINS, TRAJ, AXIS and JOINT, mm and degrees. `clamp` in m; `mark`: its hash."""
     machine = description.machine
     home = description.home / np.array([MILLIMETRE] * 3 + [DEGREE] * 3)
     home[[k for k in range(6) if k not in description.freedoms]] = 0.0
     return fill(
         description.with_pins(template(__package__, "ini.in")),
         {
+            "hash": mark,
             "title": description.title,
             "version": version(),
             "file": one_line(machine.file.replace("\\", "/").rpartition("/")[2]),
             "module": description.module,
             "n_joint": str(len(machine.joints)),
+            "absent": "".join(_absent(description)),
             "coordinates": " ".join(name.upper() for name in machine.commanded),
             "home": " ".join(_clean(value) for value in home),
             "checked": str(box.checked),
@@ -40,13 +48,34 @@ def ini_text(description: Description, box: Box, clamp: float) -> str:
     )
 
 
+def _absent(description: Description) -> Iterable[str]:
+    """Why axes are not among COORDINATES."""
+    if description.locked:
+        yield f"# No axis {_listed(description.locked)}: the machine has no such freedom, locked.\n"
+    if description.following:
+        following = _listed(description.following)
+        yield f"# No axis {following}: not commanded, follows from the others.\n"
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(name.upper() for name in names)
+
+
 def _axes(description: Description, box: Box) -> Iterable[str]:
     units = description.pose_units
-    for name, low, high in zip(
-        description.machine.commanded, box.low / units, box.high / units, strict=True
+    for name, low, high, held in zip(
+        description.machine.commanded,
+        box.low / units,
+        box.high / units,
+        description.held,
+        strict=True,
     ):
         unit = "mm" if name in "xyz" else "degrees"
         yield f"\n[AXIS_{name.upper()}]"
+        if held:
+            centre = _short(round(0.5 * (low + high), 9))
+            yield f"# Axis {name.upper()} is locked at {centre} {unit}: the machine file's"
+            yield f"# workspace holds it within {HELD:g}, left for rounding and corrections."
         yield f"MIN_LIMIT = {_short(low)}"
         yield f"MAX_LIMIT = {_short(high)}"
         yield f"# MAX_VELOCITY =\n# MAX_ACCELERATION =\n# {unit} per s, per s^2"
@@ -70,8 +99,11 @@ def _joints(description: Description) -> Iterable[str]:
         yield f"# {'mm' if linear else 'degrees'} per s, per s^2; {'mm' if linear else 'degrees'}"
 
 
-def hal_text(description: Description, clamp: float, rate_limit: float) -> str:
-    """The lines that load, order and connect the module. `clamp` in m, `rate_limit` in m/s."""
+def hal_text(description: Description, clamp: float, rate_limit: float, mark: str) -> str:
+    """The lines that load, order and connect the module. `clamp` in m, `rate_limit` in m/s.
+
+    `mark`: the hash of the export.
+    """
     temperatures = [
         f"#net {name}  YOUR.SENSOR  => {description.pins}.{name}-temperature   # {one_line(part)}"
         for name, part in zip(
@@ -86,6 +118,7 @@ def hal_text(description: Description, clamp: float, rate_limit: float) -> str:
         description.with_pins(template(__package__, "hal.in")),
         {
             "module": description.module,
+            "hash": mark,
             "title": description.title,
             "version": version(),
             "file": one_line(description.machine.file.replace("\\", "/").rpartition("/")[2]),

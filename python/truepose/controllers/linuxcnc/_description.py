@@ -32,6 +32,13 @@ LONGEST_NAME = 40
 
 _PIN = re.compile(rf"\b{PINS}(?=[.-])")
 
+HELD = 0.1
+"""Half width of the box, mm or degrees, along an axis that the workspace holds at one value.
+
+A feedback pose is off by rounding, and a corrected program asks for a little of every axis: limits
+of no width would refuse every move.
+"""
+
 WRENCHES = ("force-x", "force-y", "force-z", "moment-x", "moment-y", "moment-z")
 """Pins, in the order of a wrench."""
 
@@ -106,6 +113,30 @@ class Description:
     def pose_units(self) -> Floats:
         """(n_commanded,) m or rad of one mm or degree."""
         return np.where(np.array(self.freedoms) < 3, MILLIMETRE, DEGREE)
+
+    @property
+    def locked(self) -> tuple[str, ...]:
+        """Axes of LinuxCNC that the machine does not have: it has no such freedom."""
+        return tuple(name for name in FREEDOMS if name not in self.machine.dof)
+
+    @property
+    def following(self) -> tuple[str, ...]:
+        """Freedoms that are no axes of LinuxCNC: they are not commanded, the others make them."""
+        machine = self.machine
+        return tuple(name for name in machine.dof if name not in machine.commanded)
+
+    @property
+    def reach(self) -> tuple[Floats, Floats]:
+        """(n_commanded,) ends of the file's workspace, home included, m and rad."""
+        poses, home = self.machine.poses(), self.commanded_home
+        return np.minimum(poses.min(axis=0), home), np.maximum(poses.max(axis=0), home)
+
+    @property
+    def held(self) -> Flags:
+        """(n_commanded,) axes that the workspace holds at one value, or nearly."""
+        low, high = self.reach
+        held: Flags = high - low < 2.0 * HELD * self.pose_units
+        return held
 
     @property
     def wrenches(self) -> list[int]:

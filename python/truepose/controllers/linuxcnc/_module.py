@@ -23,14 +23,22 @@ TEMPERATURES = (-40.0, 120.0)
 PLAUSIBLE_LOADS = 10.0
 """A force or moment is plausible up to so many times that of the machine file."""
 
+HOMING_TOLERANCE = 1e-3
+"""mm from HOME at which a joint may be homed again: what feedback at rest is off, and no more."""
+
 SETTLED = 1e-12
 """How well the forward solution's pose gives the joints back, in sizes of the machine."""
 
 _WIDTH = 100
 
 
-def module_text(description: Description, machine_c: str, clamp: float, rate_limit: float) -> str:
-    """The whole module. `clamp` in m; `rate_limit` in m/s; `machine_c` with prefix `PREFIX`."""
+def module_text(
+    description: Description, machine_c: str, clamp: float, rate_limit: float, mark: str
+) -> str:
+    """The whole module. `clamp` in m; `rate_limit` in m/s; `machine_c` with prefix `PREFIX`.
+
+    `mark`: the hash of the export.
+    """
     machine = description.machine
     wrenches = description.wrenches
     condition = machine.condition
@@ -38,6 +46,7 @@ def module_text(description: Description, machine_c: str, clamp: float, rate_lim
         description.with_pins(template(__package__, "module.c.in")),
         {
             "module": description.module,
+            "hash": mark,
             "title": description.title,
             "version": version(),
             "file": one_line(machine.file.replace("\\", "/").rpartition("/")[2]),
@@ -57,6 +66,7 @@ def module_text(description: Description, machine_c: str, clamp: float, rate_lim
             "wrench": "".join(f"{index}, " for index in wrenches),
             "rate_limit": exact(_millimetres(rate_limit)),
             "clamp": exact(_millimetres(clamp)),
+            "homing_tolerance": exact(HOMING_TOLERANCE),
             "temperature_min": exact(TEMPERATURES[0]),
             "temperature_max": exact(TEMPERATURES[1]),
             "temperature_slew": exact(0.0),
@@ -73,6 +83,10 @@ def _pin_table(description: Description) -> Iterable[str]:
         yield f" *   {f'{name}-temperature':<22} in   degrees Celsius of {one_line(part)}"
     commanded = " ".join(FREEDOMS[index] for index in description.freedoms)
     yield f" *   (commanded: {commanded}; loads: {', '.join(_loads(description))})"
+    if description.locked:
+        yield f" *   (locked, the machine has no such freedom: {' '.join(description.locked)})"
+    if description.following:
+        yield f" *   (not commanded, made by the others: {' '.join(description.following)})"
 
 
 def _loads(description: Description) -> list[str]:

@@ -12,18 +12,11 @@ import numpy as np
 
 from truepose.arrays import Flags, Floats
 from truepose.controllers._export import unsupported_machine
-from truepose.controllers.linuxcnc._description import Description, status_ok
+from truepose.controllers.linuxcnc._description import HELD, Description, status_ok
 from truepose.machine.workspace import GridAxis, grid
 
 COUNTS = {1: 1001, 2: 151, 3: 25, 4: 11, 5: 7, 6: 7}
 """Poses along an axis of the dense grid, by the number of axes: 10^4 to 10^5 poses in all."""
-
-HELD = 0.1
-"""Half width of the box, mm or degrees, along an axis that the workspace holds at one value.
-
-A feedback pose is off by rounding, and a corrected program asks for a little of every axis: limits
-of no width would refuse every move.
-"""
 
 NEAR_SINGULAR = 0.05
 """Share of the conditioning at home below which a pose counts as near a singularity."""
@@ -84,12 +77,9 @@ def safe_box(description: Description, clamp: float) -> Box:
 
 def _asked(description: Description) -> tuple[Floats, Floats]:
     """Ends of the workspace, home included, and a little room along axes that are held."""
-    poses = description.machine.poses()
-    home = description.commanded_home
-    low, high = np.minimum(poses.min(axis=0), home), np.maximum(poses.max(axis=0), home)
+    low, high = description.reach
     room = HELD * description.pose_units
-    held = high - low < 2.0 * room
-    centre = 0.5 * (low + high)
+    held, centre = description.held, 0.5 * (low + high)
     return np.where(held, centre - room, low), np.where(held, centre + room, high)
 
 

@@ -187,7 +187,7 @@ def test_the_parameter_file_is_not_written_over(tmp_path: Path) -> None:
     assert [problem.code for problem in refused.value.problems] == ["file-missing"]
     with pytest.raises(RequestError) as refused:
         tp.correct_program(machine(), program(tmp_path), None, parameter_file=tmp_path)
-    assert [problem.code for problem in refused.value.problems] == ["file-unreadable"]
+    assert [problem.code for problem in refused.value.problems] == ["file-is-directory"]
 
 
 def test_many_offsets_are_named_by_their_systems_and_their_file(tmp_path: Path) -> None:

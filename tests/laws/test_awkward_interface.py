@@ -20,7 +20,6 @@ from hypothesis import strategies as st
 import truepose as tp
 from build_machine import MACHINES
 from truepose.errors import PoseError, TrueposeError
-from truepose.machine import Machine
 
 EXAMPLES = int(os.environ.get("TRUEPOSE_EXAMPLES", "60"))
 """Of each function; any number, once."""
@@ -68,7 +67,7 @@ def awkward_arrays() -> st.SearchStrategy[Any]:
         None, "text", b"bytes", 5, 0, -1, True, 1j, 10**400, float("nan"), [], {}, (), [[0.3, 0.2]],
         [[0.3], [0.2, 0.1]], [None, 0.2], ["a", "b"], {"x": 0.3}, object(), np.datetime64("2026"),
         np.array(["a", "b"]), np.zeros((2, 0)), range(2), iter([0.3, 0.2]), pathlib.Path("none"),
-        MACHINE, MACHINE.condition, lambda *given: 0.0, Machine, np.zeros((0, 0, 0, 2)), "\0", "x=",
+        MACHINE, MACHINE.condition, lambda *given: 0.0, np.zeros((0, 0, 0, 2)), "\0", "x=",
     ]  # fmt: skip
     return st.one_of(arrays(), st.sampled_from(others))
 

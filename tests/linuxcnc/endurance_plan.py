@@ -58,7 +58,7 @@ class Subject:
             moment=(0.0, 0.0, 0.0),
         )
         result = tp.compensate(self.machine, pose * self.units, condition)
-        return np.asarray(result["joint"].values[0]) * 1e3
+        return np.asarray(result["joint_corrected"].values[0]) * 1e3
 
     def words(self, pose: Sequence[float] | Floats) -> str:
         """`X1.0 Y2.0`."""

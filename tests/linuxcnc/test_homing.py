@@ -134,7 +134,7 @@ def test_what_is_refused_would_shift_the_zero(done: Run) -> None:
         moment=(0.0, 0.0, 0.0),
     )
     result = tp.compensate(machine, machine.home[:2], condition)
-    added = (result["joint"].values[0] - result["joint_nominal"].values[0]) * 1e3
+    added = (result["joint_corrected"].values[0] - result["joint_nominal"].values[0]) * 1e3
     assert np.abs(added).max() > 0.1
     warm = pins_of(done, "warm", OFFSETS)
     for number in range(2):

@@ -48,7 +48,7 @@ def values(document: dict[str, Any], name: str, unit: str) -> NDArray[np.float64
         ("budget", "error", "elastic", "mm", CASE["errors_mm"]["elastic"], MM),
         ("budget", "overall_error_upper", None, "mm", CASE["errors_mm"]["overall_max"], MM),
         ("budget", "overall_error_lower", None, "mm", CASE["errors_mm"]["overall_min"], MM),
-        ("compensate", "joint", None, "mm", CASE["joints_compensated_mm"], MM),
+        ("compensate", "joint_corrected", None, "mm", CASE["joints_compensated_mm"], MM),
         (
             "compensate", "residual_upper", None, "mm",
             CASE["residual_after_compensation_mm"]["at_max"], MM,

@@ -25,6 +25,13 @@ pub struct Input<'py> {
     what: &'static str,
 }
 
+/// Rows that were given to a call, of which one may fail.
+#[derive(Clone, Copy)]
+pub enum Given<'a, 'py> {
+    Commands(&'a Input<'py>),
+    Joints(&'a Input<'py>),
+}
+
 impl<'py> Input<'py> {
     /// From anything that NumPy takes for a real array. `widths` lists the last dimensions that are
     /// allowed; `what` names the argument and its last dimension in messages.

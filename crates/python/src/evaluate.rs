@@ -1,7 +1,7 @@
 //! How calls are evaluated: blocks of samples without the interpreter's lock, one status per sample,
 //! one error or the status in the end.
 
-use crate::arrays::{Array, Input, filled};
+use crate::arrays::{Array, Given, Input, filled};
 use crate::failure::pose_error;
 use crate::machine::Machine;
 use crate::quantity::Quantity;
@@ -20,13 +20,6 @@ pub struct Placed {
     pub joints: Vec<f64>,
     pub poses: Vec<f64>,
     pub status: Vec<Status>,
-}
-
-/// Rows that were given to a call, of which one may fail.
-#[derive(Clone, Copy)]
-pub enum Given<'a, 'py> {
-    Commands(&'a Input<'py>),
-    Joints(&'a Input<'py>),
 }
 
 impl Machine {

@@ -1,8 +1,7 @@
 //! The machine as a Python class.
 
-use crate::arrays::{Array, Input, filled, output};
+use crate::arrays::{Array, Given, Input, filled, output};
 use crate::description::description;
-use crate::evaluate::Given;
 use crate::failure::{KernelError, kernel_error};
 use crate::quantity::Quantity;
 use crate::samples::{BLOCK, in_blocks_into, with_codes, write_coordinates};

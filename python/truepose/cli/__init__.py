@@ -7,9 +7,11 @@ click and the thin command files, never numpy, the kernel or the report.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from types import FrameType
 
 import click
 
@@ -95,4 +97,12 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         # A terminal that has no µ shows a question mark, not a traceback.
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        if signal.getsignal(number) is signal.SIG_DFL:  # nohup ignores it, and so do we then
+            signal.signal(number, _leave)
     sys.exit(run())
+
+
+def _leave(number: int, _: FrameType | None) -> None:
+    """End as the signal would, but with no temporary file left."""
+    sys.exit(128 + number)

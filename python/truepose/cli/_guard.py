@@ -74,7 +74,13 @@ class GuardedGroup(click.Group):
             result = super().invoke(ctx)
             sys.stdout.flush()
         except KeyboardInterrupt:
-            click.echo("Interrupted: no file was changed.", err=True)
+            from truepose.files.one_run import written
+
+            names = ", ".join(str(path) for path in written())
+            click.echo(
+                f"Interrupted after {names} was written." if names else INTERRUPTED_UNCHANGED,
+                err=True,
+            )
             return INTERRUPTED
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
@@ -90,6 +96,8 @@ class GuardedGroup(click.Group):
             return BAD_INPUT
         return result
 
+
+INTERRUPTED_UNCHANGED = "Interrupted: no file was changed."
 
 JSON_ASKED = "truepose.json_asked"
 """Key in the context's shared `meta`: set once `--format json` is parsed."""

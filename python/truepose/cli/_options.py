@@ -38,6 +38,8 @@ class OutputFile(click.Path):
         """The path, once it is noted what it is asked for with."""
         from truepose.files.one_run import will_write
 
+        if value == "":
+            self.fail("an empty name", param, ctx)
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
         will_write(path, value if param is None else param.opts[0])
         return path

@@ -19,6 +19,8 @@ from truepose.cli._progress import progress, waiting
 from truepose.cli._show import show_answers, show_tables
 from truepose.compensation.compensate import against_nominal
 from truepose.errors import Problem, RequestError
+from truepose.files.document import MACHINE_FILE
+from truepose.files.text_file import read_text
 from truepose.files.wording import counted
 from truepose.files.writing import replacing, require_writable, written_together
 from truepose.reporting import formats
@@ -70,6 +72,12 @@ def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMAT
     if request.witness is not None and not machine.accuracy.asks:
         raise _no_witness("no accuracy that is asked for", ASK)
     return machine
+
+
+def machine_text(request: Request) -> str:
+    """The machine file as it was read, once if it comes out of a pipe."""
+    _, text = read_text(request.machine_file, MACHINE_FILE)
+    return text
 
 
 def evaluate(request: Request, machine: Machine) -> xr.Dataset:

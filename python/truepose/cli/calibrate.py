@@ -280,5 +280,5 @@ def _write_page(request: Request, machine: Machine, dataset: Any, page: Path) ->
     from truepose.cli import _steps
 
     study = replace(_steps.study_of(request, machine), calibration=dataset)
-    text = request.machine_file.read_text(encoding="utf-8")
+    text = _steps.machine_text(request)
     _steps.report_page().write(study, page, text)

@@ -67,7 +67,7 @@ def command(**options: Any) -> int:
     study = _steps.with_time(_steps.study_of(request, machine))
     study = _uncertainty.with_how_sure(_steps.with_strain(request, study))
     study = _steps.with_calibration(study, measurements)
-    text = request.machine_file.read_text(encoding="utf-8")
+    text = _steps.machine_text(request)
     page.write(study, request.output, text)
     show_answers(told(machine, study.accuracy), gains(study.accuracy))
     shown = [

@@ -147,13 +147,13 @@ def _step(value: Any, words: list[str]) -> tuple[str | int, int] | None:
     return None
 
 
-_KIND = FileKind("a machine file (TOML)", ".toml")
+MACHINE_FILE = FileKind("a machine file (TOML)", ".toml")
 
 
 def read(path: str | Path) -> Document:
     """Read a machine file. Raises `MachineFileError` for what is no readable TOML text."""
     file = str(path)
-    content, text = read_text(Path(path), _KIND)
+    content, text = read_text(Path(path), MACHINE_FILE)
     try:
         data = parse_toml(text)
     except TomlError as error:
@@ -173,7 +173,7 @@ def _not_toml(error: TomlError, file: str, text: str) -> Problem:
         file,
         error.line,
         found=found or None,
-        expected=_KIND.phrase,
+        expected=MACHINE_FILE.phrase,
     )
 
 

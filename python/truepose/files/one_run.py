@@ -8,7 +8,7 @@ of a run, in Python, nothing is noted: who names a file there knows it.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -19,10 +19,15 @@ from truepose.errors import Fault, RequestError
 
 @dataclass
 class _Files:
-    """Of one run, links followed; `outputs` by what they were asked for with."""
+    """Of one run, links followed; `outputs` by what they were asked for with.
+
+    `written`: outputs that have their names; `of_pipes`: what came out of pipes.
+    """
 
     inputs: list[Path] = field(default_factory=list)
     outputs: dict[str, Path] = field(default_factory=dict)
+    written: list[Path] = field(default_factory=list)
+    of_pipes: dict[Path, bytes] = field(default_factory=dict)
 
 
 _RUN: ContextVar[_Files | None] = ContextVar("files of one run", default=None)
@@ -56,7 +61,7 @@ def will_write(path: Path, asked_with: str) -> None:
                 f"{path} for both",
                 "a file for each",
             )
-    run.outputs[asked_with] = Path(os.path.realpath(path))
+    run.outputs[asked_with] = real_path(path)
 
 
 def reads(path: Path) -> None:
@@ -67,7 +72,7 @@ def reads(path: Path) -> None:
     for asked_with, output in run.outputs.items():
         if _same(path, output):
             raise _over_input(output, f"{path}, of {asked_with}")
-    run.inputs.append(Path(os.path.realpath(path)))
+    run.inputs.append(real_path(path))
 
 
 def require_not_read(path: Path) -> None:
@@ -75,6 +80,37 @@ def require_not_read(path: Path) -> None:
     run = _RUN.get()
     if run is not None and any(_same(path, read) for read in run.inputs):
         raise _over_input(path, str(path))
+
+
+def has_written(path: Path) -> None:
+    """Note that an output has its name now."""
+    run = _RUN.get()
+    if run is not None:
+        run.written.append(path)
+
+
+def written() -> tuple[Path, ...]:
+    """Outputs of this run that have their names."""
+    run = _RUN.get()
+    return () if run is None else tuple(run.written)
+
+
+def once(path: Path, read: Callable[[], bytes]) -> bytes:
+    """What came out of a pipe, which a run reads once however often it asks."""
+    run = _RUN.get()
+    if run is None:
+        return read()
+    if path not in run.of_pipes:
+        run.of_pipes[path] = read()
+    return run.of_pipes[path]
+
+
+def real_path(path: Path) -> Path:
+    """The path with links followed, as far as the system can; where a file is written."""
+    try:
+        return Path(os.path.realpath(path))
+    except (OSError, ValueError):
+        return path
 
 
 def _over_input(path: Path, found: str) -> RequestError:
@@ -89,7 +125,7 @@ def _over_input(path: Path, found: str) -> RequestError:
 
 def _same(one: Path, other: Path) -> bool:
     """Whether both names are of one file, by links too, or would be."""
-    if os.path.realpath(one) == os.path.realpath(other):
+    if real_path(one) == real_path(other):
         return True
     try:
         return one.samefile(other)

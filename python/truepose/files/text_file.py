@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
-from truepose.errors import MachineFileError, Problem
+from truepose.errors import MachineFileError, Problem, RequestError
 from truepose.files.limits import LARGEST_FILE
-from truepose.files.one_run import reads
+from truepose.files.one_run import once, reads
 from truepose.files.writing import kind_of, standing_for
 
 
@@ -52,13 +53,38 @@ def read_text(path: Path, kind: FileKind) -> tuple[bytes, str]:
     return content, _decoded(content, file)
 
 
+def require_input(path: Path, kind: FileKind) -> None:
+    """Refuse, before any work, what is no ordinary file that may be read, and note it as an input.
+
+    Raises `RequestError` (file-missing, file-is-directory, file-unreadable, output-is-input).
+    """
+    try:
+        found = kind_of(path.stat().st_mode)
+    except (FileNotFoundError, NotADirectoryError):
+        raise RequestError(_missing(path, kind)) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        raise RequestError(_unreadable(str(path), reason)) from None
+    if found is not None:
+        code = "file-is-directory" if found == "a folder" else "file-unreadable"
+        message = f"{path} is {found}"
+        raise RequestError(Problem(code, message, str(path), found=found, expected=kind.phrase))
+    reads(path)
+    if not os.access(path, os.R_OK):
+        raise RequestError(_unreadable(str(path), "no permission to read"))
+
+
 def _content(path: Path) -> bytes:
-    """All of it; of a pipe what comes, for `LARGEST_FILE` may never come to an end."""
+    """All of it, up to `LARGEST_FILE`: a pipe may never come to an end."""
+
+    def read() -> bytes:
+        with path.open("rb") as file:
+            return file.read(LARGEST_FILE + 1)
+
     kind = kind_of(path.stat().st_mode)
     if kind in ("a device", "a socket"):
         raise MachineFileError(_unreadable(str(path), kind))
-    with path.open("rb") as file:
-        content = file.read(LARGEST_FILE + 1)
+    content = once(path, read) if kind == "a pipe" else read()
     if len(content) > LARGEST_FILE:
         raise MachineFileError(
             Problem(
@@ -84,13 +110,15 @@ def _unreadable(file: str, reason: str) -> Problem:
 
 def _missing(path: Path, kind: FileKind) -> Problem:
     folder = sorted(path.parent.glob(f"*{kind.ending}")) if path.parent.is_dir() else []
-    others = {other.stem: other for other in folder}  # the ending makes no two names alike
+    others = {
+        other.stem: other for other in folder if other != path
+    }  # the ending makes no two names alike
     near = get_close_matches(path.stem, others, n=1)
     return Problem(
         "file-missing",
         f"there is no file {path}",
         str(path),
-        found="nothing",
+        found="a link to nothing" if path.is_symlink() else "nothing",
         expected=kind.phrase,
         hint=f"did you mean {others[near[0]]}?" if near else None,
     )

@@ -7,17 +7,24 @@ each file is the old one or the new one.
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
+import signal
 import stat
+import threading
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
+from types import FrameType
 
 from truepose.errors import Fault, RequestError
-from truepose.files.one_run import require_not_read
+from truepose.files.one_run import has_written, real_path, require_not_read
 from truepose.files.wording import one_of
+
+LONGEST_STEM = 40
+"""Characters of a name that a temporary file has too: names may be long, and it has ten more."""
 
 
 def require_writable(path: Path, endings: Collection[str], inputs: Collection[Path] = ()) -> None:
@@ -26,6 +33,13 @@ def require_writable(path: Path, endings: Collection[str], inputs: Collection[Pa
     `endings` are those that can be written (".json", ...); `inputs` are files that must survive.
     Raises `RequestError` (codes `output-ending`, `output-not-writable`, `output-is-input`).
     """
+    with _refused(path):
+        _require_writable(path, endings, inputs)
+
+
+def _require_writable(path: Path, endings: Collection[str], inputs: Collection[Path]) -> None:
+    if "\0" in str(path):
+        raise OSError(errno.EINVAL, "a name with a null character")
     ending = path.suffix.lower()
     folder = Path(os.path.realpath(path)).parent
     if ending not in endings:
@@ -74,7 +88,9 @@ def require_writable(path: Path, endings: Collection[str], inputs: Collection[Pa
 
 def require_new(path: Path) -> None:
     """Refuse a path where something stands. Raises `RequestError` (code `output-exists`)."""
-    if path.exists() or path.is_symlink():
+    with _refused(path):
+        there = path.exists() or path.is_symlink()
+    if there:
         raise _refusal(
             Fault(
                 "output-exists",
@@ -117,7 +133,8 @@ def require_folder(path: Path, names: Collection[str] = ()) -> None:
             path,
         )
     for name in names:
-        _require_ordinary(path / name)
+        with _refused(path / name):
+            _require_ordinary(path / name)
 
 
 @contextmanager
@@ -148,16 +165,21 @@ class FileSet:
         """Where to write what will be `path`; what was written for it before in the set is gone."""
         require_not_read(path)
         _require_ordinary(path)
-        target = _target(path)
+        target = real_path(path)
+        other = self._asked.get(target, path)
+        if other != path:
+            message = f"{other} and {path} are one file"
+            found = f"links to {target}"
+            raise _refusal(Fault("output-twice", message, found, "a file for each"), path)
         # The ending is kept: some writers choose their form by it.
-        name = f".{target.stem}.{secrets.token_hex(4)}{target.suffix}"
+        name = f".{target.stem[:LONGEST_STEM]}.{secrets.token_hex(4)}{target.suffix}"
         self._drop(target)
         self._temporary[target], self._asked[target] = target.with_name(name), path
         return self._temporary[target]
 
     def standing_for(self, path: Path) -> Path:
         """Where the content of `path` is: with the name it has as yet, if it is of the set."""
-        return self._temporary.get(_target(path), path)
+        return self._temporary.get(real_path(path), path)
 
     def take_places(self) -> None:
         """All files get their names. Raises `RequestError` (output-not-writable)."""
@@ -165,16 +187,35 @@ class FileSet:
             with _refused(self._asked[target]):
                 _on_disk(temporary, os.O_RDWR)
                 _take_over(temporary, target)
-        for target, temporary in self._temporary.items():
-            with _refused(self._asked[target]):
-                temporary.replace(target)
+        with _uninterrupted():
+            self._rename()
         for folder in {target.parent for target in self._temporary}:
             with suppress(OSError):  # not every file system can
                 _on_disk(folder, os.O_RDONLY)
 
+    def _rename(self) -> None:
+        """One after the other; where one is refused, those before it get back what stood there."""
+        before = {target: _Before(target) for target in self._temporary}
+        done: list[Path] = []
+        try:
+            for target, temporary in self._temporary.items():
+                try:
+                    with _refused(self._asked[target]):
+                        temporary.replace(target)
+                except RequestError:
+                    for other in done:
+                        before[other].come_back()
+                    raise
+                done.append(target)
+            for target in done:
+                has_written(self._asked[target])
+        finally:
+            for earlier in before.values():
+                earlier.forget()
+
     def leave_out(self, path: Path) -> None:
         """Write nothing to `path` after all."""
-        self._drop(_target(path))
+        self._drop(real_path(path))
 
     def remove(self) -> None:
         """No temporary file stays."""
@@ -218,18 +259,15 @@ def standing_for(path: Path) -> Path:
     return path if files is None else files.standing_for(path)
 
 
-def _target(path: Path) -> Path:
-    """A link stays a link; what it points to is replaced."""
-    return Path(os.path.realpath(path))
-
-
 def _require_ordinary(path: Path) -> None:
     """Refuse a target that is no ordinary file, or that may not be changed."""
     try:
         state = path.stat()
-    except OSError:
+    except FileNotFoundError:
         return
     kind = kind_of(state.st_mode)
+    if kind is None and path.is_absolute() and path.parts[1:2] in (("dev",), ("proc",)):
+        kind = "a stream of the system"
     if kind is not None:
         raise _refusal(
             Fault(
@@ -266,6 +304,50 @@ def kind_of(mode: int) -> str | None:
     return next((name for is_kind, name in kinds if is_kind(mode)), None)
 
 
+class _Before:
+    """What stands at a target, by a second name with which it can come back."""
+
+    def __init__(self, target: Path) -> None:
+        self._target = target
+        self._there = target.exists()
+        name = target.with_name(f".{target.stem[:LONGEST_STEM]}.{secrets.token_hex(4)}.before")
+        self._name: Path | None = name
+        try:
+            os.link(target, name)
+        except OSError:  # nothing is there, or the file system has no second names
+            self._name = None
+
+    def come_back(self) -> None:
+        """What stood there stands there again, as far as it can."""
+        with suppress(OSError):
+            if self._name is not None:
+                self._name.replace(self._target)
+            elif not self._there:
+                self._target.unlink()
+
+    def forget(self) -> None:
+        """No second name stays."""
+        if self._name is not None:
+            with suppress(OSError):
+                self._name.unlink()
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Ctrl-C waits until the block is done, which takes some microseconds."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # it goes to the main thread only
+        return
+    asked: list[FrameType | None] = []
+    handler = signal.signal(signal.SIGINT, lambda _, frame: asked.append(frame))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if asked and callable(handler):
+        handler(signal.SIGINT, asked[0])
+
+
 def _take_over(temporary: Path, target: Path) -> None:
     """Give a file the mode and the owner of the one whose place it takes."""
     try:
@@ -274,7 +356,10 @@ def _take_over(temporary: Path, target: Path) -> None:
         return
     new = temporary.stat()
     if (new.st_uid, new.st_gid) != (old.st_uid, old.st_gid):
-        os.chown(temporary, old.st_uid, old.st_gid)
+        try:
+            os.chown(temporary, old.st_uid, old.st_gid)
+        except PermissionError:
+            raise PermissionError(0, "a file of another user, who would lose it") from None
     temporary.chmod(stat.S_IMODE(old.st_mode))
 
 

@@ -298,6 +298,8 @@ class Condition:
 
 def _finite(value: object) -> bool:
     """Whether it is a number, and a finite one."""
+    if np.ma.is_masked(value):
+        return False
     try:
         return math.isfinite(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):

@@ -55,6 +55,22 @@ class TemperatureLog:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "temperatures", MappingProxyType(temperatures))
 
+    def __eq__(self, other: object) -> bool:
+        """Whether it says the same, whatever file that is in."""
+        if not isinstance(other, TemperatureLog):
+            return NotImplemented
+        return (
+            np.array_equal(self.times, other.times)
+            and self.temperatures.keys() == other.temperatures.keys()
+            and all(
+                np.array_equal(values, other.temperatures[part])
+                for part, values in self.temperatures.items()
+            )
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.times.tobytes(), *sorted(self.temperatures)))
+
     @property
     def span(self) -> tuple[float, float]:
         """First and last time, s."""

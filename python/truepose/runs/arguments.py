@@ -82,7 +82,15 @@ def _whole(value: object) -> bool:
 
 
 def _number(value: object) -> bool:
-    return isinstance(value, float | np.floating) or _whole(value)
+    if isinstance(value, float | np.floating):
+        return True
+    if not _whole(value):
+        return False
+    try:
+        float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        return False
+    return True
 
 
 def _names(value: object) -> bool:
@@ -140,12 +148,7 @@ def _or_none(kind: Kind) -> Kind:
 
 
 def _one_value(value: object) -> bool:
-    return value is None or isinstance(value, str | bytes | int | float | np.generic)
-
-
-def _of_truepose(value: object) -> bool:
-    """Whether its class is one of ours, of a layer that is above this one."""
-    return type(value).__module__.partition(".")[0] == "truepose"
+    return value is None or isinstance(value, str | bytes | bool | np.generic) or _number(value)
 
 
 _LATER: Kind = (_anything, "")
@@ -173,7 +176,7 @@ KINDS: dict[str, Kind] = {
     "Any": _LATER,
     "Correlation": _LATER,
     "Measurements | str | Path": (
-        lambda value: _path(value) or _of_truepose(value),
+        lambda value: _path(value) or type(value).__name__ == "Measurements",
         "the name of a file of measurements, or what is read from it",
     ),
     "Instrument | Iterable[Instrument]": _LATER,

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose._kernel import STATUS
-from truepose.arrays import Flags, Floats, Indices
-from truepose.errors import Problem, RequestError
+from truepose.arrays import Flags, Floats, Indices, real_numbers
+from truepose.errors import ArgumentError, Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.sources import PoseBlock, Source, acting
 
@@ -59,8 +59,8 @@ def requested_poses(machine: Machine, poses: ArrayLike | None) -> Floats:
         return machine.poses()
     count = len(machine.commanded)
     try:
-        given = np.asarray(poses, np.float64)
-    except (TypeError, ValueError):
+        given = real_numbers("poses", poses)
+    except ArgumentError:
         raise _bad_poses(machine, "something that is not an array of numbers") from None
     if given.ndim == 0 or given.shape[-1] != count:
         raise _bad_poses(machine, f"shape {given.shape}")

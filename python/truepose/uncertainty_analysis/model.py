@@ -241,7 +241,9 @@ def _inputs(inputs: Mapping[str, Input]) -> dict[str, Input]:
             Problem(
                 "no-input",
                 "a function needs inputs that are uncertain",
-                found="nothing" if given else f"something of type {type(inputs).__name__}",
+                found="nothing"
+                if given or inputs is None
+                else f"something of type {type(inputs).__name__}",
                 expected='inputs by name, such as {"x": tp.Input.normal(1.0, 0.1)}',
             )
         )

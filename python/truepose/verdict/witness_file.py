@@ -120,7 +120,7 @@ class _Writing:
             if not name.endswith((".u", ".v")):
                 text.set_parameter(name, value)
         edits.pose(self._witness.pose)
-        text.move_to(self._path.parent)
+        text.move_to(self._path)
         try:
             draft = self._draft()
             if self._causes_stay and not self._same_condition(draft):

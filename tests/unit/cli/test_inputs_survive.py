@@ -223,7 +223,7 @@ def test_ctrl_c_ends_the_wait_for_a_pipe(command: str, tmp_path: Path) -> None:
     if command == "gcode":  # a program is read twice, which a pipe is not
         _, errors = process.communicate(timeout=60)
         assert process.returncode == 2
-        assert "the program is a pipe" in errors
+        assert "input is a pipe" in errors
         return
     # It is at the pipe once its other end can be opened without waiting.
     for _ in range(600):
@@ -232,6 +232,7 @@ def test_ctrl_c_ends_the_wait_for_a_pipe(command: str, tmp_path: Path) -> None:
             break
         except OSError:
             time.sleep(0.1)
+    time.sleep(0.5)  # it waits in the system, not on the way there
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     os.close(other)
@@ -259,3 +260,71 @@ def test_an_export_that_fails_leaves_the_old_set(tmp_path: Path, capsys: Capture
     after = contents(tmp_path)
     assert after.keys() == before.keys()
     assert np.mean([after[name] != before[name] for name in after]) > 0.3
+
+
+LONG = "n" * 300
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("check", f"{LONG}.toml"),
+        ("check", TRIPOD, "-o", f"{LONG}.json"),
+        ("check", TRIPOD, "-o", f"{LONG}/a.json"),
+        ("init", "tripod", "-o", f"{LONG}.toml"),
+        ("gcode", TRIPOD, f"{LONG}.ngc", "--dry-run"),
+        ("gcode", TRIPOD, TRIPOD, "--dry-run", "--var", f"{LONG}.var"),
+        ("plan", TRIPOD, "--instrument", f"{LONG}.csv:a", "--poses", 5),
+        ("check", TRIPOD, "--set", 'condition.temperature_log="a\\u0000b.csv"'),
+    ],
+)
+def test_names_that_no_file_has_are_refused(
+    arguments: tuple[object, ...], capsys: Capture, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = call(capsys, *arguments)
+    assert outcome.code == 2, outcome.err
+    assert outcome.codes
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_output_without_a_name_is_refused(capsys: Capture) -> None:
+    assert call(capsys, "export", "c", TRIPOD, "-o", "").code == 2
+
+
+def test_a_machine_file_out_of_a_pipe_is_read_once(tmp_path: Path, capsys: Capture) -> None:
+    pipe = tmp_path / "pipe.toml"
+    os.mkfifo(pipe)
+    machine = MACHINES / "planar_two_slider.toml"
+    writer = threading.Thread(target=lambda: pipe.write_text(machine.read_text()))
+    writer.start()
+    page = tmp_path / "page.html"
+    outcome = call(capsys, "report", pipe, "-o", page)
+    writer.join()
+    assert outcome.code == 0, outcome.err
+    assert "name = &#34;Planar two-slider PKM&#34;" in page.read_text()
+
+
+def test_a_calibrated_machine_with_a_log_goes_where_a_link_leads(
+    tmp_path: Path, capsys: Capture
+) -> None:
+    data = MACHINES.parent / "examples" / "data"
+    text = (data / "delta_printer.toml").read_text()
+    log = "time (s),default (degC)\n0,20\n10,20\n"
+    (tmp_path / "log.csv").write_text(log)
+    (tmp_path / "machine.toml").write_text(
+        text + '\n[condition]\ntemperature_log = "log.csv"\n'
+        if "[condition]" not in text
+        else text.replace("[condition]", '[condition]\ntemperature_log = "log.csv"', 1)
+    )
+    far = tmp_path / "far"
+    far.mkdir()
+    link = tmp_path / "link.toml"
+    link.symlink_to(far / "real.toml")
+    outcome = call(
+        capsys, "calibrate", tmp_path / "machine.toml", data / "delta_positions.csv",
+        "--machine-output", link, "--date", "2026-01-01", "--force",
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    assert call(capsys, "check", link).code in (0, 1)
+    assert call(capsys, "check", far / "real.toml").code in (0, 1)

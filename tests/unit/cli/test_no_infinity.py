@@ -73,7 +73,7 @@ def test_a_band_that_has_no_bound_is_no_yes(
     proven = found.proven.values
     assert proven.any()
     assert not proven.all()
-    for variable in ("joint", "bound", "residual_lower", "residual_upper"):
+    for variable in ("joint_corrected", "bound", "residual_lower", "residual_upper"):
         assert np.isfinite(found[variable]).all()
     assert (np.isfinite(found.second_order).all("component").values == proven).all()
     # There the errors of the lengths are carried to the tool more than anywhere else.

@@ -56,7 +56,7 @@ def test_poses_of_a_template_are_decimals(
     every = {repr(float(Fraction(200) + Fraction(200 * at, 64))) for at in range(65)}
     assert {row["pose_x [mm]"] for row in rows} <= every
     # L = 500 mm: at x = 200 or 400, y = 100 a carriage stands where 3, 4, 5 say.
-    at_400 = {row["joint_d1 [mm]"] for row in rows if float(row["pose_x [mm]"]) == 400.0}
+    at_400 = {row["joint_nominal_d1 [mm]"] for row in rows if float(row["pose_x [mm]"]) == 400.0}
     y_400 = {row["pose_y [mm]"] for row in rows if float(row["pose_x [mm]"]) == 400.0}
     assert at_400 == {repr(float(y) + 300.0) for y in y_400}
 

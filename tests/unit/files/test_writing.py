@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
@@ -198,3 +199,74 @@ def test_what_is_no_file_is_no_target(unusual: tuple[Path, str]) -> None:
         assert (problem.code, problem.found) == ("output-not-writable", kind)
     assert kind_of(place.stat().st_mode) == kind
     assert place.stat().st_ino == before.st_ino
+
+
+def test_two_names_of_one_file_are_not_both_of_a_set(tmp_path: Path) -> None:
+    real, link = tmp_path / "a.hal", tmp_path / "a.c"
+    real.write_text("old")
+    link.symlink_to(real)
+    with pytest.raises(RequestError) as caught, written_together():  # noqa: PT012
+        with replacing(link) as temporary:
+            temporary.write_text("c")
+        with replacing(real) as temporary:
+            temporary.write_text("hal")
+    assert caught.value.problems[0].code == "output-twice"
+    assert real.read_text() == "old"
+    assert sorted(tmp_path.iterdir()) == sorted([real, link])
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_a_rename_that_fails_brings_back_those_before_it(
+    there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pair = tmp_path / "a.json", tmp_path / "b.json"
+    if there:
+        for file in pair:
+            file.write_text("old")
+    replace = Path.replace
+
+    def refused(self: Path, target: Path) -> Path:
+        if target == pair[1]:
+            raise OSError(16, "Device or resource busy")
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", refused)
+    with pytest.raises(RequestError) as caught, written_together():  # noqa: PT012
+        for file in pair:
+            with replacing(file) as temporary:
+                temporary.write_text("new")
+    assert caught.value.problems[0].found == "Device or resource busy"
+    left = {path.name: path.read_text() for path in tmp_path.iterdir()}
+    assert left == ({"a.json": "old", "b.json": "old"} if there else {})
+
+
+def test_ctrl_c_waits_until_all_have_their_places(
+    pair: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace = Path.replace
+
+    def interrupted(self: Path, target: Path) -> Path:
+        os.kill(os.getpid(), signal.SIGINT)
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt), written_together():  # noqa: PT012
+        for file in pair:
+            with replacing(file) as temporary:
+                temporary.write_text("new")
+    assert [file.read_text() for file in pair] == ["new", "new"]
+    assert sorted(pair[0].parent.iterdir()) == sorted(pair)
+
+
+def test_long_names_can_be_written(tmp_path: Path) -> None:
+    file = tmp_path / ("n" * 250 + ".json")
+    with replacing(file) as temporary:
+        temporary.write_text("new")
+    assert file.read_text() == "new"
+
+
+@pytest.mark.parametrize("name", ["n" * 300 + ".json", "n" * 300 + "/a.json", "a\0.json"])
+def test_a_name_that_no_file_has_is_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(RequestError) as caught:
+        require_writable(tmp_path / name, [".json"])
+    assert caught.value.problems[0].code == "output-not-writable"

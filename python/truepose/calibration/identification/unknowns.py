@@ -21,7 +21,7 @@ from truepose.calibration.identification.properties import Property, properties_
 from truepose.calibration.instruments._base import Instrument
 from truepose.calibration.measurements import Measurements
 from truepose.calibration.observables import UNITS, column_name, is_parameter
-from truepose.errors import Problem, RequestError
+from truepose.errors import ArgumentError, Problem, RequestError
 from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.files.units import QuantityError, UnitSystem
 from truepose.files.wording import did_you_mean
@@ -280,6 +280,8 @@ def _chosen_unknowns(
     chosen: dict[str, _MachineUnknown] = {}
     problems = []
     for text in identify:
+        if not isinstance(text, str):
+            raise ArgumentError.of("identify", text, 'names, such as ["strut.*.length"]')
         pattern, _, band = (part.strip() for part in text.partition("="))
         if pattern in known:
             names = [pattern]

@@ -99,7 +99,7 @@ def _amount(text: str, amount: str, reads: list[str]) -> tuple[float, str]:
 
 def _of_file(machine: Machine, text: str) -> tuple[Instrument, ...]:
     path, name = text, ""
-    if not Path(text).exists() and ":" in text:
+    if ":" in text and not _exists(text):
         path, _, name = text.rpartition(":")
     declared = read_instruments(path, machine)
     if not name:
@@ -114,6 +114,13 @@ def _of_file(machine: Machine, text: str) -> tuple[Instrument, ...]:
             hint=did_you_mean(name, names),
         )
     return named
+
+
+def _exists(name: str) -> bool:
+    try:
+        return Path(name).exists()
+    except (OSError, ValueError):  # no name that a file may have
+        return False
 
 
 def read_instruments(path: str | Path, machine: Machine) -> tuple[Instrument, ...]:

@@ -50,6 +50,7 @@ from truepose.runs.dataset import (
     quantity_coords,
 )
 from truepose.runs.quantities import POSITIONS
+from truepose.uncertainty_analysis.arguments import required_seed
 
 DOMINATED = 0.5
 """An unknown of which the readings give less than this share of the information is called
@@ -168,6 +169,9 @@ def plan(
                 expected=one_of(CRITERIA),
             )
         )
+    required_seed(seed)
+    if not 0 <= starts <= MOST_STARTS:
+        raise ArgumentError.of("starts", starts, f"a whole number from 0 to {MOST_STARTS}")
     field = Field(
         machine, instrument, candidates=candidates, condition=condition, identify=identify
     )
@@ -200,6 +204,10 @@ def plan(
         field.relative,
         seed,
     )
+
+
+MOST_STARTS = 10_000
+"""Searches that a plan begins: a few dozen find the best."""
 
 
 def _instruments(given: Instrument | Iterable[Instrument]) -> tuple[Instrument, ...]:

@@ -157,7 +157,7 @@ def write_calibrated(
         text.set_property(*edit)
     _write_bands(text, machine, result, coverage)
     given_at = text.set_coverage(Accuracy(at=AT).at_text)
-    text.move_to(path.parent)
+    text.move_to(path)
     text.set_controller(held)
     _write_provenance(text, machine, provenance, warnings)
     with replacing(path) as temporary:

@@ -17,6 +17,7 @@ from truepose.arrays import Floats
 from truepose.errors import RequestError
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.document import Document, read
+from truepose.files.one_run import real_path
 from truepose.files.settings import apply
 from truepose.files.text_file import FileKind, read_text
 from truepose.files.units import UnitSystem, meant
@@ -231,13 +232,17 @@ class MachineText:
         between = "" if before.endswith("\n\n") else "\n" if before.endswith("\n") else "\n\n"
         self.toml = tomlkit.parse(f"{before}{between}{text}")
 
-    def move_to(self, folder: Path) -> None:
-        """Rewrite relative names of data files for a machine file in another folder."""
-        old, new = self._folder.resolve(), folder.resolve()
-        if old == new:
+    def move_to(self, file: Path) -> None:
+        """Rewrite relative names of data files for a machine file of another name.
+
+        They are whole names where that is a link into another folder: the file is read by both.
+        """
+        old, new = self._folder.resolve(), file.parent.resolve()
+        linked = real_path(file).parent != new
+        if old == new and not linked:
             return
         names = {
-            name: Path(os.path.relpath(old / name, new)).as_posix()
+            name: Path(old / name if linked else os.path.relpath(old / name, new)).as_posix()
             for name in self._machine.data_files
             if not Path(name).is_absolute()
         }

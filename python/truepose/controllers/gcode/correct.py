@@ -7,7 +7,6 @@ takes little memory and none is handed over without its proof.
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
@@ -49,9 +48,9 @@ from truepose.controllers.gcode.tolerance import (
 )
 from truepose.controllers.gcode.work_offsets import Positions, WorkOffsets, named, work_offsets
 from truepose.errors import Problem, RequestError
-from truepose.files.one_run import reads
+from truepose.files.text_file import FileKind, require_input
 from truepose.files.wording import one_of
-from truepose.files.writing import kind_of, replacing, require_writable
+from truepose.files.writing import replacing, require_writable
 from truepose.machine import Condition, Machine
 from truepose.runs.arguments import checked
 from truepose.runs.controller_geometry import (
@@ -81,6 +80,8 @@ TURN = 5e-4
 
 DIGITS = 6
 """Decimals of mm and degrees; inches have one more."""
+
+PROGRAM = FileKind("a program of G-code", ".ngc")
 
 HINTS = {
     "gcode-no-offset": "say what it is: --offset G54 x=..,y=.., or --var with LinuxCNC's parameter "
@@ -486,18 +487,7 @@ def _problems_of(program: Path) -> Iterator[None]:
 
 def _require_files(program: Path, written: Path | None, parameters: Path | None) -> None:
     """Refuse what cannot be read or written before any work is done."""
-    if not program.exists():
-        raise _file_problem("file-missing", "there is no such program", program, "no such file")
-    if program.is_dir():
-        raise _file_problem("file-is-directory", "the program is a folder", program, "a folder")
-    # It is read more than once.
-    if (kind := kind_of(program.stat().st_mode)) is not None:
-        raise _file_problem("file-unreadable", f"the program is {kind}", program, kind)
-    reads(program)
-    if not os.access(program, os.R_OK):
-        raise _file_problem(
-            "file-unreadable", "the program cannot be read", program, "no permission to read"
-        )
+    require_input(program, PROGRAM)
     if written is None:
         return
     inputs = {"the program": program, "the parameter file": parameters}

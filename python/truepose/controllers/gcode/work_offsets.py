@@ -15,7 +15,7 @@ from pathlib import Path
 
 from truepose.controllers.gcode._axes import AXES, DEGREE, LINEAR, MILLIMETRE, scale_of
 from truepose.errors import Problem, RequestError
-from truepose.files.one_run import reads
+from truepose.files.text_file import FileKind, require_input
 from truepose.files.wording import one_of
 from truepose.machine import Machine
 
@@ -28,6 +28,8 @@ ROTATION = "R"
 ACTIVE, FIRST, EACH, TURN = 5220, 5221, 20, 9
 G92_IN_FORCE, G92 = 5210, 5211
 """Numbers of LinuxCNC's parameters."""
+
+PARAMETER_FILE = FileKind("the file that PARAMETER_FILE of LinuxCNC's INI names", ".var")
 
 MOST_BYTES = 1 << 20
 """Of a parameter file: LinuxCNC's has some ten thousand."""
@@ -148,18 +150,7 @@ def read_parameters(path: Path, machine: Machine) -> WorkOffsets:
 
 
 def _lines(path: Path) -> Iterator[tuple[int, float]]:
-    if not path.is_file():
-        there = path.exists()
-        raise RequestError(
-            Problem(
-                "file-unreadable" if there else "file-missing",
-                "this is no parameter file" if there else "there is no such parameter file",
-                file=str(path),
-                found="a folder, a device or a pipe" if there else "no file",
-                expected="the file that PARAMETER_FILE of LinuxCNC's INI names",
-            )
-        )
-    reads(path)
+    require_input(path, PARAMETER_FILE)
     try:
         with path.open("rb") as file:
             text = file.read(MOST_BYTES + 1)

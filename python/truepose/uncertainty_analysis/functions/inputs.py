@@ -156,8 +156,8 @@ def _refused(code: str, message: str, *, found: str, expected: str) -> RequestEr
 
 def _finite(name: str, value: float) -> float:
     try:
-        number = float(value)
-    except (TypeError, ValueError):
+        number = float(value if not np.ma.is_masked(value) else "masked")
+    except (TypeError, ValueError, OverflowError):
         raise _refused(
             "wrong-type", f"{name} is not a number", found=repr(value), expected="a number"
         ) from None

@@ -159,6 +159,17 @@ def description_of(path: Path) -> Description:
             **limits,
         }
 
+    def limb(entry: Mapping[str, Any]) -> Description:
+        """Of which closures it is; what it is made of does not show in geometry."""
+        return {
+            "name": entry["name"],
+            "strut": entry.get("strut"),
+            "guides": entry.get("guides", []),
+            "side" if "strut" in entry else "platform_side": entry["axis"],
+            "parts": [],
+            **dict.fromkeys(("mass", "whole_length", "carriage_mass"), 0.0),
+        }
+
     named = [*machine["dof"], *workspace.get("home", {})]
     description: Description = {
         "dof": machine["dof"],
@@ -171,6 +182,8 @@ def description_of(path: Path) -> Description:
         "guides": [{**g, **geometry(g)} for g in rows("guide")],
         "closure_compliance": None,
     }
+    if "limb" in file:
+        description["limbs"] = [limb(entry) for entry in rows("limb")]
     if Reference(description).overconstrained:
         description["closure_compliance"] = [compliance(entry) for entry in rows("strut")]
     return description
@@ -272,6 +285,11 @@ def deviated(description: Description, deviation: Mapping[str, float]) -> Descri
             along = tangents(direction)["uv".index(part[0])]
             tilted = np.array(row[field]) + change * np.linalg.norm(direction) * along
             row[field] = tilted.tolist()
+            row[f"nominal_{field}"] = nominal[key][field]
+        elif table == "guide" and field == "offset":
+            value = list(row.get(field, [0.0, 0.0]))
+            value[int(part[0]) - 1 if part else 0] += change
+            row[field] = value
         elif part:
             value = list(row.get(field, [0.0, 0.0, 0.0]))
             value["xyz".index(part[0])] += change

@@ -1,9 +1,9 @@
-"""Trusses in CalculiX, a finite-element program that shares nothing with truepose.
+"""Structures in CalculiX, a finite-element program that shares nothing with truepose.
 
-A `Deck` gathers any number of structures of two-node trusses (T3D2), springs to the ground
-(SPRING1), rigid bodies and linear equations between displacements; `run` solves them all in one
-linear static step and reads the displacements from the table that it prints, seven digits a number.
-SI throughout.
+A `Deck` gathers any number of structures of two-node trusses (T3D2), solids of twenty nodes
+(C3D20R), springs to the ground (SPRING1), rigid bodies and linear equations between displacements;
+`run` solves them all in one linear static step and reads the displacements from the table that it
+prints, seven digits a number. SI throughout.
 
 G. Dhondt, CalculiX CrunchiX user's manual, version 2.20: *SOLID SECTION, *SPRING, *RIGID BODY,
 *EQUATION.
@@ -55,6 +55,7 @@ class Deck:
         self.reference = reference
         self._nodes: list[Vector] = []
         self._elements: list[str] = []
+        self._number_of_elements = 0
         self._bodies: list[str] = []
         self._held: list[str] = []
         self._equations: list[str] = []
@@ -82,7 +83,7 @@ class Deck:
         expansion: float = 0.0,
     ) -> None:
         """A straight element of `stiffness` N/m and `mass` kg; gravity finds half at each end."""
-        number = len(self._elements) + 1
+        number = self._next_element()
         length = float(np.linalg.norm(self._nodes[end - 1] - self._nodes[start - 1]))
         self._elements.append(
             f"*ELEMENT, TYPE=T3D2, ELSET=E{number}\n{number}, {start}, {end}\n"
@@ -95,12 +96,43 @@ class Deck:
         if mass > 0.0:
             self._heavy.append(number)
 
+    def solid(
+        self,
+        elements: Sequence[Sequence[int]],
+        modulus: float,
+        poisson: float,
+        *,
+        density: float = 0.0,
+        expansion: float = 0.0,
+    ) -> None:
+        """One part of elements of twenty nodes each, in the manual's order for C3D20R.
+
+        `modulus` Pa, `density` kg/m^3, `expansion` 1/K.
+        """
+        rows = []
+        for nodes in elements:
+            number = self._next_element()
+            numbers = [str(each) for each in (number, *nodes)]
+            # The program reads at most sixteen numbers from a line.
+            rows.append(", ".join(numbers[:11]) + ",\n" + ", ".join(numbers[11:]))
+            if density > 0.0:
+                self._heavy.append(number)
+        name = len(self._elements) + 1
+        self._elements.append(
+            f"*ELEMENT, TYPE=C3D20R, ELSET=S{name}\n" + "\n".join(rows) + "\n"
+            f"*MATERIAL, NAME=S{name}\n"
+            f"*ELASTIC\n{_number(modulus)}, {_number(poisson)}\n"
+            f"*DENSITY\n{_number(density)}\n"
+            f"*EXPANSION, ZERO={_number(self.reference)}\n{_number(expansion)}\n"
+            f"*SOLID SECTION, ELSET=S{name}, MATERIAL=S{name}"
+        )
+
     def spring(self, stiffness: float) -> int:
         """A node whose first displacement is held by a spring alone, N/m (or N m/rad).
 
         It stands for one way in which something gives; `shifted` says what moves with it.
         """
-        node, number = self.node([0.0, 0.0, 0.0]), len(self._elements) + 1
+        node, number = self.node([0.0, 0.0, 0.0]), self._next_element()
         self._elements.append(
             f"*ELEMENT, TYPE=SPRING1, ELSET=E{number}\n{number}, {node}\n"
             f"*SPRING, ELSET=E{number}\n1\n{_number(stiffness)}"
@@ -160,6 +192,10 @@ class Deck:
             for way, value in zip(EVERY_WAY, np.asarray(vector, float), strict=True)
             if value != 0.0
         ]
+
+    def _next_element(self) -> int:
+        self._number_of_elements += 1
+        return self._number_of_elements
 
     def text(self) -> str:
         """The input file."""

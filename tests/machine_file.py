@@ -20,7 +20,7 @@ from truepose.machine import Machine
 File = dict[str, Any]
 Row = dict[str, Any]
 
-ROWS = ("drive", "strut", "guide")
+ROWS = ("drive", "strut", "guide", "limb")
 """The array tables, whose rows have a name each."""
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")

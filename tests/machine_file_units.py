@@ -41,7 +41,7 @@ SI = {
     **{"length": "m", "angle": "rad", "force": "N", "moment": "N m", "temperature": "K"},
     **{"temperature_difference": "K", "area": "m^2", "stress": "Pa", "stiffness": "N/m"},
     **{"expansion": "1/K", "mass": "kg", "time": "s", "acceleration": "m/s^2"},
-    **{"temperature_gradient": "K/m", "torsional_stiffness": "N m/rad"},
+    **{"temperature_gradient": "K/m", "torsional_stiffness": "N m/rad", "second_moment": "m^4"},
 }
 """A unit of every dimension that a bare number may have."""
 
@@ -50,7 +50,7 @@ CUSTOMARY = {
     **{"temperature": "degF", "temperature_difference": "delta_degF", "area": "in^2"},
     **{"stress": "psi", "stiffness": "lbf/in", "expansion": "1/delta_degF", "mass": "lb"},
     **{"time": "min", "acceleration": "ft/s^2", "temperature_gradient": "delta_degF/in"},
-    **{"torsional_stiffness": "lbf in/rad"},
+    **{"torsional_stiffness": "lbf in/rad", "second_moment": "in^4"},
 }
 """Inches and pounds."""
 
@@ -99,7 +99,7 @@ def resized(file: File, parameters: Mapping[str, str], factor: float) -> File:
     """
     powers = {
         **{"length": 1, "area": 2, "force": 2, "moment": 3, "stiffness": 1},
-        **{"torsional_stiffness": 3, "mass": 2, "temperature_gradient": -1},
+        **{"torsional_stiffness": 3, "mass": 2, "temperature_gradient": -1, "second_moment": 4},
     }
     return bare(file, parameters, SI, lambda value, of: value * factor ** powers.get(of, 0))
 

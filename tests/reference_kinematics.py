@@ -214,7 +214,10 @@ class Reference:
             - self.length(strut, joints)
             for strut in self.struts
         ]
-        return np.concatenate([struts, *(self.guided(g, point, rotation) for g in self.guides)])
+        guides = [self.guided(g, point, rotation) for g in self.guides]
+        given_way = [np.array(g.get("offset", [0.0, 0.0]), float) for g in self.guides]
+        off = [found - by[: found.size] for found, by in zip(guides, given_way, strict=True)]
+        return np.concatenate([struts, *off])
 
     def guided(self, guide: Mapping[str, Any], point: Vector, rotation: Vector) -> Vector:
         """Residuals (1,) or (2,) of a guide, m."""
@@ -225,7 +228,7 @@ class Reference:
         own = self.platform_point(guide.get("platform", [0.0, 0.0, 0.0]), point, rotation)
         if guide["kind"] == "plane":
             return np.array([unit(guide["normal"]) @ (own - origin)])
-        return np.asarray((rotation @ tangents(guide["axis"]).T).T @ (origin - own))
+        return np.asarray(self._across(guide) @ rotation.T @ (origin - own))
 
     def rows(self, joints: Vector, point: Vector, rotation: Vector) -> Vector:
         """(n_closure, 6) derivatives of the closures to the platform's twist at the tool point.
@@ -241,6 +244,15 @@ class Reference:
             rows += self._rows_of_guide(guide, point, rotation)
         return np.array(rows)
 
+    @staticmethod
+    def _across(guide: Mapping[str, Any]) -> Vector:
+        """(2, 3) across a line, platform axes: the tangents of the nominal one, less what is along.
+
+        They are of unit length only where the line is not tilted; a residual counts by them.
+        """
+        axis, ways = unit(guide["axis"]), tangents(guide.get("nominal_axis", guide["axis"]))
+        return np.asarray(ways - np.outer(ways @ axis, axis))
+
     def _rows_of_guide(
         self, guide: Mapping[str, Any], point: Vector, rotation: Vector
     ) -> list[list[float]]:
@@ -253,7 +265,7 @@ class Reference:
             return [[*normal, *np.cross(arm, normal)]]
         # The platform's line slides on the frame's point: that is where the force acts.
         arm = np.array(guide.get("origin", [0.0, 0.0, 0.0]), float) - point
-        across = (rotation @ tangents(guide["axis"]).T).T
+        across = self._across(guide) @ rotation.T
         return [[*-one, *-np.cross(arm, one)] for one in across]
 
     def roots(self, drive: Mapping[str, Any], point: Vector, rotation: Vector) -> list[float]:

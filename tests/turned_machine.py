@@ -60,6 +60,11 @@ def turned(
             base.direction(guide, key)
         for key in ("axis", "platform_axis"):
             platform.direction(guide, key)
+    for limb in rows_of(result, "limb"):
+        (base if "strut" in limb else platform).direction(limb, "axis")
+    for row in rows_of(result, "drive", "limb"):
+        for part in row.get("chain", []):
+            base.direction(part, "axis")
     platform.point(result["machine"], "tool")
     if "frame" in result:
         base.point(result["frame"], "anchor")

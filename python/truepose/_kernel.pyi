@@ -259,25 +259,65 @@ class Machine:
         placements: ArrayLike,
         columns: ArrayLike,
         parameter_compliance: ArrayLike,
+        pairs: Sequence[tuple[int, int]] = ...,
     ) -> _WithStatus:
-        """(compliance (n, n_component, n_component), status)."""
+        """(compliance (n, n_component, n_component), status).
+
+        `parameter_compliance` (n or 1, k + n_pair): of each column, then of `pairs` of places among
+        them that give way under each other's load.
+        """
     def stiffness_at(
         self,
         joints: ArrayLike,
         placements: ArrayLike,
         columns: ArrayLike,
         parameter_compliance: ArrayLike,
+        pairs: Sequence[tuple[int, int]] = ...,
     ) -> _WithStatus:
-        """(stiffness (n, n_component, n_component), status)."""
+        """(stiffness (n, n_component, n_component), status).
+
+        `parameter_compliance` (n or 1, k + n_pair): of each column, then of `pairs` of places among
+        them that give way under each other's load.
+        """
+    @property
+    def limb_parameters(self) -> list[int]:
+        """The parameters that the limbs give way by, limb by limb."""
+    @property
+    def limb_pairs(self) -> list[tuple[int, int]]:
+        """The two parameters of each column of `limb_compliances_at`."""
+    def limb_compliances_at(self, joints: ArrayLike, placements: ArrayLike) -> _Floats:
+        """(n, n_pair) m/N: the upper triangle of each limb's matrix, row by row."""
+    def limb_ends_at(self, joints: ArrayLike, placements: ArrayLike) -> _Floats:
+        """(n, n_limb, 2, 3) m: the base end and the platform end of each limb, base axes."""
+    def limb_wrenches_at(self, joints: ArrayLike, placements: ArrayLike) -> _Floats:
+        """(n, n_closure of limbs, 6) force and moment of a unit of each, about the tool point."""
+    def limb_sag_at(
+        self, joints: ArrayLike, placements: ArrayLike, weight: Sequence[float]
+    ) -> _Floats:
+        """(n, n_closure of limbs) m by which they open under the limbs' own weight.
+
+        Beyond what the closure forces do; `weight` (3,) is that of a kilogram, N, base axes.
+        """
+    def limb_bend_at(
+        self, joints: ArrayLike, placements: ArrayLike, gradients: ArrayLike
+    ) -> _Floats:
+        """(n, n_closure of limbs) m by which they open where limbs are warmer on one side.
+
+        `gradients` (n or 1, 3 n_limb), K/m, limb axes.
+        """
     def c_functions(
         self,
         always: Sequence[_Term],
         per_kelvin: Sequence[Sequence[_Term]],
         compliance: Sequence[_Term],
+        shared: Sequence[tuple[int, int, float]],
+        limbs: bool,
     ) -> dict[str, tuple[str, str, int]]:
         """C functions of the machine's formulas: name -> (arguments, body, values kept).
 
         Terms are shifts of parameters: always, per kelvin of each part, and per load on them.
+        `shared`: two parameters and how each gives way under the other's load; `limbs`: whether
+        limbs give way.
         `crates/kernel/src/code` says what each function computes.
         """
     @property

@@ -4,13 +4,16 @@
 in which an earlier run of it stands, and kills it: every second time at any moment of its run, and
 else within the milliseconds in which its files take their places, which the command tells us. Then
 every file is the old one or the new one, whole, and the files of one command are all old or all
-new. What a killed process leaves besides are its temporary files, whose names begin with a point.
+new, unless the kill fell between two renames, some microseconds apart. Then those that a controller
+loads together (LinuxCNC's module, INI and HAL file) say so by their hashes, and are not loaded.
+What a killed process leaves besides are its temporary files, whose names begin with a point.
 """
 
 from __future__ import annotations
 
 import os
 import random
+import re
 import select
 import shutil
 import signal
@@ -82,6 +85,9 @@ main()
 PATH = os.pathsep.join(str(Path(folder).resolve()) for folder in sys.path if folder)
 """The same truepose as here, whatever the folder."""
 
+HASH = re.compile(r'^(?:KINEMATICS = .* ini=|loadrt .* hal=|#define HASH ")(\w{8})', re.M)
+"""Where the files of an export of LinuxCNC say what they are of."""
+
 MOMENTS = 20e-3
 """s after that within which a command is killed."""
 
@@ -91,12 +97,19 @@ class Killed:
     """What stands after one kill: each file "old", "new", "none" or "half"; whether it was late.
 
     `mixed`: files of the set are of different runs. `ended`: it was done before the kill.
+    `hashes`: of the export that each file says it is of, if it does.
     """
 
     command: str
     aimed: bool
     ended: bool
     files: dict[str, str]
+    hashes: frozenset[str] = frozenset()
+
+    @property
+    def told(self) -> bool:
+        """Whether a mixed set says that it is one, so that it is not loaded."""
+        return len(self.hashes) > 1
 
     @property
     def mixed(self) -> bool:
@@ -141,7 +154,14 @@ class Kills:
         process.send_signal(signal.SIGKILL)
         process.wait()
         os.close(ears)
-        return Killed(self.name, aimed, ended, {name: self._state(name) for name in self.names})
+        files = {name: self._state(name) for name in self.names}
+        return Killed(self.name, aimed, ended, files, self.hashes(folder))
+
+    def hashes(self, folder: Path) -> frozenset[str]:
+        """Of which exports the files of a folder say they are."""
+        there = [folder / name for name in self.names if (folder / name).exists()]
+        texts = [path.read_text(errors="replace") for path in there]
+        return frozenset(found for text in texts for found in HASH.findall(text))
 
     def _state(self, name: str) -> str:
         """Which run a file is of, byte by byte."""

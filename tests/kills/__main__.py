@@ -37,11 +37,13 @@ def main() -> int:
         states = Counter("/".join(sorted(set(kill.files.values()))) for kill in own)
         files = max((len(kill.files) for kill in own), default=0)
         print(f"{name:16} {len(own):4} kills, {files} files: {dict(states)}")
-    bad = [kill for kill in found if kill.half or kill.mixed]
+    bad = [kill for kill in found if kill.half or (kill.mixed and not kill.told)]
     for kill in bad:
         print(kill)
     alive = sum(not kill.ended for kill in found)
-    print(f"{len(found)} kills, {alive} of them before the end; half or mixed: {len(bad)}")
+    told = sum(kill.mixed and kill.told for kill in found)
+    print(f"{len(found)} kills, {alive} of them before the end; mixed and refused: {told}")
+    print(f"half, or mixed and not refused: {len(bad)}")
     return int(bool(bad))
 
 

@@ -126,6 +126,12 @@ class Mechanics:
                     add(f"{name}.origin.{axis}", -force[k])
             for parameter, value in self.on_directions(member, amount).items():
                 add(f"{name}.{parameter}", value)
+            if member.kind == "line":
+                number = 2 if f"{name}.offset.1" in found else 1
+                add(f"{name}.offset.{number}", amount)
+            elif member.kind in ("plane", "universal"):
+                size = 1.0 if member.kind == "plane" else self.reference.characteristic_length
+                add(f"{name}.offset", -amount / size)
         for k, axis in enumerate("xyz"):
             # The tool point moves in the platform: the platform goes back against its members.
             add(f"tool.{axis}", float(-pulled @ self.rotation[:, k]))

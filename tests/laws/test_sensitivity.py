@@ -103,7 +103,9 @@ def test_displacement_agrees_with_the_reference(machine: MachineUnderTest) -> No
     assert (status == OK).all()
 
     deviation = dict(zip(kernel.parameters, values, strict=True))
-    actual = Reference(deviated(machine.description, deviation))
+    # The size by which a universal joint's offset counts is that of the nominal machine.
+    size = {"characteristic_length": kernel.characteristic_length}
+    actual = Reference(deviated(machine.description, deviation) | size)
     for i in range(0, len(joints), 4):
         rotation = rotation_of_quaternion(placements[i, 3:])
         point, turned = actual.forward(joints[i], placements[i, :3], rotation)

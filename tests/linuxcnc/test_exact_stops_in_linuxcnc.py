@@ -18,6 +18,14 @@ CLOSELY = 100
 SPACING = 3e-7
 """m: half of what lies between two of them, at 50 mm/s."""
 
+TRIES, LOST = 4, 2e-3
+"""How often LinuxCNC may lose its position, and the mm beside its end that tell of it.
+
+Without a real-time kernel and with all processors busy a blended program was seen to go on 7.5 um
+beside its path from the first block after the dwell to its end. A block that reaches the planner
+while the one before it slows down is known to be blended wrongly (LinuxCNC/linuxcnc, 4543).
+"""
+
 PART = """\
 G21 G90 G17 G94 {mode}
 G0 X280 Y180
@@ -66,13 +74,18 @@ def test_the_estimate_is_what_linuxcnc_takes(mode: str, tmp_path: Path) -> None:
             {"do": "stop_sampling"},
         ]
     steps.append({"do": "read", "label": "end"})
-    folder = tmp_path / "run"
-    folder.mkdir()
     files = tp.export(machine, "linuxcnc").files
-    done = run(folder, files, steps, axes="XY", joints=2, programs=programs)
-    assert not done["end"]["errors"]
+    for number in range(TRIES):
+        folder = tmp_path / f"run{number}"
+        folder.mkdir()
+        done = run(folder, files, steps, axes="XY", joints=2, programs=programs)
+        assert not done["end"]["errors"]
+        joints = {name: feeds(trace) for name, trace in done.traces.items()}
+        if np.abs(joints["blended"][-1] - joints["stopping"][-1]).max() < LOST:
+            break
+    else:
+        pytest.fail(f"LinuxCNC lost its position in all of {TRIES} blended programs")
     # Blended, the tool leaves the pieces by no more than P.
-    joints = {name: feeds(trace) for name, trace in done.traces.items()}
     stopping, blended = (machine.forward(joints[name] * 1e-3) for name in ("stopping", "blended"))
     cycles = np.arange(len(stopping))
     closely = np.linspace(0.0, cycles[-1], CLOSELY * cycles[-1] + 1)

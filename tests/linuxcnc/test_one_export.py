@@ -87,6 +87,19 @@ def test_the_module_does_not_start_with_another_hash(
         started(module, parameters, tmp_path)
 
 
+def refusal(files: Mapping[str, str], folder: Path) -> str:
+    """What LinuxCNC says, in one line, of files with which it does not start."""
+    with pytest.raises(AssertionError) as caught:
+        run(
+            folder,
+            {f"truepose_{MACHINE}.{ending}": text for ending, text in files.items()},
+            [{"do": "home"}],
+            axes="XY",
+            joints=2,
+        )
+    return " ".join(str(caught.value).split())
+
+
 @pytest.mark.parametrize(("wrong", "name"), [("hal", "HAL"), ("ini", "INI")])
 def test_linuxcnc_does_not_start_with_a_file_of_another_export(
     wrong: str, name: str, tmp_path: Path
@@ -96,15 +109,7 @@ def test_linuxcnc_does_not_start_with_a_file_of_another_export(
     files = dict(exported(machine))
     other = exported(machine, rate_limit="0.5")
     files[wrong] = other[wrong]
-    with pytest.raises(AssertionError) as caught:
-        run(
-            tmp_path,
-            {f"truepose_{MACHINE}.{ending}": text for ending, text in files.items()},
-            [{"do": "home"}],
-            axes="XY",
-            joints=2,
-        )
-    told = " ".join(str(caught.value).split())
+    told = refusal(files, tmp_path)
     assert (
         f"the module has the hash {the_hash(exported(machine))}, the {name} file has "
         f"{the_hash(other)}. Take module, INI and HAL file from one export"
@@ -117,14 +122,6 @@ def test_linuxcnc_says_what_line_is_missing(tmp_path: Path) -> None:
     files = dict(exported(tp.load(MACHINES / f"{MACHINE}.toml")))
     own = the_hash(files)
     files["hal"] = files["hal"].replace(f" hal={own}", "")
-    with pytest.raises(AssertionError) as caught:
-        run(
-            tmp_path,
-            {f"truepose_{MACHINE}.{ending}": text for ending, text in files.items()},
-            [{"do": "home"}],
-            axes="XY",
-            joints=2,
-        )
-    told = " ".join(str(caught.value).split())
+    told = refusal(files, tmp_path)
     assert "the HAL file has none." in told
     assert f"it has the line: loadrt [KINS]KINEMATICS hal={own}" in told

@@ -22,6 +22,7 @@ pub mod statics;
 mod status;
 
 pub use machine::{
-    Description, DriveDescription, GuideDescription, Machine, MachineError, StrutDescription,
+    ChainDescription, Description, DriveDescription, GuideDescription, Machine, MachineError,
+    StrutDescription,
 };
 pub use status::Status;

@@ -23,14 +23,21 @@ impl Machine {
 #[pymethods]
 impl Machine {
     /// C functions `{name: (arguments, body, values)}` of the machine's formulas; terms are (parameter,
-    /// constant, slope, strut or None).
+    /// constant, slope, strut or None); `shared`: two parameters and by how much each gives way under the
+    /// other's load; `limbs`: whether limbs give way.
     fn c_functions<'py>(
         &self,
         py: Python<'py>,
         always: Vec<GivenTerm>,
         per_kelvin: Vec<Vec<GivenTerm>>,
         compliance: Vec<GivenTerm>,
+        shared: Vec<(usize, usize, f64)>,
+        limbs: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
+        if shared.iter().any(|&(one, other, _)| one.max(other) >= self.inner.parameters.len()) {
+            let message = "a parameter that the machine does not have";
+            return Err(pyo3::exceptions::PyIndexError::new_err(message));
+        }
         let terms = |given: Vec<GivenTerm>| {
             given.into_iter().map(|term| self.term(term)).collect::<PyResult<Vec<Term>>>()
         };
@@ -38,6 +45,8 @@ impl Machine {
             always: terms(always)?,
             per_kelvin: per_kelvin.into_iter().map(terms).collect::<PyResult<_>>()?,
             compliance: terms(compliance)?,
+            shared,
+            limbs,
         };
         let functions = PyDict::new(py);
         for function in code::functions(&self.inner, &shifts) {

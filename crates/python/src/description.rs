@@ -5,8 +5,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use std::collections::BTreeMap;
 use truepose_kernel::element::{DriveKind, Field, GuideKind};
-use truepose_kernel::machine::{FREEDOMS, JointLimit};
-use truepose_kernel::{Description, DriveDescription, GuideDescription, StrutDescription};
+use truepose_kernel::machine::{Axes, FREEDOMS, JointLimit, Part, Place, Section, Side};
+use truepose_kernel::{
+    ChainDescription, Description, DriveDescription, GuideDescription, StrutDescription,
+};
 
 fn refused<T>(code: &'static str, message: String, place: &str) -> PyResult<T> {
     Err(KernelError::new_err((code, message, place.to_owned())))
@@ -63,7 +65,11 @@ fn drive(table: &Bound<'_, PyDict>) -> PyResult<DriveDescription> {
     };
     let fields = element_fields(table, kind.table().fields)?;
     let travel = item(table, "travel", &place)?.extract()?;
-    Ok(DriveDescription { name, kind, travel, working_mode, fields })
+    let yields = match optional(table, "yields")? {
+        None => false,
+        Some(flag) => flag.extract()?,
+    };
+    Ok(DriveDescription { name, kind, travel, working_mode, fields, yields })
 }
 
 /// An element's own fields, as far as they are given.
@@ -128,6 +134,53 @@ fn strut(table: &Bound<'_, PyDict>) -> PyResult<StrutDescription> {
     })
 }
 
+/// What gives way in a limb: a joint or guidance with its `compliance`, or a beam with its `section`.
+fn part(table: &Bound<'_, PyDict>, place: &str) -> PyResult<Part> {
+    if let Some(section) = optional(table, "section")? {
+        let [stretch, y, z, torsion, about_y, about_z, expansion]: [f64; 7] = section.extract()?;
+        let section =
+            Section { stretch, shear: [y, z], torsion, bending: [about_y, about_z], expansion };
+        let length = optional(table, "length")?.map(|value| value.extract()).transpose()?;
+        return Ok(Part::Beam { length, section });
+    }
+    let at_carriage: bool = item(table, "at_carriage", place)?.extract()?;
+    let axes = match optional(table, "axes")? {
+        None => Axes::Limb,
+        Some(axes) => {
+            let [x, y]: [[f64; 3]; 2] = axes.extract()?;
+            Axes::Frame(x, y)
+        }
+    };
+    Ok(Part::Joint {
+        place: if at_carriage { Place::Carriage } else { Place::InTurn },
+        axes,
+        compliance: item(table, "compliance", place)?.extract()?,
+    })
+}
+
+fn limb(table: &Bound<'_, PyDict>) -> PyResult<ChainDescription> {
+    let name: String = item(table, "name", "limb")?.extract()?;
+    let place = format!("limb.{name}");
+    let side = match optional(table, "platform_side")? {
+        Some(direction) => Side::Platform(direction.extract()?),
+        None => Side::Frame(item(table, "side", &place)?.extract()?),
+    };
+    let parts = item(table, "parts", &place)?.cast_into::<PyList>()?;
+    Ok(ChainDescription {
+        strut: optional(table, "strut")?.map(|value| value.extract()).transpose()?,
+        guides: item(table, "guides", &place)?.extract()?,
+        side,
+        parts: parts
+            .iter()
+            .map(|table| part(table.cast::<PyDict>()?, &place))
+            .collect::<PyResult<_>>()?,
+        mass: item(table, "mass", &place)?.extract()?,
+        whole_length: item(table, "whole_length", &place)?.extract()?,
+        carriage_mass: item(table, "carriage_mass", &place)?.extract()?,
+        name,
+    })
+}
+
 /// Reads the whole dict; its keys are documented in `truepose/_kernel.pyi`.
 pub fn description(table: &Bound<'_, PyDict>) -> PyResult<Description> {
     let dof: Vec<String> = item(table, "dof", "machine")?.extract()?;
@@ -157,6 +210,10 @@ pub fn description(table: &Bound<'_, PyDict>) -> PyResult<Description> {
         None => PyList::empty(table.py()),
         Some(list) => list.cast_into::<PyList>()?,
     };
+    let limbs = match optional(table, "limbs")? {
+        None => PyList::empty(table.py()),
+        Some(list) => list.cast_into::<PyList>()?,
+    };
     let closure_compliance = optional(table, "closure_compliance")?;
     let parameter_compliance = optional(table, "parameter_compliance")?;
     let drives = item(table, "drives", "machine")?.cast_into::<PyList>()?;
@@ -179,6 +236,7 @@ pub fn description(table: &Bound<'_, PyDict>) -> PyResult<Description> {
             .iter()
             .map(|table| guide(table.cast::<PyDict>()?))
             .collect::<PyResult<_>>()?,
+        chains: limbs.iter().map(|table| limb(table.cast::<PyDict>()?)).collect::<PyResult<_>>()?,
         closure_compliance: closure_compliance
             .map(|value| value.extract())
             .transpose()?

@@ -10,7 +10,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyIndexError;
 use pyo3::prelude::*;
 use truepose_kernel::Status;
-use truepose_kernel::batch::{self, Deviations, Rows, Samples};
+use truepose_kernel::batch::{self, Deviations, Rows, Samples, Yielding};
 use truepose_kernel::kinematics::{self, Obstacle};
 use truepose_kernel::machine::{FREEDOMS, indices_of};
 use truepose_kernel::spatial::Pose;
@@ -253,22 +253,26 @@ impl Machine {
         (joints, poses, codes(py, &[count], &placed.status)?).into_bound_py_any(py)
     }
 
-    /// A block's compliance or stiffness from (columns, compliances of these parameters).
+    /// A block's compliance or stiffness from (columns, compliances of these parameters and pairs, pairs).
     pub fn elastic_at<'py>(
         &self,
         py: Python<'py>,
         joints: &Bound<'py, PyAny>,
         placements: &Bound<'py, PyAny>,
-        (columns, compliances): (&Bound<'py, PyAny>, &Bound<'py, PyAny>),
-        quantity: impl for<'a> Fn(&'a truepose_kernel::Machine, &[usize], Rows<'a>) -> Quantity<'a>
-        + Sync,
+        (columns, compliances, pairs): (&Bound<'py, PyAny>, &Bound<'py, PyAny>, &[(usize, usize)]),
+        quantity: impl for<'a> Fn(&'a truepose_kernel::Machine, Yielding<'a>) -> Quantity<'a> + Sync,
     ) -> PyResult<Bound<'py, PyAny>> {
         let columns = self.columns(columns)?;
-        let given = Input::new(compliances, &[columns.len()], "parameter_compliance")?;
+        if pairs.iter().any(|&(one, other)| one.max(other) >= columns.len()) {
+            let message = "a pair of columns that are not among them";
+            return Err(pyo3::exceptions::PyIndexError::new_err(message));
+        }
+        let width = columns.len() + pairs.len();
+        let given = Input::new(compliances, &[width], "parameter_compliance")?;
         let further = [self.components(), self.components()];
         let machine = &self.inner;
         self.at_placements(py, joints, placements, Some(&given), &further, |rows| {
-            quantity(machine, &columns, rows)
+            quantity(machine, Yielding { columns: &columns, pairs, compliances: rows })
         })
     }
 

@@ -11,6 +11,7 @@ mod gcode;
 mod identification;
 mod largest;
 mod least_squares;
+mod limbs;
 mod machine;
 mod proof;
 mod quantity;

@@ -370,7 +370,9 @@ impl Machine {
         })
     }
 
-    /// (compliance (n, n_component, n_component), status) from parameter compliances (n or 1, k).
+    /// (compliance (n, n_component, n_component), status) from the compliances of parameters, then of pairs of
+    /// them, (n or 1, k + n_pair).
+    #[pyo3(signature = (joints, placements, columns, parameter_compliance, pairs=vec![]))]
     fn compliance_at<'py>(
         &self,
         py: Python<'py>,
@@ -378,14 +380,17 @@ impl Machine {
         placements: &Bound<'py, PyAny>,
         columns: &Bound<'py, PyAny>,
         parameter_compliance: &Bound<'py, PyAny>,
+        pairs: Vec<(usize, usize)>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let given = (columns, parameter_compliance);
-        self.elastic_at(py, joints, placements, given, |machine, columns, rows| {
-            Quantity::Compliance(batch::Compliance::new(machine, columns, rows))
+        let given = (columns, parameter_compliance, pairs.as_slice());
+        self.elastic_at(py, joints, placements, given, |machine, yielding| {
+            Quantity::Compliance(batch::Compliance::new(machine, yielding))
         })
     }
 
-    /// (stiffness (n, n_component, n_component), status) from parameter compliances (n or 1, k).
+    /// (stiffness (n, n_component, n_component), status) from the compliances of parameters, then of pairs of
+    /// them, (n or 1, k + n_pair).
+    #[pyo3(signature = (joints, placements, columns, parameter_compliance, pairs=vec![]))]
     fn stiffness_at<'py>(
         &self,
         py: Python<'py>,
@@ -393,10 +398,11 @@ impl Machine {
         placements: &Bound<'py, PyAny>,
         columns: &Bound<'py, PyAny>,
         parameter_compliance: &Bound<'py, PyAny>,
+        pairs: Vec<(usize, usize)>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let given = (columns, parameter_compliance);
-        self.elastic_at(py, joints, placements, given, |machine, columns, rows| {
-            Quantity::Stiffness(batch::Stiffness::new(machine, columns, rows))
+        let given = (columns, parameter_compliance, pairs.as_slice());
+        self.elastic_at(py, joints, placements, given, |machine, yielding| {
+            Quantity::Stiffness(batch::Stiffness::new(machine, yielding))
         })
     }
 

@@ -181,8 +181,7 @@ def _unknown_values(calibration: Calibration) -> dict[str, Floats]:
     machine = calibration.machine
     nominal = unknowns.nominal_sizes(machine)
     for number, identified in unknowns.properties.items():
-        if identified.kind == "expansion":
-            nominal[number] = machine.struts[identified.strut].expansion or 0.0
+        nominal[number] = identified.start(machine)
     covariance = covariance_of(calibration)
     open_ = ~np.isfinite(np.diagonal(covariance))
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)

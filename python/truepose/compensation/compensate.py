@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.compensation.corrected import corrected_deviations
+from truepose.compensation.parasitic import parasitic_remains
 from truepose.compensation.remainder import Remainder
 from truepose.error_budget.largest import largest
 from truepose.machine import Condition, Machine
@@ -86,7 +87,8 @@ def compensate(
     command not be followed (`correction_` and the kernel's status). `poses` (..., n_commanded), SI,
     default the file's workspace. The Dataset, SI, and both terms are described in docs/results.md.
 
-    Where there is nothing to correct, the attribute `warnings` has the reason. Raises as
+    Where there is nothing to correct, or something that no command can, the attribute `warnings`
+    has the reason. Raises as
     `truepose.budget`; `RequestError` (controller-unsaid, controller-contradicted) for a calibrated
     file of which it is not known with which geometry its controller works.
     """
@@ -117,7 +119,11 @@ def against_nominal(
     dataset = run.dataset(coords=quantity_coords(machine))
     moved = np.abs(dataset["joint_corrected"] - dataset["joint_nominal"]).max()
     if max(moved, np.abs(dataset["residual_middle"]).max()) < ROUNDING:
-        dataset.attrs["warnings"] = json.dumps([nothing_to_correct(machine)])
+        warnings = [nothing_to_correct(machine)]
+    else:
+        warnings = parasitic_remains(machine, dataset["residual_middle"])
+    if warnings:
+        dataset.attrs["warnings"] = json.dumps(warnings)
     return dataset
 
 

@@ -15,6 +15,10 @@ b = O - p and the motion y to first order, its part of second order is
     - r x (r x b) / 2 - r x (y + w) - s y along
 
 as y stays across what a tilt makes of it. All products are told with their signs.
+
+Where a guide belongs to a limb, its closures are e, what the limb gives way by, and not 0. That is
+a length: it takes no part in products, but that the vectors above are not of unit length once they
+tilt by t, by which e counts t^2 more at the most (of a line) or t^2 / 2.
 """
 
 from __future__ import annotations
@@ -79,6 +83,17 @@ class Guides:
         arm = motion.arms(point[np.newaxis], self._tool)[:, 0]
         return arm, np.asarray(motion.forms(point) - motion.forms(self._tool))
 
+    def _offsets(self, guide: Guide, motion: Motion, count: int) -> tuple[Floats, Floats]:
+        """(n or 1, count) what its closures have given way by, m, and (n or 1, 1) at the most."""
+        names = [f"{guide.part}.offset"]
+        if count > 1:
+            names = [f"{guide.part}.offset.{number + 1}" for number in range(count)]
+        if not self._names.has(names[0]):
+            return np.zeros((1, count)), np.zeros((1, 1))
+        columns = np.array([self._names[name] for name in names], np.intp)
+        values = motion.values(columns)
+        return values, norm(np.abs(values) + motion.reach(motion.forms(columns)))[:, np.newaxis]
+
     def _plane(self, guide: Guide, motion: Motion, sensitivity: Floats) -> Closures:
         origin = self._names.point(f"{guide.part}.origin")
         tilt, tilts = self._tilt(guide, "normal", motion)
@@ -87,7 +102,9 @@ class Guides:
         base = np.broadcast_to(np.eye(3), (len(arm), 3, 3))
         rows = motion.of_platform(base, np.repeat(arm[:, np.newaxis], 3, axis=1))
         rows = rows + motion.rotation @ own - motion.forms(origin)
+        given_way, give = self._offsets(guide, motion, 1)
         off = ((motion.position + arm - motion.values(origin)) * normal).sum(axis=1)
+        off = off - given_way[:, 0]
 
         size, turn = norm(arm)[:, np.newaxis], norm(motion.turn_reach)[:, np.newaxis]
         moved = norm(motion.reach(own))[:, np.newaxis]
@@ -97,7 +114,7 @@ class Guides:
             whole, more = turn + further, relative + shift + further * size
             carried = majorants.turn_bent(whole) * size + majorants.turn(whole) * moved
             signed = 0.5 * whole**2 * size + whole * moved + tilted * more
-            rest = carried + tilted * (more + carried)
+            rest = carried + tilted * (more + carried) + 0.5 * give * tilted**2
             return np.asarray(np.maximum(rest - signed, 0.0))
 
         return Closures(
@@ -120,7 +137,9 @@ class Guides:
         arm, own = self._own(guide, motion)
         seen = motion.values(origin) - motion.position
         along = ((seen - arm) * axis).sum(axis=1)
+        given_way, give = self._offsets(guide, motion, 2)
         off = seen - arm - along[:, np.newaxis] * axis
+        off = off - (given_way[:, np.newaxis] @ ways)[:, 0]
         across = tangents(axis)
 
         moves = motion.rotation @ own
@@ -142,6 +161,7 @@ class Guides:
             with np.errstate(divide="ignore"):
                 skewed = np.where(askew * tilted < 1.0, tilted / (1.0 - askew * tilted), np.inf)
             rest = carried + (more + carried) * skewed + lever * askew * tilted * skewed
+            rest = rest + give * tilted**2
             return np.repeat(np.maximum(rest - signed, 0.0), 2, axis=1)
 
         other = np.swapaxes(ways @ np.swapaxes(across, 1, 2), 1, 2) @ tilts
@@ -163,6 +183,7 @@ class Guides:
         ways = platform.tangents @ np.swapaxes(motion.rotation, 1, 2)
         opened = (frame.tangents @ on_platform[:, :, np.newaxis])[:, :, 0]
 
+        given_way, give = self._offsets(guide, motion, 1)
         turn = norm(motion.turn_reach)[:, np.newaxis]
         one, other = frame.reach[:, np.newaxis], platform.reach[:, np.newaxis]
 
@@ -171,13 +192,14 @@ class Guides:
             swung = majorants.turn(whole)
             signed = 0.5 * whole**2 + whole * (one + other) + one * other
             rest = majorants.turn_bent(whole) + swung * other + one * (other + swung * (1 + other))
+            rest = rest + 0.5 * give / self._length * (one**2 + other**2 + (one * other) ** 2)
             return np.asarray(np.maximum(rest - signed, 0.0))
 
         leans = np.swapaxes(ways, 1, 2) @ of_platform
         carried = skew(on_platform) @ (np.swapaxes(frame.tangents, 1, 2) @ of_frame)
         carried = carried - skew(on_frame) @ leans
         size = np.square(opened).sum(axis=1, keepdims=True)
-        off = np.abs((on_frame * on_platform).sum(axis=1))
+        off = np.abs((on_frame * on_platform).sum(axis=1) - given_way[:, 0] / self._length)
         return Closures(
             sensitivity @ (opened / size)[:, :, np.newaxis],
             _pairs(

@@ -74,8 +74,9 @@ class Bases:
 
     @property
     def is_proven(self) -> bool:
-        """Whether all drives are of kinds whose remainder is proven here."""
-        return all(drive.kind in KINDS for _, drive in self._drives.values())
+        """Whether all drives are of kinds that are proven here, and no carriage yields."""
+        drives = [drive for _, drive in self._drives.values()]
+        return all(drive.kind in KINDS and not drive.chain for drive in drives)
 
     def base(self, motion: Motion, which: int) -> _Base:
         """Of one of the struts."""

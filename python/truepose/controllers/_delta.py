@@ -37,7 +37,7 @@ SWITCHES = switch_option("the end of each drive's travel that raises the tool")
 
 
 @dataclass(frozen=True)
-class Limb:
+class DeltaLimb:
     """One drive and its rods at the machine's home, the platform level.
 
     `drive`, its number `index`, and unit `axis` (3,). `origin` (3,), m, of the drive. `base` (3,),
@@ -56,7 +56,7 @@ class Limb:
     home: float
 
 
-def limbs(machine: Machine, controller: str, kind: str) -> list[Limb]:
+def limbs(machine: Machine, controller: str, kind: str) -> list[DeltaLimb]:
     """The three limbs of a delta whose drives are all of a `kind`.
 
     Raises `RequestError`: controller-cannot, no-pose-left where home is out of reach.
@@ -96,7 +96,7 @@ def limbs(machine: Machine, controller: str, kind: str) -> list[Limb]:
         origin = vector(machine, f"{drive.part}.origin")
         axis = np.array(drive.fields["axis"], np.float64)
         delta_limbs.append(
-            Limb(
+            DeltaLimb(
                 drive,
                 index,
                 axis / np.linalg.norm(axis),
@@ -149,7 +149,7 @@ __all__ = [
     "LEAN",
     "SWITCHES",
     "TOWERS",
-    "Limb",
+    "DeltaLimb",
     "limbs",
     "lowest_z",
     "print_radius",

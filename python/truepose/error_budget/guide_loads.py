@@ -18,16 +18,17 @@ class GuideLoads:
     def __init__(self, machine: Machine) -> None:
         first = len(machine.struts)
         owners = [name.partition(".")[0] for name in machine.closures[first:]]
-        self._guides = machine.guides
+        of_limbs = {name for limb in machine.limbs for name in limb.guides}
+        self._guides = tuple(guide for guide in machine.guides if guide.name not in of_limbs)
         self._closures = [
             [first + at for at, owner in enumerate(owners) if owner == guide.name]
-            for guide in machine.guides
+            for guide in self._guides
         ]
         # A universal guide's closure is a length: what turns it, times the machine's size.
         self._lever = [
-            machine.characteristic_length if _is_turned(guide) else 1.0 for guide in machine.guides
+            machine.characteristic_length if _is_turned(guide) else 1.0 for guide in self._guides
         ]
-        self._highest = np.zeros(len(machine.guides))
+        self._highest = np.zeros(len(self._guides))
         self._acting = 0.0
 
     def add(self, block: PoseBlock, usable: Flags) -> None:

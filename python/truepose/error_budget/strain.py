@@ -253,11 +253,12 @@ def _own_weight(block: PoseBlock) -> list[ParameterDeviation]:
     moved: list[ParameterDeviation] = [] if uneven is None else [(lengths, uneven)]
     if block.base_forces is None:
         return moved
-    columns, compliance = block.compliances
+    yielding = block.compliances
+    columns = yielding.columns
     forces = block.base_forces.reshape(len(block.base_forces), -1)
     kernel = block.machine.kernel
     loads = kernel.base_loads_at(block.joints, block.placements, forces, columns)
-    return [*moved, (columns, loads * compliance)]
+    return [*moved, (columns, yielding.deflection(loads))]
 
 
 def _misfit(machine: Machine, deviation: Deviation) -> Floats:

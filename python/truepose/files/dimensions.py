@@ -56,6 +56,13 @@ _ALL = (
         "N m/rad",
         "12 kN m/rad",
     ),
+    Dimension(
+        "second_moment",
+        "a second moment of area",
+        "second moments of area",
+        "m^4",
+        "2.1e6 mm^4",
+    ),
     Dimension("ratio", "a plain number", "plain numbers", "1", "1.0"),
 )
 

@@ -15,7 +15,7 @@ from truepose.files.toml_text import TomlError, lines_of, parse_toml
 Key = tuple[str | int, ...]
 """Where a value stands: keys of tables and numbers of list items, from the top."""
 
-ARRAY_TABLES = ("drive", "strut", "guide")
+ARRAY_TABLES = ("drive", "strut", "guide", "limb")
 """The tables of which a file has several, told apart by their `name`."""
 
 NAMELESS_TABLES = ("correlation",)

@@ -144,7 +144,7 @@ class _Stiffness(_Quantity):
     rigid: bool = False
 
     def read(self, value: Any, units: UnitSystem) -> float:
-        if self.rigid and value == math.inf:
+        if self.rigid and value in (math.inf, RIGID):
             return math.inf
         if units.read(value, self.dimension) == 0.0:
             raise QuantityError(
@@ -188,33 +188,51 @@ class _Series(_Stiffness):
 
 @dataclass(frozen=True)
 class _PerAxis(_Stiffness):
-    """Stiffness along x, y and z: one for all three, or a list of them; `inf` is rigid."""
+    """Stiffness along or about some axes: one for all, or a list of them; `inf` is rigid."""
 
     rigid: bool = True
+    axes: tuple[str, ...] = ("x", "y", "z")
 
     def read(self, value: Any, units: UnitSystem) -> Any:
         if not isinstance(value, list):
-            return (super().read(value, units),) * 3
-        if len(value) != 3:
+            return (super().read(value, units),) * len(self.axes)
+        if len(value) != len(self.axes):
             raise QuantityError(
                 "wrong-type",
-                f"expected one stiffness or a list of 3, found a list of {len(value)}",
+                f"expected one stiffness or a list of {len(self.axes)}, found a list of "
+                f"{len(value)}",
                 found=shown_value(value),
-                expected="one stiffness, or [x, y, z]",
+                expected=f"one stiffness, or [{', '.join(self.axes)}]",
                 hint="inf is a rigid one",
             )
-        x, y, z = (super(_PerAxis, self).read(component, units) for component in value)
-        return (x, y, z)
+        return tuple(super(_PerAxis, self).read(component, units) for component in value)
 
     def json_schema(self) -> JsonSchemaValue:
         one = super().json_schema()
         several = {
             "type": "array",
             "items": {"anyOf": one["anyOf"]},
-            "minItems": 3,
-            "maxItems": 3,
+            "minItems": len(self.axes),
+            "maxItems": len(self.axes),
         }
-        return one | {"anyOf": [*one["anyOf"], several], "x-per-axis": True}
+        return one | {"anyOf": [*one["anyOf"], several], "x-per-axis": list(self.axes)}
+
+
+@dataclass(frozen=True)
+class _PerWay(_Quantity):
+    """A plain number above zero along y and z: one for both, or a list of them."""
+
+    def read(self, value: Any, units: UnitSystem) -> Any:
+        if not isinstance(value, list):
+            return (super().read(value, units),) * 2
+        if len(value) != 2:
+            raise QuantityError(
+                "wrong-type",
+                f"expected one number or a list of 2, found a list of {len(value)}",
+                found=shown_value(value),
+                expected="one number, or [along y, along z]",
+            )
+        return tuple(super(_PerWay, self).read(component, units) for component in value)
 
 
 @dataclass(frozen=True)
@@ -339,6 +357,9 @@ def quantity(dimension: str, *, sign: Sign = "any") -> Any:
     return Annotated[float, _Quantity(dimension, sign)]
 
 
+RIGID = "rigid"
+"""The word for a stiffness that is infinite, where a file may say so."""
+
 _NO_ERROR = "no machine is without error; leave the key out where nothing is asked"
 
 Length = Annotated[float, _Quantity("length")]
@@ -361,6 +382,11 @@ Modulus = Annotated[float, _Quantity("stress", "positive")]
 Stiffness = Annotated[float, _Stiffness("stiffness")]
 SeriesStiffness = Annotated[float, _Series("stiffness")]
 SeriesTorsionalStiffness = Annotated[float, _Series("torsional_stiffness")]
+RigidStiffness = Annotated[float, _Stiffness("stiffness", rigid=True)]
+AcrossStiffness = Annotated[tuple[float, float], _PerAxis("stiffness", axes=("y", "z"))]
+TiltStiffness = Annotated[tuple[float, float, float], _PerAxis("torsional_stiffness")]
+SecondMoment = Annotated[float, _Quantity("second_moment", "positive")]
+ShearCoefficient = Annotated[tuple[float, float], _PerWay("ratio", "positive")]
 AxisStiffness = Annotated[tuple[float, float, float], _PerAxis("stiffness")]
 Mass = Annotated[float, _Quantity("mass", "not negative")]
 Time = Annotated[float, _Quantity("time")]

@@ -13,8 +13,11 @@ from truepose._kernel import Machine as KernelMachine
 from truepose.errors import CATALOGUE, Fault, MachineFileError, Problem
 from truepose.files.document import Document
 from truepose.files.units import UnitSystem, shown_value
+from truepose.machine import limb_checks
 from truepose.machine.compliances import compliances
 from truepose.machine.elements import strut_geometry
+from truepose.machine.limbs import Limb
+from truepose.machine.limbs import described as limb_description
 from truepose.machine.parts import Drive, Guide, Strut
 from truepose.machine.tables.machine import MachineTable
 from truepose.machine.validation import Validated
@@ -29,7 +32,23 @@ class Described:
     drives: Sequence[Drive]
     struts: Sequence[Strut]
     guides: Sequence[Guide]
+    limbs: Sequence[Limb]
     home: Mapping[str, float]
+
+    @property
+    def limb_parts(self) -> limb_checks.Parts:
+        """What the checks of limbs look at."""
+        rows = self.validated.rows(strut_geometry())
+        return limb_checks.Parts(
+            self.document,
+            self.drives,
+            self.struts,
+            self.guides,
+            self.limbs,
+            [getattr(row, "length", None) for row in rows],
+            [tuple(getattr(row, "base", (0.0, 0.0, 0.0))) for row in rows],
+            self.validated.units,
+        )
 
 
 def kernel(described: Described) -> KernelMachine:
@@ -38,10 +57,16 @@ def kernel(described: Described) -> KernelMachine:
     Where there are more closures than freedoms, it knows how stiff the limbs are: at home, where a
     telescopic strut has the length that its stiffness then has everywhere.
     """
+    wrong = list(limb_checks.problems(described.limb_parts))
+    if wrong:
+        raise MachineFileError(*dict.fromkeys(wrong))
     description = _description(described)
     machine = _built(described.document, description)
     if not machine.overconstrained:
         return machine
+    wrong = list(limb_checks.unsupported(described.limb_parts))
+    if wrong:
+        raise MachineFileError(*wrong)
     lengths = _home_lengths(machine)
     columns, values = compliances(machine, described.drives, described.struts, lengths)
     names = machine.parameters
@@ -54,6 +79,11 @@ def problems(described: Described, machine: KernelMachine) -> list[Problem]:
     problems = list(_rigid(described, machine)) if machine.overconstrained else []
     if described.guides and (free := _free_motions(machine)) is not None and len(free):
         problems.append(_loose(described, machine, free))
+    if described.limbs and not problems:
+        joints, placements, _ = machine.place(_commanded_home(machine)[np.newaxis, :])
+        problems += limb_checks.chain_problems(
+            described.limb_parts, machine, joints[0], placements[0]
+        )
     return problems
 
 
@@ -92,6 +122,7 @@ def _description(described: Described) -> dict[str, Any]:
                 "kind": drive.kind,
                 "travel": list(drive.travel),
                 "working_mode": drive.working_mode,
+                "yields": bool(drive.chain),
                 **_as_lists(drive.fields),
             }
             for drive in described.drives
@@ -103,6 +134,9 @@ def _description(described: Described) -> dict[str, Any]:
         "guides": [
             {"name": guide.name, "kind": guide.kind, **_as_lists(guide.fields)}
             for guide in described.guides
+        ],
+        "limbs": [
+            limb_description(limb, described.drives, described.struts) for limb in described.limbs
         ],
     }
 

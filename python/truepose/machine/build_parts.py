@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from truepose.files.file_table import FileTable
+from truepose.machine.chains import Beam, ChainJoint, Vector
 from truepose.machine.condition import (
     DEFAULT_PART,
     ISO_1_REFERENCE_TEMPERATURE,
@@ -17,14 +18,16 @@ from truepose.machine.condition import (
 )
 from truepose.machine.cutting import cutting_force, kienzle_force
 from truepose.machine.elements import drive_kinds, strut_geometry
+from truepose.machine.limbs import Limb
 from truepose.machine.materials import MATERIALS
-from truepose.machine.parts import Body, Drive, Guide, Joint, Strut, Vector, carriage_part
+from truepose.machine.parts import Body, Drive, Guide, Joint, Strut, carriage_part
 from truepose.machine.tables.body import CarriageTable, FrameTable, PlatformTable, ToolTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.drive import DriveTable
 from truepose.machine.tables.force import AccelerationTable, ForceTable, MomentTable
 from truepose.machine.tables.guide import GuideTable
 from truepose.machine.tables.joint import JointTable
+from truepose.machine.tables.limb import LimbPartTable, LimbTable, section_of
 from truepose.machine.tables.mounting import MountingTable
 from truepose.machine.tables.strut import StrutTable
 from truepose.machine.validation import Model, Validated
@@ -53,6 +56,7 @@ def drives(validated: Validated) -> tuple[Drive, ...]:
                 stiffness=fields.pop("stiffness"),
                 mass=common.mass,
                 carriage=_carriage(common) if kind.has_carriage else None,
+                chain=tuple(_chain_part(part) for part in common.chain or ()),
                 fields=fields,
             )
         )
@@ -73,6 +77,40 @@ def _rows(validated: Validated, model: type[Model], table: str) -> list[tuple[Mo
     """What every row of a table says in common, and in the model of its kind."""
     own = [model for model in validated.geometry.get(table, []) if model is not None]
     return list(zip(validated.rows(model), own, strict=True))
+
+
+def limbs(validated: Validated) -> tuple[Limb, ...]:
+    """Every `[[limb]]`."""
+    return tuple(
+        Limb(
+            row.name,
+            row.strut,
+            tuple(row.guides),
+            row.axis,
+            tuple(_chain_part(part) for part in row.chain),
+            row.mass,
+            row.length,
+            row.compliance,
+        )
+        for row in validated.rows(LimbTable)
+    )
+
+
+def _chain_part(row: LimbPartTable) -> ChainJoint | Beam:
+    if row.joint is not None:
+        given = {key: getattr(row, key) for key in ("radial", "axial", "across", "tilt", "axis")}
+        said = {key: value for key, value in given.items() if value is not None}
+        return ChainJoint(row.joint, **said)
+    if row.beam == "rigid":
+        return Beam(row.length, None, expansion=_expansion(row.material, row.expansion))
+    material = MATERIALS.get(row.material or "")
+    modulus = row.modulus if row.modulus is not None else material.modulus if material else None
+    assert modulus is not None  # the table has looked
+    shear = row.shear_modulus
+    if shear is None:
+        shear = modulus / (2.0 * (1.0 + (row.poisson_ratio or 0.0)))
+    expansion = _expansion(row.material, row.expansion)
+    return Beam(row.length, section_of(row), modulus, shear, expansion)
 
 
 def struts(validated: Validated) -> tuple[Strut, ...]:

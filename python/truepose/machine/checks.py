@@ -17,7 +17,7 @@ from truepose.files.wording import counted, did_you_mean, one_of
 from truepose.machine.build_workspace import too_large
 from truepose.machine.condition import DEFAULT_PART
 from truepose.machine.elements import drive_kinds, guide_kinds
-from truepose.machine.parts import BODIES, carriage_part, is_body
+from truepose.machine.parts import BODIES, carriage_part, is_body, is_limb, limb_part
 from truepose.machine.tables.accuracy import AccuracyTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.strut import StrutTable
@@ -419,7 +419,8 @@ def _parts_with_temperatures(document: Document, validated: Validated) -> Iterat
         for row in _rows(document, "drive")
         if isinstance(row.get("name"), str) and _has_carriage(row)
     ]
-    growing = [*rows, *(body for body in BODIES if body != "tool")]
+    limbs = [limb_part(name) for _, name in named_rows(document.data, "limb")]
+    growing = [*rows, *limbs, *(body for body in BODIES if body != "tool")]
     for key, given, known in (
         ("temperature", condition.temperature, [DEFAULT_PART, *rows, *BODIES]),
         ("gradient", condition.gradient, growing),
@@ -446,15 +447,16 @@ def _gradients(document: Document, validated: Validated) -> Iterator[Problem]:
     for part in (condition.gradient or ()) if condition is not None else ():
         key = document.key(f"condition.gradient.{part}")
         value = document.value(key)
-        if isinstance(value, list) != is_body(part):
+        across = is_body(part) or is_limb(part)
+        if isinstance(value, list) != across:
             yield document.problem(
                 Fault(
                     "wrong-type",
                     f"{part} has a gradient along each of its axes"
-                    if is_body(part)
+                    if across
                     else f"{part} has one gradient, along itself",
                     found=shown_value(value),
-                    expected="[x, y, z]" if is_body(part) else "one temperature gradient",
+                    expected="[x, y, z]" if across else "one temperature gradient",
                 ),
                 key,
             )

@@ -17,7 +17,8 @@ from truepose.arrays import Floats, real_numbers
 from truepose.errors import ArgumentError, Problem, RequestError
 from truepose.files.units import UnitSystem, default_units, shown_value
 from truepose.files.wording import did_you_mean, one_of
-from truepose.machine.parts import Vector, is_body
+from truepose.machine.chains import Vector
+from truepose.machine.parts import is_body, is_limb
 from truepose.spatial import tangents
 
 if TYPE_CHECKING:
@@ -125,6 +126,11 @@ class Condition:
         for part, gradient in self.gradients.items():
             if str(part).startswith(_ALONG) and any(gradient[1:]):
                 raise _bad(f"gradient.{part}", str(gradient), "one number, along itself, K/m")
+            if is_limb(str(part)) and gradient[0] != 0.0:
+                raise _bad(f"gradient.{part}", str(gradient), "0 along it: that is its strut's")
+        for part in self.part_temperatures:
+            if is_limb(str(part)):
+                raise _bad(str(part), "a temperature", "that of its strut or of the platform")
         if not (_finite(self.gravity) and self.gravity >= 0.0):
             raise _bad("gravity", str(self.gravity), "an acceleration of zero or more, m/s^2")
         if self.time is not None and not _finite(self.time):
@@ -315,7 +321,7 @@ def _number(name: str, value: object) -> float:
 
 def _along(part: str, value: float | Sequence[float]) -> Vector:
     if isinstance(value, (int, float)):
-        if is_body(part):
+        if is_body(part) or is_limb(part):
             raise _bad(f"gradient.{part}", str(value), "three numbers, along its axes, K/m")
         return (_number(f"gradient.{part}", value), 0.0, 0.0)
     return _vector(f"gradient.{part}", value)

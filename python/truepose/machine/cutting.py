@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from truepose.machine.parts import Vector
+from truepose.machine.chains import Vector
 from truepose.machine.tables.force import CuttingTable, KienzleTable
 
 _UNIT_THICKNESS = 1e-3

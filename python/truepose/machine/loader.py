@@ -116,7 +116,8 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
     workspace, home = build_workspace.workspace(document, validated, data_files, problems)
     _raise([*problems, *data_files.problems])
     guides = build_parts.guides(validated)
-    described = build_kernel.Described(document, validated, drives, struts, guides, home)
+    limbs = build_parts.limbs(validated)
+    described = build_kernel.Described(document, validated, drives, struts, guides, limbs, home)
     kernel = build_kernel.kernel(described)
     _raise(build_kernel.problems(described, kernel))
     platform, frame, tool = build_parts.bodies(validated)
@@ -127,6 +128,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         drives=drives,
         struts=struts,
         guides=guides,
+        limbs=limbs,
         bodies=(platform, frame, tool),
         condition=condition,
         data_files=data_files,
@@ -150,6 +152,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         drives=drives,
         struts=struts,
         guides=guides,
+        limbs=limbs,
         sources=sources,
         file_units=validated.units.shown(),
         platform=platform,

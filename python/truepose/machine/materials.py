@@ -19,12 +19,16 @@ from truepose.files.wording import did_you_mean, one_of
 
 @dataclass(frozen=True)
 class Material:
-    """Young's modulus (Pa) along the part and linear expansion coefficient (1/K)."""
+    """Young's modulus (Pa) along the part and linear expansion coefficient (1/K).
+
+    `poisson`: Poisson's ratio, None of a material that is not alike in all directions.
+    """
 
     name: str
     modulus: float
     expansion: float
     source: str
+    poisson: float | None = None
 
 
 MATERIALS: dict[str, Material] = {
@@ -35,26 +39,31 @@ MATERIALS: dict[str, Material] = {
             210e9,
             12e-6,
             "EN 1993-1-1, 3.2.6: structural steel, up to 100 degC",
+            0.3,
         ),
         Material(
             "aluminium",
             70e9,
             23e-6,
             "EN 1999-1-1, 3.2.5: structural aluminium alloys",
+            0.3,
         ),
         Material(
             "cast iron",
             110e9,
             11e-6,
             "EN 1561, annex: grey iron EN-GJL-250, 103 to 118 GPa; expansion between its values "
-            "below 20 degC (10e-6) and from 20 to 200 degC (11.7e-6), which want confirming",
+            "below 20 degC (10e-6) and from 20 to 200 degC (11.7e-6), which want confirming; "
+            "Poisson's ratio 0.26",
+            0.26,
         ),
         Material(
             "invar",
             141e9,
             1.2e-6,
             "makers' data sheets of Invar 36, annealed: 20.5e6 psi, 1.18e-6 1/K from 25 to 100 "
-            "degC; ASTM F1684 allows more, and cold work changes it",
+            "degC; ASTM F1684 allows more, and cold work changes it; Poisson's ratio 0.29",
+            0.29,
         ),
         Material(
             "carbon fibre",

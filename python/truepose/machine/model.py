@@ -19,10 +19,17 @@ from truepose.files.shown_units import ShownUnits, shown_units
 from truepose.files.units import FileUnit
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine.calls import OfJoints, OfPoses, OfWrenches, WithStatus
-from truepose.machine.compliances import compliances, end_compliances, known
+from truepose.machine.chains import Vector
+from truepose.machine.compliances import (
+    compliances,
+    compliances_at,
+    end_compliances,
+    known,
+)
 from truepose.machine.condition import DEFAULT_PART, Condition
 from truepose.machine.equality import equal
-from truepose.machine.parts import BODIES, Body, Drive, Guide, Strut, Vector
+from truepose.machine.limbs import Limb
+from truepose.machine.parts import BODIES, Body, Drive, Guide, Strut
 from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.controller import Holds
 from truepose.machine.workspace import Accuracy, Workspace
@@ -90,6 +97,7 @@ class Machine(Represented):
     tool: Body = field(default_factory=lambda: Body("tool"))
     mounting: Vector = (0.0, 0.0, 0.0)
     guides: tuple[Guide, ...] = ()
+    limbs: tuple[Limb, ...] = ()
     data_files: Mapping[str, str] = field(default_factory=dict)
     """SHA-256 of each file of data that the machine file names."""
     replaced: Mapping[str, float] = field(default_factory=dict)
@@ -211,7 +219,7 @@ class Machine(Represented):
     @property
     def stiffness_known(self) -> Flags:
         """(n_strut,) whether the file says how stiff something is along each strut's limb."""
-        return known(self.drives, self.struts)
+        return known(self.drives, self.struts, self.limbs)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -263,12 +271,13 @@ class Machine(Represented):
         """Parameters (k,) that may give way, and their compliance (n, k), m/N or rad/(N m).
 
         `lengths` (n, n_strut): present length of each strut, m. The first n_strut columns are the
-        struts' lengths. In series along the limb; 0, rigid, where the file says nothing.
+        struts' lengths. In series along the limb; 0, rigid, where the file says nothing. What a
+        `[[limb]]` says is not among them: it depends on the pose.
         """
         given = np.atleast_2d(real_numbers("lengths", lengths))
         if given.ndim != 2 or given.shape[1] != len(self.struts):
             raise ArgumentError.of("lengths", lengths, f"an array (n, {len(self.struts)})")
-        return compliances(self.kernel, self.drives, self.struts, given)
+        return compliances(self.kernel, self.drives, self.struts, given, self.limbs)
 
     @property
     def end_compliances(self) -> Floats:
@@ -276,7 +285,7 @@ class Machine(Represented):
 
         Its joints and a telescopic drive, which stands at the base end: shares of `compliances`.
         """
-        return end_compliances(self.kernel, self.drives, self.struts)
+        return end_compliances(self.kernel, self.drives, self.struts, self.limbs)
 
     @overload
     def stiffness(self, poses: ArrayLike, *, status: Literal[False] = False) -> Floats: ...
@@ -309,8 +318,10 @@ class Machine(Represented):
         leading, size = given.shape[:-1], len(self.components)
         joints, placements, placed = self.kernel.place(given.reshape(-1, given.shape[-1]))
         lengths = self.kernel.lengths_at(joints, placements)
-        columns, compliance = self.compliances(lengths)
-        matrices, solved = block(joints, placements, columns, compliance)
+        yielding = compliances_at(self, joints, placements, lengths)
+        matrices, solved = block(
+            joints, placements, yielding.columns, yielding.stacked, yielding.pairs
+        )
         result = matrices.reshape(*leading, size, size)
         codes = np.where(placed == 0, solved, placed)
         if status:
@@ -406,7 +417,7 @@ class Machine(Represented):
         """Raise `RequestError` (unknown-part) with every part that the machine does not have."""
         if not isinstance(condition, Condition):
             raise ArgumentError.of("condition", condition, "a truepose.Condition")
-        known_parts = self.parts
+        known_parts = (*self.parts, *(limb.part for limb in self.limbs))
         problems = [
             Problem(
                 "unknown-part",

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-Vector = tuple[float, float, float]
+from truepose.machine.chains import Beam, ChainJoint, Vector
+
 Fields = Mapping[str, float | tuple[float, ...]]
 
 BODIES = ("platform", "frame", "tool")
@@ -15,6 +16,9 @@ BODIES = ("platform", "frame", "tool")
 
 _CARRIAGE = "carriage."
 """How the path of a carriage begins: `carriage.d1` is that of drive d1."""
+
+
+_LIMB = "limb."
 
 
 def carriage_part(drive: str) -> str:
@@ -25,6 +29,29 @@ def carriage_part(drive: str) -> str:
 def is_body(part: str) -> bool:
     """Whether a part, by its path, extends along three axes: one of `BODIES`, or a carriage."""
     return part in BODIES or part.startswith(_CARRIAGE)
+
+
+def limb_part(limb: str) -> str:
+    """Path of a limb, by its name."""
+    return f"{_LIMB}{limb}"
+
+
+def is_limb(part: str) -> bool:
+    """Whether a part, by its path, is a limb: it has a temperature gradient and no temperature."""
+    return part.startswith(_LIMB)
+
+
+def gives_way_only(parameter: str) -> bool:
+    """Whether a parameter is nothing but how a limb or a carriage gives way.
+
+    Such are zero in every machine that carries no load. They are neither toleranced nor identified:
+    as errors they would repeat lengths, origins and directions.
+    """
+    table, _, name = parameter.partition(".")
+    own = name.partition(".")[2]
+    return (table == "guide" and own.partition(".")[0] == "offset") or (
+        table == "drive" and own.startswith(_CARRIAGE)
+    )
 
 
 def in_series(*stiffnesses: float | None) -> float | None:
@@ -86,7 +113,8 @@ class Drive(_WithFields):
     `fixed_at`; None: that at which a telescopic strut would have no length. `stiffness`: N/m, or
     N m/rad of a crank, of all that the file names, in series; None: rigid. `mass` (kg) is that of
     the `carriage`, the body between the drive's point and the struts' base joints; None where the
-    drive moves none.
+    drive moves none. `chain`: what lies between the frame and the body that it moves, a
+    carriage or an arm; empty where that is rigid.
     """
 
     name: str
@@ -103,6 +131,7 @@ class Drive(_WithFields):
     stiffness: float | None = None
     mass: float = 0.0
     carriage: Body | None = None
+    chain: tuple[ChainJoint | Beam, ...] = ()
 
     @property
     def part(self) -> str:

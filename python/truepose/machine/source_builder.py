@@ -16,6 +16,7 @@ from truepose.files.tolerance_standards import ToleranceClassError
 from truepose.files.units import QuantityError
 from truepose.files.wording import did_you_mean
 from truepose.machine.condition import Condition
+from truepose.machine.limbs import Limb
 from truepose.machine.parts import Body, Drive, Guide, Strut
 from truepose.machine.validation import Validated
 
@@ -54,6 +55,7 @@ class SourceBuilder:
         struts: tuple[Strut, ...],
         bodies: tuple[Body, Body, Body],
         guides: tuple[Guide, ...] = (),
+        limbs: tuple[Limb, ...] = (),
         condition: Condition,
         data_files: DataFiles,
     ) -> None:
@@ -63,6 +65,7 @@ class SourceBuilder:
         self.platform, self.frame, self.tool = bodies
         self.carriages = tuple(drive.carriage for drive in drives if drive.carriage is not None)
         self.guides = guides
+        self.limbs = limbs
         self.condition = condition
         self.problems: list[Problem] = []
         self._document = document

@@ -29,6 +29,11 @@ def machine(it: Machine) -> Table:
         ("commanded", " ".join(it.commanded)),
         ("drives", ", ".join(f"{drive.name} ({drive.kind})" for drive in it.drives)),
         ("struts (closures)", f"{len(it.struts)}: " + ", ".join(strut.name for strut in it.struts)),
+        *(
+            [("limbs", ", ".join(f"{limb.name} ({limb.family})" for limb in it.limbs))]
+            if it.limbs
+            else []
+        ),
         ("parameters", str(len(it.parameters))),
         ("characteristic length", it.shown.length.text(it.characteristic_length, 6)),
         ("home", pose_text(it.home, it.dof, it.shown)),

@@ -15,6 +15,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.errors import Problem
+from truepose.machine.limbs import Limb
 from truepose.machine.parts import Body, Drive, Guide, Strut, is_body
 
 if TYPE_CHECKING:
@@ -127,6 +128,22 @@ def silent(
             yield _no_expansion(body.part, what, kind)
 
 
+def silent_limbs(condition: Condition, limbs: Iterable[Limb]) -> Iterator[Problem]:
+    """Limbs that are warmer on one side, of whose beams nobody says how they expand."""
+    for limb in limbs:
+        unsaid = any(beam.expansion is None for beam in limb.beams)
+        if unsaid and any(condition.gradient(limb.part)):
+            yield Problem(
+                code="no-expansion",
+                message=f"limb {limb.name} is warmer on one side, but nothing says how much its "
+                "beams expand",
+                path=limb.part,
+                found="a beam with neither expansion nor material",
+                expected='expansion = "1.1e-5 1/K", or a material, of every beam of its chain',
+                hint='a beam that does not expand has expansion = "0 1/K"',
+            )
+
+
 def located(parts: SourceBuilder, problem: Problem) -> Problem:
     """A part that the file does not describe is wrong where the condition names it."""
     part = str(problem.path)
@@ -184,5 +201,6 @@ __all__ = [
     "not_included",
     "not_included_text",
     "silent",
+    "silent_limbs",
     "twice",
 ]

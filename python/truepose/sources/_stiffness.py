@@ -7,16 +7,19 @@ from collections.abc import Sequence
 from truepose.errors import Problem
 from truepose.machine import Drive, Strut
 from truepose.machine.compliances import known
+from truepose.machine.limbs import Limb
 
 
-def lacking(drives: Sequence[Drive], struts: Sequence[Strut], cause: str) -> list[Problem]:
+def lacking(
+    drives: Sequence[Drive], struts: Sequence[Strut], limbs: Sequence[Limb], cause: str
+) -> list[Problem]:
     """A problem (no-stiffness) for every limb along which nothing says how stiff it is.
 
     `cause` is what bends the machine: "a force acts on the tool".
     """
     return [
         _no_stiffness(strut, cause)
-        for strut, stiff in zip(struts, known(drives, struts), strict=True)
+        for strut, stiff in zip(struts, known(drives, struts, limbs), strict=True)
         if not stiff
     ]
 

@@ -46,7 +46,7 @@ class Elastic:
     @classmethod
     def build(cls, parts: SourceBuilder) -> Self | None:
         """Always there, for a condition given later may have a force that the file has not."""
-        problems = lacking(parts.drives, parts.struts, _CAUSE)
+        problems = lacking(parts.drives, parts.struts, parts.limbs, _CAUSE)
         if np.any(parts.condition.wrench != 0.0):
             for problem in problems:
                 parts.record(problem)
@@ -63,10 +63,11 @@ class Elastic:
         Raises `TrueposeError` (no-stiffness) for limbs whose stiffness the machine does not say;
         all of them at once.
         """
-        columns, compliance = block.compliances
+        yielding = block.compliances
+        columns = yielding.columns
         if not np.any(condition.wrench != 0.0):
             return Deviation.of(columns)
-        problems = lacking(machine.drives, machine.struts, _CAUSE)
+        problems = lacking(machine.drives, machine.struts, machine.limbs, _CAUSE)
         if problems:
             raise TrueposeError(*problems)
-        return Deviation.of(columns, block.loads(columns, "tool") * compliance)
+        return Deviation.of(columns, yielding.deflection(block.loads(columns, "tool")))

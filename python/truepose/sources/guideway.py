@@ -26,8 +26,8 @@ from truepose.files.file_table import FileTable
 from truepose.files.quantity import Direction, Length, PositiveLength, refuse
 from truepose.files.ratio import SlopeWithin, one_or_limits
 from truepose.files.tolerance import Band
+from truepose.machine.chains import Vector
 from truepose.machine.elements import drive_kinds
-from truepose.machine.parts import Vector
 from truepose.sources._columns import Columns
 from truepose.sources._coverage import uncovered
 from truepose.sources.deviation import Deviation

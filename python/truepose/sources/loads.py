@@ -67,7 +67,7 @@ class Loads:
         if np.any(condition.acceleration) and parts.platform.mass == 0.0:
             parts.record(_no_mass("acceleration", "a mass of [platform]"))
         elif source.acts(condition):
-            for problem in lacking(parts.drives, parts.struts, _CAUSE):
+            for problem in lacking(parts.drives, parts.struts, parts.limbs, _CAUSE):
                 parts.record(problem)
         return source
 
@@ -88,14 +88,20 @@ class Loads:
         """
         if np.any(condition.acceleration) and machine.platform.mass == 0.0:
             raise TrueposeError(_no_mass("acceleration", "a mass of [platform]"))
-        problems = lacking(machine.drives, machine.struts, _CAUSE)
+        problems = lacking(machine.drives, machine.struts, machine.limbs, _CAUSE)
         if problems:
             raise TrueposeError(*problems)
-        columns, compliance = block.compliances
-        shift = block.loads(columns, "own") * compliance
+        yielding = block.compliances
+        columns = yielding.columns
+        shift = yielding.deflection(block.loads(columns, "own"))
         if block.uneven_stretch is not None:
             # The struts' lengths are the first columns.
             shift[:, : len(machine.struts)] += block.uneven_stretch
+        if block.sag is not None:
+            places = [
+                int(np.flatnonzero(columns == at)[0]) for at in machine.kernel.limb_parameters
+            ]
+            shift[:, places] += block.sag
         if condition.envelope is None:
             return Deviation.of(columns, shift)
         return _with_envelope(block, condition.envelope, shift)
@@ -103,13 +109,14 @@ class Loads:
 
 def _with_envelope(block: PoseBlock, envelope: Envelope, shift: np.ndarray) -> Deviation:
     """The shift, and for each axis a group of columns moved by the direction's component."""
-    columns, compliance = block.compliances
+    yielding = block.compliances
+    columns = yielding.columns
     shifts, halves, signs = [shift], [np.zeros_like(shift)], [np.ones_like(shift)]
     groups = [np.full(columns.size, OWN_GROUP)]
     axes = envelope.wrenches
     for group, wrench in enumerate(axes):
         load = block.loads_of(wrench[np.newaxis], columns)
-        moved = np.broadcast_to(load * compliance, compliance.shape)
+        moved = np.broadcast_to(yielding.deflection(load), yielding.own.shape)
         shifts.append(np.zeros_like(moved))
         halves.append(np.abs(moved))
         signs.append(np.where(moved < 0.0, -1.0, 1.0))
@@ -118,10 +125,12 @@ def _with_envelope(block: PoseBlock, envelope: Envelope, shift: np.ndarray) -> D
     # that is anywhere on a circle it is distributed as a sine.
     return Deviation.of(
         np.tile(columns, len(shifts)),
-        np.concatenate([np.broadcast_to(table, compliance.shape) for table in shifts], axis=1),
-        np.concatenate([np.broadcast_to(table, compliance.shape) for table in halves], axis=1),
+        np.concatenate([np.broadcast_to(table, yielding.own.shape) for table in shifts], axis=1),
+        np.concatenate([np.broadcast_to(table, yielding.own.shape) for table in halves], axis=1),
         groups=np.concatenate(groups),
-        sign=np.concatenate([np.broadcast_to(table, compliance.shape) for table in signs], axis=1),
+        sign=np.concatenate(
+            [np.broadcast_to(table, yielding.own.shape) for table in signs], axis=1
+        ),
         edge=False,
         distribution=UNIFORM if len(axes) == 3 else ARCSINE,
         group_names=dict.fromkeys(range(len(axes)), UNKNOWN_DIRECTION),

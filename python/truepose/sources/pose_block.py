@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from truepose.arrays import Codes, Flags, Floats, Indices
+from truepose.machine.compliances import Compliances, compliances_at
 from truepose.representation import Represented
 from truepose.spatial import quaternion_to_matrix
 
@@ -124,8 +125,9 @@ class PoseBlock(Represented):
         shares = np.array([strut.mass * strut.centre_of_mass for strut in struts])
         on_platform = platform.mass * (self.weight - np.array(self.condition.acceleration))
         on_struts = shares[:, np.newaxis] * self.weight
+        tubes = self.tube_wrench
         if not (on_platform.any() or on_struts.any()):
-            return np.zeros((1, 6))
+            return np.zeros((1, 6)) if tubes is None else tubes
         names = self.machine.parameters
         tool = self.machine.nominal[[names.index(f"tool.{axis}") for axis in "xyz"]]
         arm = self.rotations @ (np.array(platform.centre_of_mass) - tool)
@@ -135,7 +137,45 @@ class PoseBlock(Represented):
         if on_struts.any():
             arms = self.centres[:, :, 1] - self.placements[:, np.newaxis, :3]
             wrench[:, 3:] += np.cross(arms, on_struts).sum(axis=1)
+        return wrench if tubes is None else wrench + tubes
+
+    @cached_property
+    def tube_wrench(self) -> Floats | None:
+        """(n, 6) weight and inertia of tubes that the platform carries, at the tool; None: none."""
+        tubes = [(at, limb) for at, limb in enumerate(self.machine.limbs) if limb.mass > 0.0]
+        if not tubes:
+            return None
+        ends = self.machine.kernel.limb_ends_at(self.joints, self.placements)
+        wrench = np.zeros((self.indices.size, 6))
+        for at, limb in tubes:
+            force = limb.mass * (self.weight - np.array(self.condition.acceleration))
+            back = ends[:, at, 0] - ends[:, at, 1]
+            size = np.linalg.norm(back, axis=1, keepdims=True)
+            half = 0.5 * (limb.length or 0.0)
+            centre = ends[:, at, 1] + half * back / size - self.placements[:, :3]
+            wrench[:, :3] += force
+            wrench[:, 3:] += np.cross(centre, force)
         return wrench
+
+    @cached_property
+    def sag(self) -> Floats | None:
+        """(n, n_closure of limbs) m by which limbs open under their own weight beyond the loads.
+
+        None where no limb weighs anything.
+        """
+        struts = {strut.name: strut.mass for strut in self.machine.struts}
+        carried = {strut.name: strut.drive for strut in self.machine.struts}
+        drives = {drive.name: drive.mass for drive in self.machine.drives}
+        masses = [
+            limb.mass
+            + struts.get(limb.strut or "", 0.0)
+            + drives.get(carried.get(limb.strut or "") or "", 0.0)
+            for limb in self.machine.limbs
+        ]
+        if not any(masses):
+            return None
+        kernel = self.machine.kernel
+        return kernel.limb_sag_at(self.joints, self.placements, self.weight.tolist())
 
     @cached_property
     def base_forces(self) -> Floats | None:
@@ -244,9 +284,9 @@ class PoseBlock(Represented):
         return kernel.loads_at(self.joints, self.placements, wrenches, columns)[0]
 
     @cached_property
-    def compliances(self) -> tuple[Indices, Floats]:
-        """Parameters (k,) that may give way, and their compliance (n, k), m/N or rad/(N m)."""
-        return self.machine.compliances(self.lengths)
+    def compliances(self) -> Compliances:
+        """Parameters that may give way, and how far under load, m/N or rad/(N m)."""
+        return compliances_at(self.machine, self.joints, self.placements, self.lengths)
 
     def rise(self, part: str) -> float | Floats:
         """Temperature of a part above the reference, K: one number, or (n, 1) at `times`."""

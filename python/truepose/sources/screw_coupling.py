@@ -23,7 +23,7 @@ from truepose.arrays import Floats
 from truepose.errors import Fault, Problem, TrueposeError
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import Direction, Length
-from truepose.machine.parts import Vector
+from truepose.machine.chains import Vector
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
 from truepose.spatial import quaternion_to_matrix

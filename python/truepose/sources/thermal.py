@@ -22,7 +22,7 @@ import numpy as np
 from truepose.arrays import Floats
 from truepose.errors import TrueposeError
 from truepose.machine.parts import Body, Drive, Strut
-from truepose.sources._expansion import ASKED_BY, located, silent, twice
+from truepose.sources._expansion import ASKED_BY, located, silent, silent_limbs, twice
 from truepose.sources._growth import Growth, along_line
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
@@ -53,6 +53,8 @@ class Thermal:
         bodies = (parts.platform, parts.frame, parts.tool, *parts.carriages)
         for problem in silent(parts.condition, parts.drives, parts.struts, bodies):
             parts.record(located(parts, problem))
+        for problem in silent_limbs(parts.condition, parts.limbs):
+            parts.record(located(parts, problem))
         for problem in twice(parts.kernel, parts.drives, parts.struts):
             parts.record(problem)
         every: tuple[Drive | Strut | Body, ...] = (*parts.drives, *parts.struts, *bodies)
@@ -77,6 +79,7 @@ class Thermal:
         of them at once.
         """
         unsaid = list(silent(condition, machine.drives, machine.struts, machine.bodies))
+        unsaid += silent_limbs(condition, machine.limbs)
         if unsaid:
             raise TrueposeError(*unsaid)
         moved = _Moved(machine, condition, block)
@@ -85,6 +88,7 @@ class Thermal:
             moved.drive(index, drive)
             moved.carriage(drive)
         moved.frame()
+        moved.limbs()
         moved.platform_and_tool()
         return moved.deviation()
 
@@ -172,6 +176,19 @@ class _Moved:
             for index, drive in enumerate(self.machine.drives):
                 if drive.name in names:
                     self._on_bent_frame(frame, index, drive)
+
+    def limbs(self) -> None:
+        """Limbs that hold the platform and are warmer on one side: they bend."""
+        limbs = self.machine.limbs
+        gradients = np.array([self.condition.gradient(limb.part) for limb in limbs]).ravel()
+        if not gradients.any():
+            return
+        kernel = self.machine.kernel
+        opened = kernel.limb_bend_at(
+            self.block.joints, self.block.placements, gradients[np.newaxis]
+        )
+        for column, values in zip(kernel.limb_parameters, opened.T, strict=True):
+            self._add(column, values[:, np.newaxis])
 
     def _held_at(self, drive: Drive) -> Floats:
         """(3,) where the frame holds a drive: a crank's pivot; where a screw or scale is fixed."""

@@ -23,6 +23,7 @@ from truepose.files.data_file import Column
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.quantity import LengthTolerance
 from truepose.files.tolerance import LISTED, Band
+from truepose.machine.parts import gives_way_only
 from truepose.probability.distributions import (
     ARCSINE,
     TRIANGULAR,
@@ -207,7 +208,11 @@ def _of_table(parts: SourceBuilder, of_struts: Mapping[int, _Stated]) -> dict[in
         for key in entries:
             if _rank(key, names) != rank:
                 continue
-            matches = [i for i, name in enumerate(names) if name == key or fnmatchcase(name, key)]
+            matches = [
+                i
+                for i, name in enumerate(names)
+                if name == key or (fnmatchcase(name, key) and not gives_way_only(name))
+            ]
             if not _is_one_kind(parts, key, matches, entries[key]):
                 continue
             columns = [column for column in matches if column not in decided]
@@ -232,6 +237,7 @@ def _is_one_kind(parts: SourceBuilder, key: str, matches: list[int], value: obje
     names = parts.kernel.parameters
     path = f"tolerance.{key}"
     if not matches:
+        known = tuple(name for name in names if not gives_way_only(name))
         nested = isinstance(value, dict) and not _WILDCARDS & set(key) and "." not in key
         parts.refuse(
             Fault(
@@ -241,7 +247,7 @@ def _is_one_kind(parts: SourceBuilder, key: str, matches: list[int], value: obje
                 expected='a parameter name, or a pattern such as "strut.*.base.x"',
                 hint='a name with points stands in quotation marks: "strut.1.base.x" = 0.05'
                 if nested
-                else parts.suggest(key, _patterns(names) if "*" in key else names),
+                else parts.suggest(key, _patterns(known) if "*" in key else known),
             ),
             path,
         )
@@ -300,8 +306,22 @@ def _stated(
         entry = _with_band(parts, tolerance, listed, size, path)
         if entry is None:
             break
+        name = parts.kernel.parameters[column]
+        if gives_way_only(name) and entry.band.half > 0.0:
+            parts.refuse(_of_offset(name), path)
+            break
         stated[column] = entry
     return stated
+
+
+def _of_offset(name: str) -> Fault:
+    return Fault(
+        "tolerance-of-offset",
+        f"{name} is what a limb gives way by, and has no tolerance",
+        found="a band",
+        expected="a known value, [v, v], or no entry",
+        hint="as an error it would repeat lengths, origins and directions: give those a tolerance",
+    )
 
 
 def _entry(

@@ -257,7 +257,9 @@ def _known(
     if _varies(deviation.half) or _varies(deviation.signed_half):
         raise _unknown(machine, source, "its band differs from pose to pose")
     if how == "wrench":
-        columns, table = block.compliances
+        if machine.kernel.limb_pairs:
+            raise _unknown(machine, source, "how its limbs bend is not enclosed over a region")
+        columns, table = block.compliances.columns, block.compliances.own
         if not np.any(condition.wrench != 0.0):
             return []
     else:

@@ -162,8 +162,8 @@ def test_an_expansion_that_was_found_is_in_it() -> None:
         (name,), np.empty(0, np.intp), np.empty((0, 1)), properties={0: expansion}
     )
     ours = calibrated_machine(machine, unknowns, np.array([2e-6]), np.array([[1e-14]]))
-    before = machine.struts[expansion.strut].expansion or 0.0
-    assert ours.struts[expansion.strut].expansion == pytest.approx(before + 2e-6)
+    before = machine.struts[expansion.index].expansion or 0.0
+    assert ours.struts[expansion.index].expansion == pytest.approx(before + 2e-6)
 
 
 def test_what_nothing_determines_is_refused() -> None:

@@ -22,6 +22,8 @@ from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.arrays import joined
 from truepose.errors import RequestError
 from truepose.machine import Condition, Machine
+from truepose.machine.chains import Beam
+from truepose.machine.limbs import with_limbs
 
 FILES = {path.stem: path for path in machine_files()}
 CROSSED = tp.load(FILES["planar_crossed"])
@@ -240,6 +242,52 @@ def test_expansion_and_compliance_are_found() -> None:
     noisy = fit(machine, read_of(machine, data, unknowns, truth, 5), unknowns)
     assert (np.abs(noisy.values - truth) < 5.0 * noisy.deviations).all()
     assert (noisy.deviations[np.array(unknowns.units) == "1/K"] < 1e-6).all()
+
+
+def test_how_much_more_the_beams_of_limbs_give_way_is_found() -> None:
+    """A modulus of 168 GPa where 210 was filed is a compliance of 1.25 times as much."""
+    machine = tp.load(FILES["3prs"])
+    cold = reference_condition(machine)
+    random = np.random.default_rng(4)
+    conditions = tuple(
+        dataclasses.replace(cold, force=tuple(random.uniform(-800.0, 800.0, 3).tolist()))
+        for _ in range(40)
+    )
+    data = tracked(machine, rows=40, condition=conditions)
+    unknowns = unknowns_of(machine, data, ("limb.*.compliance", "drive.*.offset"))
+    assert unknowns.names[-3:] == ("limb.1.compliance", "limb.2.compliance", "limb.3.compliance")
+    truth = np.concatenate([random.uniform(-1e-5, 1e-5, 3), [0.25, -0.1, 0.05]])
+    read = read_of(machine, data, unknowns, truth, None)
+    exact = fit(machine, read, unknowns, robust=False, use_prior=False)
+    np.testing.assert_allclose(exact.values, truth, atol=1e-9, rtol=1e-6)
+    # What is read is what a machine of other moduli does: the beams alone, not the joints.
+    limbs = tuple(
+        dataclasses.replace(
+            limb,
+            chain=tuple(
+                dataclasses.replace(
+                    part,
+                    modulus=part.modulus / (1.0 + more),
+                    shear_modulus=part.shear_modulus / (1.0 + more),
+                )
+                if isinstance(part, Beam)
+                else part
+                for part in limb.chain
+            ),
+        )
+        for limb, more in zip(machine.limbs, truth[3:], strict=True)
+    )
+    pose = machine.poses()[:1]
+    by_modulus = with_limbs(machine, limbs).compliance(pose)
+    found = machine
+    for number, identified in unknowns.properties.items():
+        changed = identified.changed(found, float(exact.values[number]))
+        assert changed is not None
+        found = changed
+    np.testing.assert_allclose(found.compliance(pose), by_modulus, rtol=1e-6, atol=1e-18)
+    assert np.abs(by_modulus / machine.compliance(pose) - 1.0).max() > 0.05
+    noisy = fit(machine, read_of(machine, data, unknowns, truth, 5), unknowns)
+    assert (np.abs(noisy.values - truth) < 5.0 * noisy.deviations).all()
 
 
 def test_an_outlier_is_named_and_moves_nothing_much() -> None:

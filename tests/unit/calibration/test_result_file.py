@@ -419,6 +419,20 @@ def test_properties_are_written(tmp_path: Path) -> None:
     assert 'modulus = "168.0 GPa"' in said
 
 
+def test_the_compliance_of_a_limb_is_written(tmp_path: Path) -> None:
+    path, machine = filed(tmp_path, (MACHINES / "3prs.toml").read_text())
+    unknowns = dataclasses.replace(
+        unknown(machine, {"drive.d1.offset": 1.0}),
+        names=("drive.d1.offset", "limb.2.compliance"),
+        effects=np.array([[1.0, 0.0]]),
+        properties={1: properties_of(machine)["limb.2.compliance"]},
+    )
+    written, said = write(tmp_path, path, machine, unknowns, [0.0, 0.25], np.eye(2) * 1e-12)
+    assert [limb.compliance for limb in written.limbs] == [1.0, 1.25, 1.0]
+    assert "compliance = 1.25" in said
+    assert "compliance" not in said.partition('name = "2"')[0].partition("[[limb]]")[2]
+
+
 def test_data_files_are_found_from_another_folder(tmp_path: Path) -> None:
     text = edited(
         PLANAR, ("[workspace]", '[tolerance]\n"tool.x" = { data = "held.csv" } # x\n[workspace]')

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from command_line import MACHINES, PLANAR, call
+from command_line import PLANAR, call
+from guided_machines import guided
 
-GUIDED = MACHINES / "3prs.toml"
+GUIDED = guided("3prs")
 FEW = ["--set", "workspace.grid={z = [0, 100, 2], a = [0, 10, 2]}"]
 WARNING = re.compile(
     r"^warning\[guide-taken-rigid\]: guides are taken as rigid: g1 carries .*$", re.M

@@ -23,9 +23,12 @@ from truepose.machine import Condition, Machine
 from truepose.runs.displacement import sum_deviations
 from truepose.runs.poses import PoseRun
 from truepose.sources import Deviation, PoseBlock, acting
+from yielding_machines import CHAINS, yielding
 
 MACHINE_FOLDER = Path("machines")
 MACHINES = sorted(path.stem for path in MACHINE_FOLDER.glob("*.toml"))
+YIELDING = [f"yielding_{name}" for name in CHAINS]
+"""Deltas on carriages and arms that give way."""
 FREEDOMS = "xyzabc"
 WITHOUT = {"hexapod_all_sources": ("loads", "backlash", "clearance", "screw_coupling")}
 ALWAYS = {"hexapod_all_sources": ("tolerance", "sensor", "actuator", "guideway")}
@@ -33,7 +36,7 @@ ALWAYS = {"hexapod_all_sources": ("tolerance", "sensor", "actuator", "guideway")
 POSES = 100_000
 Floats = NDArray[np.float64]
 
-exported = pytest.mark.parametrize("name", MACHINES)
+exported = pytest.mark.parametrize("name", [*MACHINES, *YIELDING])
 OF_EACH_KIND = {"planar_two_slider", "rotary_delta", "tricept", "overconstrained"}
 """Sliders, cranks, guides, and more closures than freedoms: what the C is printed of differs."""
 
@@ -42,6 +45,8 @@ in_part = pytest.mark.parametrize("name", thinned(MACHINES, OF_EACH_KIND))
 
 @cache
 def machine_of(name: str) -> Machine:
+    if name in YIELDING:
+        return tp.load(yielding(name.removeprefix("yielding_")))
     return tp.load(f"machines/{name}.toml")
 
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import truepose as tp
 from build_machine import MACHINES
+from guided_machines import guided
 from machine_under_test import MachineUnderTest
 from reference_kinematics import rotation_of_quaternion
 from truepose.machine import Envelope
@@ -27,13 +28,13 @@ DIGITS = 0.6e-3
 
 @cache
 def under_test(name: str) -> MachineUnderTest:
-    return MachineUnderTest(MACHINES / f"{name}.toml")
+    return MachineUnderTest(guided(name))
 
 
 @cache
 def machine(name: str) -> tp.Machine:
     """Without what its file says to act."""
-    found = tp.load(MACHINES / f"{name}.toml")
+    found = tp.load(guided(name))
     return found.with_condition(found.condition.replace(force=(0, 0, 0), moment=(0, 0, 0)))
 
 
@@ -91,7 +92,7 @@ def test_the_tube_of_a_tricept_carries_a_force_and_its_joint_a_moment() -> None:
 
 
 def test_weight_is_a_load_like_another() -> None:
-    heavy = tp.load(MACHINES / "3prs.toml", settings=["platform.mass=20 kg", "mounting.a=60"])
+    heavy = tp.load(guided("3prs"), settings=["platform.mass=20 kg", "mounting.a=60"])
     still = heavy.condition.replace(force=(0, 0, 0))
     (warning,) = warnings(tp.budget(heavy, under_test("3prs").poses, still))
     weight = 20 * 9.80665 * np.array([0.0, -np.sin(np.pi / 3), -np.cos(np.pi / 3)])

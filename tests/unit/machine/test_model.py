@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from build_machine import MACHINES
+from guided_machines import guided
 from machine_texts import HEXAPOD, PLANAR, edited, load_text
 from truepose.errors import PoseError, RequestError
 from truepose.machine import Condition, Envelope, Machine, load
@@ -227,7 +227,7 @@ def test_no_stiffness_without_a_strut_that_gives_it(tmp_path: Path) -> None:
 
 
 def test_a_platform_that_a_guide_holds_has_a_compliance_but_no_stiffness() -> None:
-    machine = load(MACHINES / "tricept.toml", registry=REGISTRY)
+    machine = load(guided("tricept"), registry=REGISTRY)
     poses = machine.poses()[:2]
     assert np.isfinite(machine.compliance(poses)).all()
     with pytest.raises(PoseError) as caught:

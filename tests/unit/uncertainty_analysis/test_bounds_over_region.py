@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from build_machine import MACHINES
+from guided_machines import rigidly_guided
 from made_source import MadeSource, with_sources
 from truepose import _kernel
 from truepose.errors import RequestError
@@ -190,13 +191,19 @@ def test_a_wider_gap_takes_fewer_parts(gap: float) -> None:
 @pytest.mark.parametrize("name", ["3prs", "3rpr", "hexapod"])
 def test_machines_that_turn_in_a_small_region(name: str) -> None:
     """One with parasitic freedoms, a planar body, and all six freedoms."""
-    machine = load(name)
+    machine = tp.load(rigidly_guided(MACHINES / f"{name}.toml"))
     centre = dict(zip(machine.commanded, machine.poses().mean(axis=0).tolist(), strict=True))
     region = {each: (value - 2e-3, value + 2e-3) for each, value in centre.items()}
     found = tp.bounds(machine, region=region, gap=0.3)
     assert str(found.status.values) == "proven"
     assert_closed(found, 0.3)
     assert_encloses(found, machine, anywhere(region, 30, 4), SAMPLES)
+
+
+def test_how_limbs_bend_is_not_enclosed_over_a_region() -> None:
+    machine = load("3prs")
+    with pytest.raises(RequestError, match="how its limbs bend is not enclosed over a region"):
+        tp.bounds(machine, region={"z": (0.0, 1e-3)})
 
 
 def test_a_freedom_not_named_stays_at_home() -> None:

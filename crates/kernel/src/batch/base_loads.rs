@@ -52,8 +52,7 @@ impl Work for Chunk<'_> {
             group.load(machine, samples, sample, lanes);
             forces.load(sample, lanes, &mut force);
             for (i, strut) in machine.struts.iter().enumerate() {
-                let own = &group.p[strut.first..];
-                let base = [own[0], own[1], own[2]];
+                let base = strut.carried_base(&group.p);
                 let acting = [force[3 * i], force[3 * i + 1], force[3 * i + 2]];
                 let work = &mut works[i];
                 match strut.drive {
@@ -64,6 +63,10 @@ impl Work for Chunk<'_> {
                         let parameters = &group.p[drive.first..];
                         drive.kind.base_load(nominal, parameters, joint, base, acting, work);
                     }
+                }
+                if let Some(carriage) = strut.carriage {
+                    let (own, turn) = (&group.p[strut.first..], &group.p[carriage + 3..]);
+                    work.set_carriage([own[0], own[1], own[2]], [turn[0], turn[1], turn[2]]);
                 }
             }
             for (cell, &column) in cells.iter_mut().zip(columns) {

@@ -13,7 +13,7 @@ use crate::linear::{CLOSURES, Order, SIX, factor_pivoting};
 use crate::machine::{Machine, indices_of};
 use crate::scalar::Real;
 use crate::statics::{
-    ClosureMatrix, closure_compliance, closure_forces, parameter_load, pose_compliance,
+    ClosureMatrix, add_shared, closure_compliance, closure_forces, parameter_load, pose_compliance,
     pose_stiffness,
 };
 use crate::status::Status;
@@ -351,26 +351,50 @@ impl FirstOrder for Loads<'_> {
     }
 }
 
+/// How parameters give way under load: a symmetric matrix, most of it zero.
+#[derive(Clone, Copy)]
+pub struct Yielding<'a> {
+    /// Which parameters.
+    pub columns: &'a [usize],
+    /// Places among these, two by two, of parameters that give way under each other's load.
+    pub pairs: &'a [(usize, usize)],
+    /// A sample a row: the compliance of each parameter (m/N, rad/(N m)), then that of each pair.
+    pub compliances: Rows<'a>,
+}
+
 /// Twist per unit wrench, (component, component) per sample.
 pub struct Compliance<'a> {
     components: Vec<usize>,
     dependents: Vec<&'a [(usize, usize)]>,
+    pairs: Vec<(usize, usize)>,
     compliances: Rows<'a>,
 }
 
 impl<'a> Compliance<'a> {
-    /// From the compliances (m/N, rad/(N m)) of the parameters of the given indices.
-    pub fn new(machine: &'a Machine, columns: &[usize], compliances: Rows<'a>) -> Self {
-        let dependents = dependents(machine, columns);
-        Compliance { components: indices_of(&machine.dof), dependents, compliances }
+    /// From what gives way.
+    pub fn new(machine: &'a Machine, yielding: Yielding<'a>) -> Self {
+        Compliance {
+            components: indices_of(&machine.dof),
+            dependents: dependents(machine, yielding.columns),
+            pairs: yielding.pairs.to_vec(),
+            compliances: yielding.compliances,
+        }
     }
 
     /// How far closures open per unit force in closures.
     #[inline(always)]
     fn of_closures<S: Real>(&self, linear: &Linearisation<S>, place: Place) -> ClosureMatrix<S> {
-        let mut compliances = vec![S::default(); self.dependents.len()];
+        let count = self.dependents.len();
+        let mut compliances = vec![S::default(); count + self.pairs.len()];
         self.compliances.load(place.first, place.size, &mut compliances);
-        closure_compliance(&linear.to_parameters, &self.dependents, &compliances)
+        let (own, shared) = compliances.split_at(count);
+        let gradients = &linear.to_parameters;
+        let mut matrix = closure_compliance(gradients, &self.dependents, own);
+        for (&(one, other), &compliance) in self.pairs.iter().zip(shared) {
+            let (one, other) = (self.dependents[one], self.dependents[other]);
+            add_shared(gradients, [one, other], compliance, &mut matrix);
+        }
+        matrix
     }
 }
 
@@ -404,10 +428,10 @@ pub struct Stiffness<'a> {
 }
 
 impl<'a> Stiffness<'a> {
-    /// From the compliances (m/N, rad/(N m)) of the parameters of the given indices.
-    pub fn new(machine: &'a Machine, columns: &[usize], compliances: Rows<'a>) -> Self {
+    /// From what gives way.
+    pub fn new(machine: &'a Machine, yielding: Yielding<'a>) -> Self {
         let closures = machine.closure_count();
-        Stiffness { from: Compliance::new(machine, columns, compliances), closures }
+        Stiffness { from: Compliance::new(machine, yielding), closures }
     }
 }
 

@@ -15,7 +15,7 @@ pub use crate::dispatch::{InstructionSet, instruction_set, use_instruction_set};
 pub use base_loads::base_loads;
 pub use first_order::{
     Compliance, FirstOrder, Forces, InternalForces, JointJacobian, Loads, Sensitivity, Stiffness,
-    first_order,
+    Yielding, first_order,
 };
 pub use forward::{displacement, displacements, forward_poses};
 pub use inverse::inverses;

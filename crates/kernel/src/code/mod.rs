@@ -7,16 +7,18 @@
 //! In C, `p` is the flat vector of parameters, `q` the joints, `at` the tool point, `r` the platform's axes
 //! row by row, `u` a quaternion; outputs come last. All SI, rad.
 
+use crate::element::guide::Placement;
 use crate::kinematics::{
     Gradients, Limb, Limbs, closed_form, gradients, inverse, leanings, place_limbs, system,
 };
 use crate::linear::{CLOSURES, Matrix6, SIX, factor, factor_pivoting, solve_transposed};
-use crate::machine::Machine;
+use crate::machine::{Chain, Machine};
 use crate::scalar::{Scalar, Tape, Trace};
 use crate::spatial::{
     Pose, RotationMatrix, Vector, angle_rates, euler_angles, euler_axes, quaternion_from_euler,
     rotation_matrix,
 };
+use crate::statics::{ChainMatrix, PlacedChain};
 
 /// One printed function.
 pub struct Function {
@@ -156,29 +158,53 @@ pub struct Shifts {
     pub per_kelvin: Vec<Vec<Term>>,
     /// Per load: compliances.
     pub compliance: Vec<Term>,
+    /// Of two parameters that give way under each other's load: the same at every pose.
+    pub shared: Vec<(usize, usize, f64)>,
+    /// Whether limbs give way, by what the machine says of them.
+    pub limbs: bool,
 }
 
 impl Shifts {
+    /// The limbs that give way.
+    fn chains<'m>(&self, machine: &'m Machine) -> &'m [Chain] {
+        if self.limbs { &machine.chains } else { &[] }
+    }
+
     /// The parameters that give way, in the order of `load`.
-    fn loaded(&self) -> Vec<usize> {
+    fn loaded(&self, machine: &Machine) -> Vec<usize> {
+        let own = self.compliance.iter().map(|term| term.parameter);
+        let shared = self.shared.iter().flat_map(|&(one, other, _)| [one, other]);
+        let of_limbs = self.chains(machine).iter().flat_map(|chain| &chain.parameters);
         let mut parameters = Vec::new();
-        for term in &self.compliance {
-            if !parameters.contains(&term.parameter) {
-                parameters.push(term.parameter);
+        for parameter in own.chain(shared).chain(of_limbs.copied()) {
+            if !parameters.contains(&parameter) {
+                parameters.push(parameter);
             }
         }
         parameters
     }
 
-    /// Parameters `p` shifted; `load` as [`Shifts::loaded`].
+    /// The matrices of the limbs that give way, at a pose.
+    fn limbs<'t>(
+        &self,
+        machine: &Machine,
+        (p, q): (&[Trace<'t>], &[Trace<'t>]),
+        at: Placement<'_, Trace<'t>>,
+    ) -> Vec<ChainMatrix<Trace<'t>>> {
+        let matrix = |chain| PlacedChain::new(machine, chain, p, q, at).compliance();
+        self.chains(machine).iter().map(matrix).collect()
+    }
+
+    /// Parameters `p` shifted; `load` as [`Shifts::loaded`], `matrices` as [`Shifts::limbs`].
     fn apply<'t>(
         &self,
-        limbs: &Limbs<Trace<'t>>,
+        machine: &Machine,
+        (limbs, matrices): (&Limbs<Trace<'t>>, &[ChainMatrix<Trace<'t>>]),
         p: &[Trace<'t>],
         rise: &[Trace<'t>],
         load: &[Trace<'t>],
     ) -> Vec<Trace<'t>> {
-        let loaded = self.loaded();
+        let loaded = self.loaded(machine);
         let one = p[0].lift(1.0);
         let mut shifted = p.to_vec();
         let mut add = |terms: &[Term], factor: &dyn Fn(&Term) -> Trace<'t>| {
@@ -194,8 +220,20 @@ impl Shifts {
         for (terms, &rise) in self.per_kelvin.iter().zip(rise) {
             add(terms, &|_| rise);
         }
-        let at = |term: &Term| loaded.iter().position(|&k| k == term.parameter).unwrap_or(0);
-        add(&self.compliance, &|term| load[at(term)]);
+        let at = |parameter: usize| loaded.iter().position(|&k| k == parameter).unwrap_or(0);
+        add(&self.compliance, &|term| load[at(term.parameter)]);
+        for &(first, second, value) in &self.shared {
+            let value = one.lift(value);
+            shifted[first] = shifted[first] + value * load[at(second)];
+            shifted[second] = shifted[second] + value * load[at(first)];
+        }
+        for (chain, matrix) in self.chains(machine).iter().zip(matrices) {
+            for (row, &moved) in matrix.iter().zip(&chain.parameters) {
+                for (&value, &by) in row.iter().zip(&chain.parameters) {
+                    shifted[moved] = shifted[moved] + value * load[at(by)];
+                }
+            }
+        }
         shifted
     }
 }
@@ -219,7 +257,7 @@ impl Shifts {
 pub fn functions(machine: &Machine, shifts: &Shifts) -> Vec<Function> {
     let (parameters, joints) = (machine.parameters.len(), machine.drives.len());
     let count = machine.closure_count();
-    let loaded = shifts.loaded();
+    let loaded = shifts.loaded(machine);
     let mut all = Vec::from(bodies());
     all.push(function(
         "closed_form",
@@ -281,16 +319,26 @@ pub fn functions(machine: &Machine, shifts: &Shifts) -> Vec<Function> {
             f.give("load", loads(machine, &loaded, &gradients, &multipliers));
         },
     ));
-    all.push(function(
-        "shifted",
-        "const double *p, const double *q, const double *rise, const double *load, double *to",
-        |f| {
-            let (p, q) = (f.many("p", parameters), f.many("q", joints));
-            let rise = f.many("rise", shifts.per_kelvin.len());
-            let load = f.many("load", loaded.len());
-            f.give("to", shifts.apply(&placed(machine, &p, &q), &p, &rise, &load));
-        },
-    ));
+    // The matrix of a limb depends on the pose; without one the function knows none.
+    let arguments = if shifts.chains(machine).is_empty() {
+        "const double *p, const double *q, const double *rise, const double *load, double *to"
+    } else {
+        "const double *p, const double *q, const double at[3], const double r[9], \
+         const double *rise, const double *load, double *to"
+    };
+    all.push(function("shifted", arguments, |f| {
+        let (p, q) = (f.many("p", parameters), f.many("q", joints));
+        let matrices = if shifts.chains(machine).is_empty() {
+            Vec::new()
+        } else {
+            let (at, r) = (f.inputs("at"), f.matrix("r"));
+            shifts.limbs(machine, (&p, &q), (&r, at))
+        };
+        let rise = f.many("rise", shifts.per_kelvin.len());
+        let load = f.many("load", loaded.len());
+        let limbs = placed(machine, &p, &q);
+        f.give("to", shifts.apply(machine, (&limbs, &matrices), &p, &rise, &load));
+    }));
     if machine.limited {
         all.push(function(
             "lean",
@@ -376,8 +424,10 @@ fn compensated(machine: &Machine, shifts: &Shifts) -> Function {
             for (k, row) in order.into_iter().enumerate() {
                 multipliers[row] = placed_multipliers[k];
             }
-            let load = loads(machine, &shifts.loaded(), &gradients, &multipliers);
-            let shifted = shifts.apply(&placed(machine, &p, &nominal), &p, &rise, &load);
+            let load = loads(machine, &shifts.loaded(machine), &gradients, &multipliers);
+            let matrices = shifts.limbs(machine, (&p, &nominal), (&r, at));
+            let limbs = placed(machine, &p, &nominal);
+            let shifted = shifts.apply(machine, (&limbs, &matrices), &p, &rise, &load);
             f.give_reach(machine, &shifted, at, &r, ["q", "left"]);
             let mut growth = f.tape.constant(0.0);
             for i in 1..SIX {

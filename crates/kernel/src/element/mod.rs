@@ -21,7 +21,7 @@ pub use drive::{ClosureGradient, Drive, InverseRoot};
 pub use table::{Dimension, Drawing, ElementTable, Field, ParameterField};
 
 use crate::scalar::{Real, Scalar};
-use crate::spatial::Vector;
+use crate::spatial::{Vector, cross};
 use drive::{DRIVE_INPUTS, driven_base_load, driven_gradient};
 use guide::{
     ANCHOR_PARAMETERS, Anchor, Guide, GuideFrames, GuideLimb, Placement, gradient_of, residual_of,
@@ -31,8 +31,8 @@ use std::ops::Deref;
 use strut::strut_gradient;
 
 /// Where the gradient of one closure has its derivatives to the parameters that the closure reads: a
-/// strut's `base`, `platform`, `length`, the drive's parameters, `tool`, `ring_radius`; a guide's anchors
-/// ([`Anchor::slot`]), then `tool`.
+/// strut's `base`, `platform`, `length`, the drive's parameters, `tool`, `ring_radius`, the carriage's
+/// displacements; a guide's anchors ([`Anchor::slot`]) and offset, then `tool`.
 pub struct Slots;
 
 impl Slots {
@@ -48,13 +48,19 @@ impl Slots {
     pub const TOOL: usize = Self::DRIVE + MAX_DRIVE_PARAMETERS;
     /// `ring_radius`.
     pub const RING_RADIUS: usize = Self::TOOL + 3;
+    /// The first displacement of the strut's carriage; two more and three turns follow.
+    pub const CARRIAGE: usize = Self::RING_RADIUS + 1;
     /// How many.
-    pub const COUNT: usize = Self::RING_RADIUS + 1;
+    pub const COUNT: usize = Self::CARRIAGE + 6;
+    /// What the limb of a guide has given way by.
+    pub const OFFSET: usize = ANCHOR_PARAMETERS;
 
-    /// Whether a strut's slot is of its base side: the base, the length and the drive.
+    /// Whether a strut's slot is of its base side: the base, the length, the drive and its carriage.
     #[inline(always)]
     pub fn is_base_side(slot: usize) -> bool {
-        slot < Self::PLATFORM || (Self::LENGTH..Self::TOOL).contains(&slot)
+        slot < Self::PLATFORM
+            || (Self::LENGTH..Self::TOOL).contains(&slot)
+            || slot >= Self::CARRIAGE
     }
 }
 
@@ -98,6 +104,26 @@ impl<S: Scalar> ParameterGradient<S> {
     #[inline(always)]
     pub fn set_ring_radius(&mut self, to_radius: S) {
         self.0[Slots::RING_RADIUS] = to_radius;
+    }
+
+    /// To the six displacements of the carriage, in its axes, once those to the base that it carries are
+    /// there: at `own` on the carriage, which has turned by `turn`, so that the base is at
+    /// `own + displacement + turn x own`.
+    #[inline(always)]
+    pub fn set_carriage(&mut self, own: Vector<S>, turn: Vector<S>) {
+        let to_base = [self.0[Slots::BASE], self.0[Slots::BASE + 1], self.0[Slots::BASE + 2]];
+        let to_turn = cross(own, to_base);
+        let turned = cross(to_base, turn);
+        for k in 0..3 {
+            self.0[Slots::CARRIAGE + k] = to_base[k];
+            self.0[Slots::CARRIAGE + 3 + k] = to_turn[k];
+            self.0[Slots::BASE + k] = to_base[k] + turned[k];
+        }
+    }
+
+    /// To what a guide's limb has given way by.
+    pub fn set_offset(&mut self, to_offset: S) {
+        self.0[Slots::OFFSET] = to_offset;
     }
 
     /// To a guide's anchors and the tool point.

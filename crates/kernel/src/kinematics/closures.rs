@@ -41,7 +41,7 @@ impl<S: Scalar> Limb<S> {
     #[inline(always)]
     pub fn undriven(strut: &Strut, p: &[S], tool: Vector<S>) -> Self {
         let own = &p[strut.first..];
-        let base = [own[0], own[1], own[2]];
+        let base = strut.carried_base(p);
         let length = match strut.own_length {
             Some(index) => p[index],
             None => base[0].lift(0.0),
@@ -135,7 +135,7 @@ pub fn ring_arm<S: Scalar>(
 
 /// A guide's anchors for parameters `p`.
 #[inline(always)]
-fn guide_limb<S: Scalar>(guide: &MachineGuide, p: &[S], tool: Vector<S>) -> GuideLimb<S> {
+pub fn guide_limb<S: Scalar>(guide: &MachineGuide, p: &[S], tool: Vector<S>) -> GuideLimb<S> {
     let zero = tool[0].lift(0.0);
     let value =
         |anchor: Anchor, k: usize| guide.first[anchor as usize].map_or(zero, |at| p[at + k]);
@@ -153,6 +153,8 @@ pub struct GuideClosure<'a, S> {
     guide: &'a MachineGuide,
     which: usize,
     limb: GuideLimb<S>,
+    /// What the limb that it stands for has given way by, m, if that is a parameter.
+    offset: Option<S>,
 }
 
 /// The guides' closures, each with its number among all closures.
@@ -164,18 +166,33 @@ pub fn guide_closures<'a, S: Scalar>(
     closures.map(move |(number, &(guide, which))| {
         let guide = &machine.guides[guide];
         let limb = guide_limb(guide, p, tool_point(machine, p));
-        (machine.struts.len() + number, GuideClosure { guide, which, limb })
+        let offset = machine.guide_offsets[number].map(|at| p[at]);
+        (machine.struts.len() + number, GuideClosure { guide, which, limb, offset })
     })
+}
+
+/// The wrench of one of the guides' closures about the tool point: its row, also in the freedoms that the
+/// frame holds.
+pub fn guide_wrench<S: Scalar>(
+    machine: &Machine,
+    number: usize,
+    p: &[S],
+    at: Placement<'_, S>,
+) -> [S; SIX] {
+    let (index, which) = machine.guide_closures[number];
+    let guide = &machine.guides[index];
+    let limb = guide_limb(guide, p, tool_point(machine, p));
+    guide.kind.row(which, &guide.frames, &limb, at, machine.characteristic_length).1
 }
 
 impl<S: Scalar> GuideClosure<'_, S> {
     /// Residual and row; zero in the freedoms that the frame holds.
     pub fn row(&self, machine: &Machine, at: Placement<'_, S>) -> (S, [S; SIX]) {
-        let GuideClosure { guide, which, limb } = self;
+        let GuideClosure { guide, which, limb, offset } = self;
         let length = machine.characteristic_length;
         let (residual, mut row) = guide.kind.row(*which, &guide.frames, limb, at, length);
         hold(machine, &mut row);
-        (residual, row)
+        (offset.map_or(residual, |offset| residual - offset), row)
     }
 
     /// Derivatives to the parameters.
@@ -185,9 +202,12 @@ impl<S: Scalar> GuideClosure<'_, S> {
         at: Placement<'_, S>,
         to_parameters: &mut ParameterGradient<S>,
     ) {
-        let GuideClosure { guide, which, limb } = self;
+        let GuideClosure { guide, which, limb, offset } = self;
         let length = machine.characteristic_length;
         guide.kind.gradient(*which, &guide.frames, limb, at, length, to_parameters);
+        if let Some(offset) = offset {
+            to_parameters.set_offset(offset.lift(-1.0));
+        }
     }
 }
 

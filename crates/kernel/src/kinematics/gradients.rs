@@ -35,6 +35,11 @@ pub fn strut_gradient<S: Scalar, const RINGS: bool>(
             drive.kind.gradient(nominal, parameters, q[index], points, length, to_parameters)
         }
     };
+    if let Some(carriage) = strut.carriage {
+        let own = &p[strut.first..];
+        let turn = &p[carriage + 3..];
+        to_parameters.set_carriage([own[0], own[1], own[2]], [turn[0], turn[1], turn[2]]);
+    }
     to_parameters.set_platform(rotate_back(rotation, gradient.centre));
     if ring.is_some() {
         to_parameters.set_ring_radius(dot(gradient.centre, radial));

@@ -68,7 +68,7 @@ pub fn closed_form<S: Scalar>(
     let strut = &machine.struts[drive.struts[0]];
     let own = &p[strut.first..];
     let tool = &p[machine.tool..];
-    let base = [own[0], own[1], own[2]];
+    let base = strut.carried_base(p);
     let platform = [own[3] - tool[0], own[4] - tool[1], own[5] - tool[2]];
     let arm = match &strut.ring {
         None => rotate(rotation, platform),
@@ -396,7 +396,7 @@ pub fn obstacles(machine: &Machine, p: &[f64], pose: &Pose<f64>) -> Vec<Obstacle
         let Some(length) = strut.own_length.map(|own| p[own]) else { continue };
         let arm = rotate(&rotation, machine.platform_arm(p, strut));
         let platform = add(arm, pose.position);
-        let base = [0, 1, 2].map(|k| p[strut.first + k]);
+        let base = strut.carried_base(p);
         let [least, most] = match strut.drive {
             None => [norm(subtract(platform, base)); 2],
             Some(drive) => {

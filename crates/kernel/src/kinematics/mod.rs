@@ -10,7 +10,9 @@ mod linearisation;
 mod overconstrained;
 
 pub(crate) use closures::system;
-pub use closures::{Limb, Limbs, Sample, limbs, place_limbs, ring_arm, tool_point};
+pub use closures::{
+    Limb, Limbs, Sample, guide_limb, guide_wrench, limbs, place_limbs, ring_arm, tool_point,
+};
 pub use condition::{condition, free_motions};
 pub use forward::{Descent, chord, chord_inverse, descend, forward, start_order};
 pub(crate) use gradients::{Gradients, gradients};

@@ -2,14 +2,24 @@
 
 use super::description::error;
 use super::{
-    Description, DriveDescription, FREEDOMS, GuideDescription, Machine, MachineDrive, MachineError,
-    MachineGuide, Parameter, Ring, Strut, StrutDescription, indices_of,
+    COMPONENTS, Description, DriveDescription, FREEDOMS, GuideDescription, Machine, MachineDrive,
+    MachineError, MachineGuide, Parameter, Ring, Strut, StrutDescription, indices_of,
 };
 use crate::element::guide::{Anchor, GuideFrames, anchor_parameters};
 use crate::element::{Dimension, Direction, Slots, strut};
 use crate::linear::{CLOSURES, SIX};
 use crate::spatial::{Pose, Vector, norm, scale};
 use std::collections::BTreeMap;
+
+/// Of the six displacements of a carriage.
+const DISPLACEMENTS: [Dimension; SIX] = [
+    Dimension::Length,
+    Dimension::Length,
+    Dimension::Length,
+    Dimension::Angle,
+    Dimension::Angle,
+    Dimension::Angle,
+];
 
 impl Machine {
     /// Builds a machine from its description.
@@ -27,6 +37,8 @@ impl Machine {
             struts: Vec::new(),
             guides: Vec::new(),
             guide_closures: Vec::new(),
+            guide_offsets: Vec::new(),
+            chains: Vec::new(),
             closure_compliance: [0.0; CLOSURES],
             parameter_compliance: Vec::new(),
             parameters: Vec::new(),
@@ -46,7 +58,8 @@ impl Machine {
             machine.add_drive(index, drive)?;
         }
         for guide in &description.guides {
-            machine.add_guide(guide)?;
+            let of_limb = description.chains.iter().any(|chain| chain.guides.contains(&guide.name));
+            machine.add_guide(guide, of_limb)?;
         }
         machine.tool = machine.nominal.len();
         for k in 0..3 {
@@ -60,6 +73,9 @@ impl Machine {
             if let (None, Some(drive)) = (strut.own_length, strut.drive) {
                 strut.length_parameter = machine.drives[drive].first;
             }
+        }
+        for chain in &description.chains {
+            machine.add_chain(chain)?;
         }
         machine.check_counts()?;
         machine.find_dependents();
@@ -158,13 +174,14 @@ impl Machine {
             first,
             own_length,
             length_parameter: own_length.unwrap_or(0),
+            carriage: None,
             ring,
             limits,
         });
         Ok(())
     }
 
-    fn add_guide(&mut self, guide: &GuideDescription) -> Result<(), MachineError> {
+    fn add_guide(&mut self, guide: &GuideDescription, of_limb: bool) -> Result<(), MachineError> {
         let place = format!("guide.{}", guide.name);
         check_unique("guide", &guide.name, self.guides.iter().map(|other| &other.name))?;
         let mut frames = GuideFrames::default();
@@ -193,7 +210,18 @@ impl Machine {
             }
         }
         let number = self.guides.len();
-        self.guide_closures.extend((0..guide.kind.closures()).map(|which| (number, which)));
+        let count = guide.kind.closures();
+        self.guide_closures.extend((0..count).map(|which| (number, which)));
+        for which in 0..count {
+            let name = match count {
+                1 => format!("{place}.offset"),
+                _ => format!("{place}.offset.{}", which + 1),
+            };
+            self.guide_offsets.push(of_limb.then_some(self.nominal.len()));
+            if of_limb {
+                self.add_parameter(name, Dimension::Length, 0.0);
+            }
+        }
         self.guides.push(MachineGuide {
             name: guide.name.clone(),
             kind: guide.kind,
@@ -257,8 +285,16 @@ impl Machine {
             let value = component.map_or(0.0, |k| values[field][k]);
             self.add_parameter(format!("{place}.{}", parameter.name), parameter.dimension, value);
         }
-        let struts =
+        let struts: Vec<usize> =
             (0..self.struts.len()).filter(|&i| self.struts[i].drive == Some(index)).collect();
+        if drive.yields {
+            for &strut in &struts {
+                self.struts[strut].carriage = Some(self.nominal.len());
+            }
+            for (name, dimension) in COMPONENTS.iter().zip(DISPLACEMENTS) {
+                self.add_parameter(format!("{place}.carriage.{name}"), dimension, 0.0);
+            }
+        }
         let scale = table.parameters.iter().position(|parameter| parameter.name == "scale");
         self.drives.push(MachineDrive {
             name: drive.name.clone(),
@@ -291,6 +327,9 @@ impl Machine {
                 let drive = &self.drives[drive];
                 depend(i, drive.first, Slots::DRIVE, drive.kind.table().parameters.len());
             }
+            if let Some(first) = strut.carriage {
+                depend(i, first, Slots::CARRIAGE, 6);
+            }
             if let Some(ring) = strut.ring {
                 depend(i, ring.radius, Slots::RING_RADIUS, 1);
             }
@@ -302,6 +341,9 @@ impl Machine {
                 if let Some(first) = self.guides[guide].first[anchor as usize] {
                     depend(i, first, anchor.slot(), anchor_parameters(anchor).len());
                 }
+            }
+            if let Some(offset) = self.guide_offsets[number] {
+                depend(i, offset, Slots::OFFSET, 1);
             }
             depend(i, self.tool, Slots::TOOL, 3);
         }

@@ -1,5 +1,6 @@
 //! A machine as its file gives it, in SI units, and why it may be none.
 
+use super::chain::{Part, Side};
 use crate::element::DriveKind;
 use crate::element::GuideKind;
 use crate::linear::SIX;
@@ -20,6 +21,8 @@ pub struct DriveDescription {
     pub working_mode: Option<f64>,
     /// The element's fields; missing ones take their default.
     pub fields: BTreeMap<String, Vec<f64>>,
+    /// Whether its carriage gives way, so that all struts on it move together.
+    pub yields: bool,
 }
 
 /// A strut as the machine file gives it, in SI units.
@@ -62,6 +65,27 @@ pub struct GuideDescription {
     pub fields: BTreeMap<String, Vec<f64>>,
 }
 
+/// A limb as the machine file gives it, in SI units.
+#[derive(Clone, Debug)]
+pub struct ChainDescription {
+    /// Unique among the limbs.
+    pub name: String,
+    /// The strut that it contains.
+    pub strut: Option<String>,
+    /// The guides that it contains.
+    pub guides: Vec<String>,
+    /// See [`Chain::side`](super::Chain::side).
+    pub side: Side,
+    /// From the base to the platform.
+    pub parts: Vec<Part>,
+    /// See [`Chain::mass`](super::Chain::mass).
+    pub mass: f64,
+    /// See [`Chain::whole_length`](super::Chain::whole_length).
+    pub whole_length: f64,
+    /// See [`Chain::carriage_mass`](super::Chain::carriage_mass).
+    pub carriage_mass: f64,
+}
+
 /// A whole machine, in SI units.
 #[derive(Clone, Debug)]
 pub struct Description {
@@ -81,6 +105,8 @@ pub struct Description {
     pub struts: Vec<StrutDescription>,
     /// Passive limbs, whose closures come after the struts'.
     pub guides: Vec<GuideDescription>,
+    /// Limbs that say what they are made of.
+    pub chains: Vec<ChainDescription>,
     /// m/N of each closure in itself, in their order; none: 0. Where there are more closures than
     /// freedoms these, and those of the parameters, share a misfit out; infinite: the closure carries
     /// nothing.

@@ -1,16 +1,21 @@
 //! The immutable machine: elements, platform and the flat vector of parameters.
 
 mod build;
+mod build_chain;
+mod chain;
 mod description;
 
+pub use chain::{Axes, CHAIN_CLOSURES, Chain, Ends, Part, Place, Section, Side};
 pub use description::{
-    Description, DriveDescription, GuideDescription, JointLimit, MachineError, StrutDescription,
+    ChainDescription, Description, DriveDescription, GuideDescription, JointLimit, MachineError,
+    StrutDescription,
 };
 
 use crate::element::guide::GuideFrames;
 use crate::element::{Dimension, Direction, DriveKind, GuideKind};
 use crate::linear::{CLOSURES, SIX};
-use crate::spatial::{Pose, Vector, norm, rotate, rotation_matrix, subtract};
+use crate::scalar::Scalar;
+use crate::spatial::{Pose, Vector, add, cross, norm, rotate, rotation_matrix, subtract};
 
 /// The names of a platform's freedoms; Euler angles a, b, c with `R = Rz(c) Ry(b) Rx(a)`.
 pub const FREEDOMS: [&str; SIX] = ["x", "y", "z", "a", "b", "c"];
@@ -39,10 +44,28 @@ pub struct Strut {
     pub own_length: Option<usize>,
     /// The parameter that every source which moves this strut's length moves.
     pub length_parameter: usize,
+    /// Where the six displacements of the carriage stand that it shares with others.
+    pub carriage: Option<usize>,
     /// The ring on which its platform-side joint slides.
     pub ring: Option<Ring>,
     /// How far it may lean at its base-side and at its platform-side joint.
     pub limits: [Option<JointLimit>; 2],
+}
+
+impl Strut {
+    /// Its base-side joint centre in the axes of what carries it, for parameters `p`: moved and turned with a
+    /// carriage that gives way.
+    #[inline(always)]
+    pub fn carried_base<S: Scalar>(&self, p: &[S]) -> Vector<S> {
+        let own = [p[self.first], p[self.first + 1], p[self.first + 2]];
+        match self.carriage {
+            None => own,
+            Some(first) => {
+                let turned = cross([p[first + 3], p[first + 4], p[first + 5]], own);
+                add(add(own, [p[first], p[first + 1], p[first + 2]]), turned)
+            }
+        }
+    }
 }
 
 /// A ring on which a platform-side joint slides.
@@ -105,6 +128,10 @@ pub struct Machine {
     pub guides: Vec<MachineGuide>,
     /// The closures after the struts': guide, and which of its closures.
     pub guide_closures: Vec<(usize, usize)>,
+    /// Where the offset of each of them stands: what its limb gives way by, if it belongs to one.
+    pub guide_offsets: Vec<Option<usize>>,
+    /// The limbs that say what they are made of.
+    pub chains: Vec<Chain>,
     /// m/N of each closure in itself.
     pub closure_compliance: [f64; CLOSURES],
     /// (parameter, m/N or rad/(N m)).
@@ -193,7 +220,7 @@ impl Machine {
             square += arm.iter().map(|value| value * value).sum::<f64>() / count;
             let centre = rotate(&rotation, arm);
             let platform = [0, 1, 2].map(|k| centre[k] + self.home.position[k]);
-            let base: Vector<f64> = [0, 1, 2].map(|k| self.nominal[strut.first + k]);
+            let base = strut.carried_base(&self.nominal);
             let length = strut.own_length.map(|index| self.nominal[index]);
             reach += length.unwrap_or_else(|| norm(subtract(platform, base))) / count;
         }
@@ -213,7 +240,7 @@ impl Machine {
         let rotation = rotation_matrix(self.home.rotation);
         let centre = rotate(&rotation, self.platform_arm(&self.nominal, strut));
         let platform = [0, 1, 2].map(|k| centre[k] + self.home.position[k]);
-        let base = [0, 1, 2].map(|k| self.nominal[strut.first + k]);
+        let base = strut.carried_base(&self.nominal);
         let length = strut.own_length.map_or(0.0, |own| self.nominal[own]);
         let middle = 0.5 * (drive.travel[0] + drive.travel[1]);
         let away = |mode: f64| {

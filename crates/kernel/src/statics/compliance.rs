@@ -37,6 +37,24 @@ pub fn closure_compliance<S: Real>(
     matrix
 }
 
+/// Adds what two parameters of these (closure, slot) pairs give way under each other's load.
+#[inline(always)]
+pub fn add_shared<S: Real>(
+    to_parameters: &[ParameterGradient<S>; CLOSURES],
+    [one, other]: [&[(usize, usize)]; 2],
+    compliance: S,
+    matrix: &mut ClosureMatrix<S>,
+) {
+    for &(i, slot) in one {
+        let scaled = to_parameters[i][slot] * compliance;
+        for &(k, slot) in other {
+            let shared = scaled * to_parameters[k][slot];
+            matrix[i][k] = matrix[i][k] + shared;
+            matrix[k][i] = matrix[k][i] + shared;
+        }
+    }
+}
+
 /// `W^-1 C_g W^-T`: twist of the platform per unit wrench on the tool, with the
 /// twist per unit residual, `W^-1`.
 #[inline(always)]

@@ -26,6 +26,7 @@ from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.files.units import QuantityError, UnitSystem
 from truepose.files.wording import did_you_mean
 from truepose.machine import Machine
+from truepose.machine.parts import gives_way_only
 from truepose.representation import Facts, Represented
 from truepose.sources import Deviation
 from truepose.sources.tolerance import bands_of
@@ -262,9 +263,10 @@ def _chosen_unknowns(
     for name, unit, column in zip(
         machine.parameters, machine.units, range(len(machine.parameters)), strict=True
     ):
-        known[name] = _MachineUnknown(
-            name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf
-        )
+        if not gives_way_only(name):
+            known[name] = _MachineUnknown(
+                name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf
+            )
     for name, identifiable in properties_of(machine).items():
         unit, label = identifiable.unit, identifiable.label(machine)
         known[name] = _MachineUnknown(

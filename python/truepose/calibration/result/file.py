@@ -62,9 +62,6 @@ _NAMED = 6
 _SAME_BAND = 1e-9
 """Relative to the standard deviations: the same of a covariance."""
 
-_PROPERTY_KEYS = {"expansion": "expansion", "stiffness": "stiffness", "modulus": "stress"}
-"""Keys of a strut that identified properties are written to, with their dimension."""
-
 
 class MachineUnknowns(Protocol):
     """What is read of the unknowns of a fit: those of the machine come first."""
@@ -184,12 +181,7 @@ def property_edits(
         changed = identified.changed(machine, float(values[number]))
         if changed is None:
             continue
-        before, after = machine.struts[identified.strut], changed.struts[identified.strut]
-        edits += [
-            PropertyEdit(f"{after.part}.{key}", dimension, float(getattr(after, key)))
-            for key, dimension in _PROPERTY_KEYS.items()
-            if getattr(after, key) != getattr(before, key)
-        ]
+        edits += [PropertyEdit(*edit) for edit in identified.edits(machine, changed)]
     return edits
 
 

@@ -24,6 +24,7 @@ from truepose.controllers._export import unsupported_machine
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
+from truepose.machine.compliances import without_limbs
 from truepose.machine.parts import Body, Drive, Strut
 from truepose.runs.displacement import ParameterDeviation, sum_deviations
 from truepose.runs.poses import PoseRun
@@ -64,12 +65,16 @@ class Term:
 class KnownShifts:
     """Shifts at the reference, per kelvin of each part, and compliances, term by term.
 
-    `left_out`: sources that the machine has, and that were asked to be left out.
+    `shared`: of two parameters that give way under each other's load. `limbs`: whether limbs give
+    way, which the kernel prints. `left_out`: sources that the machine has, and that were asked to
+    be left out.
     """
 
     at_reference: tuple[Term, ...]
     per_kelvin: dict[str, tuple[Term, ...]]
     compliance: tuple[Term, ...]
+    shared: tuple[tuple[int, int, float], ...]
+    limbs: bool
     left_out: tuple[str, ...]
 
 
@@ -102,10 +107,14 @@ def known_shifts(machine: Machine, without: Sequence[str] = ()) -> KnownShifts:
             refused[source.name] = str(failure)
     if refused:
         raise RequestError(*_refusals(machine, refused, without))
+    yields = len(asked) > len(shifting)
+    compliance, shared = _compliance(block) if yields else ((), ())
     return KnownShifts(
         tuple(at_reference),
         {part: tuple(terms) for part, terms in per_kelvin.items()},
-        _compliance(block) if len(asked) > len(shifting) else (),
+        compliance,
+        shared,
+        yields and bool(machine.limbs),
         tuple(source.name for source in sources if source.name in without),
     )
 
@@ -199,13 +208,20 @@ def _per_kelvin(
     return _terms(block, columns, large / LARGE)
 
 
-def _compliance(block: PoseBlock) -> tuple[Term, ...]:
-    """Everything that gives way; nothing where the machine does not say how stiff it is."""
+def _compliance(
+    block: PoseBlock,
+) -> tuple[tuple[Term, ...], tuple[tuple[int, int, float], ...]]:
+    """Everything that gives way but limbs; nothing where nobody says how stiff it is."""
     machine = block.machine
-    if lacking(machine.drives, machine.struts, ""):
-        return ()
-    columns, values = machine.compliances(block.lengths)
-    return tuple(_terms(block, columns, values))
+    if lacking(machine.drives, machine.struts, machine.limbs, ""):
+        return (), ()
+    given = without_limbs(machine, block.lengths)
+    shared = [] if given.shared is None else given.shared[0].tolist()
+    columns = given.columns.tolist()
+    return tuple(_terms(block, given.columns, given.own)), tuple(
+        (columns[one], columns[other], value)
+        for (one, other), value in zip(given.pairs, shared, strict=True)
+    )
 
 
 def _terms(block: PoseBlock, columns: Indices, values: Floats) -> Iterator[Term]:

@@ -88,11 +88,16 @@ class _Writer:
         self.machine, self.prefix, self.known = machine, prefix, known
         self.control: dict[str, Any] = machine.kernel.control
         self.parts = [part for part, terms in known.per_kelvin.items() if terms]
-        self.compliant = len({term.parameter for term in known.compliance})
+        loaded = {term.parameter for term in known.compliance}
+        loaded |= {parameter for *pair, _ in known.shared for parameter in pair}
+        loaded |= set(machine.kernel.limb_parameters) if known.limbs else set()
+        self.compliant = len(loaded)
         self.functions = machine.kernel.c_functions(
             list(map(astuple, known.at_reference)),
             [list(map(astuple, known.per_kelvin[part])) for part in self.parts],
             list(map(astuple, known.compliance)),
+            list(known.shared),
+            known.limbs,
         )
         self.strained = "compliance" in self.functions
         commanded, dof = self.control["commanded"], self.control["dof"]
@@ -214,6 +219,7 @@ class _Writer:
             "apply": self._apply(),
             "rise": self._rise(),
             "find_loads": self._find_loads(),
+            "of_pose": "placed.at, placed.r, " if self.known.limbs else "",
             "straight": self._straight() if self.straight else "",
             "parameters": "\n".join(
                 f"        {value!r}, /* {_in_comment(name)} */"

@@ -21,7 +21,15 @@ from collections.abc import Mapping
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.controllers._delta import AROUND, LEAN, Limb, limbs, lowest_z, surrounded, wrapped
+from truepose.controllers._delta import (
+    AROUND,
+    LEAN,
+    DeltaLimb,
+    limbs,
+    lowest_z,
+    surrounded,
+    wrapped,
+)
 from truepose.controllers._export import unsupported_machine
 from truepose.controllers._homing import switches
 from truepose.controllers._small_model import (
@@ -74,7 +82,7 @@ class Rotary:
         self._start = self._nominal(arms)
         self._check_endstops()
 
-    def _nominal(self, limbs: list[Limb]) -> Floats:
+    def _nominal(self, limbs: list[DeltaLimb]) -> Floats:
         start = np.empty(ENDS.stop)
         outwards = [_outwards(limb) for limb in limbs]
         shoulders = [
@@ -202,7 +210,7 @@ class Rotary:
         return lines
 
 
-def _outwards(limb: Limb) -> Floats:
+def _outwards(limb: DeltaLimb) -> Floats:
     """(3,) level unit vector in the arm's plane, away from the z axis."""
     across = np.array([limb.axis[1], -limb.axis[0], 0.0])
     across /= np.linalg.norm(across)
@@ -213,7 +221,7 @@ def _outwards(limb: Limb) -> Floats:
     return turned
 
 
-def _sense(limb: Limb) -> float:
+def _sense(limb: DeltaLimb) -> float:
     """+1 where a growing coordinate raises the arm, else -1."""
     return math.copysign(1.0, np.cross(limb.axis, _outwards(limb))[2])
 

@@ -19,6 +19,7 @@ from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.controller import ControllerTable
 from truepose.machine.tables.drive import DriveTable
 from truepose.machine.tables.guide import GuideTable
+from truepose.machine.tables.limb import LimbTable
 from truepose.machine.tables.machine import MachineTable
 from truepose.machine.tables.mounting import MountingTable
 from truepose.machine.tables.strut import StrutTable
@@ -64,6 +65,7 @@ def owners(added: Iterable[Mapping[str, type[BaseModel]]]) -> Owners:
         "drive": [DriveTable],
         "strut": [StrutTable, strut_geometry()],
         "guide": [GuideTable],
+        "limb": [LimbTable],
         "platform": [PlatformTable],
         "frame": [FrameTable],
         "tool": [ToolTable],

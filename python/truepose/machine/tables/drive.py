@@ -10,6 +10,7 @@ from truepose.files.file_table import FileTable, PartName
 from truepose.files.quantity import Expansion, Mass
 from truepose.machine.materials import MaterialName
 from truepose.machine.tables.body import CarriageTable
+from truepose.machine.tables.limb import LimbPartTable
 
 
 class DriveTable(FileTable):
@@ -37,6 +38,13 @@ class DriveTable(FileTable):
     )
     mass: Mass = Field(
         0.0, description="Mass of the carriage, shared by the struts that it carries."
+    )
+    chain: list[LimbPartTable] | None = Field(
+        None,
+        min_length=1,
+        description="What lies between the frame and the body that the drive moves, where several "
+        "struts are on it: of a slider the guidance of its carriage, a prismatic joint; of a crank "
+        "its bearing, a revolute joint, and the beams of its arm. Default: rigid.",
     )
     carriage: CarriageTable | None = Field(
         None,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from build_machine import MACHINES, description_of
+from guided_machines import guided
 from machine_texts import edited, line_of, load_text
 from reference_kinematics import Reference
 from truepose.errors import MachineFileError, Problem
@@ -104,7 +105,7 @@ def test_a_guide_is_rigid_and_cannot_strain(tmp_path: Path) -> None:
 
 def test_one_guide_too_many_beside_telescopic_struts(tmp_path: Path) -> None:
     more = guide("more", "plane", "normal = [1, 0, 0]", "platform = [0, 0, 0]")
-    text = edited(text_of("tricept"), ("[tolerance]", f"{more}[tolerance]"))
+    text = edited(guided("tricept").read_text("utf-8"), ("[tolerance]", f"{more}[tolerance]"))
     problems = problems_of(tmp_path, text)
     assert [problem.path for problem in problems] == ["guide.tube", "guide.joint", "guide.more"]
     assert {problem.code for problem in problems} == {"no-stiffness"}

@@ -164,6 +164,27 @@ class Machine:
         displacement from `placements` and of its rotation vector, where the machine then is.
         """
 
+    def band_at(
+        self,
+        joints: ArrayLike,
+        placements: ArrayLike,
+        centre: ArrayLike,
+        moved: ArrayLike,
+        values: ArrayLike,
+        parameters: ArrayLike,
+        variables: Sequence[int],
+        half: ArrayLike,
+        sigmas: Sequence[float],
+        quantities: Sequence[Sequence[int]],
+    ) -> _WithStatus:
+        """(numbers (n, 2 n_component + n_quantity), status) of a band about errors `centre`.
+
+        Reach and standard uncertainty of each component, then the largest length of each of
+        `quantities`; of the machine with the parameters `moved` (k0,) deviated by `values`
+        (n or 1, k0). `parameters` (k,) go by `half` (n or 1, k) where their variable of
+        `variables` (k,) is 1; `sigmas`: standard deviations in each variable's half band.
+        """
+
     @property
     def can_be_enclosed(self) -> bool:
         """Whether bounds over a region can be proven: see `bounds_over`."""

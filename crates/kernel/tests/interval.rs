@@ -357,6 +357,19 @@ fn products() {
 }
 
 #[test]
+fn products_with_one_number_are_those_with_its_interval() {
+    let mut random = Random(21);
+    for _ in times(200_000) {
+        let (x, y) = random.pair();
+        for factor in [y.lower, y.upper, -y.upper, 0.0, -0.0, 1.0, f64::MIN_POSITIVE] {
+            if factor.is_finite() {
+                assert_eq!(x.scaled(factor), x * Interval::point(factor), "{x:?} * {factor:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn quotients() {
     /// `bound <= a / b` without a division.
     fn not_above_quotient(bound: f64, a: &Exact, b: &Exact) -> bool {

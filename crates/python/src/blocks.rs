@@ -7,10 +7,11 @@ use crate::quantity::Quantity;
 use crate::samples::{BLOCK, codes, in_blocks_into, with_codes};
 use numpy::PyArrayMethods;
 use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use truepose_kernel::Status;
-use truepose_kernel::batch::{self, Deviations, Samples};
+use truepose_kernel::batch::{self, Band, BandColumns, Deviations, Samples, Sensitivity};
 use truepose_kernel::kinematics::{self, Loads, Obstacle, Sample};
 use truepose_kernel::machine::indices_of;
 use truepose_kernel::spatial::{Pose, add, rotation_matrix};
@@ -36,11 +37,79 @@ impl Machine {
         let samples =
             Samples { deviations: Deviations { columns: &moved, values }, ..posed.samples(count)? };
         let out = output(py, &[count], &[self.components(), columns.len()])?;
-        let status = {
+        let mut status = vec![Status::Ok; count];
+        {
             let mut writable = out.readwrite();
             let data = writable.as_slice_mut()?;
-            py.detach(|| batch::moved_sensitivities(&self.inner, &samples, &columns, data))
+            let quantity = Sensitivity::new(&self.inner, &columns);
+            py.detach(|| {
+                batch::moved_first_order(&self.inner, &samples, &quantity, data, &mut status);
+            });
+        }
+        with_codes(py, out, &status)
+    }
+
+    /// What a band does about errors `centre` (n, n_component), of the machine with the parameters `moved`
+    /// (k0,) deviated by `values` (n or 1, k0): (numbers (n, 2 n_component + n_quantity), status).
+    ///
+    /// The numbers are the reach and the standard uncertainty of each component, then the largest length of
+    /// each of `quantities` (components, at most three). `parameters` (k,), each of the variable in [-1, 1]
+    /// of `variables` (k,), by `half` (n or 1, k) where that is 1; `sigmas`: standard deviations in the half
+    /// band of each variable.
+    #[allow(clippy::too_many_arguments)] // Python's signature
+    fn band_at<'py>(
+        &self,
+        py: Python<'py>,
+        joints: &Bound<'py, PyAny>,
+        placements: &Bound<'py, PyAny>,
+        centre: &Bound<'py, PyAny>,
+        moved: &Bound<'py, PyAny>,
+        values: &Bound<'py, PyAny>,
+        parameters: &Bound<'py, PyAny>,
+        variables: Vec<usize>,
+        half: &Bound<'py, PyAny>,
+        sigmas: Vec<f64>,
+        quantities: Vec<Vec<usize>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let (parameters, moved) = (self.columns(parameters)?, self.columns(moved)?);
+        let posed = self.posed(joints, placements)?;
+        let count = posed.placements.count;
+        let components = self.components();
+        let values = Input::new(values, &[moved.len()], "values")?;
+        let half = Input::new(half, &[parameters.len()], "half")?;
+        let centre = Input::new(centre, &[components], "centre")?;
+        let known = quantities.iter().all(|quantity| {
+            quantity.len() <= 3 && quantity.iter().all(|&component| component < components)
+        });
+        if variables.len() != parameters.len()
+            || variables.iter().any(|&variable| variable >= sigmas.len())
+            || !known
+        {
+            return Err(PyValueError::new_err("the arguments do not fit each other"));
+        }
+        let columns = BandColumns {
+            parameters: &parameters,
+            variables: &variables,
+            half: half.rows_if_any(count)?,
+            sigmas: &sigmas,
         };
+        let band = Band::new(&self.inner, columns, centre.rows(count)?, &quantities);
+        let values = values.rows_if_any(count)?;
+        let samples =
+            Samples { deviations: Deviations { columns: &moved, values }, ..posed.samples(count)? };
+        let out = output(py, &[count], &[2 * components + quantities.len()])?;
+        let mut status = vec![Status::Ok; count];
+        {
+            let mut writable = out.readwrite();
+            let data = writable.as_slice_mut()?;
+            py.detach(|| {
+                if moved.is_empty() {
+                    batch::first_order(&self.inner, &samples, &band, data, &mut status);
+                } else {
+                    batch::moved_first_order(&self.inner, &samples, &band, data, &mut status);
+                }
+            });
+        }
         with_codes(py, out, &status)
     }
 

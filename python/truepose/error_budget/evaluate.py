@@ -4,23 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from truepose.arrays import Floats, Indices
-from truepose.error_budget import comparison, propagation, worst
+from truepose.error_budget import bands, comparison, worst
 from truepose.error_budget.guide_loads import GuideLoads
-from truepose.error_budget.largest import largest, lengths
 from truepose.machine import Condition, Machine
 from truepose.runs import displacement, percent
 from truepose.runs.arguments import checked
 from truepose.runs.dataset import Schema, Variable, label, quantity_coords
-from truepose.runs.first_order import effects_at, rows_of
-from truepose.runs.poses import OK, Progress, of_band
+from truepose.runs.poses import Progress, of_band
 from truepose.runs.quantities import quantities
 from truepose.runs.run import Run
 from truepose.runs.variables import variables_of
@@ -99,9 +95,6 @@ SCHEMA: Schema = {
     "rank": Variable(("source",), "1", "place of the source by its share, 1 the largest", np.intp),
     "verdict": Variable(("source",), "1", "negligible, relevant or dominant", str),
 }
-
-FEW = 1024
-"""Poses whose sensitivities to every parameter stay in the cache together."""
 
 # What is highest over poses, and of which variable.
 _HIGHEST = {
@@ -211,7 +204,7 @@ def _evaluate(
     kinds = list(quantities(machine.components).values())
     for at, deviation in enumerate(deviations):
         edges = displacement.source_edges(machine, block, deviation)
-        band = _band(machine, block, deviation, edges.error, kinds)
+        band = bands.of_source(machine, block, deviation, edges.error, kinds)
         values["error"][:, at] = edges.error
         values["error_lower"][:, at] = edges.lower
         values["error_upper"][:, at] = edges.upper
@@ -229,7 +222,8 @@ def _evaluate(
         block,
         [(d, source.sets_overall_edges) for d, source in zip(deviations, sources, strict=True)],
     )
-    together, regular = _together(machine, block, sources, deviations, overall.error, kinds)
+    variables = variables_of(machine, sources, deviations)
+    together, regular = bands.together(machine, block, variables, overall.error, kinds)
     shifted += [overall.status[0], *nominal, regular]
     at_edges += overall.status[1:]
     values |= {
@@ -244,76 +238,6 @@ def _evaluate(
         "force": block.forces,
     }
     return values, shifted, at_edges
-
-
-@dataclass(frozen=True)
-class _Band:
-    """What one source's band does at n poses: m and rad.
-
-    `reach`: down and up, (n, n_component); `uncertainty` (n, n_component), standard; `largest`
-    (n, n_quantity); `status` (n,), the kernel's.
-    """
-
-    reach: tuple[Floats, Floats]
-    uncertainty: Floats
-    largest: Floats
-    status: np.ndarray
-
-
-def _band(
-    machine: Machine,
-    block: PoseBlock,
-    deviation: Deviation,
-    error: Floats,
-    kinds: Sequence[Indices],
-) -> _Band:
-    """Of one source, whose `error` at its shift is known."""
-    n_pose = block.indices.size
-    down = np.zeros((n_pose, len(machine.components)))
-    up, uncertain = np.zeros_like(down), np.zeros_like(down)
-    status = np.full(n_pose, OK, np.uint8)
-    if not deviation.banded.size:
-        return _Band((down, up), uncertain, lengths(error, kinds), status)
-    far = np.empty((n_pose, len(kinds)))
-    correlation = deviation.banded_correlation
-    for start in range(0, n_pose, FEW):
-        poses = slice(start, start + FEW)
-        effects, sigmas, status[poses] = worst.variable_effects(machine, block, deviation, poses)
-        far[poses] = largest(error[poses], effects, deviation.domain, kinds).length
-        # Sizes first, then their squares, in the one place; what is correlated keeps its signs.
-        scratch = effects if correlation is None else None
-        down[poses], up[poses] = deviation.domain.reach(effects, scratch)
-        uncertain[poses] = propagation.standard_uncertainty(
-            effects, sigmas, scratch=effects, correlation=correlation
-        )
-    return _Band((down, up), uncertain, far, status)
-
-
-def _together(
-    machine: Machine,
-    block: PoseBlock,
-    sources: Sequence[Source],
-    deviations: Sequence[Deviation],
-    error: Floats,
-    kinds: Sequence[Indices],
-) -> tuple[Floats, np.ndarray]:
-    """The largest lengths (n, n_quantity) of all sources together, and the kernel's status (n,).
-
-    From the `error` (n, n_component) with all of them at their shifts.
-    """
-    variables = variables_of(machine, sources, deviations)
-    n_pose = block.indices.size
-    status = np.full(n_pose, OK, np.uint8)
-    if not variables.names:
-        return lengths(error, kinds), status
-    far = np.empty((n_pose, len(kinds)))
-    parameters, shift = variables.shift
-    for start in range(0, n_pose, FEW):
-        poses = slice(start, start + FEW)
-        moved = (parameters, np.ascontiguousarray(rows_of(shift, poses)))
-        effects, status[poses] = effects_at(machine, block, variables, moved, poses)
-        far[poses] = largest(error[poses], effects, variables.domain, kinds).length
-    return far, status
 
 
 __all__ = ["SCHEMA", "budget"]

@@ -20,7 +20,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats, Indices
-from truepose.error_budget.evaluate import FEW
+from truepose.error_budget.bands import FEW
 from truepose.error_budget.propagation import combine, coverage_factor
 from truepose.machine import Condition, Machine
 from truepose.runs.arguments import checked

@@ -21,8 +21,8 @@ use crate::status::Status;
 /// The samples of one group, for quantities that read inputs of their own.
 #[derive(Clone, Copy)]
 pub struct Place {
-    first: usize,
-    size: usize,
+    pub(super) first: usize,
+    pub(super) size: usize,
 }
 
 /// A quantity of first order.
@@ -114,7 +114,7 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
 }
 
 #[inline(never)]
-fn single_order<S: Real>(machine: &Machine, group: &Group<S>, size: usize) -> Order {
+pub(super) fn single_order<S: Real>(machine: &Machine, group: &Group<S>, size: usize) -> Order {
     let (p, q, pose) = group.single(group.first_finite(size));
     let mut linear = Linearisation::default();
     linear.differentiate(machine, &p, &q, &pose);

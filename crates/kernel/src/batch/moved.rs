@@ -1,41 +1,104 @@
-//! Sensitivities of a machine whose parameters have moved already.
+//! First-order quantities of a machine whose parameters have moved already.
 
-use super::forward::displacement;
-use super::samples::Samples;
-use super::threads::share_out;
-use crate::kinematics::{Linearisation, Sample, forward, limbs};
+use super::first_order::{FirstOrder, Place, single_order};
+use super::forward::{displacement, single_limbs};
+use super::samples::{Group, Samples};
+use super::threads::for_chunks;
+use crate::dispatch::{Work, dispatch};
+use crate::kinematics::{
+    Limbs, Linearisation, Sample, descend, forward, limbs, place_limbs, start_order,
+};
 use crate::linear::SIX;
-use crate::machine::{Machine, indices_of};
+use crate::machine::Machine;
+use crate::scalar::Real;
 use crate::spatial::{Pose, Vector, add, cross, dot, scale};
 use crate::status::Status;
 
-/// Derivatives of the error (displacement from `samples.poses` and rotation vector) to the parameters
-/// `columns`, at the parameters deviated by `samples.deviations` and the pose that the machine then takes:
-/// (component, column) for each sample, NaN where the status is not `ok`.
-pub fn moved_sensitivities(
+/// Below this angle, rad, two terms of the series are exact to rounding.
+const SMALL: f64 = 1e-2;
+
+/// Computes a quantity of the error (displacement from `samples.poses` and rotation vector) at the
+/// parameters deviated by `samples.deviations` and the pose that the machine then takes; `out` has `width`
+/// numbers a sample, NaN where the status is not `ok`.
+pub fn moved_first_order(
     machine: &Machine,
     samples: &Samples<'_>,
-    columns: &[usize],
+    quantity: &impl FirstOrder,
     out: &mut [f64],
-) -> Vec<Status> {
-    let components = indices_of(&machine.dof);
-    let width = components.len() * columns.len();
-    let parts = share_out(out, samples.count, width, |numbers, out| {
-        let mut status = Vec::with_capacity(numbers.len());
-        for (number, row) in numbers.zip(0..) {
-            let out = &mut out[row * width..(row + 1) * width];
-            status.push(one(machine, samples, number, (&components, columns), out));
-        }
-        status
+    status: &mut [Status],
+) {
+    let width = quantity.width();
+    for_chunks(samples.count, (out, width), (&mut [], 0), status, |first, out, _, status| {
+        let chunk = Chunk { machine, samples, quantity, first, out, status };
+        if machine.plain { dispatch(chunk) } else { chunk.run::<f64>() }
     });
-    parts.concat()
 }
 
-fn one(
+struct Chunk<'a, Q> {
+    machine: &'a Machine,
+    samples: &'a Samples<'a>,
+    quantity: &'a Q,
+    first: usize,
+    out: &'a mut [f64],
+    status: &'a mut [Status],
+}
+
+impl<Q: FirstOrder> Work for Chunk<'_, Q> {
+    #[inline(always)]
+    fn run<S: Real>(self) {
+        let Chunk { machine, samples, quantity, first, out, status } = self;
+        let width = quantity.width();
+        let mut group = Group::<S>::new(machine);
+        let mut at: Limbs<S> = Default::default();
+        let (mut forward_order, mut order) = ([0; SIX], [0; SIX]);
+        let mut columns = vec![S::default(); width / quantity.parts()];
+        let mut linear = Linearisation::default();
+        let groups = out.chunks_mut((width * S::WIDTH).max(1)).zip(status.chunks_mut(S::WIDTH));
+        for (number, (out, status)) in groups.enumerate() {
+            let place = Place { first: first + number * S::WIDTH, size: status.len() };
+            let mut proven = S::splat(-1.0);
+            if S::WIDTH > 1 {
+                if group.load(machine, samples, place.first, place.size) {
+                    place_limbs(machine, &group.p, &group.q, &mut at);
+                }
+                if number == 0 {
+                    let lane = group.first_finite(place.size);
+                    let pose = group.pose.lane(lane);
+                    forward_order = start_order(machine, &single_limbs(&at, lane), &pose);
+                    order = single_order(machine, &group, place.size);
+                }
+                let descent = descend(machine, &at, &group.pose, &forward_order);
+                linear.fill(machine, &group.p, &group.q, &at, &descent.pose, &order);
+                let error = displacement(&group.pose, &descent.pose);
+                let turned = [error[3], error[4], error[5]];
+                let square = dot(turned, turned);
+                turn_rows(&mut linear.inverse, turned, series(square));
+                for part in 0..quantity.parts() {
+                    quantity.write(&linear, place, part, &mut columns);
+                    S::store_rows(&columns, &mut out[part * columns.len()..], width, place.size);
+                }
+                let small = S::splat(SMALL * SMALL) - square;
+                proven = descent.proof.min(linear.regular).min(small);
+            }
+            for lane in 0..place.size {
+                status[lane] = Status::Ok;
+                // Also true where it is NaN.
+                if !(proven.lane(lane) > 0.0) {
+                    let out = &mut out[width * lane..width * (lane + 1)];
+                    status[lane] = alone(machine, samples, place.first + lane, quantity, out);
+                }
+            }
+        }
+    }
+}
+
+/// One sample on the scalar path.
+#[inline(never)]
+fn alone(
     machine: &Machine,
     samples: &Samples<'_>,
     number: usize,
-    (components, columns): (&[usize], &[usize]),
+    quantity: &impl FirstOrder,
     out: &mut [f64],
 ) -> Status {
     let mut p = machine.nominal.clone();
@@ -57,35 +120,46 @@ fn one(
     linear.fill_scalar(&sample, q, &pose);
     let error = displacement(&start, &pose);
     let turned = [error[3], error[4], error[5]];
-    for (at, &column) in columns.iter().enumerate() {
-        let mut twist = [0.0; SIX];
-        for &(closure, slot) in &machine.dependents[column] {
-            for (value, row) in twist.iter_mut().zip(&linear.inverse) {
-                *value -= row[closure] * linear.to_parameters[closure][slot];
-            }
-        }
-        let rate = rotation_vector_rate(turned, [twist[3], twist[4], twist[5]]);
-        twist[3..].copy_from_slice(&rate);
-        for (row, &component) in components.iter().enumerate() {
-            out[row * columns.len() + at] = twist[component];
-        }
+    let square = dot(turned, turned);
+    let factor = if square < SMALL * SMALL {
+        series(square)
+    } else {
+        let half = 0.5 * square.sqrt();
+        (1.0 - half / half.tan()) / square
+    };
+    turn_rows(&mut linear.inverse, turned, factor);
+    let width = out.len() / quantity.parts();
+    let place = Place { first: number, size: 1 };
+    for (part, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
+        quantity.write(&linear, place, part, out);
     }
     Status::Ok
+}
+
+/// `(1 - angle / 2 / tan(angle / 2)) / angle^2` of a small angle, from its square.
+#[inline(always)]
+fn series<S: Real>(square: S) -> S {
+    square.mul_add(S::splat(1.0 / 720.0), S::splat(1.0 / 12.0))
+}
+
+/// Makes of the rates of rotation, the last three rows, those of the rotation vector `turned`.
+#[inline(always)]
+fn turn_rows<S: Real, const N: usize>(rows: &mut [[S; N]; SIX], turned: Vector<S>, factor: S) {
+    for closure in 0..N {
+        let velocity = [rows[3][closure], rows[4][closure], rows[5][closure]];
+        let rate = rotation_vector_rate(turned, velocity, factor);
+        for k in 0..3 {
+            rows[3 + k][closure] = rate[k];
+        }
+    }
 }
 
 /// How a rotation vector changes with an angular velocity, both along the base axes: the inverse of the
 /// left Jacobian of the rotations (Chirikjian, "Stochastic Models, Information Theory, and Lie Groups",
 /// vol. 2, 2012, 10.6).
-fn rotation_vector_rate(vector: Vector<f64>, velocity: Vector<f64>) -> Vector<f64> {
-    let square = dot(vector, vector);
-    let angle = square.sqrt();
-    // Below 0.01 rad two terms of the series are exact to rounding.
-    let factor = if angle < 1e-2 {
-        1.0 / 12.0 + square / 720.0
-    } else {
-        let half = 0.5 * angle;
-        (1.0 - half / half.tan()) / square
-    };
+#[inline(always)]
+fn rotation_vector_rate<S: Real>(vector: Vector<S>, velocity: Vector<S>, factor: S) -> Vector<S> {
     let across = cross(vector, velocity);
-    add(velocity, add(scale(across, -0.5), scale(cross(vector, across), factor)))
+    let half = scale(across, S::splat(-0.5));
+    add(velocity, add(half, scale(cross(vector, across), factor)))
 }

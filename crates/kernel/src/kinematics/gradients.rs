@@ -71,6 +71,12 @@ impl<S: Scalar, const N: usize> Gradients<S, N> {
     }
 }
 
+/// How far a strut's closure is open: the distance between its joints less its length.
+#[inline(always)]
+fn opening<S: Scalar>(limb: &Limb<S>, arm: Vector<S>, position: Vector<S>) -> S {
+    norm(subtract(add(arm, position), limb.base)) - limb.length
+}
+
 /// Everything for parameters `p`, joints `q` and a platform at `position` with axes `rotation`.
 pub fn gradients<S: Scalar, const N: usize>(
     machine: &Machine,
@@ -92,13 +98,33 @@ pub fn gradients<S: Scalar, const N: usize>(
         let (arm, gradient) =
             strut_gradient::<S, true>(machine, strut, (p, q, tool), at, to_parameters);
         let limb = Limb::placed(machine, strut, p, q, tool);
-        result.residuals[i] = norm(subtract(add(arm, position), limb.base)) - limb.length;
+        result.residuals[i] = opening(&limb, arm, position);
         result.to_joint[i] = gradient.joint;
         result.to_twist[i] = row(machine, gradient.centre, arm);
     }
     for (i, closure) in guide_closures(machine, p) {
         closure.gradient(machine, at, &mut result.to_parameters[i]);
         (result.residuals[i], result.to_twist[i]) = closure.row(machine, at);
+    }
+    result
+}
+
+/// Residuals alone, of at most `N` closures; zero beyond the machine's.
+pub fn residuals<S: Scalar, const N: usize>(
+    machine: &Machine,
+    p: &[S],
+    q: &[S],
+    position: Vector<S>,
+    rotation: &RotationMatrix<S>,
+) -> [S; N] {
+    let mut result = [position[0].lift(0.0); N];
+    let tool = tool_point(machine, p);
+    for (i, strut) in machine.struts.iter().enumerate() {
+        let limb = Limb::placed(machine, strut, p, q, tool);
+        result[i] = opening(&limb, limb.turned_arm(strut, p, rotation, position), position);
+    }
+    for (i, closure) in guide_closures(machine, p) {
+        result[i] = closure.row(machine, (rotation, position)).0;
     }
     result
 }

@@ -15,7 +15,7 @@ pub use closures::{
 };
 pub use condition::{condition, free_motions};
 pub use forward::{Descent, chord, chord_inverse, descend, forward, start_order};
-pub(crate) use gradients::{Gradients, gradients};
+pub(crate) use gradients::{Gradients, gradients, residuals};
 pub use inverse::{Inverse, Obstacle, commanded_pose, inverse, lane_inverse, obstacles, permitted};
 pub(crate) use inverse::{closed_form, leanings};
 pub use linearisation::{Linearisation, proven_regular};

@@ -6,6 +6,7 @@
 //! makes of one of its faces. Evaluated along that d, h says how much of the bound is true, and divides
 //! the cone there.
 
+use super::directions::Directions;
 use crate::spatial::{Vector, cross, dot, norm, scale, subtract};
 
 /// Weight of a corner in the apex, of all three, below which the cone is divided on the face opposite: parts
@@ -33,15 +34,16 @@ impl Cone {
     pub fn new(
         corners: [usize; 3],
         a: Vector<f64>,
-        directions: &[Vector<f64>],
-        reach: &[f64],
+        directions: &Directions,
         enough: f64,
     ) -> Result<Self, f64> {
         let square = dot(a, a);
         if square <= enough * enough {
             return Err(square.sqrt());
         }
-        let [u, v, w] = [directions[corners[0]], directions[corners[1]], directions[corners[2]]];
+        let [i, k, l] = corners;
+        let (u, v, w) = (directions.at(i), directions.at(k), directions.at(l));
+        let reach = directions.reach();
         let (vw, wu, uv) = (cross(v, w), cross(w, u), cross(u, v));
         // a = sum weight_i u_i, times the same volume.
         let sign = 1f64.copysign(dot(u, vw));
@@ -55,7 +57,7 @@ impl Cone {
         let mut best = Cone { corners, a, bound: 0.0, apex: u, opposite: None };
         for corner in 0..3 {
             let (i, k) = (corners[(corner + 1) % 3], corners[(corner + 2) % 3]);
-            let (bound, apex) = on_face((directions[i], reach[i]), (directions[k], reach[k]));
+            let (bound, apex) = on_face((directions.at(i), reach[i]), (directions.at(k), reach[k]));
             if bound > best.bound {
                 best = Cone { bound, apex, opposite: Some(corner), ..best };
             }
@@ -71,7 +73,8 @@ impl Cone {
         // Along the normal of the two the reaches there stay.
         let normal = cross(kept[0], kept[1]);
         let step = (reach - dot(self.a, d)) / dot(normal, d);
-        [0, 1, 2].map(|k| self.a[k] + step * normal[k])
+        let a = self.a;
+        [a[0] + step * normal[0], a[1] + step * normal[1], a[2] + step * normal[2]]
     }
 }
 
@@ -85,7 +88,8 @@ fn on_face((u, at_u): (Vector<f64>, f64), (v, at_v): (Vector<f64>, f64)) -> (f64
     if aside >= 0.0 && at_u >= at_v * along {
         let length = (at_u * at_u + aside * aside).sqrt();
         let (one, other) = (at_u / length, aside / (sine * length));
-        (length, [0, 1, 2].map(|k| one * u[k] + other * across[k]))
+        let sum = |k: usize| one * u[k] + other * across[k];
+        (length, [sum(0), sum(1), sum(2)])
     } else if at_u > at_v {
         (at_u, u)
     } else {

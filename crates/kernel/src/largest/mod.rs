@@ -8,13 +8,15 @@
 //! ```
 //!
 //! is convex, and the largest length is the largest h over unit directions u (Rockafellar, Convex Analysis,
-//! 1970, section 13). From below, climbing: the set's farthest point along u is longer than h(u), and
+//! 1970, section 13). All terms but the first are the same for the opposite direction, so that the centre
+//! may be taken as one more segment, and of two opposite directions one is enough. From below, climbing: the set's farthest point along u is longer than h(u), and
 //! lies in a direction along which the set reaches at least as far. From above, cones of directions: h is
 //! at most linear between their edges, which bounds a cone by the reaches at its corners, exactly where
 //! these reach the same vertex; cones that may hold a longer vector are divided, until none may.
 
 mod batch;
 mod cone;
+mod directions;
 mod net;
 
 pub use batch::{Domain, Largest, NUMBERS, largest_of};
@@ -22,7 +24,8 @@ pub use batch::{Domain, Largest, NUMBERS, largest_of};
 use crate::scalar::Real;
 use crate::spatial::{Vector, dot, norm, scale};
 use cone::Cone;
-use net::{CONES, HALF, NET};
+use directions::Directions;
+use net::{HALF, NET};
 use std::ops::Range;
 
 /// What of a length is rounding.
@@ -71,11 +74,11 @@ fn along<S: Real>(vector: &Vector<f64>, u: Vector<S>) -> S {
 }
 
 impl Set {
-    /// How far the set without its centre reaches, along lanes of directions and along their opposites.
+    /// How far the set reaches, along lanes of directions or along their opposites, whichever is farther.
     #[inline(always)]
     fn reach<S: Real>(&self, u: Vector<S>) -> S {
         // Two sums at once: each waits for its own last addition only.
-        let mut sums = [S::splat(0.0); 2];
+        let mut sums = [along(&self.centre, u).abs(), S::splat(0.0)];
         let pairs = self.segments.chunks_exact(2);
         for segment in pairs.remainder() {
             sums[0] = sums[0] + along(segment, u).abs();
@@ -94,10 +97,10 @@ impl Set {
         sums[0] + sums[1]
     }
 
-    /// The farthest point along a direction.
+    /// The farthest point along a direction, or the opposite of that along the opposite direction.
     #[inline(always)]
     fn point(&self, u: Vector<f64>) -> Vector<f64> {
-        let mut point = self.centre;
+        let mut point = scale(self.centre, 1f64.copysign(dot(self.centre, u)));
         for segment in &self.segments {
             let sign = 1f64.copysign(dot(*segment, u));
             for k in 0..3 {
@@ -136,7 +139,8 @@ impl Set {
             }
             reached = length;
             if length > farthest.reached {
-                *farthest = Farthest { reached: length, direction: u, ..*farthest };
+                let direction = scale(u, 1f64.copysign(dot(self.centre, u)));
+                *farthest = Farthest { reached: length, direction, ..*farthest };
             }
             u = scale(point, 1.0 / length);
         }
@@ -146,8 +150,9 @@ impl Set {
 /// Room for a search, used again for the next.
 #[derive(Default)]
 pub struct Search {
-    directions: Vec<Vector<f64>>,
-    reach: Vec<f64>,
+    directions: Directions,
+    /// Cones of the net that may hold a longer vector, each with its a.
+    open: Vec<(usize, Vector<f64>)>,
     cones: Vec<Cone>,
     next: Vec<Cone>,
     /// The largest bound of the cones that were dropped.
@@ -166,13 +171,14 @@ impl Search {
             return Farthest { length, reached: length, direction };
         }
         self.begin::<S>(set);
-        for reach in &self.reach {
+        for reach in &self.directions.reach()[..HALF] {
             if !reach.is_finite() {
-                return Farthest { length: f64::NAN, reached: f64::NAN, direction: [f64::NAN; 3] };
+                let none = f64::NAN;
+                return Farthest { length: none, reached: none, direction: [none; 3] };
             }
         }
         self.climb_from(0, set, &mut farthest);
-        self.cones_of_net::<S>(farthest.reached * (1.0 + ROUNDING));
+        self.open_net::<S>(farthest.reached * (1.0 + ROUNDING));
         while !self.cones.is_empty() {
             let mut largest: f64 = 0.0;
             for cone in &self.cones {
@@ -187,7 +193,7 @@ impl Search {
             for cone in &self.cones {
                 self.directions.push(cone.apex);
             }
-            self.evaluate::<S>(set, first);
+            self.directions.evaluate_new::<S>(set, first);
             self.climb_from(first, set, &mut farthest);
             self.divide(first, farthest.reached * (1.0 + ROUNDING));
         }
@@ -195,64 +201,45 @@ impl Search {
         farthest
     }
 
-    /// Evaluates the net.
+    /// Evaluates the directions of the net.
     #[inline(always)]
     fn begin<S: Real>(&mut self, set: &Set) {
-        self.directions.clear();
-        self.directions.extend_from_slice(&NET.directions);
-        self.reach.clear();
-        self.reach.resize(2 * HALF, 0.0);
         self.cones.clear();
         self.dropped = 0.0;
-        for first in (0..HALF).step_by(S::WIDTH) {
-            let mut u = [S::default(); 3];
-            for lane in 0..S::WIDTH {
-                for k in 0..3 {
-                    u[k].set_lane(lane, self.directions[first + lane][k]);
-                }
-            }
-            let both = set.reach(u);
-            for lane in 0..S::WIDTH {
-                let middle = dot(set.centre, self.directions[first + lane]);
-                self.reach[first + lane] = both.lane(lane) + middle;
-                self.reach[HALF + first + lane] = both.lane(lane) - middle;
+        if self.directions.len() == 0 {
+            for &direction in &NET.directions {
+                self.directions.push(direction);
             }
         }
+        self.directions.truncate(2 * HALF);
+        self.directions.evaluate::<S>(set, HALF);
+        self.directions.mirror(HALF);
     }
 
     /// Climbs from the direction, of those from number `first` on, along which the set reaches farthest.
     #[inline(always)]
     fn climb_from(&self, first: usize, set: &Set, farthest: &mut Farthest) {
+        let reach = self.directions.reach();
         let mut best = first;
-        for k in first..self.reach.len() {
-            if self.reach[k] > self.reach[best] {
+        for k in first..reach.len() {
+            if reach[k] > reach[best] {
                 best = k;
             }
         }
         // No point is nearer than the set reaches along its direction.
-        if self.reach[best] > farthest.reached {
-            set.climb(self.directions[best], farthest);
+        if reach[best] > farthest.reached {
+            set.climb(self.directions.at(best), farthest);
         }
     }
 
-    /// Keeps the cones of the net that may hold a vector longer than `enough`.
+    /// The cones of the net that may hold a vector longer than `enough`.
     #[inline(always)]
-    fn cones_of_net<S: Real>(&mut self, enough: f64) {
-        for first in (0..CONES).step_by(S::WIDTH) {
-            let mut a = [S::splat(0.0); 3];
-            for i in 0..3 {
-                let mut reach = S::default();
-                for lane in 0..S::WIDTH {
-                    reach.set_lane(lane, self.reach[NET.corners[first + lane][i]]);
-                }
-                for k in 0..3 {
-                    a[k] = reach.mul_add(S::load(&NET.dual[i][k][first..]), a[k]);
-                }
-            }
-            for lane in 0..S::WIDTH.min(NET.cones.saturating_sub(first)) {
-                let a = [a[0].lane(lane), a[1].lane(lane), a[2].lane(lane)];
-                self.keep(NET.corners[first + lane], a, enough);
-            }
+    fn open_net<S: Real>(&mut self, enough: f64) {
+        self.open.clear();
+        self.dropped = NET.above::<S>(self.directions.reach(), enough, &mut self.open);
+        for number in 0..self.open.len() {
+            let (cone, a) = self.open[number];
+            self.keep(NET.corners[cone], a, enough);
         }
         std::mem::swap(&mut self.cones, &mut self.next);
     }
@@ -260,7 +247,7 @@ impl Search {
     /// Keeps a cone where it may hold a vector longer than `enough`.
     #[inline(always)]
     fn keep(&mut self, corners: [usize; 3], a: Vector<f64>, enough: f64) {
-        match Cone::new(corners, a, &self.directions, &self.reach, enough) {
+        match Cone::new(corners, a, &self.directions, enough) {
             Ok(cone) => self.next.push(cone),
             Err(bound) => self.dropped = self.dropped.max(bound),
         }
@@ -271,7 +258,7 @@ impl Search {
     fn divide(&mut self, first: usize, enough: f64) {
         for number in 0..self.cones.len() {
             let (cone, new) = (self.cones[number], first + number);
-            let (d, reach) = (self.directions[new], self.reach[new]);
+            let (d, reach) = (self.directions.at(new), self.directions.reach()[new]);
             for corner in 0..3 {
                 // The part without the face opposite to the new direction is empty.
                 if cone.opposite == Some(corner) {
@@ -280,40 +267,12 @@ impl Search {
                 let mut corners = cone.corners;
                 corners[corner] = new;
                 let kept = [corners[(corner + 1) % 3], corners[(corner + 2) % 3]];
-                let kept = [self.directions[kept[0]], self.directions[kept[1]]];
+                let kept = [self.directions.at(kept[0]), self.directions.at(kept[1])];
                 let a = cone.moved(kept, d, reach);
                 self.keep(corners, a, enough);
             }
         }
         std::mem::swap(&mut self.cones, &mut self.next);
         self.next.clear();
-    }
-
-    /// Makes the directions from number `first` on unit vectors, and finds how far the set reaches.
-    #[inline(always)]
-    fn evaluate<S: Real>(&mut self, set: &Set, first: usize) {
-        let count = self.directions.len();
-        self.reach.resize(count, 0.0);
-        let [x, y, z] = set.centre;
-        let centre = [S::splat(x), S::splat(y), S::splat(z)];
-        let mut at = first;
-        while at < count {
-            let size = S::WIDTH.min(count - at);
-            let mut u = [S::splat(1.0); 3];
-            for lane in 0..size {
-                for k in 0..3 {
-                    u[k].set_lane(lane, self.directions[at + lane][k]);
-                }
-            }
-            let u = scale(u, S::splat(1.0) / norm(u));
-            let reach = dot(centre, u) + set.reach(u);
-            for lane in 0..size {
-                for k in 0..3 {
-                    self.directions[at + lane][k] = u[k].lane(lane);
-                }
-                self.reach[at + lane] = reach.lane(lane);
-            }
-            at += size;
-        }
     }
 }

@@ -4,8 +4,14 @@
 //! every variable along which the error certainly grows, or certainly falls, at its end (monotonicity):
 //! what remains is a smaller box, over which the enclosures are tighter, and so on. With all variables
 //! fixed the bound is the error at a vertex, but for rounding.
+//!
+//! Nothing is proved again over a smaller box: its machines x(t) are among those of the whole, and both
+//! the slopes S there and the inverse of every matrix there are known. A solution y in plain numbers is
+//! off by what its residuals are through that inverse (both y and the root lie where the matrices are
+//! enclosed). From its middle m the smaller box reaches x(m) + C (t - m), by the mean value theorem first
+//! in t and then in x: the chords C = -J^-1 G need G at x(m) alone, and are tighter than the slopes.
 
-use super::closures::{Placed, Six, Square, derivatives};
+use super::closures::{Derivatives, Placed, Six, Square, add_multiple, derivatives, residuals};
 use super::root::{Inverse, Root, Varying, prove};
 use super::targets::{Bounds, Closeness, TARGETS, targets};
 use super::{Deviating, Unproven, point};
@@ -23,6 +29,12 @@ use std::rc::Rc;
 pub const FINE: f64 = 1.0003;
 /// Times that the box is made smaller.
 const ROUNDS: usize = 6;
+/// An inverse that is spread by more is found again over a smaller box.
+const LOOSE: f64 = 0.05;
+/// What variables of uncertain sign may add to how far a part reaches, of that: along an axis what
+/// rounding may, elsewhere what no verdict depends on.
+const ROUNDING: f64 = 1e-13;
+const SLACK: f64 = 2e-4;
 
 /// The pose, the deviations and the machine that bounds are for.
 #[derive(Clone, Debug)]
@@ -60,6 +72,20 @@ pub struct Enclosed {
     /// Where all machines are, and where there is no other root of any of them.
     pub whole: Six,
     pub unique_in: Six,
+    /// From the plain numbers in the middle to any of the roots, and over all of that the inverse of the
+    /// closures' derivatives and the slopes.
+    between: Six,
+    inverse: Inverse,
+    slopes: Vec<Six>,
+}
+
+/// A part's machines where some variables are held at an end.
+struct Narrowed {
+    /// Where the middle one is.
+    middle: Six,
+    /// How far the machine moves per unit of each of the others: from the middle,
+    chords: Vec<Six>,
+    /// and anywhere.
     slopes: Vec<Six>,
 }
 
@@ -79,7 +105,7 @@ pub struct Part<'a> {
     pub sides: Vec<Interval>,
     pub first: Enclosed,
     /// By the end at which each variable is held: -1, 1, or 0 for neither. None where nothing is proven.
-    narrowed: RefCell<HashMap<Vec<i8>, Option<Rc<Enclosed>>>>,
+    narrowed: RefCell<HashMap<Vec<i8>, Option<Rc<Narrowed>>>>,
 }
 
 /// A bound on how far a part reaches along a direction, and what limits it.
@@ -119,13 +145,20 @@ pub fn placed(pose: &Pose<f64>) -> Placed {
 
 /// A product of plain numbers and intervals, summed.
 pub fn along(direction: &[f64; SIX], six: &Six) -> Interval {
-    let mut sum = point(0.0);
-    for k in 0..SIX {
-        if direction[k] != 0.0 {
-            sum = sum + point(direction[k]) * six[k];
+    let (mut lower, mut upper, mut size) = (0.0, 0.0, 0.0);
+    for (&factor, one) in direction.iter().zip(six) {
+        if factor == 0.0 {
+            continue;
         }
+        let (low, high) =
+            if factor > 0.0 { (one.lower, one.upper) } else { (one.upper, one.lower) };
+        lower += factor * low;
+        upper += factor * high;
+        size += (factor * low).abs().max((factor * high).abs());
     }
-    sum
+    // Rounding errs by less than seven half steps of the sum of sizes; a zero is exact.
+    let more = if size > 0.0 { size * (8.0 * f64::EPSILON) + f64::MIN_POSITIVE } else { 0.0 };
+    Interval::new(lower - more, upper + more)
 }
 
 impl<'a> Extent<'a> {
@@ -179,7 +212,9 @@ impl<'a> Extent<'a> {
         let exact = derivatives(machine, &p_middle, q, at, &middle.map(point));
         let spread = derivatives(machine, &p, q, at, &middle.map(point));
         let away = variables.iter().zip(&middles).map(|(one, middle)| *one - *middle);
-        let varying: Vec<Varying> = self.columns(&spread).into_iter().zip(away).collect();
+        let gradient = |parameter| spread.closures.to_parameter(machine, parameter);
+        let columns = self.deviating.columns(|_| true, gradient);
+        let varying: Vec<Varying> = columns.into_iter().zip(away).collect();
         let unproven = |why: Unproven| {
             let effects = effects(&spread.to_displacement, &varying);
             Box::new(Unenclosed { why, pose: Some(found_pose), effects })
@@ -203,18 +238,32 @@ impl<'a> Extent<'a> {
         for k in 0..SIX {
             at_middle[k] = at_middle[k] - off[k];
         }
-        let slopes = self
-            .columns(&over)
-            .iter()
-            .map(|column| inverse.times(column).map(|value| -value))
-            .collect();
+        let slopes = self.slopes(&over, &inverse, |_| true);
         let Root { enclosure, unique_in } = root;
-        Ok(Enclosed { middle: at_middle, pose: found_pose, whole: enclosure, unique_in, slopes })
+        Ok(Enclosed {
+            middle: at_middle,
+            pose: found_pose,
+            whole: enclosure,
+            unique_in,
+            between,
+            inverse,
+            slopes,
+        })
     }
 
-    /// Derivatives of the closures to the variables.
-    fn columns(&self, at: &super::closures::Derivatives) -> Vec<Six> {
-        self.deviating.columns(|parameter| at.closures.to_parameter(self.machine, parameter))
+    /// How far the machine moves per unit of each variable that is asked for; of the others zero.
+    fn slopes(
+        &self,
+        over: &Derivatives,
+        inverse: &Inverse,
+        asked: impl Fn(usize) -> bool,
+    ) -> Vec<Six> {
+        let gradient = |parameter| over.closures.to_parameter(self.machine, parameter);
+        let mut slopes = self.deviating.columns(&asked, gradient);
+        for (_, slope) in slopes.iter_mut().enumerate().filter(|&(variable, _)| asked(variable)) {
+            *slope = inverse.times(slope).map(|value| -value);
+        }
+        slopes
     }
 
     /// The machine over every variable in [-1, 1].
@@ -244,85 +293,164 @@ impl Part<'_> {
         }
     }
 
-    /// The machine where some variables are held at an end; none where nothing is proven.
-    fn narrowed(&self, ends: &[i8]) -> Option<Rc<Enclosed>> {
+    /// Where the machine of certain variables of the part is; none where no solution is found.
+    fn root(&self, variables: &[Interval]) -> Option<Six> {
+        let Extent { machine, joints, pose, command: (q, at), .. } = self.extent;
+        let p = self.extent.parameters(variables);
+        let nearly: Vec<f64> = p.iter().map(|one| one.midpoint()).collect();
+        let struts = limbs(machine, &nearly, joints);
+        let sample = Sample { machine, p: &nearly, limbs: &struts };
+        let (found, status) = forward(&sample, joints, &self.first.pose);
+        if status != Status::Ok {
+            return None;
+        }
+        let mut result = displacement_numbers(machine, pose, &found).map(point);
+        for (one, between) in result.iter_mut().zip(&self.first.between) {
+            // Rounding may have put it outside, where the matrices are not enclosed.
+            *one = point(one.lower.clamp(between.lower, between.upper));
+        }
+        let off = self.first.inverse.times(&residuals(machine, &p, q, at, &result));
+        for k in 0..SIX {
+            result[k] = result[k] - off[k];
+        }
+        Some(result)
+    }
+
+    /// The machines where some variables are held at an end; none where they are not enclosed.
+    fn narrowed(&self, ends: &[i8]) -> Option<Rc<Narrowed>> {
         if let Some(known) = self.narrowed.borrow().get(ends) {
             return known.clone();
         }
+        let narrowed = self.narrow(ends).map(Rc::new);
+        self.narrowed.borrow_mut().insert(ends.to_vec(), narrowed.clone());
+        narrowed
+    }
+
+    fn narrow(&self, ends: &[i8]) -> Option<Narrowed> {
         let sides: Vec<Interval> =
             ends.iter().enumerate().map(|(variable, &end)| self.side(variable, end)).collect();
-        let enclosed = self.extent.enclose(&sides, &self.first.pose).ok();
-        // The root over the smaller part is the one proved over the whole.
-        let enclosed =
-            enclosed.filter(|one| lies_in(&one.middle, &self.first.unique_in)).map(Rc::new);
-        self.narrowed.borrow_mut().insert(ends.to_vec(), enclosed.clone());
-        enclosed
+        let middles: Vec<Interval> = sides.iter().map(|side| point(side.midpoint())).collect();
+        let middle = self.root(&middles)?;
+        let varies = |variable: usize| sides[variable].lower < sides[variable].upper;
+        if !(0..sides.len()).any(varies) {
+            return Some(Narrowed { middle, chords: Vec::new(), slopes: Vec::new() });
+        }
+        let Extent { machine, command: (q, at), deviating, .. } = self.extent;
+        let p = self.extent.parameters(&sides);
+        // From the middle on: first to the deviations, where only they vary, then with the displacement.
+        let spread = derivatives(machine, &p, q, at, &middle);
+        let gradient = |parameter| spread.closures.to_parameter(machine, parameter);
+        let opened = deviating.columns(varies, gradient);
+        let chords = |inverse: &Inverse| -> Vec<Six> {
+            let chord = |(variable, column): (usize, &Six)| {
+                if varies(variable) { inverse.times(column).map(|value| -value) } else { *column }
+            };
+            opened.iter().enumerate().map(chord).collect()
+        };
+        let mut outer = self.first.whole;
+        let mut enclose = |moves: &[Six]| -> Option<(Derivatives, Inverse)> {
+            let mut whole = middle;
+            for (variable, moves) in moves.iter().enumerate() {
+                if varies(variable) {
+                    add_multiple(&mut whole, moves, sides[variable] - middles[variable]);
+                }
+            }
+            for (outer, whole) in outer.iter_mut().zip(whole) {
+                *outer = outer.intersection(whole)?;
+            }
+            let over = derivatives(machine, &p, q, at, &outer);
+            let inverse = Inverse::of(&over.to_displacement)?;
+            Some((over, inverse))
+        };
+        let (mut over, mut inverse) = enclose(&self.first.slopes)?;
+        if self.first.inverse.excess() > LOOSE {
+            // Over the smaller box it is a better one.
+            (over, inverse) = enclose(&chords(&inverse))?;
+        }
+        let slopes = self.extent.slopes(&over, &inverse, varies);
+        Some(Narrowed { middle, chords: chords(&inverse), slopes })
     }
 
     /// The most that `direction . displacement` can be.
     pub fn most(&self, direction: &[f64; SIX]) -> f64 {
-        self.reach(direction).bound
+        let along_axis = direction.iter().filter(|&&entry| entry != 0.0).count() < 2;
+        self.reach(direction, if along_axis { ROUNDING } else { SLACK }).bound
     }
 
     /// The variable to divide for a lower bound along a direction; none where that is of no use.
     pub fn loosest(&self, direction: &[f64; SIX]) -> Option<usize> {
-        self.reach(direction).loosest
+        self.reach(direction, ROUNDING).loosest
     }
 
-    fn reach(&self, direction: &[f64; SIX]) -> DirectionBound {
+    /// A bound that may be loose by a share `slack`, if that is less work.
+    fn reach(&self, direction: &[f64; SIX], slack: f64) -> DirectionBound {
         let Deviating { directions, count, .. } = self.extent.deviating;
         let mut in_direction = vec![false; *count];
         for &member in directions.iter().flatten() {
             in_direction[member] = true;
         }
         let mut ends = vec![0_i8; *count];
-        let mut own: Option<Rc<Enclosed>> = None;
+        let mut own: Option<Rc<Narrowed>> = None;
         let mut best = f64::INFINITY;
         let mut loosest = None;
         for _ in 0..ROUNDS {
-            let enclosed = own.as_deref().unwrap_or(&self.first);
-            let mut bound = along(direction, &enclosed.middle);
+            let (middle, chords, slopes) = match own.as_deref() {
+                None => (&self.first.middle, None, &self.first.slopes),
+                Some(narrowed) => (&narrowed.middle, Some(&narrowed.chords), &narrowed.slopes),
+            };
+            let mut bound = along(direction, middle);
             let mut fixed = false;
-            let mut free = !directions.is_empty();
+            let mut uncertain: Vec<(usize, i8)> = Vec::new();
+            let mut more = point(0.0);
             let mut least_certain = 0.0;
             loosest = None;
-            for (variable, slope) in enclosed.slopes.iter().enumerate() {
+            for (variable, slope) in slopes.iter().enumerate() {
                 if in_direction[variable] || ends[variable] != 0 {
                     continue;
                 }
                 let slope = along(direction, slope);
+                let chord = chords.map_or(slope, |chords| along(direction, &chords[variable]));
                 let side = self.sides[variable];
-                bound = bound + slope * (side - point(side.midpoint()));
+                bound = bound + chord * (side - point(side.midpoint()));
                 if side.lower == side.upper {
                     continue;
                 }
                 if slope.lower >= 0.0 || slope.upper <= 0.0 {
                     ends[variable] = if slope.lower >= 0.0 { 1 } else { -1 };
                     fixed = true;
-                } else {
-                    free = true;
+                    continue;
                 }
-                let uncertain = (slope.upper - slope.lower) * side.radius();
-                if uncertain > least_certain {
-                    (least_certain, loosest) = (uncertain, Some(variable));
+                // From its better end, what the other way may add.
+                let (end, against) =
+                    if slope.upper > -slope.lower { (1, -slope.lower) } else { (-1, slope.upper) };
+                uncertain.push((variable, end));
+                more = more + point(against) * (point(side.upper) - point(side.lower));
+                let size = (slope.upper - slope.lower) * side.radius();
+                if size > least_certain {
+                    (least_certain, loosest) = (size, Some(variable));
                 }
             }
             // Of a unit vector t, slopes . t is at most the length of the slopes (Cauchy and Schwarz).
             for members in directions {
                 let squares = members
                     .iter()
-                    .map(|&member| along(direction, &enclosed.slopes[member]).square())
+                    .map(|&member| along(direction, &chords.unwrap_or(slopes)[member]).square())
                     .fold(point(0.0), |sum, square| sum + square);
                 bound = bound + squares.sqrt();
             }
             best = best.min(bound.upper);
-            if !fixed {
+            // All signs are certain, or what those that are not add is little enough.
+            let settled = directions.is_empty() && more.upper <= slack * best.abs();
+            if settled {
+                uncertain.iter().for_each(|&(variable, end)| ends[variable] = end);
+            } else if !fixed {
+                // No smaller box is certain of more.
                 break;
             }
             // A smaller part that cannot be enclosed leaves the bound as it is.
             let Some(next) = self.narrowed(&ends) else { break };
-            if !free {
-                best = best.min(along(direction, &next.middle).upper);
+            if settled {
+                best = best.min((along(direction, &next.middle) + more).upper);
                 loosest = None;
                 break;
             }

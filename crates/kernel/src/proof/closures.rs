@@ -5,7 +5,7 @@
 //! R = Rc(c) R0. Its differential is (1 + |c|^2/4)^-1 (I + [c/2]x) dc (Angeles, "Fundamentals of Robotic
 //! Mechanical Systems", on linear invariants; it follows from Rc = (I - H)^-1 (I + H), H = [c/2]x).
 
-use crate::kinematics::{Gradients, gradients};
+use crate::kinematics::{self, Gradients, gradients};
 use crate::linear::SIX;
 use crate::machine::Machine;
 use crate::scalar::{Interval, Scalar};
@@ -115,4 +115,18 @@ pub fn derivatives<S: Scalar>(
         closures.to_twist[count + number][freedom] = one;
     }
     Derivatives { to_displacement, closures }
+}
+
+/// Residuals alone, at `displacement` from the pose `at`.
+pub fn residuals<S: Scalar>(
+    machine: &Machine,
+    p: &[S],
+    q: &[S],
+    at: &Placed<S>,
+    displacement: &Six<S>,
+) -> Six<S> {
+    let [x, y, z, a, b, c] = *displacement;
+    let scale = x.lift(machine.characteristic_length);
+    let Placed { position, rotation } = moved(at, [x, y, z], [a, b, c].map(|value| value / scale));
+    kinematics::residuals::<S, SIX>(machine, p, q, position, &rotation)
 }

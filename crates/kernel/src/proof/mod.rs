@@ -26,7 +26,7 @@ pub use region::Region;
 
 use crate::linear::SIX;
 use crate::scalar::Interval;
-use closures::{Six, add_multiple};
+use closures::Six;
 
 /// What the variables of a box of deviations move: column c moves `parameters[c]` by `swing[c]` times
 /// variable `variables[c]`, which lies in [-1, 1]; the variables of one of `directions` lie on the unit
@@ -46,12 +46,18 @@ pub struct Deviating {
 }
 
 impl Deviating {
-    /// Derivatives to the variables, from those to a parameter.
-    fn columns(&self, gradient: impl Fn(usize) -> Six) -> Vec<Six> {
+    /// Derivatives to the variables that are asked for, from those to a parameter; of the others zero.
+    fn columns(&self, asked: impl Fn(usize) -> bool, gradient: impl Fn(usize) -> Six) -> Vec<Six> {
         let mut columns = vec![[point(0.0); SIX]; self.count];
         let moved = self.parameters.iter().zip(&self.variables).zip(&self.swing);
         for ((&parameter, &variable), &swing) in moved {
-            add_multiple(&mut columns[variable], &gradient(parameter), point(swing));
+            if !asked(variable) {
+                continue;
+            }
+            let column = &mut columns[variable];
+            for (sum, value) in column.iter_mut().zip(gradient(parameter)) {
+                *sum = *sum + value.scaled(swing);
+            }
         }
         columns
     }

@@ -58,7 +58,7 @@ impl Region<'_> {
                 add_multiple(&mut known, &over.closures.to_parameter(machine, index), shift);
             }
             let gradient = |parameter| over.closures.to_parameter(machine, parameter);
-            (known, self.deviating.columns(gradient))
+            (known, self.deviating.columns(|_| true, gradient))
         };
         let spread = derivatives(machine, &p, q, at, &still);
         let (known, columns) = moves(&spread);

@@ -128,7 +128,7 @@ impl Region<'_> {
                 let gradient = at.closures.to_parameter(machine, index).map(|one| one.value);
                 add_multiple(&mut known, &gradient, rate);
             }
-            let columns = self.deviating.columns(change_of);
+            let columns = self.deviating.columns(|_| true, change_of);
             result.push(Rates {
                 known: follow(&over.known, &known),
                 slopes: over.slopes.iter().zip(&columns).map(|(s, c)| follow(s, c)).collect(),

@@ -144,6 +144,17 @@ impl Interval {
         if self.lower <= self.upper { radius } else { f64::INFINITY }
     }
 
+    /// The product with one number: half the work of the product with an interval.
+    #[inline(always)]
+    pub fn scaled(self, factor: f64) -> Self {
+        let (a, b) = (self.lower * factor, self.upper * factor);
+        let (lower, upper) = if factor < 0.0 { (b, a) } else { (a, b) };
+        match Self::product(lower, upper) {
+            Some(product) => product,
+            None => self * Self::point(factor),
+        }
+    }
+
     /// The largest absolute value of its numbers.
     #[inline]
     pub fn magnitude(self) -> f64 {

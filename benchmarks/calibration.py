@@ -9,6 +9,8 @@ but weighs what was read wrongly, so that its values are others.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -16,7 +18,7 @@ from benchmarks import numpy_hexapod
 from benchmarks.hexapod import N_STRUT, Array, Batch
 from benchmarks.rows import Row
 from benchmarks.timing import DisagreementError, best_seconds
-from truepose.calibration.identification.problem import IdentificationProblem, Prior
+from truepose.calibration.identification.problem import IdentificationProblem, Prior, Solved
 from truepose.calibration.identification.unknowns import unknowns_of
 from truepose.calibration.instruments import Frame, Instrument
 from truepose.calibration.measurements import Measurements
@@ -24,7 +26,7 @@ from truepose.machine import Condition
 
 POSES = 50
 NOISE = {"m": 2e-6, "rad": 10e-6}
-ASKED = 300.0
+ASKED = 600.0
 AGREED = 1e-9
 """Of the geometry's size: what the two optima may differ by."""
 
@@ -77,28 +79,55 @@ def poses_of(placements: Array, error: Array) -> Array:
     return np.hstack([placements[:, :3] + error[:, :3], angles])
 
 
+@dataclass(frozen=True)
+class Fit:
+    """Readings of one machine with errors, and the identification of its 42 parameters."""
+
+    batch: Batch
+    problem: IdentificationProblem
+    order: list[int]
+    """(42,) which unknown each of the benchmark's columns is."""
+    readings: Array
+    """(300,) with noise."""
+    uncertainty: Array
+    """(300,) of each, m and rad."""
+
+    @classmethod
+    def of(cls, batch: Batch) -> Fit:
+        """What is read at the batch's poses of a machine with the batch's first deviations."""
+        measurements = measurements_of(batch)
+        unknowns = unknowns_of(batch.machine, measurements)
+        problem = IdentificationProblem(batch.machine, measurements, unknowns)
+        # Each unknown is one parameter: where it stands among the benchmark's columns.
+        numbers = list(unknowns.columns)
+        order = [
+            int(np.flatnonzero(unknowns.effects[numbers.index(column)])[0])
+            for column in batch.columns
+        ]
+        truth = np.empty(unknowns.count)
+        truth[order] = batch.deviations[0]
+        noise = np.random.default_rng(7).standard_normal(6 * batch.count)
+        read = problem.predict(truth) + measurements.uncertainty * noise
+        return cls(batch, problem, order, read, measurements.uncertainty)
+
+    def solve(self) -> Solved:
+        """The fit, from nominal, with nothing known beforehand."""
+        solved = self.problem.solve(self.readings, prior=Prior.none(len(self.order)))
+        if solved.ending[0] not in ("cost", "step", "gradient"):
+            raise RuntimeError(f"the benchmark's fit ended as {solved.ending[0]}")
+        return solved
+
+    def values(self) -> Array:
+        """(42,) deviations that were found, in the order of the batch's columns, m."""
+        return self.solve().values[0][self.order]
+
+
 def measure() -> list[Row]:
     """Both to the same optimum, and how long they take."""
     batch = Batch.of(POSES)
-    measurements = measurements_of(batch)
-    unknowns = unknowns_of(batch.machine, measurements)
-    problem = IdentificationProblem(batch.machine, measurements, unknowns)
-    random = np.random.default_rng(7)
-    # Each unknown is one parameter: where it stands among the benchmark's columns.
-    order = [int(np.flatnonzero(unknowns.effects[list(unknowns.columns).index(column)])[0])
-             for column in batch.columns]  # fmt: skip
-    truth = np.empty(unknowns.count)
-    truth[order] = batch.deviations[0]
-    read = problem.predict(truth) + measurements.uncertainty * random.standard_normal(6 * POSES)
-    nothing = Prior.none(unknowns.count)
+    fit = Fit.of(batch)
     start = batch.machine.nominal[batch.columns]
-    table, sigma = read.reshape(POSES, 6), measurements.uncertainty.reshape(POSES, 6)
-
-    def ours():
-        solved = problem.solve(read, prior=nothing)
-        if solved.ending[0] not in ("cost", "step", "gradient"):
-            raise RuntimeError(f"the benchmark's fit ended as {solved.ending[0]}")
-        return solved.values[0]
+    table, sigma = fit.readings.reshape(POSES, 6), fit.uncertainty.reshape(POSES, 6)
 
     def by_pose(values: Array) -> Array:
         return ((readings(batch.placements, batch.joints, values) - table) / sigma).ravel()
@@ -116,14 +145,14 @@ def measure() -> list[Row]:
     def scipy_closure():
         return least_squares(by_closure, start, method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13)
 
-    found = ours()[order] + start
+    found = fit.values() + start
     peer = scipy_pose()
     gap = float(np.abs(found - peer.x).max()) / float(np.abs(start).max())
     if not gap <= AGREED:
         raise DisagreementError(f"calibration: the optima differ by {gap:.3g} of the geometry")
-    calls = {"ours": ours, "scipy": scipy_pose, "closure": scipy_closure}
+    calls = {"ours": fit.solve, "scipy": scipy_pose, "closure": scipy_closure}
     best = best_seconds(calls, rounds=5, repeats={"ours": 50})
-    evaluations = problem.solve(read, prior=nothing).evaluations[0]
+    evaluations = fit.solve().evaluations[0]
     size = f"42 parameters from {POSES} poses"
     return [
         Row(

@@ -94,7 +94,10 @@ class Fit:
 
     @classmethod
     def of(cls, batch: Batch) -> Fit:
-        """What is read at the batch's poses of a machine with the batch's first deviations."""
+        """What is read at the batch's poses of a machine with the batch's first deviations.
+
+        The machine has a tolerance on each of the batch's columns and on no other parameter.
+        """
         measurements = measurements_of(batch)
         unknowns = unknowns_of(batch.machine, measurements)
         problem = IdentificationProblem(batch.machine, measurements, unknowns)
@@ -110,9 +113,11 @@ class Fit:
         read = problem.predict(truth) + measurements.uncertainty * noise
         return cls(batch, problem, order, read, measurements.uncertainty)
 
-    def solve(self) -> Solved:
-        """The fit, from nominal, with nothing known beforehand."""
-        solved = self.problem.solve(self.readings, prior=Prior.none(len(self.order)))
+    def solve(self, *, tolerances: bool = False) -> Solved:
+        """The fit, from nominal; where `tolerances` count they are known beforehand."""
+        unknowns = self.problem.unknowns
+        prior = Prior.of(unknowns) if tolerances else Prior.none(unknowns.count)
+        solved = self.problem.solve(self.readings, prior=prior)
         if solved.ending[0] not in ("cost", "step", "gradient"):
             raise RuntimeError(f"the benchmark's fit ended as {solved.ending[0]}")
         return solved

@@ -33,16 +33,18 @@ SLOW = 0.5  # s, of a call that is timed only twice
 
 
 def measure() -> list[Row]:
-    """A row for each kind of work and axis, and one for each kind of work on two threads."""
+    """Rows for each kind of work and axis, for each on two threads, and of a machine's guide."""
     threads = truepose.threads()
     try:
         truepose.threads(1)
         with every_scaling() as every:
             rows = [exponent_row(scaled, times_of(scaled)) for scaled in every]
-            largest = {
-                scaled.work: scaled for scaled in reversed(every) if scaled.axis != "closures"
-            }
-            return rows + [_on_two_threads(scaled) for scaled in largest.values()]
+            on_threads: dict[str, Scaled] = {}
+            for scaled in every:
+                if scaled.axis != "closures":
+                    on_threads.setdefault(scaled.work, scaled)
+            rows += [_on_two_threads(scaled) for scaled in on_threads.values()]
+        return [*rows, *_with_guide()]
     finally:
         truepose.threads(threads)
 

@@ -13,7 +13,7 @@ from benchmarks.hexapod import MACHINE
 from benchmarks.rows import Row
 
 ROUNDS = 25
-FEW_ROUNDS = 7
+FEW_ROUNDS = 5
 ASKED_HELP_MS = 15.0
 PLANAR = MACHINE.with_name("planar_two_slider.toml")
 

@@ -71,8 +71,9 @@ def estimate(chosen: Sequence[Benchmark]) -> str:
     page = Page.read(RESULTS, HEAD.splitlines(), COLUMNS)
     known = page.seconds([benchmark.name for benchmark in chosen], version("truepose"))
     unknown = [benchmark.name for benchmark in chosen if benchmark.name not in known]
-    said = f"about {sum(known.values()) / 60.0:.1f} minutes, by the last runs"
-    return said + (f", and {', '.join(unknown)}, of no known duration" if unknown else "")
+    parts = [f"about {sum(known.values()) / 60.0:.1f} minutes, by the last runs"] if known else []
+    parts += [f"{', '.join(unknown)}: of no known duration"] if unknown else []
+    return "; ".join(parts)
 
 
 def show(rows: Sequence[Row]) -> None:

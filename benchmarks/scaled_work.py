@@ -176,7 +176,7 @@ def _against_size(folder: Path, largest: float) -> Iterator[Scaled]:
     yield Scaled(
         "calibration",
         "poses",
-        _sizes((25, 100, 400, 1600), max(largest, 0.2)),
+        _sizes((25, 100, 400, 1600), max(largest, 0.2)),  # enough readings for the unknowns
         lambda size: calibration(few, columns, size),
     )
     yield Scaled(

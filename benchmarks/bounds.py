@@ -2,56 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
+from benchmarks.bounded import BAND, PLANAR, home_bounds
 from benchmarks.bounds_region import bounds_over_region
 from benchmarks.hexapod import Array, geometry_columns, load
 from benchmarks.rows import Row
 from benchmarks.timing import best_seconds
-from truepose.machine import Machine
 from truepose.probability.domain import Domain
 from truepose.runs.quantities import quantities
 from truepose.sources import UNIFORM
 from truepose.uncertainty_analysis.corners import worst_corners
 
-BAND = 1e-4  # m, of every parameter of the hexapod, to either side
 ROUNDS = 7
 REPEATS = {"bounds": 5}
 ASKED_OF_COMPONENTS = 1.1
-PLANAR = {"x": (0.2, 0.4), "y": (0.1, 0.3)}
-"""The planar machine's whole workspace, m."""
 
 
 def measure() -> list[Row]:
     """Bounds of the hexapod at home, then over the planar machine's whole workspace."""
     return _at_home() + bounds_over_region("planar_two_slider", "whole workspace", PLANAR)
-
-
-Bounds = Callable[[], tuple[Any, ...]]
-
-
-def home_bounds(
-    machine: Machine, columns: NDArray[np.int64]
-) -> tuple[tuple[Array, Array], Array, Bounds]:
-    """Joints (1, 6) and placement (1, 7) at home, sensitivities there, and the work itself.
-
-    The work encloses the error of bands of `BAND` on the parameters `columns`.
-    """
-    joints, placements, status = machine.kernel.place(machine.kernel.home[np.newaxis])
-    slopes, regular = machine.kernel.sensitivity_at(joints, placements, columns)
-    if status.any() or regular.any():
-        raise ValueError("home is not a pose to bound the error at")
-    numbers, band = list(range(columns.size)), np.full((1, columns.size), BAND)
-    shift = np.empty(0, np.int64), np.empty((1, 0))
-
-    def bounds() -> tuple[Any, ...]:
-        return machine.kernel.bounds_at(joints, placements, *shift, columns, numbers, band)
-
-    return (joints, placements), slopes, bounds
 
 
 def _at_home() -> list[Row]:

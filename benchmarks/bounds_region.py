@@ -12,11 +12,11 @@ import numpy as np
 import xarray as xr
 
 import truepose
+from benchmarks.bounded import GAP
 from benchmarks.hexapod import MACHINE, Array
 from benchmarks.rows import Row
 from truepose.runs.quantities import quantities
 
-GAP = 0.05
 # A component below this share of its quantity's size is closed to the gap of this share.
 MINOR = 0.1
 ASKED_OF_REGIONS = 1.0 + GAP

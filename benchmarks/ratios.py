@@ -78,7 +78,7 @@ def agreement(work: Work, before: Results, after: Results) -> Agreement:
     for name in (name for name in common if name in no_more):
         ratio = after[name] / before[name]
         said += f"; {name} {ratio.min():.6f} to {ratio.max():.6f} x"
-        kept &= bool((ratio <= no_more[name]).all() and (ratio >= 1.0 - EQUAL).all())
+        kept &= bool((ratio <= no_more[name]).all())
     for names, where in ((before, "before"), (after, "after")):
         if alone := [name for name in names if name not in common]:
             said += f"; only {where}: {', '.join(alone)}"

@@ -55,14 +55,14 @@ class Work:
     memory: bool = False
     """Whether the process's peak memory is compared, too."""
     no_more: Mapping[str, float] | None = None
-    """Results that may be up to so many times those before, and no less: bounds that are proven."""
+    """Results that may be up to so many times those before: bounds, which may be closer, too."""
     incomparable: str = ""
     """Why results are not equal to 1e-12, where they need not be."""
 
 
 def bounds_at_pose(machines: Path, small: bool) -> Task:
     """Proven bounds of the hexapod at home, 0.1 mm on 42 parameters."""
-    from benchmarks.bounds import home_bounds
+    from benchmarks.bounded import home_bounds
     from benchmarks.hexapod import geometry_columns, load
 
     machine = load(machines)
@@ -119,8 +119,7 @@ def budget_of_three(machines: Path, small: bool) -> Task:
 def region(machines: Path, small: bool) -> Task:
     """Bounds over the planar machine's workspace, or over a small part of it."""
     import truepose
-    from benchmarks.bounds import PLANAR
-    from benchmarks.bounds_region import GAP
+    from benchmarks.bounded import GAP, PLANAR
 
     machine = truepose.load(machines / "planar_two_slider.toml")
     over = {"x": (0.29, 0.31), "y": (0.19, 0.21)} if small else PLANAR

@@ -87,9 +87,26 @@ format: tools ## put Python and Rust sources into form
 	$(BIN)/ruff format
 	cargo fmt --all
 
+# What is measured: `make bench ONLY="bounds gcode"` some, replacing their rows only; without it all but
+# what takes minutes. Byte code and the kernel are built before.
+ONLY :=
+
 .PHONY: bench
-bench: package tools ## measure, and write benchmarks/RESULTS.md
-	$(BIN)/python -m benchmarks
+bench: package tools ## measure, and write benchmarks/RESULTS.md; ONLY=name measures one alone
+	$(BIN)/python -m benchmarks $(ONLY)
+
+.PHONY: bench-region
+bench-region: package tools ## measure bounds over the delta's cubes, which takes minutes
+	$(BIN)/python -m benchmarks bounds_region
+
+.PHONY: bench-against
+bench-against: package tools ## build COMMIT=sha beside this one and write the ratios to it, benchmarks/AGAINST.md
+	@test -n "$(COMMIT)" || { echo "say which commit: make bench-against COMMIT=sha" >&2; exit 1; }
+	PYO3_PYTHON=$(abspath $(BIN)/python) $(BIN)/python -m benchmarks.against $(COMMIT) $(ONLY)
+
+.PHONY: bench-peers
+bench-peers: package tools ## install what benchmarks/peers.py compares with, Numba and JAX, into .venv
+	$(BIN)/python -m pip install --quiet --constraint requirements.lock --requirement benchmarks/requirements-peers.txt
 
 .PHONY: docs
 docs: package tools ## write the generated pages of docs/ anew; tests refuse stale ones

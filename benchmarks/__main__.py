@@ -1,4 +1,4 @@
-"""Runs the benchmarks, each in a fresh process on its own cores, and writes RESULTS.md."""
+"""Runs benchmarks, each in a fresh process on its own cores, and writes their rows."""
 
 from __future__ import annotations
 
@@ -6,19 +6,30 @@ import argparse
 import importlib
 import json
 import os
-import platform
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
 from benchmarks import BENCHMARKS
 from benchmarks.rows import Benchmark, Row
+from benchmarks.surroundings import surroundings
+from benchmarks.tables import Page, Section
 
 RESULTS = Path(__file__).with_name("RESULTS.md")
-COLUMNS = ("what", "measured", "asked", "", "times behind it")
+COLUMNS = ("measured", "asked", "", "times behind it")
+HEAD = """\
+# Benchmark results
+
+Written by `make bench`, a section a module of `benchmarks/`, which says what is measured;
+`make bench ONLY=name` measures one alone and replaces its rows only. Ratios of speed are of best
+times of several in one run: processor time on one core; wall time for two threads and for the
+million poses. Both sides were first checked to agree to 1e-12. Of samples and of regions there is
+one run, of a few seconds or more. The ratios to an earlier commit are in
+[AGAINST.md](AGAINST.md)."""
 
 
 def main() -> int:
@@ -26,29 +37,60 @@ def main() -> int:
     names = [benchmark.name for benchmark in BENCHMARKS]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
+    parser.add_argument("--print-only", action="store_true", help="leave RESULTS.md as it is")
     parser.add_argument("--measure", choices=names, help=argparse.SUPPRESS)
-    given = parser.parse_args()
-    if given.measure:
-        print(json.dumps(measured_here(given.measure)))
+    arguments = parser.parse_args()
+    if arguments.measure:
+        print(json.dumps(measured_here(arguments.measure)))
         return 0
-    if unknown := set(given.names) - set(names):
+    if unknown := set(arguments.names) - set(names):
         parser.error(f"no benchmark {', '.join(sorted(unknown))}; there are {', '.join(names)}")
 
-    chosen = [benchmark for benchmark in BENCHMARKS if benchmark.name in (given.names or names)]
-    rows: list[Row] = []
-    instruction_set = ""
+    chosen = [
+        benchmark
+        for benchmark in BENCHMARKS
+        if (benchmark.name in arguments.names if arguments.names else benchmark.usual)
+    ]
+    print(estimate(chosen), flush=True)
+    met = True
     for benchmark in chosen:
+        start = time.perf_counter()
         answer = measured_apart(benchmark)
-        instruction_set = answer["instruction_set"]
-        for row in (Row(**fields) for fields in answer["rows"]):
-            what, figure, asked, verdict, detail = row.cells()
-            note = f"  [{asked}: {verdict.strip('*')}]" if asked else ""
-            print(f"{what}: {figure}{note}\n    {detail}", flush=True)
-            rows.append(row)
-    if not given.names:
-        RESULTS.write_text("\n".join(document(rows, instruction_set)) + "\n", encoding="utf-8")
-        print(f"written to {RESULTS}")
-    return 0 if all(row.met for row in rows) else 1
+        seconds = time.perf_counter() - start
+        rows = [Row(**fields) for fields in answer["rows"]]
+        print(f"{benchmark.name}, {seconds:.0f} s", flush=True)
+        show(rows)
+        met &= all(row.met for row in rows)
+        if rows and not arguments.print_only:
+            record(benchmark.name, rows, seconds, answer["instruction_set"])
+    return 0 if met else 1
+
+
+def estimate(chosen: Sequence[Benchmark]) -> str:
+    """How long it will take, by the times that the last runs took."""
+    page = Page.read(RESULTS, HEAD.splitlines(), COLUMNS)
+    known = page.seconds([benchmark.name for benchmark in chosen], version("truepose"))
+    unknown = [benchmark.name for benchmark in chosen if benchmark.name not in known]
+    parts = [f"about {sum(known.values()) / 60.0:.1f} minutes, by the last runs"] if known else []
+    parts += [f"{', '.join(unknown)}: of no known duration"] if unknown else []
+    return "; ".join(parts)
+
+
+def show(rows: Sequence[Row]) -> None:
+    """Print what was measured."""
+    for row in rows:
+        what, figure, asked, verdict, detail = row.cells()
+        note = f"  [{asked}: {verdict.strip('*')}]" if asked else ""
+        print(f"{what}: {figure}{note}\n    {detail}", flush=True)
+
+
+def record(name: str, rows: Sequence[Row], seconds: float, instruction_set: str) -> None:
+    """Put the rows of one benchmark into RESULTS.md; all others stay as they are."""
+    page = Page.read(RESULTS, HEAD.splitlines(), COLUMNS)
+    section = page.sections.setdefault(name, Section())
+    run = f"{seconds:.0f} s; {surroundings(instruction_set)}"
+    section.replace(version("truepose"), run, [row.cells() for row in rows])
+    RESULTS.write_text(page.text([benchmark.name for benchmark in BENCHMARKS]), encoding="utf-8")
 
 
 def measured_here(name: str) -> dict[str, object]:
@@ -85,37 +127,6 @@ def measured_apart(benchmark: Benchmark) -> dict[str, object]:
     if run.returncode:
         sys.exit(f"benchmark {benchmark.name} failed; see above")
     return json.loads(run.stdout)
-
-
-def document(rows: list[Row], instruction_set: str) -> Iterator[str]:
-    """RESULTS.md, line by line."""
-    yield "# Benchmark results"
-    yield ""
-    yield "Written by `make bench`; the modules of `benchmarks/` say what is measured. Ratios of"
-    yield "speed are of best times of several in one run: processor time on one core; wall time for"
-    yield "two threads and for the million poses. Both sides were first checked to agree to 1e-12."
-    yield "Of samples and of regions there is one run, of a few seconds or more."
-    yield ""
-    yield f"* Processor: {processor()}, {os.cpu_count()} cores"
-    yield f"* Instruction set that the kernel chose: {instruction_set}"
-    yield f"* System: {platform.system()} {platform.machine()}, Python {platform.python_version()}"
-    packages = ", ".join(f"{name} {version(name)}" for name in ("truepose", "numpy", "scipy"))
-    yield f"* Packages: {packages}"
-    yield ""
-    yield f"| {' | '.join(COLUMNS)} |"
-    yield f"|{'---|' * len(COLUMNS)}"
-    for row in rows:
-        yield f"| {' | '.join(row.cells())} |"
-
-
-def processor() -> str:
-    """The processor's name as the system tells it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor() or "unknown"
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else "unknown"
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from truepose.machine import Machine
 from truepose.sources import REGISTRY, acting
 
 COUNT = 100_000
-ASKED = 3.0
+ASKED = 2.0
 PAPER = ("tolerance", "thermal", "elastic")
 REPEATS = 3
 

@@ -13,7 +13,7 @@ from benchmarks.timing import best_seconds, require_agreement
 
 ROUNDS = 25
 REPEATS = {"truepose": 2000, "fsolve": 20}
-ASKED = 100.0
+ASKED = 250.0
 
 
 def rotation(a: float, b: float, c: float) -> Array:

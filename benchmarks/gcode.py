@@ -22,13 +22,16 @@ WARMER, FORCE = 25.0, (300.0, 200.0, -150.0)
 ROOT = Path(__file__).parent.parent
 
 
-def program(machine: truepose.Machine, path: Path) -> None:
-    """Short moves, under 1 mm, on a spiral of many turns within the machine's workspace."""
+def program(machine: truepose.Machine, path: Path, lines: int = LINES) -> None:
+    """Short moves, under 1 mm, on a spiral of many turns within the machine's workspace.
+
+    A shorter program is the beginning of a longer one.
+    """
     box = machine.poses()
     low, high = box.min(axis=0), box.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    angle = np.linspace(0.0, 800.0 * np.pi, LINES)
-    reach = np.linspace(0.2, 0.9, LINES)
+    angle = np.linspace(0.0, 800.0 * np.pi, LINES)[:lines]
+    reach = np.linspace(0.2, 0.9, LINES)[:lines]
     x = 1e3 * (middle[0] + half[0] * reach * np.cos(angle))
     y = 1e3 * (middle[1] + half[1] * reach * np.sin(angle))
     scale = {name: 1e3 if name in "xyz" else np.degrees(1.0) for name in machine.commanded}

@@ -19,9 +19,9 @@ AXES = "xyz"
 SPREAD = 50e-6  # m, standard deviation of every moved parameter
 
 
-def load() -> truepose.Machine:
-    """The hexapod of the machine file."""
-    return truepose.load(MACHINE)
+def load(machines: Path = MACHINE.parent) -> truepose.Machine:
+    """The hexapod of the machine file, of another folder where one is given."""
+    return truepose.load(machines / MACHINE.name)
 
 
 def geometry_columns(machine: truepose.Machine) -> NDArray[np.int64]:
@@ -59,9 +59,9 @@ class Batch:
     deviations: Array  # (n, 42), m
 
     @classmethod
-    def of(cls, count: int) -> Batch:
+    def of(cls, count: int, machines: Path = MACHINE.parent) -> Batch:
         """`count` random poses of the hexapod with random deviations."""
-        machine = load()
+        machine = load(machines)
         columns = geometry_columns(machine)
         joints, placements, status = machine.kernel.place(workspace_poses(machine, count))
         if np.any(status):

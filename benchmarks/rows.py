@@ -11,10 +11,14 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Benchmark:
-    """A module of this package by its name, and how many cores it may use."""
+    """A module of this package by its name, how many cores it may use, and when it runs.
+
+    One that is not `usual` takes minutes: it runs only where it is named.
+    """
 
     name: str
     cores: int = 1
+    usual: bool = True
 
 
 @dataclass(frozen=True)
@@ -23,7 +27,7 @@ class Row:
 
     what: str
     measured: float
-    unit: str  # "x" for a ratio
+    unit: str  # "x" for a ratio, "" for a number
     bound: Literal["at least", "at most"]
     asked: float | None  # None: told for orientation
     detail: str
@@ -39,6 +43,7 @@ class Row:
 
     def cells(self) -> tuple[str, str, str, str, str]:
         """What, measured, asked, met or missed, and the times behind it, as text."""
-        asked = "" if self.asked is None else f"{self.bound} {self.asked:g} {self.unit}"
+        asked = "" if self.asked is None else f"{self.bound} {self.asked:g} {self.unit}".rstrip()
         verdict = "" if self.asked is None else ("met" if self.met else "**missed**")
-        return (self.what, f"{self.measured:.3g} {self.unit}", asked, verdict, self.detail)
+        measured = f"{self.measured:.3g} {self.unit}".rstrip()
+        return (self.what, measured, asked, verdict, self.detail)

@@ -119,7 +119,10 @@ fn shrunk(matrix: &Matrix6<f64>) -> Option<([f64; SIX], f64)> {
 fn sum_above(values: impl Iterator<Item = (f64, f64)>) -> f64 {
     let mut sum = 0.0;
     for (a, b) in values {
-        sum += a * b + f64::MIN_POSITIVE;
+        // A zero stays one; what underflows does not become one.
+        if a != 0.0 && b != 0.0 {
+            sum += a * b + f64::MIN_POSITIVE;
+        }
     }
     sum * SUMMED
 }

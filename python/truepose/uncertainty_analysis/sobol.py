@@ -114,6 +114,7 @@ class Design:
         """As for `indices`."""
         self._drawing, self._samples, self._seed = drawing, samples, seed
         self._swaps, self._first_at, self._total_at = _swaps(drawing, sets)
+        self._arrays: tuple[Floats, Floats, Floats, Floats] | None = None
         alone = [
             at
             for at, swap in enumerate(self._swaps)
@@ -227,8 +228,8 @@ class Design:
         base, other = values[:, 0] - centre, values[:, 1] - centre
         at_base, at_other = part.start @ slopes, part.end @ slopes
         between = part.end - part.start
-        step = values[:, 2:] - values[:, :1]
-        of_linear = np.empty_like(step)
+        step, of_linear, product, rows = self._room(len(base), base.shape[1])
+        np.subtract(values[:, 2:], values[:, :1], out=step)
         if not self._others:
             np.multiply(between[:, self._variable, np.newaxis], slopes[self._variable], of_linear)
         else:
@@ -238,19 +239,29 @@ class Design:
         for at, swap in self._others:
             of_linear[:, at] = between @ swap.moved(slopes)
         count = len(self._swaps)
-        rows = np.empty((len(base), 4 + 2 * count, base.shape[1]))
         rows[:, 0] = 0.5 * (base**2 + other**2)
         rows[:, 1] = 0.5 * (base + other)
         rows[:, 2] = 0.5 * (at_base**2 + at_other**2)
         rows[:, 3] = 0.5 * (at_base + at_other)
         first, total = rows[:, 4 : 4 + count], rows[:, 4 + count :]
         np.multiply(other[:, np.newaxis], step, out=first)
-        first -= at_other[:, np.newaxis] * of_linear
-        np.square(step, out=step)
-        np.square(of_linear, out=of_linear)
-        np.subtract(step, of_linear, out=total)
-        total *= 0.5
+        np.multiply(at_other[:, np.newaxis], of_linear, out=product)
+        first -= product
+        # step^2 - of_linear^2, halved
+        np.subtract(step, of_linear, out=product)
+        step += of_linear
+        step *= 0.5
+        np.multiply(product, step, out=total)
         return rows
+
+    def _room(self, count: int, n_output: int) -> tuple[Floats, Floats, Floats, Floats]:
+        """Three arrays (n, k, m) and the rows (n, 4 + 2 k, m), the same from model to model."""
+        swaps = len(self._swaps)
+        if self._arrays is None or self._arrays[0].shape != (count, swaps, n_output):
+            step, of_linear, product = np.empty((3, count, swaps, n_output))
+            rows = np.empty((count, 4 + 2 * swaps, n_output))
+            self._arrays = step, of_linear, product, rows
+        return self._arrays
 
 
 def estimate(parts: Floats, variance: Floats, defined: Flags, confidence: float) -> Estimate:

@@ -386,7 +386,7 @@ def test_ctrl_c_before_any_sample_passes(monkeypatch: pytest.MonkeyPatch) -> Non
     def pressed(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(f"{monte_carlo.__name__}._MachineSampler.sample", pressed)
+    monkeypatch.setattr(f"{monte_carlo.__name__}._MachineSampler.begin", pressed)
     monkeypatch.setattr(f"{monte_carlo.__name__}._FunctionSampler.sample", pressed)
     machine = load("planar_two_slider")
     with pytest.raises(KeyboardInterrupt):

@@ -87,7 +87,7 @@ def share(request: Request, machine: Machine, **asked: Any) -> xr.Dataset:
     """The shares of the variance over the file's workspace."""
     with progress("shares", first="the worst poses") as report:
         result = truepose.shares(machine, progress=report, **asked)
-    if result.attrs["interrupted"]:
+    if result.attrs.get("interrupted"):
         click.echo(
             f"Interrupted after {counted(result.sizes['pose'], 'pose')}, those of the largest "
             "first-order deviation: the result is of these.",

@@ -53,4 +53,4 @@ def command(samples: int | None, seed: int, **options: Any) -> int:
     _steps.deliver(
         request, Result("shares", machine, result), variance_shares.shares(machine, result)
     )
-    return INTERRUPTED if result.attrs["interrupted"] else 0
+    return INTERRUPTED if result.attrs.get("interrupted") else 0

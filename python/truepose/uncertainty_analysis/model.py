@@ -75,7 +75,7 @@ class Model(Protocol):
         ...
 
 
-class BlockModel:
+class SharedModel:
     """What the models of the poses of one block share."""
 
     def __init__(self, machine: Machine, block: PoseBlock, variables: Variables) -> None:
@@ -143,7 +143,7 @@ def first_order_variances(machine: Machine, variables: Variables, effects: Float
 class MachineModel:
     """The exact error of a machine at one pose of a block, m and rad, base frame."""
 
-    def __init__(self, of_block: BlockModel, pose: int) -> None:
+    def __init__(self, of_block: SharedModel, pose: int) -> None:
         """`pose`: number of the pose in the block."""
         self.of_block, self.pose = of_block, pose
         self.machine, self.block = of_block.machine, of_block.block
@@ -155,6 +155,13 @@ class MachineModel:
         self.dofs = of_block.dofs
         self.outputs: tuple[str, ...] = self.machine.components
         self.output_units = of_block.output_units
+
+    @cached_property
+    def at(self) -> PoseBlock:
+        """The block of this pose alone."""
+        chosen = np.zeros(self.block.indices.size, np.bool_)
+        chosen[self.pose] = True
+        return self.block.select(chosen)
 
     def linear(self) -> LinearModel:
         """Value and slopes where all sources are at their shift."""
@@ -368,13 +375,13 @@ class Models:
         self._progress = progress
         self._run = Run(machine, poses, condition)
 
-    def __iter__(self) -> Iterator[MachineModel]:
+    def __iter__(self) -> Iterator[tuple[int, MachineModel]]:
         """The worst pose of a block first, so that what is stopped early holds the worst."""
         total, done = len(self._run.poses), 0
         for block, variables in self._run.with_variables():
-            of_block = BlockModel(self.machine, block, variables)
+            of_block = SharedModel(self.machine, block, variables)
             for pose in of_block.worst_first.tolist():
-                yield MachineModel(of_block, pose)
+                yield int(block.indices[pose]), MachineModel(of_block, pose)
                 done += 1
                 if self._progress is not None:
                     self._progress(done, total)
@@ -383,9 +390,7 @@ class Models:
 
     def leave_out(self, model: MachineModel, status: int) -> None:
         """Set a pose aside for a reason that turned out, a kernel code or a number of `REASONS`."""
-        self._run.left_out.add(
-            model.block.indices[model.pose : model.pose + 1], np.array([status], np.uint8)
-        )
+        self._run.left_out.add(model.at.indices, np.array([status], np.uint8))
 
     def begin(self, schema: Schema, **others: int) -> None:
         """Make room for a result over all poses; `others`: lengths of dims that no machine has."""
@@ -408,7 +413,7 @@ def models(
     condition: Condition | None = None,
     progress: Progress | None = None,
 ) -> Models:
-    """The model of one pose after the other, the worst of a block first; see `Models`."""
+    """(number in the poses asked for, model), the worst of a block first; see `Models`."""
     return Models(machine, poses, condition, progress)
 
 

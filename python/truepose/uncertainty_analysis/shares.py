@@ -245,11 +245,13 @@ class _Variables:
         )
 
     @cached_property
-    def design(self) -> sobol.Design:
+    def design(self) -> sobol.SobolDesign:
         """Points of the Sobol indices: of each cause, then of each source."""
         causes = self.drawing.by_itself
         together = [np.concatenate([causes[at] for at in of]) for of in self.sets.values()]
-        return sobol.Design(self.drawing, [*causes, *together], self.plan.samples, self.plan.seed)
+        return sobol.SobolDesign(
+            self.drawing, [*causes, *together], self.plan.samples, self.plan.seed
+        )
 
     @cached_property
     def walks(self) -> shapley.Walks:
@@ -331,7 +333,7 @@ def _of_machine(run: Models, plan: _Plan) -> xr.Dataset:
     blocks: list[_Block] = []
     interrupted, lost = 0, False
     try:
-        for model in run:
+        for _, model in run:
             if not blocks or blocks[-1].block is not model.block:
                 blocks.append(_Block(model.block, _Variables.of(model, plan), {}))
             at = blocks[-1]

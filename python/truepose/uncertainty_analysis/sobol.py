@@ -99,11 +99,11 @@ def indices(
     that is no more than rounding. Evaluates samples * (2 + number of sets) points, more where
     variables are correlated.
     """
-    design = Design(drawing, sets, samples, seed)
+    design = SobolDesign(drawing, sets, samples, seed)
     return design.indices(evaluate, effects, confidence=confidence, floor=floor)
 
 
-class Design:
+class SobolDesign:
     """The points at which `indices` evaluates a model: the same for every model of the variables.
 
     Where they are few enough to be evaluated together, they are made once, as are the numbers by

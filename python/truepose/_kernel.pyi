@@ -22,6 +22,7 @@ __all__ = [
     "Identification",
     "KernelError",
     "Machine",
+    "Points",
     "Study",
     "Tallies",
     "Variables",
@@ -421,6 +422,12 @@ class Variables:
         """(count, n_variable) the samples from number `first` on."""
 
 @final
+class Points:
+    """Values (count, n_variable) of the variables at points that poses share."""
+
+    def __new__(cls, values: ArrayLike, variables: int) -> Points: ...
+
+@final
 class Tallies:
     """What is kept of samples at n poses, in constant memory.
 
@@ -435,6 +442,11 @@ class Tallies:
         """The same without samples."""
     def add(self, values: ArrayLike) -> None:
         """Add samples (count, columns) to the first pose."""
+    def append_lengths(self, positions: ArrayLike, whitening: ArrayLike, width: float) -> None:
+        """Append a column: lengths of `positions` (n, count, 3), NaN without a result.
+
+        `whitening` (n, 12) as of a `Study`; `width`: of a bin at least.
+        """
     def fail(self, count: int) -> None:
         """Count samples of the first pose that have no result."""
     def merge(self, other: Tallies) -> None:
@@ -493,6 +505,16 @@ class Study:
         """Evaluate samples into tallies of the components, the magnitudes and the length."""
     def sample_given(self, variables: Variables, values: ArrayLike, tallies: Tallies) -> None:
         """Evaluate samples of given variables (count, n_variable)."""
+    def sample_keeping(
+        self, variables: Variables, seed: int, first: int, count: int, tallies: Tallies
+    ) -> _Floats:
+        """As `sample`; (n, count, 3) position errors, NaN of a sample without a result."""
+    def sample_given_keeping(
+        self, variables: Variables, values: ArrayLike, tallies: Tallies
+    ) -> _Floats:
+        """As `sample_given`; (n, count, 3) position errors, NaN of a sample without a result."""
+    def errors(self, pose: int, points: Points) -> tuple[_Floats, int]:
+        """(n_point, n_component) exact errors at a pose, NaN without a result; how many."""
 
 def elements() -> dict[str, list[dict[str, Any]]]:
     """Every element by family (`drive`, `strut`), for models, schema, docs and pictures.

@@ -105,6 +105,7 @@ fn _kernel(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<identification::Identification>()?;
     module.add_class::<sampling::Variables>()?;
     module.add_class::<sampling::Tallies>()?;
+    module.add_class::<sampling::Points>()?;
     module.add_class::<sampling::Study>()?;
     module.add_function(wrap_pyfunction!(threads, module)?)?;
     module.add_function(wrap_pyfunction!(instruction_set, module)?)?;

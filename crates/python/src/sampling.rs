@@ -87,6 +87,29 @@ impl Variables {
     }
 }
 
+/// Values (count, n_variable) of the variables at points that poses share.
+#[pyclass(frozen, module = "truepose._kernel")]
+pub struct Points {
+    inner: sampling::Points,
+}
+
+#[pymethods]
+impl Points {
+    #[new]
+    fn new(values: &Bound<'_, PyAny>, variables: usize) -> PyResult<Self> {
+        let values = Input::new(values, &[variables], "values")?;
+        Ok(Points { inner: sampling::Points::new(values.data(), variables) })
+    }
+}
+
+/// Centre (3) and matrix (3 x 3) of a row.
+fn whitening_of(row: &[f64]) -> Whitening {
+    Whitening {
+        centre: [row[0], row[1], row[2]],
+        matrix: [0, 1, 2].map(|k| [0, 1, 2].map(|j| row[3 + 3 * k + j])),
+    }
+}
+
 /// What is kept of the samples at some poses: columns, the first of which have a covariance.
 #[pyclass(module = "truepose._kernel")]
 pub struct Tallies {
@@ -142,6 +165,40 @@ impl Tallies {
         let width = values.width;
         let Some(tally) = self.inner.first_mut() else { return Ok(()) };
         py.detach(|| rows.chunks(width).for_each(|row| tally.add(row)));
+        Ok(())
+    }
+
+    /// Appends a column to every pose: the length of its `positions` (n_pose, count, 3), NaN without a
+    /// result, taken as `whitening` (n_pose, 12) says; in bins of the order of `width`.
+    fn append_lengths(
+        &mut self,
+        py: Python<'_>,
+        positions: &Bound<'_, PyAny>,
+        whitening: &Bound<'_, PyAny>,
+        width: f64,
+    ) -> PyResult<()> {
+        let positions = Input::new(positions, &[3], "positions")?;
+        let whitening = Input::new(whitening, &[12], "whitening")?;
+        let poses = self.inner.len();
+        if whitening.count != poses
+            || poses == 0
+            || !positions.count.is_multiple_of(poses)
+            || !(width > 0.0 && width.is_finite())
+        {
+            return Err(PyValueError::new_err("positions, whitening and poses do not fit"));
+        }
+        let (rows, each) = (positions.data(), 3 * (positions.count / poses));
+        let whitening = whitening.data();
+        py.detach(|| {
+            for (i, tally) in self.inner.iter_mut().enumerate() {
+                let whitening = whitening_of(&whitening[12 * i..12 * i + 12]);
+                let lengths = rows[each * i..each * (i + 1)]
+                    .chunks(3)
+                    .filter(|row| !row[0].is_nan())
+                    .map(|row| whitening.length([row[0], row[1], row[2]]));
+                tally.append(0.0, width, lengths);
+            }
+        });
         Ok(())
     }
 
@@ -268,13 +325,7 @@ impl Study {
                 }
                 let swing = swings.row(i).to_vec();
                 let nominal = Pose::from_row(samples.poses.row(i));
-                let whitening = given.map(|rows| {
-                    let row = &rows[12 * i..12 * i + 12];
-                    Whitening {
-                        centre: [row[0], row[1], row[2]],
-                        matrix: [0, 1, 2].map(|k| [0, 1, 2].map(|j| row[3 + 3 * k + j])),
-                    }
-                });
+                let whitening = given.map(|rows| whitening_of(&rows[12 * i..12 * i + 12]));
                 StudyPose::new(machine, samples.joints.row(i), &nominal, centre, swing, whitening)
             };
             (0..count).map(pose).collect()
@@ -316,6 +367,62 @@ impl Study {
         let study = self.study(&variables.inner, seed, None);
         py.detach(|| sampling::sample(&study, first, count, &mut tallies.inner));
         Ok(())
+    }
+
+    /// As `sample`; returns the position errors (n, count, 3), NaN of a sample without a result.
+    fn sample_keeping<'py>(
+        &self,
+        py: Python<'py>,
+        variables: &Variables,
+        seed: u64,
+        first: u64,
+        count: usize,
+        tallies: &mut Tallies,
+    ) -> PyResult<Array<'py>> {
+        self.check(tallies, variables.inner.count())?;
+        let study = self.study(&variables.inner, seed, None);
+        let kept = py.detach(|| sampling::sample_keeping(&study, first, count, &mut tallies.inner));
+        filled(py, &[self.poses.len(), count], &[3], &kept)
+    }
+
+    /// As `sample_given`; returns the position errors (n, count, 3), NaN of a sample without a result.
+    fn sample_given_keeping<'py>(
+        &self,
+        py: Python<'py>,
+        variables: &Variables,
+        values: &Bound<'_, PyAny>,
+        tallies: &mut Tallies,
+    ) -> PyResult<Array<'py>> {
+        self.check(tallies, variables.inner.count())?;
+        let values = Input::new(values, &[variables.inner.count()], "values")?;
+        let (count, rows) = (values.count, values.data());
+        let study = self.study(&variables.inner, 0, Some(rows));
+        let kept = py.detach(|| sampling::sample_keeping(&study, 0, count, &mut tallies.inner));
+        filled(py, &[self.poses.len(), count], &[3], &kept)
+    }
+
+    /// Exact errors (n_point, n_component) at the pose numbered `pose`, NaN without a result; how many
+    /// points have none.
+    fn errors<'py>(
+        &self,
+        py: Python<'py>,
+        pose: usize,
+        points: &Points,
+    ) -> PyResult<(Array<'py>, usize)> {
+        let Some(at) = self.poses.get(pose) else {
+            return Err(PyValueError::new_err("there is no such pose"));
+        };
+        let points = &points.inner;
+        if self.columns.variables() > points.variables() {
+            return Err(PyValueError::new_err("a variable is needed for every column"));
+        }
+        let out = output(py, &[points.count()], &[indices_of(&self.machine.dof).len()])?;
+        let failed = {
+            let mut writable = out.readwrite();
+            let numbers = writable.as_slice_mut()?;
+            py.detach(|| sampling::errors(&self.machine, &self.columns, at, points, numbers))
+        };
+        Ok((out, failed))
     }
 
     /// Evaluates samples of given variables (count, n_variable) at every pose into `tallies`.

@@ -16,11 +16,14 @@ LARGE = ((1e9, "G"), (1e6, "M"), (1e3, "k"))
 
 
 @contextmanager
-def progress(what: str, unit: str = "poses") -> Iterator[Callable[[int, int], None] | None]:
+def progress(
+    what: str, unit: str = "poses", *, first: str = ""
+) -> Iterator[Callable[[int, int], None] | None]:
     """A function (done, total) that draws a bar, or None where stderr is no terminal.
 
     Beside the bar stand how many of what `unit`, the rate so far and the time left at that rate.
-    A `total` below one is one that is not known yet.
+    A `total` below one is one that is not known yet. Before it comes a line that stays: how long
+    all takes, where that is known, and what is done `first`, where that is said.
     """
     if not sys.stderr.isatty():
         yield None
@@ -42,6 +45,8 @@ def progress(what: str, unit: str = "poses") -> Iterator[Callable[[int, int], No
         seconds = time.monotonic() - begun
         if not bar.live.is_started and seconds > PATIENCE and (done < total or total < 1):
             bar.start()
+            if first:
+                bar.console.print(estimate(what, done, total, unit, seconds, first), markup=False)
         known = total if total >= 1 else None
         bar.update(task, completed=done, total=known, state=state(done, known, unit, seconds))
 
@@ -78,6 +83,17 @@ def waiting(what: str) -> Iterator[None]:
         timer.cancel()
         timer.join()
         bar.stop()
+
+
+def estimate(what: str, done: int, total: int, unit: str, seconds: float, first: str) -> str:
+    """How long it takes: "shares: about 1:20 for 675 poses, the worst first; Ctrl-C ...".
+
+    After `done` of `total`, if that is known, in `seconds`.
+    """
+    known = ""
+    if done >= 1 and total >= 1:
+        known = f"about {_clock(seconds / done * total)} for {_short(total)} {unit}, "
+    return f"{what}: {known}{first} first; Ctrl-C gives what is done by then"
 
 
 def state(done: int, total: int | None, unit: str, seconds: float) -> str:

@@ -50,7 +50,7 @@ SYNTAX = "x=200:400,y=100:300"
 
 def sample(request: Request, machine: Machine, **asked: Any) -> xr.Dataset:
     """The error sampled over the file's workspace; after Ctrl-C, what there is by then."""
-    with progress("Monte Carlo", "samples") as report:
+    with progress("Monte Carlo", "samples", first="the worst poses") as report:
         result = truepose.monte_carlo(machine, progress=report, **asked)
     if result.attrs["interrupted"]:
         count = int(result["samples"].sum())
@@ -85,8 +85,14 @@ def bound(
 
 def share(request: Request, machine: Machine, **asked: Any) -> xr.Dataset:
     """The shares of the variance over the file's workspace."""
-    with progress("shares") as report:
+    with progress("shares", first="the worst poses") as report:
         result = truepose.shares(machine, progress=report, **asked)
+    if result.attrs.get("interrupted"):
+        click.echo(
+            f"Interrupted after {counted(result.sizes['pose'], 'pose')}, those of the largest "
+            "first-order deviation: the result is of these.",
+            err=True,
+        )
     _steps.refuse_left_out_of(request, machine, result)
     return result
 

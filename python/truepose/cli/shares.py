@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from truepose.cli._ending import INTERRUPTED
 from truepose.cli._options import (
     Request,
     WholeNumber,
@@ -39,7 +40,8 @@ def command(samples: int | None, seed: int, **options: Any) -> int:
 
     First-order and total Sobol indices of every parameter and source that is not known exactly,
     with their confidence, the linear shares beside them, and Shapley shares where parameters are
-    correlated. The first row is the dimension to tighten first.
+    correlated. The first row is the dimension to tighten first. The worst poses come first; Ctrl-C
+    gives those done by then (exit code 130).
     """
     from truepose.cli import _steps, _uncertainty
     from truepose.reporting import variance_shares
@@ -51,4 +53,4 @@ def command(samples: int | None, seed: int, **options: Any) -> int:
     _steps.deliver(
         request, Result("shares", machine, result), variance_shares.shares(machine, result)
     )
-    return 0
+    return INTERRUPTED if result.attrs.get("interrupted") else 0

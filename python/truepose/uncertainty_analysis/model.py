@@ -16,16 +16,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from truepose._kernel import Points, Study
 from truepose.arrays import Flags, Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs.dataset import Schema, component_units
-from truepose.runs.displacement import displacement
 from truepose.runs.first_order import first_order
-from truepose.runs.poses import (
-    OK,
-    Progress,
-)
+from truepose.runs.poses import Progress
+from truepose.runs.quantities import quantities
 from truepose.runs.run import Run
 from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
@@ -33,8 +31,8 @@ from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.functions import derivatives
 from truepose.uncertainty_analysis.functions.inputs import Correlation, Input, correlation_matrix
 
-PART = 8192
-"""Samples that go to the kernel at once."""
+KEPT = 4
+"""Sets of points that the poses of a block share, kept at a time."""
 
 VALUE = "value"
 """Output of a function that returns one array."""
@@ -77,22 +75,86 @@ class Model(Protocol):
         ...
 
 
+class SharedModel:
+    """What the models of the poses of one block share."""
+
+    def __init__(self, machine: Machine, block: PoseBlock, variables: Variables) -> None:
+        self.machine, self.block, self.variables = machine, block, variables
+        self.dofs: Floats = np.array(
+            [distribution.degrees for distribution in variables.distributions], np.float64
+        )
+        self.output_units = tuple(component_units(machine))
+        self._kept: list[tuple[Floats, Points]] = []
+
+    @cached_property
+    def linear(self) -> tuple[Floats, Floats]:
+        """Value (n, m) and effects (n, m, n_variable) at every pose."""
+        value, effects, _ = first_order(self.machine, self.block, self.variables)
+        return value, effects
+
+    @cached_property
+    def study(self) -> Study:
+        """The kernel's, of every pose."""
+        shifted, shift = self.variables.shift
+        return Study(
+            self.machine.kernel,
+            self.block.joints,
+            self.block.placements,
+            shifted,
+            np.ascontiguousarray(shift),
+            self.variables.columns,
+            self.variables.variable_of.tolist(),
+            np.ascontiguousarray(self.variables.half_width),
+        )
+
+    def points(self, t: Floats) -> Points:
+        """Those for the kernel; of an array that cannot be written, made once for all poses."""
+        for given, points in self._kept:
+            if given is t:
+                return points
+        points = Points(np.ascontiguousarray(t, np.float64), len(self.variables.names))
+        if isinstance(t, np.ndarray) and not t.flags.writeable:
+            self._kept = [*self._kept[1 - KEPT :], (t, points)]
+        return points
+
+    @cached_property
+    def worst_first(self) -> Indices:
+        """(n,) numbers of the poses, the largest first-order variance first."""
+        variances = first_order_variances(self.machine, self.variables, self.linear[1])
+        return np.argsort(-variances, kind="stable")
+
+
+def first_order_variances(machine: Machine, variables: Variables, effects: Floats) -> Floats:
+    """(n,) variance of the tool's position, or of its rotation where it only turns; m^2 or rad^2.
+
+    From effects (n, m, n_variable); 0 where that is no number.
+    """
+    sigmas = np.array([distribution.sigmas for distribution in variables.distributions])
+    if not sigmas.size:
+        return np.zeros(len(effects))
+    chosen = next(iter(quantities(machine.components).values()))
+    deviations = effects[:, chosen] / sigmas
+    correlation = variables.correlation
+    others = deviations if correlation is None else deviations @ correlation
+    variances: Floats = np.nan_to_num((deviations * others).sum(axis=(1, 2)))
+    return variances
+
+
 class MachineModel:
     """The exact error of a machine at one pose of a block, m and rad, base frame."""
 
-    def __init__(self, machine: Machine, block: PoseBlock, variables: Variables, pose: int) -> None:
-        """`variables` of the whole block; `pose`: number of the pose in it."""
-        self.machine, self.block, self.pose = machine, block, pose
-        self.variables = variables.at(pose)
+    def __init__(self, of_block: SharedModel, pose: int) -> None:
+        """`pose`: number of the pose in the block."""
+        self.of_block, self.pose = of_block, pose
+        self.machine, self.block = of_block.machine, of_block.block
+        variables = of_block.variables
         self.names, self.sources = variables.names, variables.sources
         self.distributions, self.correlation = variables.distributions, variables.correlation
         self.streams, self.numbers = variables.streams, variables.numbers
         self.directions = variables.directions
-        self.dofs: Floats = np.array(
-            [distribution.degrees for distribution in variables.distributions], np.float64
-        )
-        self.outputs: tuple[str, ...] = machine.components
-        self.output_units = tuple(component_units(machine))
+        self.dofs = of_block.dofs
+        self.outputs: tuple[str, ...] = self.machine.components
+        self.output_units = of_block.output_units
 
     @cached_property
     def at(self) -> PoseBlock:
@@ -101,35 +163,19 @@ class MachineModel:
         chosen[self.pose] = True
         return self.block.select(chosen)
 
-    @property
-    def joints(self) -> Floats:
-        """(1, n_joint) commanded joint coordinates, m or rad."""
-        return self.block.joints[self.pose : self.pose + 1]
-
-    @property
-    def placement(self) -> Floats:
-        """(1, 7) tool point and unit quaternion commanded, base frame."""
-        return self.block.placements[self.pose : self.pose + 1]
-
     def linear(self) -> LinearModel:
         """Value and slopes where all sources are at their shift."""
-        only = slice(self.pose, self.pose + 1)
-        value, effects, _ = first_order(self.machine, self.block, self.variables, only)
-        return LinearModel(value[0], effects[0])
+        value, effects = self.of_block.linear
+        return LinearModel(value[self.pose], effects[self.pose])
 
     def evaluate(self, t: Floats) -> tuple[Floats, Flags]:
-        """Errors (s, m), exact; not ok where the moved machine cannot be placed."""
-        values = np.empty((len(t), len(self.outputs)))
-        fine = np.empty(len(t), np.bool_)
-        for start in range(0, len(t), PART):
-            part = slice(start, start + PART)
-            moved = self.variables.parameters_moved(t[part])
-            count = len(moved[1])
-            joints = np.repeat(self.joints, count, axis=0)
-            placements = np.repeat(self.placement, count, axis=0)
-            values[part], status = displacement(self.machine, joints, placements, moved)
-            fine[part] = status == OK
-        return values, fine
+        """Errors (s, m), exact; not ok, and NaN, where the moved machine cannot be placed."""
+        points = self.of_block.points(t)
+        values, failed = self.of_block.study.errors(self.pose, points)
+        good: Flags = np.ones(len(values), np.bool_)
+        if failed:
+            good = np.asarray(np.isfinite(values).all(axis=1))
+        return values, good
 
 
 class FunctionModel:
@@ -330,12 +376,15 @@ class Models:
         self._run = Run(machine, poses, condition)
 
     def __iter__(self) -> Iterator[tuple[int, MachineModel]]:
-        total = len(self._run.poses)
+        """The worst pose of a block first, so that what is stopped early holds the worst."""
+        total, done = len(self._run.poses), 0
         for block, variables in self._run.with_variables():
-            for pose, number in enumerate(block.indices.tolist()):
-                yield number, MachineModel(self.machine, block, variables, pose)
+            of_block = SharedModel(self.machine, block, variables)
+            for pose in of_block.worst_first.tolist():
+                yield int(block.indices[pose]), MachineModel(of_block, pose)
+                done += 1
                 if self._progress is not None:
-                    self._progress(number + 1, total)
+                    self._progress(done, total)
         if self._progress is not None:
             self._progress(total, total)
 
@@ -347,11 +396,11 @@ class Models:
         """Make room for a result over all poses; `others`: lengths of dims that no machine has."""
         self._run.begin(schema, **others)
 
-    def fill(self, model: MachineModel, values: Mapping[str, ArrayLike]) -> None:
-        """One pose of the result, `values` without their dim pose."""
-        self._run.fill(
-            model.at, {name: np.asarray(value)[np.newaxis] for name, value in values.items()}
-        )
+    def fill(self, block: PoseBlock, poses: Indices, values: Mapping[str, np.ndarray]) -> None:
+        """The `poses` (n,), ascending, of a block of the result, with `values` (n, ...)."""
+        chosen = np.zeros(block.indices.size, np.bool_)
+        chosen[poses] = True
+        self._run.fill(block.select(chosen), values)
 
     def dataset(self, coords: Mapping[str, xr.Variable]) -> xr.Dataset:
         """The Dataset of the poses filled. Raises `RequestError` (no-pose-left) if none was."""
@@ -364,7 +413,7 @@ def models(
     condition: Condition | None = None,
     progress: Progress | None = None,
 ) -> Models:
-    """(number of the pose in those asked for, its model), pose by pose; see `Models`."""
+    """(number in the poses asked for, model), the worst of a block first; see `Models`."""
     return Models(machine, poses, condition, progress)
 
 

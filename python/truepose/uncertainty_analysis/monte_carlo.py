@@ -51,9 +51,9 @@ from truepose.uncertainty_analysis.arguments import (
 )
 from truepose.uncertainty_analysis.failed_samples import OfAll, lost_text
 from truepose.uncertainty_analysis.functions.dataset import function_dataset
-from truepose.uncertainty_analysis.model import FunctionModel
+from truepose.uncertainty_analysis.model import FunctionModel, first_order_variances
 from truepose.uncertainty_analysis.sampler import Draws, Random, Sampler, sobol
-from truepose.uncertainty_analysis.stopping_rule import Adaptive, FixedNumber, StoppingRule
+from truepose.uncertainty_analysis.stopping_rule import BATCH, Adaptive, FixedNumber, StoppingRule
 
 if TYPE_CHECKING:
     from truepose.uncertainty_analysis.functions.inputs import Correlation, Input
@@ -265,16 +265,20 @@ def _of_machine(
     interrupted = False
     for block, every in run.with_variables():
         draws = asked.draws(every)
-        for part, variables in in_parts(block, every, POSES):
-            sampler = _MachineSampler(machine, part, variables)
+        found: dict[int, tuple[dict[str, np.ndarray], np.ndarray]] = {}
+        listed = list(in_parts(block, every, POSES))
+        # The part with the worst pose first: what is stopped early holds it.
+        for number in _worst_first(machine, block, every):
+            sampler = _MachineSampler(machine, *listed[number])
             drawn = sampler.run(draws, asked.stop, account.add)
             interrupted = drawn.interrupted
             if drawn.tallies is not None:
                 values = sampler.values(drawn.tallies, asked.probability)
-                sampled = reason_unless(np.asarray(drawn.tallies.count) > 1, BAND)
-                run.fill(part, values, sampled)
+                found[number] = values, reason_unless(np.asarray(drawn.tallies.count) > 1, BAND)
             if interrupted:
                 break
+        for number in sorted(found):
+            run.fill(listed[number][0], *found[number])
         if interrupted:
             break
     if interrupted and rows.count == 0:
@@ -293,6 +297,15 @@ def _of_machine(
     return dataset.assign_attrs(
         not_assembled=lost_text(dataset["failed"], dataset["samples"] + dataset["failed"])
     )
+
+
+def _worst_first(machine: Machine, block: PoseBlock, variables: Variables) -> list[int]:
+    """Numbers of the parts of a block, the one with the largest first-order variance first."""
+    _, effects, _ = first_order(machine, block, variables)
+    starts = np.arange(0, block.indices.size, POSES)
+    variances = first_order_variances(machine, variables, effects)
+    order: list[int] = np.argsort(-np.maximum.reduceat(variances, starts), kind="stable").tolist()
+    return order
 
 
 class _MachineSampler(Sampler):
@@ -338,23 +351,31 @@ class _MachineSampler(Sampler):
         widths: Floats = np.maximum(every, 1e-15) / FINENESS
         return widths
 
-    def tallies(self) -> Tallies:
-        """New ones, without the ellipse."""
-        origins, widths = self._unwhitened
-        return Tallies(origins, widths, origins.shape[1], len(self.machine.components))
+    def begin(self, draws: Draws, count: int) -> Tallies:
+        """The first samples; the covariance of the first batch is the shape of the ellipse.
 
-    def begin(self, pilot: Tallies) -> Tallies:
-        """Tallies with the ellipse, whose shape is the covariance of the pilot."""
+        Its position errors are kept until that is known: the batch is not drawn again.
+        """
         origins, widths = self._unwhitened
-        if self._axes:
-            covariance = np.asarray(pilot.covariance)[:, self._axes][:, :, self._axes]
-            self._centre = np.asarray(pilot.mean)[:, self._axes]
-            self._shape = np.nan_to_num(covariance)
-            self._study = self._studied(_whitening(self.machine, self._centre, self._shape))
-            more = np.ones((self.n_pose, 1))
-            origins = np.concatenate([origins, 0.0 * more], axis=1)
-            widths = np.concatenate([widths, more / FINENESS], axis=1)
-        return Tallies(origins, widths, origins.shape[1], len(self.machine.components))
+        tallies = Tallies(origins, widths, origins.shape[1], len(self.machine.components))
+        if not self._axes:
+            self.sample(draws, 0, count, tallies)
+            return tallies
+        pilot = min(count, BATCH)
+        given = draws.given(0, pilot)
+        if given is None:
+            positions = self._study.sample_keeping(draws.variables, draws.seed, 0, pilot, tallies)
+        else:
+            positions = self._study.sample_given_keeping(draws.variables, given, tallies)
+        covariance = np.asarray(tallies.covariance)[:, self._axes][:, :, self._axes]
+        self._centre = np.asarray(tallies.mean)[:, self._axes]
+        self._shape = np.nan_to_num(covariance)
+        whitening = _whitening(self.machine, self._centre, self._shape)
+        tallies.append_lengths(positions, whitening, 1.0 / FINENESS)
+        self._study = self._studied(whitening)
+        if count > pilot:
+            self.sample(draws, pilot, count - pilot, tallies)
+        return tallies
 
     def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
         """Evaluates the samples from number `first` on."""
@@ -443,11 +464,6 @@ class _FunctionSampler(Sampler):
         self._origins, self._widths = np.zeros((1, m)), np.ones((1, m))
         self.failed = 0
 
-    def tallies(self) -> Tallies:
-        """New ones."""
-        m = self._origins.shape[1]
-        return Tallies(self._origins, self._widths, m, m)
-
     def prepare(self, draws: Draws) -> None:
         """Origins and widths from some first samples."""
         values, fine = self.model.evaluate(draws.rows(0, 1000))
@@ -459,9 +475,12 @@ class _FunctionSampler(Sampler):
         self._origins = middle[np.newaxis]
         self._widths = np.maximum(variables_at, tiny)[np.newaxis] / FINENESS
 
-    def begin(self, pilot: Tallies) -> Tallies:
-        """The same once more: nothing is learnt from the pilot."""
-        return pilot.blank()
+    def begin(self, draws: Draws, count: int) -> Tallies:
+        """The first samples: nothing is learnt from them."""
+        m = self._origins.shape[1]
+        tallies = Tallies(self._origins, self._widths, m, m)
+        self.sample(draws, 0, count, tallies)
+        return tallies
 
     def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
         """Evaluates the samples from number `first` on."""

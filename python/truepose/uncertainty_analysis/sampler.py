@@ -15,7 +15,7 @@ from truepose.probability.copula import Copula
 from truepose.probability.domain import unit
 from truepose.probability.quantiles import normal_quantile
 from truepose.sources.deviation import Distribution
-from truepose.uncertainty_analysis.stopping_rule import BATCH, Adaptive, StoppingRule
+from truepose.uncertainty_analysis.stopping_rule import Adaptive, StoppingRule
 
 if TYPE_CHECKING:
     from truepose._kernel import Tallies
@@ -194,12 +194,8 @@ class Sampler(ABC):
     n_pose: int
 
     @abstractmethod
-    def tallies(self) -> Tallies:
-        """New ones for a pilot."""
-
-    @abstractmethod
-    def begin(self, pilot: Tallies) -> Tallies:
-        """New ones, with what was learnt from the pilot."""
+    def begin(self, draws: Draws, count: int) -> Tallies:
+        """The first `count` samples, and what is learnt from the first of them for all others."""
 
     @abstractmethod
     def sample(self, draws: Draws, first: int, count: int, into: Tallies) -> None:
@@ -213,16 +209,16 @@ class Sampler(ABC):
     def run(
         self, draws: Draws, enough: StoppingRule, account: Callable[[int], None]
     ) -> DrawnSamples:
-        """Draws until there are enough; the first batch, drawn again, is the pilot."""
+        """Draws until there are enough."""
         whole: Tallies | None = None
         done = 0
         try:
-            pilot = self.tallies()
-            first = enough.next(0, self.n_pose)
-            self.sample(draws, 0, min(first, BATCH), pilot)
             while count := enough.next(done, self.n_pose):
-                batch = self.begin(pilot) if whole is None else whole.blank()
-                self.sample(draws, done, count, batch)
+                if whole is None:
+                    batch = self.begin(draws, count)
+                else:
+                    batch = whole.blank()
+                    self.sample(draws, done, count, batch)
                 if isinstance(enough, Adaptive):
                     enough.update(batch, self.checked)
                 if whole is None:

@@ -23,12 +23,13 @@ as a control variate as for Sobol indices.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from truepose.arrays import Flags, Floats, Indices
+from truepose.arrays import Floats, Indices
 from truepose.uncertainty_analysis.random_points import Drawing, generator
 from truepose.uncertainty_analysis.sobol import (
     LEAST,
@@ -49,6 +50,10 @@ SUBSETS = 12
 
 ORDERS = 1 << 12
 """Orders drawn for a linear function of more correlated variables than `SUBSETS`."""
+
+
+KEPT = 6 << 20
+"""Numbers that the factors of orders take at most, where they are kept."""
 
 
 @dataclass(frozen=True)
@@ -79,23 +84,90 @@ def shares(
     `slopes` (n_variable, m): a linear function of the coordinates close to the outputs. `floor`
     (m,): standard deviation that is no more than rounding; the shares of an output below are NaN.
     """
-    causes = drawing.by_itself
-    sums = Sums(seed, slopes.shape[1])
-    failed = points = 0
-    for order, values, linear, good in _walks(evaluate, drawing, slopes, samples, seed):
-        points += good.size * (1 + len(causes))
-        failed += int(good.size - good.sum())
-        taken = _taken(values) - _taken(linear)
-        by_cause = np.empty_like(taken)
-        np.put_along_axis(by_cause, order[:, :, np.newaxis], taken, axis=1)
-        sums.add(by_cause[good])
-    linear_parts = linear_shares(drawing, slopes, seed)
-    # The components of a direction are not correlated, so that their linear parts add up.
-    shares = sums.means() + np.stack([linear_parts[members].sum(axis=0) for members in causes])
-    # Of its own sum, so that the shares add up to one.
-    variance = shares.sum(axis=1)
-    defined = (np.sqrt(np.maximum(variance[0], 0.0)) > floor) & (sums.count >= LEAST)
-    return ShapleyShares(estimate(shares, variance, defined, confidence), failed, points)
+    return Walks(drawing, samples, seed).shares(
+        evaluate, slopes, confidence=confidence, floor=floor
+    )
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Some walks: orders (n, d); on the way `coordinates` and `variables` (n (d + 1), n_variable).
+
+    Of d causes, which become known one after the other; all walks' starts stand first.
+    """
+
+    order: Indices
+    coordinates: Floats
+    variables: Floats
+
+
+class Walks:
+    """The walks of `shares`: the same for every model of the variables.
+
+    Where their points are few enough to be evaluated together, they are made once.
+    """
+
+    def __init__(self, drawing: Drawing, samples: int, seed: int) -> None:
+        """As for `shares`."""
+        self._drawing, self._samples, self._seed = drawing, samples, seed
+        self._causes = drawing.by_itself
+
+    def shares(
+        self, evaluate: Evaluate, slopes: Floats, *, confidence: float, floor: Floats
+    ) -> ShapleyShares:
+        """Shapley shares of every cause; see the function of this name."""
+        sums = Sums(self._seed, slopes.shape[1])
+        failed = points = 0
+        for part in self._parts():
+            values, flags = evaluate(part.variables)
+            values = np.where(flags[:, np.newaxis], values, 0.0)
+            count = len(part.order)
+            shape = (len(self._causes) + 1, count, slopes.shape[1])
+            good = np.asarray(flags.reshape(-1, count).all(axis=0))
+            points += flags.size
+            failed += int(good.size - good.sum())
+            on_the_way = values.reshape(shape).swapaxes(0, 1)
+            linear = (part.coordinates @ slopes).reshape(shape).swapaxes(0, 1)
+            taken = _taken(on_the_way) - _taken(linear)
+            by_cause = np.empty_like(taken)
+            np.put_along_axis(by_cause, part.order[:, :, np.newaxis], taken, axis=1)
+            sums.add(by_cause[good])
+        linear_parts = self._linear.parts(slopes)
+        # The components of a direction are not correlated, so that their linear parts add up.
+        shares = sums.means() + np.stack(
+            [linear_parts[members].sum(axis=0) for members in self._causes]
+        )
+        # Of its own sum, so that the shares add up to one.
+        variance = shares.sum(axis=1)
+        defined = (np.sqrt(np.maximum(variance[0], 0.0)) > floor) & (sums.count >= LEAST)
+        return ShapleyShares(estimate(shares, variance, defined, confidence), failed, points)
+
+    @cached_property
+    def _linear(self) -> LinearShares:
+        return LinearShares(self._drawing, self._seed)
+
+    def _parts(self) -> Iterable[_Part]:
+        return self._walked() if self._only is None else [self._only]
+
+    @cached_property
+    def _only(self) -> _Part | None:
+        """All walks, where they are evaluated together."""
+        if len(list(parts(self._samples, len(self._causes) + 1))) != 1:
+            return None
+        only, *_ = self._walked()
+        return only
+
+    def _walked(self) -> Iterator[_Part]:
+        drawing, n_cause = self._drawing, len(self._causes)
+        bases, others = drawing.points(WALK_BASE), drawing.points(WALK_OTHER)
+        numbers = generator(self._seed, 0, ORDER)
+        for count in parts(self._samples, n_cause + 1):
+            order = _orders(numbers, count, n_cause)
+            base, other = bases.independent(count), others.independent(count)
+            flat = _coordinates(drawing, order, base, other).reshape(-1, base.shape[1])
+            variables = drawing.variables(flat)
+            variables.flags.writeable = False
+            yield _Part(order, flat, variables)
 
 
 def linear_shares(drawing: Drawing, slopes: Floats, seed: int) -> Floats:
@@ -103,51 +175,86 @@ def linear_shares(drawing: Drawing, slopes: Floats, seed: int) -> Floats:
 
     Exact for up to `SUBSETS` correlated variables, else over random orders of them.
     """
-    squares: Floats = slopes**2
-    linked = drawing.linked
-    latent = drawing.copula.latent
-    for block in _blocks(latent):
-        inside = latent[np.ix_(block, block)]
-        of_block = slopes[linked[block]]
-        if block.size <= SUBSETS:
-            part = _over_subsets(inside, of_block)
-        else:
-            part = _over_orders(inside, of_block, generator(seed, 1, ORDER))
-        squares[linked[block]] = part
-    return squares
+    return LinearShares(drawing, seed).parts(slopes)
 
 
-def _over_subsets(latent: Floats, slopes: Floats) -> Floats:
-    """(k, m) Shapley parts of b' z over every subset of the k coordinates."""
-    count = len(slopes)
-    known = np.zeros((1 << count, slopes.shape[1]))  # variance of the mean given the subset
-    for subset in range(1, 1 << count):
-        given = np.array([bool(subset >> index & 1) for index in range(count)])
-        mean = regression(latent, given).T @ slopes
-        known[subset] = ((latent @ mean) * slopes).sum(axis=0)
-    parts = np.zeros_like(slopes)
-    subsets = np.arange(1 << count)
-    sizes = np.array([int(subset).bit_count() for subset in subsets])
-    weights = np.array([1.0 / (count * math.comb(count - 1, size)) for size in range(count)])
-    for index in range(count):
-        without = subsets[(subsets >> index & 1) == 0]
-        added = known[without | (1 << index)] - known[without]
-        parts[index] = weights[sizes[without]] @ added
-    return parts
+class LinearShares:
+    """The same for any linear function: what does not depend on it is worked out once."""
+
+    def __init__(self, drawing: Drawing, seed: int) -> None:
+        """As for `linear_shares`."""
+        self._linked = drawing.linked
+        latent = drawing.copula.latent
+        self._of: list[tuple[Indices, _Subsets | _Orders]] = []
+        for block in _blocks(latent):
+            inside = latent[np.ix_(block, block)]
+            few = block.size <= SUBSETS
+            numbers = generator(seed, 1, ORDER)
+            self._of.append((block, _Subsets(inside) if few else _Orders(inside, numbers)))
+
+    def parts(self, slopes: Floats) -> Floats:
+        """(n_variable, m) of the function with these slopes (n_variable, m)."""
+        squares: Floats = slopes**2
+        for block, of_block in self._of:
+            squares[self._linked[block]] = of_block.parts(slopes[self._linked[block]])
+        return squares
 
 
-def _over_orders(latent: Floats, slopes: Floats, numbers: np.random.Generator) -> Floats:
-    """(k, m) as `_over_subsets`, the mean over `ORDERS` random orders."""
-    count = len(slopes)
-    parts = np.zeros_like(slopes)
-    some = max(1, (1 << 20) // count**2)
-    for start in range(0, ORDERS, some):
-        orders = _orders(numbers, min(some, ORDERS - start), count)
-        # What the j-th of an order adds, given those before it, is the square of b' L in it.
-        added = np.matmul(factors(latent, orders).swapaxes(1, 2), slopes[orders]) ** 2
-        for place in range(count):
-            np.add.at(parts, orders[:, place], added[:, place])
-    return parts / ORDERS
+class _Subsets:
+    """Shapley parts of b' z over every subset of the k coordinates."""
+
+    def __init__(self, latent: Floats) -> None:
+        count = len(latent)
+        # Variance of the mean given a subset is b' L R b, R its regression: a matrix a subset.
+        self._explained = np.zeros((1 << count, count, count))
+        for subset in range(1, 1 << count):
+            given = np.array([bool(subset >> index & 1) for index in range(count)])
+            self._explained[subset] = latent @ regression(latent, given).T
+
+    def parts(self, slopes: Floats) -> Floats:
+        """(k, m) of slopes (k, m)."""
+        count = len(slopes)
+        known = ((self._explained @ slopes) * slopes).sum(axis=1)
+        parts = np.zeros_like(slopes)
+        subsets = np.arange(1 << count)
+        sizes = np.array([int(subset).bit_count() for subset in subsets])
+        weights = np.array([1.0 / (count * math.comb(count - 1, size)) for size in range(count)])
+        for index in range(count):
+            without = subsets[(subsets >> index & 1) == 0]
+            added = known[without | (1 << index)] - known[without]
+            parts[index] = weights[sizes[without]] @ added
+        return parts
+
+
+class _Orders:
+    """As `_Subsets`, the mean over `ORDERS` random orders."""
+
+    def __init__(self, latent: Floats, numbers: np.random.Generator) -> None:
+        count = len(latent)
+        self._latent = latent
+        self._some = max(1, (1 << 20) // count**2)
+        self._orders = _orders(numbers, ORDERS, count)
+        self._kept: dict[int, Floats] = {}
+
+    def parts(self, slopes: Floats) -> Floats:
+        """(k, m) of slopes (k, m)."""
+        parts = np.zeros_like(slopes)
+        for start in range(0, ORDERS, self._some):
+            orders = self._orders[start : start + self._some]
+            # What the j-th of an order adds, given those before it: the square of b' L in it.
+            added = np.matmul(self._factors(start).swapaxes(1, 2), slopes[orders]) ** 2
+            for place in range(orders.shape[1]):
+                np.add.at(parts, orders[:, place], added[:, place])
+        return parts / ORDERS
+
+    def _factors(self, start: int) -> Floats:
+        """Those of the orders from `start` on; kept where they take some 50 MB at most."""
+        if start in self._kept:
+            return self._kept[start]
+        made = factors(self._latent, self._orders[start : start + self._some])
+        if (start + self._some) * len(self._latent) ** 2 <= KEPT:
+            self._kept[start] = made
+        return made
 
 
 def _blocks(latent: Floats) -> Iterator[Indices]:
@@ -191,33 +298,6 @@ def _taken(values: Floats) -> Floats:
     before, after = values[:, :-1], values[:, 1:]
     taken: Floats = (before - after) * (values[:, :1] - 0.5 * (before + after))
     return taken
-
-
-def _walks(
-    evaluate: Evaluate, drawing: Drawing, slopes: Floats, samples: int, seed: int
-) -> Iterator[tuple[Indices, Floats, Floats, Flags]]:
-    """In parts: orders (n, d), f and linear function (n, d + 1, m) on the way, good walks (n,).
-
-    d causes, which become known one after the other.
-    """
-    n_cause, n_variable = len(drawing.by_itself), len(slopes)
-    bases, others = drawing.points(WALK_BASE), drawing.points(WALK_OTHER)
-    numbers = generator(seed, 0, ORDER)
-    for count in parts(samples, n_cause + 1):
-        order = _orders(numbers, count, n_cause)
-        coordinates = _coordinates(
-            drawing, order, bases.independent(count), others.independent(count)
-        )
-        flat = coordinates.reshape(-1, n_variable)
-        values, good = evaluate(drawing.variables(flat))
-        values = np.where(good[:, np.newaxis], values, 0.0)
-        shape = (n_cause + 1, count, slopes.shape[1])
-        yield (
-            order,
-            values.reshape(shape).swapaxes(0, 1),
-            (flat @ slopes).reshape(shape).swapaxes(0, 1),
-            np.asarray(good.reshape(n_cause + 1, count).all(axis=0)),
-        )
 
 
 def _coordinates(drawing: Drawing, order: Indices, base: Floats, other: Floats) -> Floats:

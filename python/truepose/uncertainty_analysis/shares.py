@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -33,6 +34,7 @@ from truepose.runs.arguments import checked
 from truepose.runs.dataset import Schema, Variable, component_units, label
 from truepose.runs.poses import BAND, REASONS, Progress
 from truepose.runs.quantities import quantities
+from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis import shapley, sobol
 from truepose.uncertainty_analysis.arguments import (
     required_probability,
@@ -41,7 +43,7 @@ from truepose.uncertainty_analysis.arguments import (
 )
 from truepose.uncertainty_analysis.failed_samples import lost_text
 from truepose.uncertainty_analysis.functions.dataset import function_dataset
-from truepose.uncertainty_analysis.model import FunctionModel, MachineModel, Model, Models, models
+from truepose.uncertainty_analysis.model import FunctionModel, Model, Models, models
 from truepose.uncertainty_analysis.random_points import Drawing
 
 if TYPE_CHECKING:
@@ -210,25 +212,27 @@ class _Plan:
 
 @dataclass(frozen=True)
 class _Variables:
-    """What acts: names and sources of the causes, and how to draw them.
+    """What acts: names and sources of the causes, how to draw them, and the points drawn.
 
-    A cause is what varies by itself (`Drawing.by_itself`): a variable, or a direction.
+    A cause is what varies by itself (`Drawing.by_itself`): a variable, or a direction. The points
+    are those of the machine, not of a pose: all poses share them.
     """
 
     names: tuple[str, ...]
     sources: tuple[str, ...]
     correlation: Floats | None
     drawing: Drawing
+    plan: _Plan
 
     @classmethod
-    def of(cls, model: Model, seed: int) -> _Variables:
+    def of(cls, model: Model, plan: _Plan) -> _Variables:
         drawing = Drawing(
             model.distributions,
             model.correlation,
             model.streams,
             model.numbers,
             model.names,
-            seed,
+            plan.seed,
             model.directions,
         )
         first = [int(members[0]) for members in drawing.by_itself]
@@ -237,56 +241,54 @@ class _Variables:
             tuple(model.sources[at] for at in first),
             model.correlation,
             drawing,
+            plan,
         )
 
-    @property
+    @cached_property
+    def design(self) -> sobol.SobolDesign:
+        """Points of the Sobol indices: of each cause, then of each source."""
+        causes = self.drawing.by_itself
+        together = [np.concatenate([causes[at] for at in of]) for of in self.sets.values()]
+        return sobol.SobolDesign(
+            self.drawing, [*causes, *together], self.plan.samples, self.plan.seed
+        )
+
+    @cached_property
+    def walks(self) -> shapley.Walks:
+        """Points of the Shapley shares."""
+        return shapley.Walks(self.drawing, self.plan.samples, self.plan.seed)
+
+    @cached_property
     def sets(self) -> dict[str, Indices]:
         """Numbers of the causes of each source."""
         of = np.array(self.sources)
         return {name: np.flatnonzero(of == name) for name in dict.fromkeys(self.sources)}
 
 
-def _at_one_pose(
-    model: Model, variables: _Variables, floor: Floats, plan: _Plan
-) -> dict[str, np.ndarray]:
+def _at_one_pose(model: Model, variables: _Variables, floor: Floats) -> dict[str, np.ndarray]:
     """Every variable of the schemas that there is, without its dim pose."""
-    drawing = variables.drawing
-    causes, of_sources = drawing.by_itself, variables.sets
+    drawing, confidence = variables.drawing, variables.plan.confidence
+    causes = drawing.by_itself
     count = len(causes)
-    together = [np.concatenate([causes[at] for at in of]) for of in of_sources.values()]
-    sets = [*causes, *together]
     slopes = (model.linear().effects / drawing.sigmas).T
-    estimates = sobol.indices(
-        model.evaluate,
-        drawing,
-        sets,
-        slopes,
-        samples=plan.samples,
-        seed=plan.seed,
-        confidence=plan.confidence,
-        floor=floor,
-    )
+    estimates = variables.design.indices(model.evaluate, slopes, confidence=confidence, floor=floor)
     linear = _linear(slopes, variables.correlation, causes, floor)
     values: dict[str, Any] = {
         "linear": linear,
-        "source_linear": np.array([linear[members].sum(axis=0) for members in of_sources.values()]),
+        "source_linear": np.array(
+            [linear[members].sum(axis=0) for members in variables.sets.values()]
+        ),
         "standard_deviation": np.sqrt(estimates.variance),
         "evaluations": estimates.points,
         "failed": estimates.failed,
     }
     for name, estimate in (("first", estimates.first), ("total", estimates.total)):
-        values[name], values[f"source_{name}"] = np.split(estimate.share, [count])
-        halves = np.split(estimate.half_width, [count])
-        values[f"{name}_confidence"], values[f"source_{name}_confidence"] = halves
+        values[name], values[f"source_{name}"] = estimate.share[:count], estimate.share[count:]
+        values[f"{name}_confidence"] = estimate.half_width[:count]
+        values[f"source_{name}_confidence"] = estimate.half_width[count:]
     if drawing.linked.size:
-        divided = shapley.shares(
-            model.evaluate,
-            drawing,
-            estimates.slopes,
-            samples=plan.samples,
-            seed=plan.seed,
-            confidence=plan.confidence,
-            floor=floor,
+        divided = variables.walks.shares(
+            model.evaluate, estimates.slopes, confidence=confidence, floor=floor
         )
         values["shapley"] = divided.shares.share
         values["shapley_confidence"] = divided.shares.half_width
@@ -300,12 +302,25 @@ def _linear(
 ) -> Floats:
     """(n_cause, m) shares of the linear variance, from standard uncertainties of either sign."""
     of_variables: Floats = slopes * (slopes if correlation is None else correlation @ slopes)
-    parts: Floats = np.stack([of_variables[members].sum(axis=0) for members in causes])
+    parts: Floats = np.add.reduceat(
+        of_variables[np.concatenate([np.empty(0, np.intp), *causes])],
+        np.cumsum([0, *(members.size for members in causes)])[:-1],
+        axis=0,
+    )
     whole = parts.sum(axis=0)
     varies = np.sqrt(np.maximum(whole, 0.0)) > floor
     np.divide(parts, whole, out=parts, where=varies)
     parts[:, ~varies] = np.nan
     return parts
+
+
+@dataclass(frozen=True)
+class _Block:
+    """What was worked out at the poses of one block, by their numbers in it."""
+
+    block: PoseBlock
+    variables: _Variables
+    values: dict[int, dict[str, np.ndarray]]
 
 
 def _of_machine(run: Models, plan: _Plan) -> xr.Dataset:
@@ -315,48 +330,55 @@ def _of_machine(run: Models, plan: _Plan) -> xr.Dataset:
             for unit in component_units(run.machine)
         ]
     )
-    poses: list[tuple[MachineModel, _Variables, dict[str, np.ndarray]]] = []
-    block, variables, interrupted, lost = None, None, 0, False
+    blocks: list[_Block] = []
+    interrupted, lost = 0, False
     try:
         for _, model in run:
-            if variables is None or model.block is not block:
-                block, variables = model.block, _Variables.of(model, plan.seed)
-            if not variables.names:
+            if not blocks or blocks[-1].block is not model.block:
+                blocks.append(_Block(model.block, _Variables.of(model, plan), {}))
+            at = blocks[-1]
+            if not at.variables.names:
                 continue
-            values = _at_one_pose(model, variables, floor, plan)
+            values = _at_one_pose(model, at.variables, floor)
             if np.isfinite(values["standard_deviation"]).all():
-                poses.append((model, variables, values))
+                at.values[model.pose] = values
             else:
                 run.leave_out(model, REASONS.index(BAND))
                 lost = True
     except KeyboardInterrupt:
-        if not poses:
+        if not any(at.values for at in blocks):
             raise
         interrupted = 1
     # What varies may differ from block to block: in the one there it has no band.
+    filled = [at for at in blocks if at.values]
     sources = {
         name: source
-        for _, of_pose, _ in poses
-        for name, source in zip(of_pose.names, of_pose.sources, strict=True)
+        for at in filled
+        for name, source in zip(at.variables.names, at.variables.sources, strict=True)
     }
-    if variables is not None and not sources and not lost:
+    if blocks and not sources and not lost:
         raise RequestError(_nothing_varies(run.machine.file))
     names, groups = list(sources), list(dict.fromkeys(sources.values()))
-    correlated = any(of_pose.drawing.linked.size for _, of_pose, _ in poses)
+    correlated = any(at.variables.drawing.linked.size for at in filled)
     schema = {**SCHEMA, **CORRELATED} if correlated else SCHEMA
     run.begin(schema, parameter=len(names), source=len(groups))
-    for model, of_pose, values in poses:
-        at = {
-            "parameter": [names.index(name) for name in of_pose.names],
-            "source": [groups.index(name) for name in of_pose.sets],
+    for at in filled:
+        places = {
+            "parameter": [names.index(name) for name in at.variables.names],
+            "source": [groups.index(name) for name in at.variables.sets],
         }
         lengths = {"parameter": len(names), "source": len(groups)}
+        poses = sorted(at.values)
+        stacked = {
+            name: np.stack([np.asarray(at.values[pose][name]) for pose in poses])
+            for name in at.values[poses[0]]
+        }
         whole = {
-            # Where nothing is correlated at this pose, no Shapley share was worked out.
-            name: _whole(variable, values.get(name, values["total"] * np.nan), at, lengths)
+            # Where nothing is correlated at this block, no Shapley share was worked out.
+            name: _whole(variable, stacked.get(name, stacked["total"] * np.nan), places, lengths)
             for name, variable in schema.items()
         }
-        run.fill(model, whole)
+        run.fill(at.block, np.array(poses, np.intp), whole)
     coords = _coords(names, list(sources.values()), groups)
     result = run.dataset(coords)
     # Poses that were not come to are neither used nor left out.
@@ -382,16 +404,17 @@ def _whole(
     at: Mapping[str, Sequence[int]],
     lengths: Mapping[str, int],
 ) -> np.ndarray:
-    """Values over everything that varies anywhere, from those `at` what varies at the pose."""
+    """Values (n_pose, ...) over everything that varies anywhere, from those `at` what varies."""
     along = variable.dims[1] if len(variable.dims) > 1 else None
     if along not in at:
         return values
     assert along is not None
+    if list(at[along]) == list(range(lengths[along])):
+        return values
     # A component that does not vary at all has no share of anything: all of it is NaN.
-    whole = np.repeat(
-        np.where(np.isnan(values).all(axis=0), np.nan, 0.0)[np.newaxis], lengths[along], 0
-    )
-    whole[at[along]] = values
+    nothing = np.where(np.isnan(values).all(axis=1), np.nan, 0.0)
+    whole = np.repeat(nothing[:, np.newaxis], lengths[along], axis=1)
+    whole[:, at[along]] = values
     return whole
 
 
@@ -408,9 +431,9 @@ def _coords(
 def _of_function(model: FunctionModel, plan: _Plan) -> xr.Dataset:
     if not any(given.half for given in model.inputs.values()):
         raise RequestError(_nothing_varies(None))
-    variables = _Variables.of(model, plan.seed)
+    variables = _Variables.of(model, plan)
     floor = ROUNDING * np.abs(model.linear().value)
-    values = _at_one_pose(model, variables, floor, plan)
+    values = _at_one_pose(model, variables, floor)
     schema = {
         name: variable for name, variable in {**SCHEMA, **CORRELATED}.items() if name in values
     }

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from statistics import NormalDist
 
 import numpy as np
@@ -57,6 +58,10 @@ class Estimate:
 
     share: Floats
     half_width: Floats
+
+    def of(self, rows: Sequence[int]) -> Estimate:
+        """Some of the k, in this order."""
+        return Estimate(self.share[rows], self.half_width[rows])
 
 
 @dataclass(frozen=True)
@@ -94,45 +99,169 @@ def indices(
     that is no more than rounding. Evaluates samples * (2 + number of sets) points, more where
     variables are correlated.
     """
-    swaps, first_at, total_at = _swaps(drawing, sets)
-    sums: Sums | None = None
-    slopes = effects
-    failed = points = 0
-    for part in _evaluated(evaluate, drawing, swaps, samples):
-        good = part.good
-        points += good.size * (2 + len(swaps))
-        failed += int(good.size - good.sum())
-        if sums is None:
-            # Any centre and any slopes, fixed once, leave the estimates unbiased.
-            centre, fit = _pilot(
-                np.concatenate([part.base[good], part.other[good]]),
-                np.concatenate([part.start[good], part.end[good]]) @ effects,
+    design = SobolDesign(drawing, sets, samples, seed)
+    return design.indices(evaluate, effects, confidence=confidence, floor=floor)
+
+
+class SobolDesign:
+    """The points at which `indices` evaluates a model: the same for every model of the variables.
+
+    Where they are few enough to be evaluated together, they are made once, as are the numbers by
+    which the bootstrap counts them.
+    """
+
+    def __init__(self, drawing: Drawing, sets: Sequence[Indices], samples: int, seed: int) -> None:
+        """As for `indices`."""
+        self._drawing, self._samples, self._seed = drawing, samples, seed
+        self._swaps, self._first_at, self._total_at = _swaps(drawing, sets)
+        self._arrays: tuple[Floats, Floats, Floats, Floats] | None = None
+        alone = [
+            at
+            for at, swap in enumerate(self._swaps)
+            if swap.linked is None and swap.single.size == 1
+        ]
+        self._alone: Indices = np.array(alone, np.intp)
+        self._variable: Indices = np.array([self._swaps[at].single[0] for at in alone], np.intp)
+        others = set(range(len(self._swaps))).difference(alone)
+        self._others = [(at, self._swaps[at]) for at in sorted(others)]
+
+    def indices(
+        self, evaluate: Evaluate, effects: Floats, *, confidence: float, floor: Floats
+    ) -> SobolIndices:
+        """Sobol indices of each of the sets; see the function of this name."""
+        sums: Sums | None = None
+        slopes = effects
+        failed = points = 0
+        for part in self._parts():
+            values, good = evaluate(part.variables)
+            every: Flags = np.all(good.reshape(len(part.start), -1), axis=1)
+            whole = bool(every.all())
+            if not whole:
+                # What cannot be evaluated may be NaN, which no weight of zero takes out of a sum.
+                values = np.where(good[:, np.newaxis], values, 0.0)
+            values = values.reshape(len(part.start), -1, values.shape[1])
+            points += good.size
+            failed += int(every.size - every.sum())
+            if sums is None:
+                # Any centre and any slopes, fixed once, leave the estimates unbiased.
+                centre, fit = _pilot(
+                    np.concatenate([values[every, 0], values[every, 1]]),
+                    np.concatenate([part.start[every], part.end[every]]) @ effects,
+                )
+                slopes = effects * fit
+                sums = Sums(self._seed, slopes.shape[1], self._counts)
+            rows = self._rows(part, values, centre, slopes)
+            sums.add(rows if whole else rows[every])
+        assert sums is not None
+        return self._estimates(sums, slopes, failed, points, confidence, floor)
+
+    def _estimates(
+        self,
+        sums: Sums,
+        slopes: Floats,
+        failed: int,
+        points: int,
+        confidence: float,
+        floor: Floats,
+    ) -> SobolIndices:
+        means = sums.means()
+        covariance = self._drawing.covariance
+        linear_variance = ((covariance @ slopes) * slopes).sum(axis=0)
+        # Weighted means of the rows, with what is exact of the linear function put back.
+        variance = (
+            means[:, 0] - means[:, 1] ** 2 - (means[:, 2] - means[:, 3] ** 2) + linear_variance
+        )
+        count = len(self._swaps)
+        exact = np.empty((2, count, slopes.shape[1]))
+        exact[:, self._alone] = slopes[self._variable] ** 2
+        for at, swap in self._others:
+            exact[0, at] = swap.first(slopes, covariance)
+            exact[1, at] = swap.total(slopes, covariance)
+        firsts = means[:, 4 : 4 + count] + exact[0]
+        totals = means[:, 4 + count :] + exact[1]
+        some = sums.count >= LEAST
+        spread = np.sqrt(np.maximum(variance[0], 0.0))
+        defined = (spread > floor) & some
+        return SobolIndices(
+            estimate(firsts, variance, defined, confidence).of(self._first_at),
+            estimate(totals, variance, defined, confidence).of(self._total_at),
+            np.where(some, np.where(spread > floor, variance[0], 0.0), np.nan),
+            slopes,
+            failed,
+            points,
+        )
+
+    def _parts(self) -> Iterable[_Part]:
+        return self._evaluated() if self._only is None else [self._only]
+
+    @cached_property
+    def _only(self) -> _Part | None:
+        """All points, where they are evaluated together."""
+        if self._samples * (2 + len(self._swaps)) > STACK:
+            return None
+        only, *_ = self._evaluated()
+        return only
+
+    @cached_property
+    def _counts(self) -> Floats | None:
+        return None if self._only is None else counts(self._seed, self._samples)
+
+    def _evaluated(self) -> Iterator[_Part]:
+        drawing, swaps = self._drawing, self._swaps
+        starts, ends = drawing.points(BASE), drawing.points(OTHER)
+        for count in parts(self._samples, 2 + len(swaps)):
+            start, end = starts.next(count), ends.next(count)
+            base, other = drawing.variables(start), drawing.variables(end)
+            stack = np.empty((count, 2 + len(swaps), base.shape[1]))
+            stack[:, 0], stack[:, 1] = base, other
+            for at, swap in enumerate(swaps, start=2):
+                stack[:, at] = swap.variables(base, other, start, end)
+            variables = stack.reshape(-1, stack.shape[2])
+            variables.flags.writeable = False
+            yield _Part(variables, start, end)
+
+    def _rows(self, part: _Part, values: Floats, centre: Floats, slopes: Floats) -> Floats:
+        """(n, 4 + 2 k, m): moments of f and the linear g, then first and total of k swaps, f - g.
+
+        From f (n, 2 + k, m), less `centre` (m,), which does not change what is estimated.
+        """
+        base, other = values[:, 0] - centre, values[:, 1] - centre
+        at_base, at_other = part.start @ slopes, part.end @ slopes
+        between = part.end - part.start
+        step, of_linear, product, rows = self._room(len(base), base.shape[1])
+        np.subtract(values[:, 2:], values[:, :1], out=step)
+        if not self._others:
+            np.multiply(between[:, self._variable, np.newaxis], slopes[self._variable], of_linear)
+        else:
+            of_linear[:, self._alone] = (
+                between[:, self._variable, np.newaxis] * slopes[self._variable]
             )
-            slopes = effects * fit
-            sums = Sums(seed, slopes.shape[1])
-        sums.add(_rows(part, centre, slopes, swaps)[good])
-    assert sums is not None
-    means = sums.means()
-    covariance = drawing.covariance
-    linear_variance = np.einsum("vm,vw,wm->m", slopes, covariance, slopes)
-    # Weighted means of the rows, with what is exact of the linear function put back.
-    variance = means[:, 0] - means[:, 1] ** 2 - (means[:, 2] - means[:, 3] ** 2) + linear_variance
-    exact_first = np.array([swap.first(slopes, covariance) for swap in swaps])
-    exact_total = np.array([swap.total(slopes, covariance) for swap in swaps])
-    count = len(swaps)
-    firsts = means[:, 4 : 4 + count] + exact_first
-    totals = means[:, 4 + count :] + exact_total
-    some = sums.count >= LEAST
-    spread = np.sqrt(np.maximum(variance[0], 0.0))
-    defined = (spread > floor) & some
-    return SobolIndices(
-        estimate(firsts[:, first_at], variance, defined, confidence),
-        estimate(totals[:, total_at], variance, defined, confidence),
-        np.where(some, np.where(spread > floor, variance[0], 0.0), np.nan),
-        slopes,
-        failed,
-        points,
-    )
+        for at, swap in self._others:
+            of_linear[:, at] = between @ swap.moved(slopes)
+        count = len(self._swaps)
+        rows[:, 0] = 0.5 * (base**2 + other**2)
+        rows[:, 1] = 0.5 * (base + other)
+        rows[:, 2] = 0.5 * (at_base**2 + at_other**2)
+        rows[:, 3] = 0.5 * (at_base + at_other)
+        first, total = rows[:, 4 : 4 + count], rows[:, 4 + count :]
+        np.multiply(other[:, np.newaxis], step, out=first)
+        np.multiply(at_other[:, np.newaxis], of_linear, out=product)
+        first -= product
+        # step^2 - of_linear^2, halved
+        np.subtract(step, of_linear, out=product)
+        step += of_linear
+        step *= 0.5
+        np.multiply(product, step, out=total)
+        return rows
+
+    def _room(self, count: int, n_output: int) -> tuple[Floats, Floats, Floats, Floats]:
+        """Three arrays (n, k, m) and the rows (n, 4 + 2 k, m), the same from model to model."""
+        swaps = len(self._swaps)
+        if self._arrays is None or self._arrays[0].shape != (count, swaps, n_output):
+            step, of_linear, product = np.empty((3, count, swaps, n_output))
+            rows = np.empty((count, 4 + 2 * swaps, n_output))
+            self._arrays = step, of_linear, product, rows
+        return self._arrays
 
 
 def estimate(parts: Floats, variance: Floats, defined: Flags, confidence: float) -> Estimate:
@@ -142,6 +271,10 @@ def estimate(parts: Floats, variance: Floats, defined: Flags, confidence: float)
     (m,).
     """
     usable = defined & (variance > 0.0)
+    if usable.all():
+        shares = parts / variance[:, np.newaxis]
+        spread = shares[1:].std(axis=0, ddof=1)
+        return Estimate(shares[0], _width(confidence) * spread)
     shares = np.divide(
         parts,
         variance[:, np.newaxis],
@@ -154,7 +287,12 @@ def estimate(parts: Floats, variance: Floats, defined: Flags, confidence: float)
         known = shares[1:][:, :, defined]
         # A replicate without variance, from a handful of samples, says nothing.
         spread[:, defined] = _deviation(known)
-    return Estimate(share, NormalDist().inv_cdf(0.5 + 0.5 * confidence) * spread)
+    return Estimate(share, _width(confidence) * spread)
+
+
+def _width(confidence: float) -> float:
+    """Half of an interval that holds the share `confidence`, in standard deviations."""
+    return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
 def _deviation(values: Floats) -> Floats:
@@ -168,13 +306,24 @@ def _deviation(values: Floats) -> Floats:
     return deviation
 
 
+def counts(seed: int, samples: int, numbers: np.random.Generator | None = None) -> Floats:
+    """(1 + REPLICATES, samples) how often each row counts: once, and in each of the bootstrap's."""
+    drawn = generator(seed, 0, COUNTS) if numbers is None else numbers
+    times = np.empty((1 + REPLICATES, samples))
+    times[0] = 1.0
+    times[1:] = drawn.poisson(1.0, (samples, REPLICATES)).T
+    return times
+
+
 class Sums:
     """Means over rows, as they are and as the bootstrap counts them.
 
-    Rows are (n, k, m): k statistics of m outputs.
+    Rows are (n, k, m): k statistics of m outputs. `known`: the counts of as many rows as are added
+    at most, all at once, where these are known.
     """
 
-    def __init__(self, seed: int, n_output: int) -> None:
+    def __init__(self, seed: int, n_output: int, known: Floats | None = None) -> None:
+        self._seed, self._known = seed, known
         self._counts = generator(seed, 0, COUNTS)
         self._total: Floats | None = None
         self._weight = np.zeros(1 + REPLICATES)
@@ -182,9 +331,10 @@ class Sums:
 
     def add(self, rows: Floats) -> None:
         """More rows (n, k, m)."""
-        times = np.empty((1 + REPLICATES, len(rows)))
-        times[0] = 1.0
-        times[1:] = self._counts.poisson(1.0, (len(rows), REPLICATES)).T
+        if self._known is None:
+            times = counts(self._seed, len(rows), self._counts)
+        else:
+            times = self._known[:, : len(rows)]
         sums = times @ rows.reshape(len(rows), rows.shape[1] * rows.shape[2])
         self._total = sums if self._total is None else self._total + sums
         self._weight += times.sum(axis=1)
@@ -284,35 +434,14 @@ def _swaps(drawing: Drawing, sets: Sequence[Indices]) -> tuple[list[Swap], list[
 
 @dataclass(frozen=True)
 class _Part:
-    """Some base samples: f(A), f(B) (n, m) and f of each swap (n, k, m), and which are good (n,).
+    """Some base samples: `variables` (n (2 + k), n_variable) at A, B and every swap of each.
 
     `start`, `end` (n, n_variable): coordinates of A and B.
     """
 
-    base: Floats
-    other: Floats
-    swapped: Floats
-    good: Flags
+    variables: Floats
     start: Floats
     end: Floats
-
-
-def _evaluated(
-    evaluate: Evaluate, drawing: Drawing, swaps: Sequence[Swap], samples: int
-) -> Iterator[_Part]:
-    starts, ends = drawing.points(BASE), drawing.points(OTHER)
-    for count in parts(samples, 2 + len(swaps)):
-        start, end = starts.next(count), ends.next(count)
-        base, other = drawing.variables(start), drawing.variables(end)
-        stack = np.empty((2 + len(swaps), *base.shape))
-        stack[0], stack[1] = base, other
-        for at, swap in enumerate(swaps, start=2):
-            stack[at] = swap.variables(base, other, start, end)
-        values, good = evaluate(stack.reshape(-1, stack.shape[2]))
-        # What cannot be evaluated may be NaN, which no weight of zero takes out of a sum.
-        values = np.where(good[:, np.newaxis], values, 0.0).reshape(len(stack), count, -1)
-        every: Flags = np.all(good.reshape(len(stack), count), axis=0)
-        yield _Part(values[0], values[1], values[2:].swapaxes(0, 1), every, start, end)
 
 
 def parts(samples: int, points: int) -> Iterable[int]:
@@ -332,25 +461,3 @@ def _pilot(values: Floats, linear: Floats) -> tuple[Floats, Floats]:
     common = ((values - mean) * about).sum(axis=0)
     slope = np.divide(common, squares, out=np.ones_like(common), where=squares > 0.0)
     return mean - slope * of_linear, slope
-
-
-def _rows(part: _Part, centre: Floats, slopes: Floats, swaps: Sequence[Swap]) -> Floats:
-    """(n, 4 + 2 k, m): moments of f and of the linear g, then first and total of k swaps, f - g.
-
-    f is taken less `centre` (m,), which does not change what is estimated.
-    """
-    base, other = part.base - centre, part.other - centre
-    at_base, at_other = part.start @ slopes, part.end @ slopes
-    step = part.swapped - part.base[:, np.newaxis]
-    of_linear = np.empty_like(step)
-    for number, swap in enumerate(swaps):
-        of_linear[:, number] = (part.end - part.start) @ swap.moved(slopes)
-    rows = np.empty((len(base), 4 + 2 * len(swaps), base.shape[1]))
-    rows[:, 0] = 0.5 * (base**2 + other**2)
-    rows[:, 1] = 0.5 * (base + other)
-    rows[:, 2] = 0.5 * (at_base**2 + at_other**2)
-    rows[:, 3] = 0.5 * (at_base + at_other)
-    count = len(swaps)
-    rows[:, 4 : 4 + count] = other[:, np.newaxis] * step - at_other[:, np.newaxis] * of_linear
-    rows[:, 4 + count :] = 0.5 * (step**2 - of_linear**2)
-    return rows

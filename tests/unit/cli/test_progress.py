@@ -86,3 +86,11 @@ def test_work_that_says_nothing_of_itself_shows_that_it_goes_on(
 )
 def test_how_far_the_work_is(done: int, total: int | None, seconds: float, said: str) -> None:
     assert _progress.state(done, total, "poses", seconds) == said
+
+
+def test_the_estimate_says_how_long_and_what_comes_first() -> None:
+    said = _progress.estimate("shares", 25, 675, "poses", 2.0, "the worst poses")
+    assert said == (
+        "shares: about 0:54 for 675 poses, the worst poses first; Ctrl-C gives what is done by then"
+    )
+    assert "about" not in _progress.estimate("Monte Carlo", 9, 0, "samples", 2.0, "the worst poses")

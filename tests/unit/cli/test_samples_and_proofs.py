@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -204,6 +205,28 @@ def test_ctrl_c_in_the_middle_of_sampling_gives_the_result_so_far(tmp_path: Path
     assert samples.size == 2
     assert (samples > 0).all()
     assert (samples < 1e9).all()
+
+
+def test_ctrl_c_of_shares_gives_the_worst_poses(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    whole = truepose.shares
+
+    def stopped(*given: Any, **asked: Any) -> Any:
+        def stop(done: int, total: int) -> None:
+            if done == 4:
+                raise KeyboardInterrupt
+
+        return whole(*given, **{**asked, "progress": stop})
+
+    monkeypatch.setattr(truepose, "shares", stopped, raising=False)
+    output = tmp_path / "found.json"
+    outcome = call(capsys, "shares", PLANAR, "--samples", "16", "--output", output)
+    assert outcome.code == 130
+    assert "Interrupted after 4 poses" in outcome.err
+    document = json.loads(output.read_text("utf-8"))
+    assert document["attributes"]["interrupted"] == 1
+    assert len(document["variables"]["standard_deviation"]["values"]) == 4
 
 
 @pytest.mark.parametrize(

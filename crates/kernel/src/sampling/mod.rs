@@ -4,11 +4,13 @@
 //! variable's identity alone, whatever threads, lanes or calls the samples are shared out to.
 
 mod monte_carlo;
+mod points;
 mod random;
 mod tally;
 mod variables;
 
-pub use monte_carlo::{Columns, Study, StudyPose, Whitening, sample};
+pub use monte_carlo::{Columns, Study, StudyPose, Whitening, sample, sample_keeping};
+pub use points::{Points, errors};
 pub use tally::Tally;
 pub use variables::{Copula, Shape, Variable, Variables};
 

@@ -15,6 +15,8 @@ use crate::status::Status;
 
 /// The most columns of a tally: six components, two magnitudes, the distance in the coverage ellipsoid.
 const COLUMNS: usize = 9;
+/// Segments that go to a pose one after the other: its histograms are fetched once for all of them.
+const TOGETHER: usize = 8;
 
 /// A matrix that takes a position error, less its centre, to a vector whose length orders the errors from
 /// the most likely to the least.
@@ -33,6 +35,21 @@ struct Move {
     variable: usize,
     /// Whether no column before it moves the parameter.
     first: bool,
+}
+
+impl Whitening {
+    /// The length of a position error so taken.
+    pub fn length(&self, position: [f64; 3]) -> f64 {
+        let mut square = 0.0;
+        for row in &self.matrix {
+            let mut along = 0.0;
+            for k in 0..3 {
+                along += (position[k] - self.centre[k]) * row[k];
+            }
+            square += along * along;
+        }
+        square.sqrt()
+    }
 }
 
 /// What the variables move.
@@ -120,6 +137,33 @@ pub struct Study<'a> {
 
 /// Evaluates the `count` samples from number `first` on at every pose into its tally.
 pub fn sample(study: &Study<'_>, first: u64, count: usize, tallies: &mut [Tally]) {
+    evaluate(study, first, count, tallies, false);
+}
+
+/// The same, and the position errors (pose, sample, 3) besides, NaN of a sample without a result.
+pub fn sample_keeping(
+    study: &Study<'_>,
+    first: u64,
+    count: usize,
+    tallies: &mut [Tally],
+) -> Vec<f64> {
+    let width = study.poses.len();
+    let mut kept = vec![0.0; 3 * width * count];
+    for (number, sums) in evaluate(study, first, count, tallies, true).iter().enumerate() {
+        let (segment, pose) = (number / width, number % width);
+        let at = 3 * (pose * count + segment * SEGMENT);
+        kept[at..at + sums.positions.len()].copy_from_slice(&sums.positions);
+    }
+    kept
+}
+
+fn evaluate(
+    study: &Study<'_>,
+    first: u64,
+    count: usize,
+    tallies: &mut [Tally],
+    keeping: bool,
+) -> Vec<Sums> {
     let segments = count.div_ceil(SEGMENT);
     let width = study.poses.len();
     let columns = tallies.first().map_or(0, Tally::columns);
@@ -129,10 +173,11 @@ pub fn sample(study: &Study<'_>, first: u64, count: usize, tallies: &mut [Tally]
     let parts = share_out(&mut sums, segments, width, |segments, sums| {
         // Counts of whole numbers: in whatever order they are added, their sums are the same.
         let mut own = blank.clone();
-        for (segment, sums) in segments.zip(sums.chunks_mut(width)) {
-            let size = SEGMENT.min(count - segment * SEGMENT);
+        let starts = segments.step_by(TOGETHER);
+        for (segment, sums) in starts.zip(sums.chunks_mut(TOGETHER * width)) {
             let at = segment * SEGMENT;
-            let work = Segment { study, first, at, size, sums, tallies: &mut own };
+            let size = (sums.len() / width * SEGMENT).min(count - at);
+            let work = Segments { study, first, at, size, sums, tallies: &mut own, keeping };
             if study.machine.plain { dispatch(work) } else { work.run::<f64>() }
         }
         own
@@ -148,81 +193,131 @@ pub fn sample(study: &Study<'_>, first: u64, count: usize, tallies: &mut [Tally]
             tally.add_sums(sums);
         }
     }
+    sums
 }
 
-struct Segment<'a> {
+struct Segments<'a> {
     study: &'a Study<'a>,
     first: u64,
     at: usize,
     size: usize,
     sums: &'a mut [Sums],
     tallies: &'a mut [Tally],
+    keeping: bool,
 }
 
-impl Work for Segment<'_> {
+impl Work for Segments<'_> {
     #[inline(always)]
     fn run<S: Real>(self) {
-        let Segment { study, first, at, size, sums, tallies } = self;
+        let Segments { study, first, at, size, sums, tallies, keeping } = self;
         let Study { machine, variables, columns, .. } = *study;
         let count = variables.count();
-        let mut values = vec![0.0; count * SEGMENT];
+        let length = count * SEGMENT;
+        let segments = size.div_ceil(SEGMENT);
+        let mut values = vec![0.0; length * segments];
         match study.given {
-            None => variables.draw::<S>(study.seed, first + at as u64, &mut values),
+            None => {
+                for segment in 0..segments {
+                    let into = &mut values[segment * length..][..length];
+                    variables.draw::<S>(study.seed, first + (at + segment * SEGMENT) as u64, into);
+                }
+            }
             Some(given) => {
                 for sample in 0..size {
+                    let (segment, place) = (sample / SEGMENT, sample % SEGMENT);
                     for variable in 0..count {
-                        values[variable * SEGMENT + sample] =
+                        values[segment * length + variable * SEGMENT + place] =
                             given[(at + sample) * count + variable];
                     }
                 }
             }
         }
         let components = indices_of(&machine.dof);
-        let mut p: Vec<S> = vec![S::default(); machine.nominal.len()];
-        let mut q: Vec<S> = vec![S::default(); machine.drives.len()];
-        let mut placed: Limbs<S> = Default::default();
-        for ((pose, sums), tally) in study.poses.iter().zip(sums).zip(tallies) {
-            for (value, &centre) in p.iter_mut().zip(&pose.centre) {
-                *value = S::splat(centre);
-            }
-            for (value, &joint) in q.iter_mut().zip(&pose.joints) {
-                *value = S::splat(joint);
-            }
-            let start = Pose::<S>::splat(&pose.start);
-            let nominal = Pose::<S>::splat(&pose.nominal);
-            let mut moments = Moments::<S>::new(tally, components.len());
-            for from in (0..size).step_by(S::WIDTH) {
-                for (column, &swing) in columns.moves.iter().zip(&pose.swing) {
-                    let value = S::load(&values[column.variable * SEGMENT + from..]);
-                    let parameter = &mut p[column.parameter];
-                    let from = if column.first {
-                        S::splat(pose.centre[column.parameter])
-                    } else {
-                        *parameter
-                    };
-                    *parameter = S::splat(swing).mul_add(value, from);
-                }
-                place_limbs(machine, &p, &q, &mut placed);
-                let mut descent = if machine.plain {
-                    chord(machine, &placed, &start, &pose.inverse)
-                } else {
-                    Descent { pose: start, proof: S::splat(-1.0) }
-                };
-                let lanes = S::WIDTH.min(size - from);
-                let mut status = [Status::Ok; LANES];
-                for lane in 0..lanes {
-                    // Also true where it is NaN.
-                    if !(descent.proof.lane(lane) > 0.0) {
-                        let (one, outcome) = alone(machine, &p, pose, lane);
-                        status[lane] = outcome;
-                        descent.pose.set_lane(lane, &one.to_row());
+        let width = study.poses.len();
+        for (number, (pose, tally)) in study.poses.iter().zip(tallies).enumerate() {
+            let mut moved = Moved::<S>::at(pose);
+            for segment in 0..segments {
+                let values = &values[segment * length..][..length];
+                let size = SEGMENT.min(size - segment * SEGMENT);
+                let sums = &mut sums[segment * width + number];
+                let mut moments = Moments::<S>::new(tally, components.len());
+                for from in (0..size).step_by(S::WIDTH) {
+                    let lanes = S::WIDTH.min(size - from);
+                    let (error, status) = moved.error(machine, columns, pose, lanes, |variable| {
+                        S::load(&values[variable * SEGMENT + from..])
+                    });
+                    let status = &status[..lanes];
+                    if keeping {
+                        for (lane, &status) in status.iter().enumerate() {
+                            let ok = status == Status::Ok;
+                            let along = |k: usize| if ok { error[k].lane(lane) } else { f64::NAN };
+                            sums.positions.extend([along(0), along(1), along(2)]);
+                        }
                     }
+                    moments.add(&error, &components, pose.whitening.as_ref(), status, tally);
                 }
-                let error = displacement(&nominal, &descent.pose);
-                moments.add(&error, &components, pose.whitening.as_ref(), &status[..lanes], tally);
+                moments.finish(sums, tally);
             }
-            moments.finish(sums, tally);
         }
+    }
+}
+
+/// The machine as the samples in the lanes have it, its buffers kept from one to the next.
+pub(super) struct Moved<S> {
+    p: Vec<S>,
+    q: Vec<S>,
+    placed: Limbs<S>,
+    start: Pose<S>,
+    nominal: Pose<S>,
+}
+
+impl<S: Real> Moved<S> {
+    /// At a pose.
+    #[inline(always)]
+    pub(super) fn at(pose: &StudyPose) -> Self {
+        let lanes = |values: &[f64]| values.iter().map(|&value| S::splat(value)).collect();
+        Moved {
+            p: lanes(&pose.centre),
+            q: lanes(&pose.joints),
+            placed: Default::default(),
+            start: Pose::splat(&pose.start),
+            nominal: Pose::splat(&pose.nominal),
+        }
+    }
+
+    /// Errors at that `pose` where `value(variable)` are the variables; what became of the
+    /// first `lanes` lanes.
+    #[inline(always)]
+    pub(super) fn error(
+        &mut self,
+        machine: &Machine,
+        columns: &Columns,
+        pose: &StudyPose,
+        lanes: usize,
+        value: impl Fn(usize) -> S,
+    ) -> ([S; 6], [Status; LANES]) {
+        for (column, &swing) in columns.moves.iter().zip(&pose.swing) {
+            let parameter = &mut self.p[column.parameter];
+            let from =
+                if column.first { S::splat(pose.centre[column.parameter]) } else { *parameter };
+            *parameter = S::splat(swing).mul_add(value(column.variable), from);
+        }
+        place_limbs(machine, &self.p, &self.q, &mut self.placed);
+        let mut descent = if machine.plain {
+            chord(machine, &self.placed, &self.start, &pose.inverse)
+        } else {
+            Descent { pose: self.start, proof: S::splat(-1.0) }
+        };
+        let mut status = [Status::Ok; LANES];
+        for lane in 0..lanes {
+            // Also true where it is NaN.
+            if !(descent.proof.lane(lane) > 0.0) {
+                let (one, outcome) = alone(machine, &self.p, pose, lane);
+                status[lane] = outcome;
+                descent.pose.set_lane(lane, &one.to_row());
+            }
+        }
+        (displacement(&self.nominal, &descent.pose), status)
     }
 }
 

@@ -121,14 +121,18 @@ struct Distribution<'a> {
 }
 
 impl Distribution<'_> {
-    /// The value below which lies a `share` of all, linear within a bin.
-    fn quantile(&self, share: f64) -> f64 {
+    /// The value below which lies a `share` of all, linear within a bin. `from`: a bin that is not behind
+    /// that of the share, which is put there: ascending shares walk over the bins once.
+    fn quantile_from(&self, share: f64, from: &mut usize) -> f64 {
         let total = self.up_to[BINS - 1];
         if total == 0 {
             return f64::NAN;
         }
         let wanted = share * total as f64;
-        let bin = self.up_to.partition_point(|&sum| sum == 0 || (sum as f64) < wanted);
+        while self.up_to.get(*from).is_some_and(|&sum| sum == 0 || (sum as f64) < wanted) {
+            *from += 1;
+        }
+        let bin = *from;
         let Some(&count) = self.of.counts.get(bin) else { return self.of.highest };
         let before = self.up_to[bin] - count;
         let inside = (wanted - before as f64) / count as f64;
@@ -139,9 +143,13 @@ impl Distribution<'_> {
     /// The narrowest interval that holds a `share` of all (JCGM 101:2008, 5.3.4).
     fn shortest(&self, share: f64) -> [f64; 2] {
         let mut best = [f64::NAN; 2];
+        let (mut lower, mut upper) = (0, 0);
         for start in 0..=STARTS {
             let below = (1.0 - share) * start as f64 / STARTS as f64;
-            let ends = [self.quantile(below), self.quantile(below + share)];
+            let ends = [
+                self.quantile_from(below, &mut lower),
+                self.quantile_from(below + share, &mut upper),
+            ];
             if !(best[1] - best[0] <= ends[1] - ends[0]) {
                 best = ends;
             }
@@ -159,6 +167,8 @@ pub struct Sums {
     pub first: Vec<f64>,
     /// Of the products of two of the columns with a covariance, upper triangle row after row.
     pub second: Vec<f64>,
+    /// Position errors of the samples, three numbers each, NaN without a result, where they are kept.
+    pub positions: Vec<f64>,
 }
 
 impl Sums {
@@ -168,6 +178,7 @@ impl Sums {
             count: 0,
             first: vec![0.0; columns],
             second: vec![0.0; covariant * (covariant + 1) / 2],
+            positions: Vec::new(),
         }
     }
 
@@ -290,6 +301,18 @@ impl Tally {
         }
     }
 
+    /// Appends a column, its value in each sample that has a result.
+    pub fn append(&mut self, origin: f64, width: f64, values: impl Iterator<Item = f64>) {
+        let mut histogram = Histogram::new(origin, width);
+        let mut sum = 0.0;
+        for value in values {
+            sum += value - origin;
+            histogram.add(value);
+        }
+        self.sums.first.push(sum);
+        self.histograms.push(histogram);
+    }
+
     /// Adds the samples of another tally of the same origins and widths.
     pub fn merge(&mut self, other: Tally) {
         self.sums.add(&other.sums);
@@ -322,7 +345,15 @@ impl Tally {
     /// The values of a column below which lie the `shares` of the samples.
     pub fn quantiles(&self, column: usize, shares: &[f64]) -> Vec<f64> {
         let distribution = self.histograms[column].distribution();
-        shares.iter().map(|&share| distribution.quantile(share)).collect()
+        let (mut before, mut bin) = (f64::INFINITY, 0);
+        let quantile = |&share: &f64| {
+            if !(share >= before) {
+                bin = 0;
+            }
+            before = share;
+            distribution.quantile_from(share, &mut bin)
+        };
+        shares.iter().map(quantile).collect()
     }
 
     /// The narrowest interval of a column that holds a `share` of the samples.

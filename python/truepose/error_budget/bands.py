@@ -71,7 +71,7 @@ def of_source(
     return _by_effects(machine, block, deviation, error, kinds)
 
 
-def together(
+def of_all(
     machine: Machine,
     block: PoseBlock,
     variables: Variables,
@@ -170,4 +170,4 @@ def _by_effects(
     return BandEffect((down, up), uncertain, far, status)
 
 
-__all__ = ["BandEffect", "is_plain", "of_source", "together"]
+__all__ = ["BandEffect", "is_plain", "of_all", "of_source"]

@@ -223,7 +223,7 @@ def _evaluate(
         [(d, source.sets_overall_edges) for d, source in zip(deviations, sources, strict=True)],
     )
     variables = variables_of(machine, sources, deviations)
-    together, regular = bands.together(machine, block, variables, overall.error, kinds)
+    together, regular = bands.of_all(machine, block, variables, overall.error, kinds)
     shifted += [overall.status[0], *nominal, regular]
     at_edges += overall.status[1:]
     values |= {

@@ -1,6 +1,6 @@
 //! Unit vectors, and how far a set reaches along them.
 
-use super::Set;
+use super::set::Set;
 use crate::scalar::{LANES, Real};
 use crate::spatial::{Vector, norm, scale};
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
     from truepose.reporting.accuracy import Told
-    from truepose.reporting.tables import Table
+    from truepose.reporting.table import Table
 
 PIPED_WIDTH = 160
 """Columns where the output is no terminal, so that no table is squeezed."""

@@ -28,7 +28,7 @@ from truepose.reporting.accuracy import gains, told
 from truepose.reporting.display import nearest_middle, pose_text, where_highest
 from truepose.reporting.result import Result
 from truepose.reporting.study import Study, warnings_of
-from truepose.reporting.tables import Table
+from truepose.reporting.table import Table
 from truepose.runs.poses import faults_text, reason_text
 from truepose.verdict import witness_file
 from truepose.verdict.answer import BEFORE, NOT_MET, STATES

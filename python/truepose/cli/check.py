@@ -19,7 +19,7 @@ from truepose.cli._options import (
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
-    from truepose.reporting.tables import Table
+    from truepose.reporting.table import Table
     from truepose.reporting.workspace_check import WorkspaceCheck
     from truepose.verdict.answer import Answer
 
@@ -88,6 +88,7 @@ def command(**options: Any) -> int:
 
 def _tables(machine: Machine, check: WorkspaceCheck, answers: tuple[Answer, ...]) -> list[Table]:
     from truepose.reporting import calibrated_files, inputs, tables, workspace_check
+    from truepose.reporting.table import with_not_included
     from truepose.sources import not_included_text
 
     left_out = not_included_text(machine, machine.condition)
@@ -96,7 +97,7 @@ def _tables(machine: Machine, check: WorkspaceCheck, answers: tuple[Answer, ...]
         inputs.machine(machine),
         *([] if made is None else [made]),
         inputs.condition(machine),
-        tables.with_not_included(inputs.sources(machine), left_out),
+        with_not_included(inputs.sources(machine), left_out),
         inputs.deviations(machine),
         workspace_check.table(machine, check),
     ]

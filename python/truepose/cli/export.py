@@ -91,7 +91,7 @@ def _show_controllers() -> None:
     from truepose.cli._show import show_tables
     from truepose.controllers import REGISTRY
     from truepose.controllers import controller as adapter_of
-    from truepose.reporting.tables import Table
+    from truepose.reporting.table import Table
 
     header = ("controller", "what it is given", "options")
     rows = []

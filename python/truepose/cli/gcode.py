@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from truepose.controllers.gcode import Errors, Proof
     from truepose.files.shown_units import Shown
     from truepose.machine import Machine
-    from truepose.reporting.tables import Table
+    from truepose.reporting.table import Table
 
 
 @click.command("gcode")
@@ -267,7 +267,7 @@ def _tables(machine: Machine, proof: Proof, said: str) -> Iterable[Table]:
     import numpy as np
 
     from truepose.controllers.gcode._axes import LINEAR, Axes
-    from truepose.reporting.tables import Table
+    from truepose.reporting.table import Table
 
     axes = Axes(machine)
     rows = []

@@ -12,7 +12,7 @@ from truepose.cli._options import OutputFile, format_option, takes
 
 if TYPE_CHECKING:
     from truepose.machine.library import LibraryMachine
-    from truepose.reporting.tables import Table
+    from truepose.reporting.table import Table
 
 
 @click.command("init")
@@ -37,13 +37,14 @@ def command(kind: str | None, listed: bool, output: Path | None, format: str) ->
     """
     if listed == (kind is not None):
         raise click.UsageError("Give a KIND, or --list to see which there are.")
-    from truepose.cli._steps import note_written
-    from truepose.files.writing import replacing, require_new, require_writable
     from truepose.machine import library
 
     if kind is None:
         _show(library.machines(), format)
         return 0
+    from truepose.cli._steps import note_written
+    from truepose.files.writing import replacing, require_new, require_writable
+
     machine = library.machine_of(kind)
     path = output or Path(f"{kind}.toml")
     require_writable(path, [".toml"])
@@ -64,7 +65,7 @@ def _show(machines: Sequence[LibraryMachine], form: str) -> None:
 
 
 def _table(machines: Sequence[LibraryMachine]) -> Table:
-    from truepose.reporting.tables import Table
+    from truepose.reporting.table import Table
 
     header = ("kind", "freedoms", "drives", "what it is")
     return Table(

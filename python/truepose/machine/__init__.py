@@ -6,14 +6,40 @@ nothing here imports them.
 
 from __future__ import annotations
 
-from truepose.files.tolerance import Band, Tolerance
-from truepose.files.units import FileUnit
-from truepose.machine.condition import Condition, Envelope
-from truepose.machine.loader import load
-from truepose.machine.model import Machine
-from truepose.machine.parts import Body, Drive, Guide, Joint, Strut
-from truepose.machine.source_builder import ErrorSource, SourceBuilder, SourceType
-from truepose.machine.workspace import Accuracy, GridAxis, Workspace
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from truepose.files.tolerance import Band, Tolerance
+    from truepose.files.units import FileUnit
+    from truepose.machine.condition import Condition, Envelope
+    from truepose.machine.loader import load
+    from truepose.machine.model import Machine
+    from truepose.machine.parts import Body, Drive, Guide, Joint, Strut
+    from truepose.machine.source_builder import ErrorSource, SourceBuilder, SourceType
+    from truepose.machine.workspace import Accuracy, GridAxis, Workspace
+
+_WHERE = {
+    "Accuracy": "truepose.machine.workspace",
+    "Band": "truepose.files.tolerance",
+    "Body": "truepose.machine.parts",
+    "Condition": "truepose.machine.condition",
+    "Drive": "truepose.machine.parts",
+    "Envelope": "truepose.machine.condition",
+    "ErrorSource": "truepose.machine.source_builder",
+    "FileUnit": "truepose.files.units",
+    "GridAxis": "truepose.machine.workspace",
+    "Guide": "truepose.machine.parts",
+    "Joint": "truepose.machine.parts",
+    "Machine": "truepose.machine.model",
+    "SourceBuilder": "truepose.machine.source_builder",
+    "SourceType": "truepose.machine.source_builder",
+    "Strut": "truepose.machine.parts",
+    "Tolerance": "truepose.files.tolerance",
+    "Workspace": "truepose.machine.workspace",
+    "load": "truepose.machine.loader",
+}
+"""Name -> the module that is imported when it is first used: the library needs none of them."""
 
 __all__ = [
     "Accuracy",
@@ -35,3 +61,17 @@ __all__ = [
     "Workspace",
     "load",
 ]
+
+
+if not TYPE_CHECKING:  # type checkers know the names above, and refuse all others
+
+    def __getattr__(name: str) -> Any:
+        if name not in _WHERE:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(import_module(_WHERE[name]), name)
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.reporting.display import MISSING, number, pose_text, where_highest
-from truepose.reporting.tables import MOST_LISTED, Table
+from truepose.reporting.table import Table
+from truepose.reporting.tables import MOST_LISTED
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,7 +16,8 @@ from truepose.calibration.acceptance.sentences import listed, quantity, sentence
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.files.shown_units import Shown, ShownUnits
 from truepose.reporting.display import MISSING, decimals_for, number, where_highest
-from truepose.reporting.tables import MOST_LISTED, Table
+from truepose.reporting.table import Table
+from truepose.reporting.tables import MOST_LISTED
 
 if TYPE_CHECKING:
     import xarray as xr

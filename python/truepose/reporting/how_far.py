@@ -12,7 +12,7 @@ from truepose.files.wording import counted
 from truepose.reporting.accuracy import AFTER, BEFORE
 from truepose.reporting.display import MISSING
 from truepose.reporting.study import Study
-from truepose.reporting.tables import Table
+from truepose.reporting.table import Table
 from truepose.reporting.uncertainty_tables import rounded
 
 NUMBERS = {

@@ -10,7 +10,7 @@ from truepose.files.shown_units import Shown, ShownUnits
 from truepose.machine.parts import is_body
 from truepose.reporting.display import MISSING, nearest_middle, number, pose_text
 from truepose.reporting.result import in_file_units
-from truepose.reporting.tables import Table
+from truepose.reporting.table import Table
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Machine

@@ -11,7 +11,8 @@ from truepose.calibration.planning.plan import DOMINATED
 from truepose.files.wording import counted
 from truepose.reporting.display import column
 from truepose.reporting.result import in_file_units, pose_si
-from truepose.reporting.tables import MOST_LISTED, Table
+from truepose.reporting.table import Table
+from truepose.reporting.tables import MOST_LISTED
 
 if TYPE_CHECKING:
     from truepose.calibration.planning.comparison import Comparison

@@ -6,7 +6,6 @@ In the units for people (`truepose.files.shown_units`), percentages of the comma
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +23,7 @@ from truepose.reporting.display import (
     where_highest,
 )
 from truepose.reporting.study import Study, warnings_of
+from truepose.reporting.table import Table, with_not_included
 from truepose.runs.poses import reason_text
 
 if TYPE_CHECKING:
@@ -34,29 +34,6 @@ if TYPE_CHECKING:
 
 MOST_LISTED = 20
 """Rows of a list of poses shown to people; files for programs hold them all."""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table ready to be shown: every cell is text, `words` leading columns are words.
-
-    The other columns are numbers and stand to the right.
-    """
-
-    name: str
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    words: int = 1
-    note: str = ""
-
-
-def with_not_included(table: Table, parts: str) -> Table:
-    """The table, whose note also names what is not in the results, where anything is not.
-
-    `parts`: as the attribute `not_included` of a result has them, `frame (no material)`.
-    """
-    return replace(table, note=f"{table.note} Not included: {parts}.") if parts else table
 
 
 def ranking(study: Study) -> Table:

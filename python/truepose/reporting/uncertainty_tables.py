@@ -23,7 +23,8 @@ from truepose.reporting.display import (
 )
 from truepose.reporting.reading import at_text, components, percent_text, quantities, worst_pose
 from truepose.reporting.study import Study
-from truepose.reporting.tables import MOST_LISTED, Table
+from truepose.reporting.table import Table
+from truepose.reporting.tables import MOST_LISTED
 from truepose.reporting.variance_shares import shares
 from truepose.runs.poses import not_assembled_text
 

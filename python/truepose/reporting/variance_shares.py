@@ -11,7 +11,8 @@ from truepose.arrays import Floats
 from truepose.files.wording import counted
 from truepose.reporting.display import column, is_position, where_highest
 from truepose.reporting.reading import at_text, components, position_of
-from truepose.reporting.tables import MOST_LISTED, Table
+from truepose.reporting.table import Table
+from truepose.reporting.tables import MOST_LISTED
 from truepose.uncertainty_analysis.shares import first_to_tighten
 
 if TYPE_CHECKING:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from truepose.arrays import Flags, Floats
 from truepose.reporting.display import number, pose_text, where_highest
 from truepose.reporting.result import in_file_units, pose_in_file_units
-from truepose.reporting.tables import MOST_LISTED, Table
+from truepose.reporting.table import Table
+from truepose.reporting.tables import MOST_LISTED
 from truepose.runs.poses import OK
 
 if TYPE_CHECKING:

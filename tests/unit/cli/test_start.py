@@ -26,6 +26,24 @@ def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
     assert "Usage: truepose" in done.stdout
 
 
+@pytest.mark.parametrize("form", ["table", "json", "csv"])
+def test_the_kinds_are_listed_without_a_machine(form: str) -> None:
+    """Only what draws a table on a terminal is imported for them."""
+    heavy = [name for name in HEAVY if name != "rich" or form != "table"]
+    program = (
+        "import sys; from truepose.cli import run; code = run(sys.argv[1:]); "
+        f"sys.exit(code or ','.join(name for name in {heavy} if name in sys.modules) or 0)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, "init", "--list", "--format", form],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "planar_two_slider" in done.stdout
+
+
 def test_help_names_every_command_in_the_order_of_work(capsys: pytest.CaptureFixture[str]) -> None:
     shown = call(capsys, "--help").out
     places = [shown.index(f"\n  {name} ") for name in COMMANDS]

@@ -22,7 +22,7 @@ from truepose.reporting.figures import (
 )
 from truepose.reporting.result import Result
 from truepose.reporting.study import Study
-from truepose.reporting.tables import Table
+from truepose.reporting.table import Table
 
 FIGURES = (
     calibration_residuals,

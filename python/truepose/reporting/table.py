@@ -1,0 +1,28 @@
+"""A table for people, of which nothing is known but its text: ready for a terminal or a page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table ready to be shown: every cell is text, `words` leading columns are words.
+
+    The other columns are numbers and stand to the right.
+    """
+
+    name: str
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    words: int = 1
+    note: str = ""
+
+
+def with_not_included(table: Table, parts: str) -> Table:
+    """The table, whose note also names what is not in the results, where anything is not.
+
+    `parts`: as the attribute `not_included` of a result has them, `frame (no material)`.
+    """
+    return replace(table, note=f"{table.note} Not included: {parts}.") if parts else table

@@ -12,6 +12,7 @@ use crate::kinematics::{
 use crate::linear::{CLOSURES, Order, SIX, factor_pivoting};
 use crate::machine::{Machine, indices_of};
 use crate::scalar::Real;
+use crate::spatial::Pose;
 use crate::statics::{
     ClosureMatrix, add_shared, closure_compliance, closure_forces, parameter_load, pose_compliance,
     pose_stiffness,
@@ -114,10 +115,15 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
 }
 
 #[inline(never)]
-pub(super) fn single_order<S: Real>(machine: &Machine, group: &Group<S>, size: usize) -> Order {
+fn single_order<S: Real>(machine: &Machine, group: &Group<S>, size: usize) -> Order {
     let (p, q, pose) = group.single(group.first_finite(size));
+    row_order(machine, &p, &q, &pose)
+}
+
+/// The order in which the rows are eliminated at a pose.
+pub(super) fn row_order(machine: &Machine, p: &[f64], q: &[f64], pose: &Pose<f64>) -> Order {
     let mut linear = Linearisation::default();
-    linear.differentiate(machine, &p, &q, &pose);
+    linear.differentiate(machine, p, q, pose);
     let mut square = [[0.0; SIX]; SIX];
     square.copy_from_slice(&linear.rows[..SIX]);
     factor_pivoting(&square).order

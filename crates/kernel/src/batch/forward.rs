@@ -126,7 +126,7 @@ pub fn displacement<S: Real>(from: &Pose<S>, to: &Pose<S>) -> [S; 6] {
 }
 
 #[inline(always)]
-pub(super) fn single_limbs<S: Real>(limbs: &Limbs<S>, lane: usize) -> Limbs<f64> {
+fn single_limbs<S: Real>(limbs: &Limbs<S>, lane: usize) -> Limbs<f64> {
     let mut single: Limbs<f64> = Default::default();
     for (one, many) in single.iter_mut().zip(limbs) {
         one.base = many.base.map(|value| value.lane(lane));

@@ -1,14 +1,14 @@
 //! First-order quantities of a machine whose parameters have moved already.
 
-use super::first_order::{FirstOrder, Place, single_order};
-use super::forward::{displacement, single_limbs};
+use super::first_order::{FirstOrder, Place, row_order};
+use super::forward::displacement;
 use super::samples::{Group, Samples};
 use super::threads::for_chunks;
 use crate::dispatch::{Work, dispatch};
 use crate::kinematics::{
-    Limbs, Linearisation, Sample, descend, forward, limbs, place_limbs, start_order,
+    Limbs, Linearisation, Sample, descend, forward, inverse, limbs, place_limbs, start_order,
 };
-use crate::linear::SIX;
+use crate::linear::{IN_ORDER, Order, SIX};
 use crate::machine::Machine;
 use crate::scalar::Real;
 use crate::spatial::{Pose, Vector, add, cross, dot, scale};
@@ -28,16 +28,37 @@ pub fn moved_first_order(
     status: &mut [Status],
 ) {
     let width = quantity.width();
+    let orders = Orders::at_home(machine);
     for_chunks(samples.count, (out, width), (&mut [], 0), status, |first, out, _, status| {
-        let chunk = Chunk { machine, samples, quantity, first, out, status };
+        let chunk = Chunk { machine, samples, quantity, orders: &orders, first, out, status };
         if machine.plain { dispatch(chunk) } else { chunk.run::<f64>() }
     });
+}
+
+/// In which order the rows are eliminated: that of one pose, so that no sample depends on its neighbours.
+struct Orders {
+    forward: Order,
+    rows: Order,
+}
+
+impl Orders {
+    /// Of the nominal machine at home. Where its order does not serve, a sample has its own.
+    fn at_home(machine: &Machine) -> Self {
+        let solved = inverse(machine, &machine.nominal, &machine.home);
+        let (p, q, pose) = (&machine.nominal, &solved.joints, &solved.pose);
+        if !matches!(solved.status, Status::Ok | Status::OutOfTravel) {
+            return Orders { forward: IN_ORDER, rows: IN_ORDER };
+        }
+        let forward = start_order(machine, &limbs(machine, p, q), pose);
+        Orders { forward, rows: row_order(machine, p, q, pose) }
+    }
 }
 
 struct Chunk<'a, Q> {
     machine: &'a Machine,
     samples: &'a Samples<'a>,
     quantity: &'a Q,
+    orders: &'a Orders,
     first: usize,
     out: &'a mut [f64],
     status: &'a mut [Status],
@@ -46,11 +67,10 @@ struct Chunk<'a, Q> {
 impl<Q: FirstOrder> Work for Chunk<'_, Q> {
     #[inline(always)]
     fn run<S: Real>(self) {
-        let Chunk { machine, samples, quantity, first, out, status } = self;
+        let Chunk { machine, samples, quantity, orders, first, out, status } = self;
         let width = quantity.width();
         let mut group = Group::<S>::new(machine);
         let mut at: Limbs<S> = Default::default();
-        let (mut forward_order, mut order) = ([0; SIX], [0; SIX]);
         let mut columns = vec![S::default(); width / quantity.parts()];
         let mut linear = Linearisation::default();
         let groups = out.chunks_mut((width * S::WIDTH).max(1)).zip(status.chunks_mut(S::WIDTH));
@@ -61,14 +81,9 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
                 if group.load(machine, samples, place.first, place.size) {
                     place_limbs(machine, &group.p, &group.q, &mut at);
                 }
-                if number == 0 {
-                    let lane = group.first_finite(place.size);
-                    let pose = group.pose.lane(lane);
-                    forward_order = start_order(machine, &single_limbs(&at, lane), &pose);
-                    order = single_order(machine, &group, place.size);
-                }
-                let descent = descend(machine, &at, &group.pose, &forward_order);
-                linear.fill(machine, &group.p, &group.q, &at, &descent.pose, &order);
+                let descent = descend(machine, &at, &group.pose, &orders.forward);
+                let (p, q) = (&group.p, &group.q);
+                linear.fill(machine, p, q, &at, &descent.pose, &orders.rows);
                 let error = displacement(&group.pose, &descent.pose);
                 let turned = [error[3], error[4], error[5]];
                 let square = dot(turned, turned);

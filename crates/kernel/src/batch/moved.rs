@@ -42,8 +42,12 @@ struct Orders {
 }
 
 impl Orders {
-    /// Of the nominal machine at home. Where its order does not serve, a sample has its own.
+    /// Of the nominal machine at home. Where its order does not serve, a sample has its own, as every
+    /// sample of a machine that is not plain.
     fn at_home(machine: &Machine) -> Self {
+        if !machine.plain {
+            return Orders { forward: IN_ORDER, rows: IN_ORDER };
+        }
         let solved = inverse(machine, &machine.nominal, &machine.home);
         let (p, q, pose) = (&machine.nominal, &solved.joints, &solved.pose);
         if !matches!(solved.status, Status::Ok | Status::OutOfTravel) {

@@ -57,7 +57,11 @@ def test_derivatives_equal_central_differences(case: CalibrationUnderTest) -> No
 
 
 def test_without_noise_the_truth_comes_back(case: CalibrationUnderTest) -> None:
-    """All that the readings determine, to 1e-9 of the machine's size; nothing else moves."""
+    """All that the readings determine, to 3e-9 of the machine's size; nothing else moves.
+
+    The weakest direction that they see takes rounding of 1e-16 m to 1.7e-9 in the linear algebra of
+    some processors, to 0.8e-9 in that of others.
+    """
     random = np.random.default_rng(case.seed)
     problem, unknowns = case.problem, case.unknowns
     equations = case.equations(use_prior=False)
@@ -67,8 +71,8 @@ def test_without_noise_the_truth_comes_back(case: CalibrationUnderTest) -> None:
     truth = unknowns.prior_mean + equations.scale * away
     prior = Prior(equations.gauge_rows(), unknowns.prior_mean)
     solved = problem.solve(problem.predict(truth), prior=prior)
-    # Tolerances are some ten micrometres wide: this is a millionth of them, or less.
+    # Tolerances are some ten micrometres wide: this is some millionths of them, or less.
     size = np.where(np.array(unknowns.units) == "m", case.machine.characteristic_length, 1.0)
-    assert (np.abs(solved.values[0] - truth) < 1e-9 * size).all()
+    assert (np.abs(solved.values[0] - truth) < 3e-9 * size).all()
     misfit = problem.predict(solved.values[0]) - problem.predict(truth)
     assert np.abs(misfit / problem.measurements.uncertainty).max() < 1e-8

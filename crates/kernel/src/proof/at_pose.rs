@@ -9,7 +9,8 @@
 //! the slopes S there and the inverse of every matrix there are known. A solution y in plain numbers is
 //! off by what its residuals are through that inverse (both y and the root lie where the matrices are
 //! enclosed). From its middle m the smaller box reaches x(m) + C (t - m), by the mean value theorem first
-//! in t and then in x: the chords C = -J^-1 G need G at x(m) alone, and are tighter than the slopes.
+//! in t and then in x: the chords C = -J^-1 G need G at x(m) alone, and are tighter than the slopes. Where
+//! the inverse over the whole is spread widely, a smaller box is proved by itself.
 
 use super::closures::{Derivatives, Placed, Six, Square, add_multiple, derivatives, residuals};
 use super::root::{Inverse, Root, Varying, prove};
@@ -29,7 +30,7 @@ use std::rc::Rc;
 pub const FINE: f64 = 1.0003;
 /// Times that the box is made smaller.
 const ROUNDS: usize = 6;
-/// An inverse that is spread by more is found again over a smaller box.
+/// Where the inverse is spread by more, every smaller box is proved by itself.
 const LOOSE: f64 = 0.05;
 /// What variables of uncertain sign may add to how far a part reaches, of that: along an axis what
 /// rounding may, elsewhere what no verdict depends on.
@@ -321,9 +322,23 @@ impl Part<'_> {
         if let Some(known) = self.narrowed.borrow().get(ends) {
             return known.clone();
         }
-        let narrowed = self.narrow(ends).map(Rc::new);
+        // Where all is loose, so is what follows from it; but a vertex is a vertex.
+        let loose = self.first.inverse.excess() > LOOSE && ends.contains(&0);
+        let narrowed = if loose { None } else { self.narrow(ends) };
+        let narrowed = narrowed.or_else(|| self.proven(ends)).map(Rc::new);
         self.narrowed.borrow_mut().insert(ends.to_vec(), narrowed.clone());
         narrowed
+    }
+
+    /// The same by a proof of its own.
+    fn proven(&self, ends: &[i8]) -> Option<Narrowed> {
+        let sides: Vec<Interval> =
+            ends.iter().enumerate().map(|(variable, &end)| self.side(variable, end)).collect();
+        let proven = self.extent.enclose(&sides, &self.first.pose).ok()?;
+        // The root over the smaller part is the one proved over the whole.
+        let same = lies_in(&proven.middle, &self.first.unique_in);
+        let Enclosed { middle, slopes, .. } = proven;
+        same.then(|| Narrowed { middle, chords: slopes.clone(), slopes })
     }
 
     fn narrow(&self, ends: &[i8]) -> Option<Narrowed> {
@@ -340,35 +355,22 @@ impl Part<'_> {
         // From the middle on: first to the deviations, where only they vary, then with the displacement.
         let spread = derivatives(machine, &p, q, at, &middle);
         let gradient = |parameter| spread.closures.to_parameter(machine, parameter);
-        let opened = deviating.columns(varies, gradient);
-        let chords = |inverse: &Inverse| -> Vec<Six> {
-            let chord = |(variable, column): (usize, &Six)| {
-                if varies(variable) { inverse.times(column).map(|value| -value) } else { *column }
-            };
-            opened.iter().enumerate().map(chord).collect()
-        };
-        let mut outer = self.first.whole;
-        let mut enclose = |moves: &[Six]| -> Option<(Derivatives, Inverse)> {
-            let mut whole = middle;
-            for (variable, moves) in moves.iter().enumerate() {
-                if varies(variable) {
-                    add_multiple(&mut whole, moves, sides[variable] - middles[variable]);
-                }
-            }
-            for (outer, whole) in outer.iter_mut().zip(whole) {
-                *outer = outer.intersection(whole)?;
-            }
-            let over = derivatives(machine, &p, q, at, &outer);
-            let inverse = Inverse::of(&over.to_displacement)?;
-            Some((over, inverse))
-        };
-        let (mut over, mut inverse) = enclose(&self.first.slopes)?;
-        if self.first.inverse.excess() > LOOSE {
-            // Over the smaller box it is a better one.
-            (over, inverse) = enclose(&chords(&inverse))?;
+        let mut chords = deviating.columns(varies, gradient);
+        let mut outer = middle;
+        for variable in (0..sides.len()).filter(|&variable| varies(variable)) {
+            let away = sides[variable] - middles[variable];
+            add_multiple(&mut outer, &self.first.slopes[variable], away);
         }
+        for (outer, whole) in outer.iter_mut().zip(&self.first.whole) {
+            *outer = outer.intersection(*whole)?;
+        }
+        let over = derivatives(machine, &p, q, at, &outer);
+        let inverse = Inverse::of(&over.to_displacement)?;
         let slopes = self.extent.slopes(&over, &inverse, varies);
-        Some(Narrowed { middle, chords: chords(&inverse), slopes })
+        for (_, chord) in chords.iter_mut().enumerate().filter(|&(variable, _)| varies(variable)) {
+            *chord = inverse.times(chord).map(|value| -value);
+        }
+        Some(Narrowed { middle, chords, slopes })
     }
 
     /// The most that `direction . displacement` can be.

@@ -391,6 +391,14 @@ impl Part<'_> {
         for &member in directions.iter().flatten() {
             in_direction[member] = true;
         }
+        // Of a unit vector t, slopes . t is at most the length of the slopes (Cauchy and Schwarz).
+        let farthest = |slopes: &[Six]| {
+            let length = |members: &Vec<usize>| {
+                let squares = members.iter().map(|&one| along(direction, &slopes[one]).square());
+                squares.fold(point(0.0), |sum, square| sum + square).sqrt()
+            };
+            directions.iter().map(length).fold(point(0.0), |sum, one| sum + one)
+        };
         let mut ends = vec![0_i8; *count];
         let mut own: Option<Rc<Narrowed>> = None;
         let mut best = f64::INFINITY;
@@ -432,30 +440,24 @@ impl Part<'_> {
                     (least_certain, loosest) = (size, Some(variable));
                 }
             }
-            // Of a unit vector t, slopes . t is at most the length of the slopes (Cauchy and Schwarz).
-            for members in directions {
-                let squares = members
-                    .iter()
-                    .map(|&member| along(direction, &chords.unwrap_or(slopes)[member]).square())
-                    .fold(point(0.0), |sum, square| sum + square);
-                bound = bound + squares.sqrt();
-            }
+            bound = bound + farthest(chords.unwrap_or(slopes));
             best = best.min(bound.upper);
             // All signs are certain, or what those that are not add is little enough.
-            let settled = directions.is_empty() && more.upper <= slack * best.abs();
-            if settled {
+            let settled = more.upper <= slack * best.abs();
+            if settled || !fixed {
+                // No smaller box is certain of more. From the better ends on: where a sign becomes certain
+                // this goes over into the bound of the smaller box, without a jump.
                 uncertain.iter().for_each(|&(variable, end)| ends[variable] = end);
-            } else if !fixed {
-                // No smaller box is certain of more.
+                let Some(last) = self.narrowed(&ends) else { break };
+                let reached = along(direction, &last.middle) + more + farthest(&last.chords);
+                best = best.min(reached.upper);
+                if settled && directions.is_empty() {
+                    loosest = None;
+                }
                 break;
             }
             // A smaller part that cannot be enclosed leaves the bound as it is.
             let Some(next) = self.narrowed(&ends) else { break };
-            if settled {
-                best = best.min((along(direction, &next.middle) + more).upper);
-                loosest = None;
-                break;
-            }
             own = Some(next);
         }
         DirectionBound { bound: best, loosest }

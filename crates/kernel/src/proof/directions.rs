@@ -228,7 +228,11 @@ pub fn longest(
             return Longest { bound, direction };
         }
         cells.swap_remove(worst);
-        cells.extend(parts.into_iter().map(|corners| net.cell(corners)));
+        // What no vector of the cone exceeds, none of a part does, however uneven the reaches are.
+        cells.extend(parts.into_iter().map(|corners| {
+            let part = net.cell(corners);
+            Cell { bound: part.bound.min(bound), ..part }
+        }));
     }
 }
 

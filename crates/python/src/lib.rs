@@ -13,6 +13,7 @@ mod largest;
 mod least_squares;
 mod limbs;
 mod machine;
+mod once;
 mod proof;
 mod quantity;
 mod samples;

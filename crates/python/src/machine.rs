@@ -3,6 +3,7 @@
 use crate::arrays::{Array, Given, Input, filled, output};
 use crate::description::description;
 use crate::failure::{KernelError, kernel_error};
+use crate::once::Once;
 use crate::quantity::Quantity;
 use crate::samples::{BLOCK, in_blocks_into, with_codes, write_coordinates};
 use numpy::{PyArray1, PyArrayMethods};
@@ -22,6 +23,7 @@ pub struct Machine {
     pub inner: truepose_kernel::Machine,
     description: Py<PyDict>,
     replaced: BTreeMap<usize, f64>,
+    pub once: Once,
 }
 
 fn names(flags: &[bool; 6], all: [&'static str; 6]) -> Vec<&'static str> {
@@ -32,8 +34,10 @@ impl Machine {
         let machine = truepose_kernel::Machine::new(&description(table)?).map_err(kernel_error)?;
         let values: Vec<(usize, f64)> =
             replaced.iter().map(|(&index, &value)| (index, value)).collect();
+        let inner = machine.with_values(&values);
         Ok(Machine {
-            inner: machine.with_values(&values),
+            once: Once::new(&inner),
+            inner,
             description: table.copy()?.unbind(),
             replaced,
         })
@@ -169,6 +173,9 @@ impl Machine {
         start: Option<&Bound<'py, PyAny>>,
         status: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
+        if !status && let Some(pose) = self.forward_once(joints, start) {
+            return Ok(PyArray1::from_slice(py, pose.numbers()).into_any());
+        }
         let machine = &self.inner;
         let joints = Input::new(joints, &[machine.drives.len()], "joints")?;
         let count = joints.count;

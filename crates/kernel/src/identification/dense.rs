@@ -32,6 +32,8 @@ pub struct Linear {
     pub rows: usize,
     /// Whether R is so far from singular that a back substitution gives the step.
     pub trusted: bool,
+    /// Whether R is that of normal equations, and so far from singular that they serve for another gradient.
+    pub(super) of_normal: bool,
 }
 
 impl Linear {
@@ -44,6 +46,7 @@ impl Linear {
             gradient: DVector::zeros(size),
             rows: 0,
             trusted: false,
+            of_normal: false,
         }
     }
 
@@ -59,7 +62,7 @@ impl Linear {
     pub fn set_dense(&mut self, mut slope: DMatrix<f64>, residual: &[f64]) -> bool {
         let (rows, size) = slope.shape();
         assert_eq!(residual.len(), rows, "one residual for each row of the slope");
-        self.rows = rows;
+        (self.rows, self.of_normal) = (rows, false);
         if rows == 0 {
             *self = Linear::new(size);
             return true;
@@ -107,19 +110,37 @@ impl Linear {
     pub fn set_normal(&mut self, normal: &DMatrix<f64>, gradient: &[f64], rows: usize) -> bool {
         let size = gradient.len();
         assert_eq!(normal.shape(), (size, size), "a normal matrix for the gradient");
-        self.rows = rows;
-        self.columns = normal.diagonal().map(f64::sqrt);
-        self.gradient = DVector::from_column_slice(gradient);
+        // Column after column, of which the lower triangle then is what is read.
+        let turned = normal.transpose();
+        self.set_normal_rows(turned.as_slice(), size, gradient, rows)
+    }
+
+    /// As [`Linear::set_normal`], from rows of `stride` numbers one after another.
+    pub fn set_normal_rows(
+        &mut self,
+        normal: &[f64],
+        stride: usize,
+        gradient: &[f64],
+        rows: usize,
+    ) -> bool {
+        let (size, given) = (gradient.len(), stride);
+        (self.rows, self.of_normal) = (rows, false);
+        for (i, column) in self.columns.iter_mut().enumerate() {
+            *column = normal[i * given + i].sqrt();
+        }
+        self.gradient.copy_from_slice(gradient);
         if !self.columns.iter().all(|&length| length > 0.0) {
             return false;
         }
         let stride = (size + 1).next_multiple_of(LANES);
         let mut table = vec![0.0; size * stride];
+        let shares: Vec<f64> = self.columns.iter().map(|length| 1.0 / length).collect();
         for (i, row) in table.chunks_exact_mut(stride).enumerate() {
-            for j in i..size {
-                row[j] = normal[(i, j)] / self.columns[i] / self.columns[j];
+            let (own, normal) = (shares[i], &normal[i * given + i..i * given + size]);
+            for ((cell, value), share) in row[i..size].iter_mut().zip(normal).zip(&shares[i..]) {
+                *cell = value * own * share;
             }
-            row[size] = gradient[i] / self.columns[i];
+            row[size] = gradient[i] * own;
         }
         let mut inverse_norm = f64::INFINITY;
         dispatch(Triangle { table: &mut table, size, stride, inverse_norm: &mut inverse_norm });
@@ -127,11 +148,34 @@ impl Linear {
         if !self.trusted {
             return false;
         }
-        let above = |i: usize, j: usize| if j < i { 0.0 } else { table[i * stride + j] };
-        self.factor = DMatrix::from_fn(size, size, above);
-        self.turned = DVector::from_fn(size, |i, _| table[i * stride + size]);
-        self.unscale();
-        self.finite()
+        for (j, column) in self.factor.as_mut_slice().chunks_exact_mut(size.max(1)).enumerate() {
+            let length = self.columns[j];
+            for (cell, row) in column[..=j].iter_mut().zip(table.chunks_exact(stride)) {
+                *cell = row[j] * length;
+            }
+        }
+        for (turned, row) in self.turned.iter_mut().zip(table.chunks_exact(stride)) {
+            *turned = row[size];
+        }
+        self.of_normal = self.finite();
+        self.of_normal
+    }
+
+    /// Another gradient (n,) in the same triangle.
+    pub(super) fn set_gradient(&mut self, gradient: &[f64]) {
+        self.gradient.copy_from_slice(gradient);
+        self.turned.copy_from_slice(gradient);
+        eliminate_transposed(&self.factor, self.turned.as_mut_slice());
+    }
+
+    /// Length |D p| of the step that makes the model least with another gradient (n,) in the same triangle, which is
+    /// regular.
+    pub(super) fn way_with(&self, gradient: &[f64], axes: &[f64]) -> f64 {
+        let mut step = gradient.to_vec();
+        eliminate_transposed(&self.factor, &mut step);
+        eliminate(&self.factor, &mut step);
+        step.iter_mut().zip(axes).for_each(|(value, axis)| *value *= axis);
+        norm(&step)
     }
 
     /// R of the slope itself, from R of its unit columns.
@@ -349,6 +393,15 @@ fn eliminate(factor: &DMatrix<f64>, x: &mut [f64]) {
         let (above, here) = x.split_at_mut(j);
         here[0] /= column[j];
         above.iter_mut().zip(column).for_each(|(value, part)| *value -= part * here[0]);
+    }
+}
+
+/// The same with the transposed triangle.
+fn eliminate_transposed(factor: &DMatrix<f64>, x: &mut [f64]) {
+    let columns = factor.as_slice().chunks_exact(factor.nrows().max(1));
+    for (j, column) in columns.take(x.len()).enumerate() {
+        let (above, here) = x.split_at_mut(j);
+        here[0] = (here[0] - dot(&column[..j], above)) / column[j];
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::design::{Design, Observation, Observed, Prepared};
 use super::observation::{InstrumentView, Placed, Reading, StrutView, of_strut};
-use crate::batch::{Deviations, Rows, Samples, Sensitivity, first_order, forward_poses};
+use crate::batch::{Deviations, Loads, Rows, Samples, Sensitivity, first_order, forward_poses};
 use crate::dispatch::{Work, dispatch};
 use crate::linear::SIX;
 use crate::machine::indices_of;
@@ -242,6 +242,85 @@ impl<'a> Evaluation<'a> {
         true
     }
 
+    /// The gradient alone of half the sum of squares of `residuals`, which are weighted by `weights`, to the unknowns,
+    /// at the poses of the last [`Self::place`]: by virtual work. Readings pull at the platform with a
+    /// wrench, and what loads the parameters under it is the derivative to them, so that no
+    /// sensitivity is multiplied out. False where a pose is singular, or something else than the platform is read.
+    pub fn gradient(&self, weights: &[f64], residuals: &[f64], gradient: &mut [f64]) -> bool {
+        let (prepared, design) = (self.prepared, &self.prepared.design);
+        let apart = |sight: &Observed| matches!(sight, Observed::Strut | Observed::Parameter);
+        if prepared.sights.iter().any(apart) {
+            return false;
+        }
+        gradient.fill(0.0);
+        let mut wrenches = vec![0.0; SIX * design.poses];
+        for pose in 0..design.poses {
+            let observed = prepared.of_pose[pose]..prepared.of_pose[pose + 1];
+            let mut all = design.observations[observed.clone()].iter();
+            if !all.all(|observation| self.stands(observation)) {
+                continue;
+            }
+            for number in observed {
+                let observation = &design.observations[number];
+                let instrument = &design.instruments[observation.instrument];
+                let placed = &self.placed[observation.instrument];
+                let pull = weights[number] * residuals[number];
+                let reading = match prepared.sights[number] {
+                    Observed::View(view) => {
+                        self.views[view].reading(observation.observable, placed)
+                    }
+                    Observed::Between(from, to) => {
+                        let (reading, to_other) = self.views[from].separation(&self.views[to]);
+                        if let Some(other) = observation.other {
+                            pull_at(&mut wrenches[SIX * other..], pull, &to_other);
+                        }
+                        reading
+                    }
+                    Observed::Strut | Observed::Parameter => return false,
+                };
+                pull_at(&mut wrenches[SIX * pose..], pull, &reading.to_twist);
+                for (unknown, derivative) in instrument.unknowns.iter().zip(reading.to_own) {
+                    if let Some(unknown) = *unknown {
+                        gradient[unknown] += pull * derivative;
+                    }
+                }
+                if let Some(bias) = observation.bias {
+                    gradient[bias] += pull;
+                }
+            }
+        }
+        for wrench in wrenches.chunks_exact_mut(SIX) {
+            for &freedom in &design.machine.held {
+                wrench[freedom] = 0.0;
+            }
+        }
+        let columns = prepared.columns.len();
+        let mut loads = vec![0.0; design.poses * columns];
+        let mut status = vec![Status::Ok; design.poses];
+        let quantity = Loads::new(&design.machine, &prepared.columns, Rows::each(&wrenches, SIX));
+        let samples = self.samples(&self.poses);
+        first_order(&design.machine, &samples, &quantity, &mut loads, &mut status);
+        for pose in 0..design.poses {
+            if self.status[pose] != Status::Ok {
+                continue;
+            }
+            if status[pose] != Status::Ok {
+                return false;
+            }
+            let loads = &loads[pose * columns..(pose + 1) * columns];
+            if prepared.one_to_one {
+                gradient.iter_mut().zip(loads).for_each(|(sum, load)| *sum += load);
+            } else if !design.terms.is_empty() {
+                let factors = design.coefficients.row(pose);
+                let terms = design.terms.iter().zip(&prepared.term_columns);
+                for ((term, &column), factor) in terms.zip(factors) {
+                    gradient[term.unknown] += factor * loads[column];
+                }
+            }
+        }
+        gradient.iter().all(|value| value.is_finite())
+    }
+
     /// How the unknowns move the platform at one pose: (twist component, unknown), rows padded. What no
     /// unknown moves stays as it is, zero.
     #[inline(always)]
@@ -332,23 +411,50 @@ impl Receiver for Summed<'_> {
         for part in rows.chunks_exact(TOGETHER * stride) {
             let row = |k: usize| &part[k * stride..(k + 1) * stride];
             let six_rows = [row(0), row(1), row(2), row(3), row(4), row(5)];
-            for column in (0..stride).step_by(S::WIDTH) {
-                let right = six_rows.map(|row| S::load(&row[column..column + S::WIDTH]));
-                let [a, b, c, d, e, f] = six_rows.map(|row| row.iter());
-                let left = a.zip(b).zip(c).zip(d).zip(e).zip(f);
-                let sums = matrix.chunks_exact_mut(stride).zip(left);
-                for (sums, (((((a, b), c), d), e), f)) in sums.take((*count).min(column + S::WIDTH))
-                {
-                    let cells = &mut sums[column..column + S::WIDTH];
-                    let mut sum = S::load(cells);
-                    sum = S::splat(*a).mul_add(right[0], sum);
-                    sum = S::splat(*b).mul_add(right[1], sum);
-                    sum = S::splat(*c).mul_add(right[2], sum);
-                    sum = S::splat(*d).mul_add(right[3], sum);
-                    sum = S::splat(*e).mul_add(right[4], sum);
-                    S::splat(*f).mul_add(right[5], sum).store(cells);
-                }
+            let mut column = 0;
+            while column + 2 * S::WIDTH <= stride {
+                add_products::<S, 2>(&six_rows, column, matrix, *count);
+                column += 2 * S::WIDTH;
             }
+            if column < stride {
+                add_products::<S, 1>(&six_rows, column, matrix, *count);
+            }
+        }
+    }
+}
+
+/// Adds the products of rows with their own cells from `column` on, `N` lanes wide, to the upper triangle.
+#[inline(always)]
+fn add_products<S: Real, const N: usize>(
+    rows: &[&[f64]; TOGETHER],
+    column: usize,
+    matrix: &mut [f64],
+    count: usize,
+) {
+    let stride = rows[0].len();
+    let height = count.min(column + N * S::WIDTH);
+    let mut right = [[S::default(); TOGETHER]; N];
+    for n in 0..N {
+        let first = column + n * S::WIDTH;
+        for k in 0..TOGETHER {
+            right[n][k] = S::load(&rows[k][first..first + S::WIDTH]);
+        }
+    }
+    let (a, b, c) = (&rows[0][..height], &rows[1][..height], &rows[2][..height]);
+    let (d, e, f) = (&rows[3][..height], &rows[4][..height], &rows[5][..height]);
+    for (i, sums) in matrix.chunks_exact_mut(stride).take(height).enumerate() {
+        let (a, b, c) = (S::splat(a[i]), S::splat(b[i]), S::splat(c[i]));
+        let (d, e, f) = (S::splat(d[i]), S::splat(e[i]), S::splat(f[i]));
+        let cells = &mut sums[column..column + N * S::WIDTH];
+        for n in 0..N {
+            let cells = &mut cells[n * S::WIDTH..(n + 1) * S::WIDTH];
+            let mut sum = S::load(cells);
+            sum = a.mul_add(right[n][0], sum);
+            sum = b.mul_add(right[n][1], sum);
+            sum = c.mul_add(right[n][2], sum);
+            sum = d.mul_add(right[n][3], sum);
+            sum = e.mul_add(right[n][4], sum);
+            f.mul_add(right[n][5], sum).store(cells);
         }
     }
 }
@@ -438,6 +544,13 @@ impl<R: Receiver> Work for RowsOf<'_, '_, R> {
             }
             self.receiver.take::<S>(observed.start, observed.len(), &rows, stride);
         }
+    }
+}
+
+/// Adds a reading's pull to a wrench, the first six numbers.
+fn pull_at(wrench: &mut [f64], pull: f64, to_twist: &[f64; SIX]) {
+    for (sum, share) in wrench.iter_mut().zip(to_twist) {
+        *sum += pull * share;
     }
 }
 

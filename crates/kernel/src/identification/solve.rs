@@ -63,6 +63,16 @@ impl<'a> Fit<'a> {
             .map(move |row| row.iter().zip(&away).map(|(factor, away)| factor * away).sum::<f64>())
     }
 
+    /// Adds the gradient of the prior.
+    fn add_prior(&self, values: &[f64], gradient: &mut [f64]) {
+        let rows = self.prior.rows.chunks_exact(self.size().max(1));
+        for (row, residual) in rows.zip(self.prior_residuals(values)) {
+            for (sum, factor) in gradient.iter_mut().zip(row) {
+                *sum += factor * residual;
+            }
+        }
+    }
+
     /// The whole slope, for where normal equations are too ill-conditioned.
     fn dense(&mut self, values: &[f64]) -> Option<(DMatrix<f64>, Vec<f64>)> {
         let (n, m) = (self.size(), self.residuals.len());
@@ -113,6 +123,19 @@ impl Problem for Fit<'_> {
         cost.is_finite().then_some(cost)
     }
 
+    fn gradient(&mut self, values: &[f64], gradient: &mut [f64]) -> bool {
+        if !self.evaluation.gradient(self.readings.weights, &self.residuals, gradient) {
+            return false;
+        }
+        self.add_prior(values, gradient);
+        self.evaluation.accept();
+        true
+    }
+
+    fn linearises_last(&self) -> bool {
+        false
+    }
+
     fn linearise(&mut self, values: &[f64], linear: &mut Linear) -> bool {
         let n = self.size();
         let Fit { evaluation, readings, residuals, normal, .. } = self;
@@ -122,19 +145,15 @@ impl Problem for Fit<'_> {
         evaluation.accept();
         let stride = padded(n);
         let mut gradient = self.normal.gradient[..n].to_vec();
-        for (row, residual) in
-            self.prior.rows.chunks_exact(n.max(1)).zip(self.prior_residuals(values))
-        {
-            for (sum, factor) in gradient.iter_mut().zip(row) {
-                *sum += factor * residual;
+        self.add_prior(values, &mut gradient);
+        if self.prior.rows.iter().any(|factor| *factor != 0.0) {
+            let sums = self.normal.matrix.chunks_exact_mut(stride.max(1));
+            for (sums, information) in sums.zip(self.information.chunks_exact(n.max(1))) {
+                sums.iter_mut().zip(information).for_each(|(sum, known)| *sum += known);
             }
         }
-        let matrix = DMatrix::from_fn(n, n, |i, j| {
-            let (i, j) = (i.min(j), i.max(j));
-            self.normal.matrix[i * stride + j] + self.information[i * n + j]
-        });
         let rows = self.residuals.len() + self.prior.rows.len() / n.max(1);
-        if linear.set_normal(&matrix, &gradient, rows) {
+        if linear.set_normal_rows(&self.normal.matrix, stride, &gradient, rows) {
             return true;
         }
         let Some((slope, residuals)) = self.dense(values) else { return false };

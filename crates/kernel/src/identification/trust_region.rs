@@ -34,6 +34,10 @@ const HELD: f64 = 0.1;
 const MULTIPLIER_STEPS: usize = 20;
 /// A column so much shorter than another, in the norm D, may be rounding: only singular values tell.
 const SHORT: f64 = 1e-6;
+/// After a step that promised at most this share of the cost the triangle is kept, and only the gradient is taken anew.
+const KEPT: f64 = 1e-3;
+/// A kept triangle serves while each step is shorter than the last by this factor.
+const CONTRACTION: f64 = 0.05;
 /// A trust region without bounds; its square is still a number.
 const BOUNDLESS: f64 = 1e150;
 
@@ -46,6 +50,15 @@ pub trait Problem {
     /// Linearises at the values, where the cost was evaluated just before; false where that is not finite, and whatever
     /// `linear` then holds is not looked at.
     fn linearise(&mut self, values: &[f64], linear: &mut Linear) -> bool;
+    /// The gradient (n,), slope^T residual, at the values, where the cost was evaluated just before; false where it is not
+    /// to be had for much less than a linear model.
+    fn gradient(&mut self, _values: &[f64], _gradient: &mut [f64]) -> bool {
+        false
+    }
+    /// Whether the linear model where the iteration ends is asked for.
+    fn linearises_last(&self) -> bool {
+        true
+    }
     /// Whether to give up at once, as after an error outside.
     fn interrupted(&self) -> bool {
         false
@@ -204,6 +217,9 @@ pub fn minimise(
     let mut promise = Promise::new(&linear, &axes.of, cost);
     // What the model promised when it was last believed, and whether a trial failed since.
     let (mut last, mut rough) = (f64::INFINITY, false);
+    // Whether the triangle is that of an earlier point.
+    let mut kept = false;
+    let mut gradient = vec![0.0; size];
     let status = 'ended: loop {
         if promise.cosine <= limits.gradient {
             break Status::Gradient;
@@ -231,16 +247,37 @@ pub fn minimise(
             let held = if rounding { 1.0 } else { share };
             radius = next_radius(radius, length, held, multiplier, actual, half_slope);
             let mut taken = rounding || share >= ACCEPTED;
-            if taken && !problem.linearise(&there, &mut next) {
-                (taken, radius) = (false, 0.5 * radius.min(length));
+            let cost_there = tried.unwrap_or(cost);
+            let settled = cost_there <= options.rounding
+                || rounding && (promised <= limits.cost || promised > 0.5 * last);
+            if taken && settled && !problem.linearises_last() {
+                (values, cost) = (there, cost_there);
+                iterations += 1;
+                break 'ended Status::Cost;
+            }
+            // Once steps are short a chord does: the same triangle with the gradient there.
+            let chord = taken
+                && promised <= KEPT
+                && multiplier == 0.0
+                && linear.of_normal
+                && problem.gradient(&there, &mut gradient)
+                && linear.way_with(&gradient, &axes.of) <= CONTRACTION * length;
+            if chord {
+                linear.set_gradient(&gradient);
+                kept = true;
+            } else if taken {
+                if problem.linearise(&there, &mut next) {
+                    std::mem::swap(&mut linear, &mut next);
+                    kept = false;
+                } else {
+                    (taken, radius) = (false, 0.5 * radius.min(length));
+                }
             }
             if problem.interrupted() {
                 break 'ended Status::Stalled;
             }
             if taken {
-                values = there;
-                cost = tried.unwrap_or(cost);
-                std::mem::swap(&mut linear, &mut next);
+                (values, cost) = (there, cost_there);
                 extent = axes.extent(&values);
                 iterations += 1;
             }
@@ -274,6 +311,15 @@ pub fn minimise(
             }
             if taken {
                 break;
+            }
+            if kept {
+                // It may be the triangle that fails.
+                kept = false;
+                evaluations += 1;
+                if problem.cost(&values).is_some() && problem.linearise(&values, &mut next) {
+                    std::mem::swap(&mut linear, &mut next);
+                    break;
+                }
             }
         }
         axes.widen(&linear);

@@ -78,6 +78,20 @@ impl<S: Scalar> Limb<S> {
     }
 }
 
+impl<S: Real> Limb<S> {
+    /// The same strut in every lane.
+    #[inline(always)]
+    pub fn splat(limb: &Limb<f64>) -> Self {
+        let mut result = Limb::default();
+        for k in 0..3 {
+            result.base[k] = S::splat(limb.base[k]);
+            result.arm[k] = S::splat(limb.arm[k]);
+        }
+        result.length = S::splat(limb.length);
+        result
+    }
+}
+
 /// The tool point in platform axes.
 #[inline(always)]
 pub fn tool_point<S: Scalar>(machine: &Machine, p: &[S]) -> Vector<S> {

@@ -20,17 +20,17 @@ use crate::status::Status;
 
 /// After a full step s shorter than this (relative) come chord steps on the same factors: Newton
 /// leaves an error of about s^2, each chord step multiplies it by about s.
-const CHORD: f64 = 2e-4;
+pub(super) const CHORD: f64 = 2e-4;
 /// Chord steps before the next full one.
-const CHORD_STEPS: usize = 3;
+pub(super) const CHORD_STEPS: usize = 3;
 /// A chord step c on factors of a full step s leaves about c s: settled below this.
-const SETTLED: f64 = 1e-15;
+pub(super) const SETTLED: f64 = 1e-15;
 /// Full steps before a group of lanes gives up to the scalar path.
-const LANE_STEPS: usize = 12;
+pub(super) const LANE_STEPS: usize = 12;
 /// Full steps of one plain iteration on the scalar path.
 const STEPS: usize = 40;
 /// Plain iteration: a longer relative step may leave the assembly.
-const LONG_STEP: f64 = 0.5;
+pub(super) const LONG_STEP: f64 = 0.5;
 /// Following the residual: longest relative step, and shortest share of the way.
 const FOLLOWED_STEP: f64 = 0.1;
 const SHORTEST_SHARE: f64 = 1e-5;
@@ -46,7 +46,7 @@ pub struct Descent<S> {
 /// The size of a twist relative to the machine: displacement over characteristic length, plus rad.
 /// A sum, so that no NaN is lost.
 #[inline(always)]
-fn relative_size<S: Real>(machine: &Machine, twist: &[S; SIX]) -> S {
+pub(super) fn relative_size<S: Real>(machine: &Machine, twist: &[S; SIX]) -> S {
     let displacement = twist[0].abs() + twist[1].abs() + twist[2].abs();
     let rotation = twist[3].abs() + twist[4].abs() + twist[5].abs();
     displacement.mul_add(S::splat(1.0 / machine.characteristic_length), rotation)

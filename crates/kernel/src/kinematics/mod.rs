@@ -7,6 +7,7 @@ mod forward;
 mod gradients;
 mod inverse;
 mod linearisation;
+mod once;
 mod overconstrained;
 
 pub(crate) use closures::system;
@@ -19,6 +20,7 @@ pub(crate) use gradients::{Gradients, gradients, residuals};
 pub use inverse::{Inverse, Obstacle, commanded_pose, inverse, lane_inverse, obstacles, permitted};
 pub(crate) use inverse::{closed_form, leanings};
 pub use linearisation::{Linearisation, proven_regular};
+pub use once::forward_once;
 pub use overconstrained::{Equilibrium, Loads, internal_forces, least_energy};
 
 /// Singular: smallest scaled singular value below this share of the largest.

@@ -186,3 +186,59 @@ fn what_cannot_be_iterated_on_is_refused() {
     let none = Options { first_radius: 0.0, ..options };
     assert_eq!(refusal(&[0.0, 0.0], None, &none), Refusal::Radius);
 }
+
+/// The decays with gradients alone, which may be wrong, and a count of whole linear models.
+struct Counted {
+    gradients: Option<f64>,
+    models: usize,
+}
+
+impl Problem for Counted {
+    fn size(&self) -> usize {
+        4
+    }
+
+    fn cost(&mut self, values: &[f64]) -> Option<f64> {
+        Some(square_sum(&decays(values)))
+    }
+
+    fn linearise(&mut self, values: &[f64], linear: &mut Linear) -> bool {
+        self.models += 1;
+        let slope = DMatrix::from_row_slice(30, 4, &decays_slope(values));
+        let gradient = slope.tr_mul(&nalgebra::DVector::from_vec(decays(values)));
+        linear.set_normal(&slope.tr_mul(&slope), gradient.as_slice(), 30)
+    }
+
+    fn gradient(&mut self, values: &[f64], gradient: &mut [f64]) -> bool {
+        let Some(factor) = self.gradients else { return false };
+        let slope = DMatrix::from_row_slice(30, 4, &decays_slope(values));
+        let exact = slope.tr_mul(&nalgebra::DVector::from_vec(decays(values)));
+        gradient.iter_mut().zip(exact.iter()).for_each(|(value, part)| *value = factor * part);
+        true
+    }
+
+    fn linearises_last(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn chords_end_where_whole_models_do_and_ask_for_fewer() {
+    let ended = |gradients: Option<f64>| {
+        let mut problem = Counted { gradients, models: 0 };
+        let solution = minimise(&mut problem, &START, None, &Options::default()).unwrap();
+        assert!(solution.status.converged());
+        (solution, problem.models)
+    };
+    let (whole, models) = ended(None);
+    let (chords, fewer) = ended(Some(1.0));
+    assert!(fewer < models, "{fewer} of {models}");
+    // A gradient that is far off contracts nothing: whole models take over.
+    let (wrong, _) = ended(Some(1e6));
+    for solution in [&chords, &wrong] {
+        assert!((solution.cost - whole.cost).abs() < 1e-12 * whole.cost);
+        for (a, b) in solution.values.iter().zip(&whole.values) {
+            assert!((a - b).abs() < 1e-9);
+        }
+    }
+}

@@ -257,7 +257,7 @@ pub fn held_row<S: Real>(machine: &Machine, number: usize) -> [S; SIX] {
 #[inline(always)]
 pub fn squared_rows<S: Real>(
     machine: &Machine,
-    limbs: &Limbs<S>,
+    limbs: &[Limb<S>],
     pose: &Pose<S>,
     order: &Order,
     rows: &mut Matrix6<S>,
@@ -284,7 +284,7 @@ pub fn squared_rows<S: Real>(
 #[inline(always)]
 pub fn squared_residuals<S: Real>(
     machine: &Machine,
-    limbs: &Limbs<S>,
+    limbs: &[Limb<S>],
     pose: &Pose<S>,
     order: &Order,
     residuals: &mut [S; SIX],

@@ -2,7 +2,7 @@
 //! parameters and joints. By implicit differentiation, never through an iteration.
 
 use super::SINGULAR;
-use super::closures::{Limbs, Sample, guide_closures, held_row, row, tool_point};
+use super::closures::{Limb, Limbs, Sample, guide_closures, held_row, row, tool_point};
 use super::elastic::spread;
 use super::gradients::strut_gradient;
 use crate::element::ParameterGradient;
@@ -146,7 +146,7 @@ impl Linearisation<f64> {
 /// most F; F^2 is at most n + sum |arm|^2 / l^2. `determinant` is that of the squared rows, W times
 /// twice the strut lengths. The factor of two covers that it may belong to the last but one iterate.
 #[inline(always)]
-pub fn proven_regular<S: Real>(machine: &Machine, limbs: &Limbs<S>, determinant: S) -> S {
+pub fn proven_regular<S: Real>(machine: &Machine, limbs: &[Limb<S>], determinant: S) -> S {
     let count = machine.struts.len();
     let l = machine.characteristic_length;
     let mut arms = S::splat(0.0);

@@ -4,7 +4,7 @@
 //! rows that was found before. Wherever one of them does not hold there is no answer, and the road that pivots
 //! and follows the residual has to be taken.
 
-use super::closures::{Limb, Limbs, limbs, squared_residuals, squared_rows};
+use super::closures::{Limb, squared_residuals, squared_rows, tool_point};
 use super::forward::{CHORD, CHORD_STEPS, LANE_STEPS, LONG_STEP, SETTLED, relative_size};
 use super::linearisation::proven_regular;
 use crate::dispatch::{Work, dispatch};
@@ -44,10 +44,10 @@ impl Work for Once<'_> {
     #[inline(always)]
     fn run<S: Real>(self) {
         let Once { machine, q, start, order, found } = self;
-        let placed = limbs(machine, &machine.nominal, q);
-        let mut at: Limbs<S> = Default::default();
-        for (lanes, limb) in at.iter_mut().zip(&placed).take(machine.struts.len()) {
-            *lanes = Limb::splat(limb);
+        let tool = tool_point(machine, &machine.nominal);
+        let mut at = [Limb::<S>::default(); SIX];
+        for (lanes, strut) in at.iter_mut().zip(&machine.struts) {
+            *lanes = Limb::splat(&Limb::placed(machine, strut, &machine.nominal, q, tool));
         }
         let mut pose = Pose::<S>::splat(start);
         let mut rows = [[S::default(); SIX]; SIX];

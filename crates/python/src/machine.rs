@@ -23,7 +23,7 @@ pub struct Machine {
     pub inner: truepose_kernel::Machine,
     description: Py<PyDict>,
     replaced: BTreeMap<usize, f64>,
-    pub once: Once,
+    once: Once,
 }
 
 fn names(flags: &[bool; 6], all: [&'static str; 6]) -> Vec<&'static str> {
@@ -173,7 +173,7 @@ impl Machine {
         start: Option<&Bound<'py, PyAny>>,
         status: bool,
     ) -> PyResult<Bound<'py, PyAny>> {
-        if !status && let Some(pose) = self.forward_once(joints, start) {
+        if !status && let Some(pose) = self.once.forward(&self.inner, joints, start) {
             return Ok(PyArray1::from_slice(py, pose.numbers()).into_any());
         }
         let machine = &self.inner;

@@ -1,8 +1,8 @@
 //! One forward call of one pose: vectors in, a vector out, nothing else allocated or checked twice.
 
-use crate::machine::Machine;
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use truepose_kernel::Machine;
 use truepose_kernel::kinematics::{forward_once, limbs, start_order};
 use truepose_kernel::linear::{IN_ORDER, Order, SIX};
 use truepose_kernel::spatial::Pose;
@@ -16,7 +16,7 @@ pub struct Once {
 }
 
 impl Once {
-    pub fn new(machine: &truepose_kernel::Machine) -> Self {
+    pub fn new(machine: &Machine) -> Self {
         let middle = |travel: [f64; 2]| 0.5 * (travel[0] + travel[1]);
         let order = if machine.plain {
             let joints: Vec<f64> =
@@ -55,15 +55,15 @@ fn vector(object: &Bound<'_, PyAny>) -> Option<([f64; SIX], usize)> {
     Some((values, count))
 }
 
-impl Machine {
+impl Once {
     /// The pose for a vector of joints; none for whatever is not the plain case of a vector, a plain machine and a
     /// proven pose, which the general road then answers or refuses.
-    pub fn forward_once(
+    pub fn forward(
         &self,
+        machine: &Machine,
         joints: &Bound<'_, PyAny>,
         start: Option<&Bound<'_, PyAny>>,
     ) -> Option<Freedoms> {
-        let machine = &self.inner;
         if !machine.plain {
             return None;
         }
@@ -82,7 +82,7 @@ impl Machine {
                 } else {
                     return None;
                 };
-                let mut coordinates = self.once.home;
+                let mut coordinates = self.home;
                 let mut from = given.iter();
                 for (coordinate, _) in coordinates.iter_mut().zip(flags).filter(|(_, flag)| **flag)
                 {
@@ -91,7 +91,7 @@ impl Machine {
                 Pose::from_coordinates(coordinates)
             }
         };
-        let pose = forward_once(machine, &joints[..count], &start, &self.once.order)?;
+        let pose = forward_once(machine, &joints[..count], &start, &self.order)?;
         let coordinates = pose.to_coordinates();
         let mut result = Freedoms { values: [0.0; SIX], count: 0 };
         for (value, _) in coordinates.iter().zip(&machine.dof).filter(|(_, flag)| **flag) {

@@ -1,10 +1,10 @@
-//! One generic closure serves all five scalars.
+//! One generic closure serves all six scalars.
 
 use std::path::Path;
 use std::process::Command;
 use truepose_kernel::element::guide::{GuideFrames, GuideLimb};
 use truepose_kernel::element::{Direction, DriveKind, GuideKind, ParameterGradient, strut};
-use truepose_kernel::scalar::{Dual, Interval, LANES, Lanes, Scalar, Tape, Trace};
+use truepose_kernel::scalar::{AffineForm, Dual, Interval, LANES, Lanes, Scalar, Tape, Trace};
 use truepose_kernel::spatial::{quaternion_from_euler, rotation_matrix};
 
 type Many = Lanes<{ truepose_kernel::dispatch::PORTABLE }>;
@@ -147,6 +147,85 @@ fn an_interval_result_contains_samples() {
         for x in &many {
             assert!(result.contains(residual(kind, &frame(), x)), "{kind:?}");
         }
+    }
+}
+
+/// The inputs over a box of three variables, each moved by all of them, `size` wide.
+fn formed(at: &[f64; INPUTS], size: f64) -> [AffineForm<3>; INPUTS] {
+    std::array::from_fn(|i| {
+        let rates = [0, 1, 2].map(|k| Interval::point(size * input_slope(i, k)));
+        AffineForm::of_rates(Interval::point(at[i]), &rates, Interval::ENTIRE)
+    })
+}
+
+fn input_slope(input: usize, variable: usize) -> f64 {
+    ((input * 3 + variable) as f64 * 1.7).sin()
+}
+
+#[test]
+fn an_affine_form_contains_samples_and_is_off_by_second_order() {
+    for kind in kinds() {
+        for x in samples(20) {
+            let mut widths = Vec::new();
+            for size in [1e-2, 1e-3] {
+                let result = residual(kind, &frame(), &formed(&x, size));
+                for e in samples(100) {
+                    let e = [0, 1, 2].map(|k| ((e[k] * 1e6).sin() * 1.5).clamp(-1.0, 1.0));
+                    let moved: [f64; INPUTS] = std::array::from_fn(|i| {
+                        x[i] + (0..3).map(|k| size * input_slope(i, k) * e[k]).sum::<f64>()
+                    });
+                    let value = residual(kind, &frame(), &moved);
+                    let linear =
+                        result.middle + (0..3).map(|k| result.slopes[k] * e[k]).sum::<f64>();
+                    // `moved` and `linear` are rounded, too.
+                    assert!((value - linear).abs() <= result.rest + 1e-14, "{kind:?} {size}");
+                    assert!(result.range.lower - 1e-14 <= value, "{kind:?} {size}");
+                    assert!(value <= result.range.upper + 1e-14, "{kind:?} {size}");
+                }
+                widths.push(result.rest);
+            }
+            // Of a tenth of the box a hundredth, and what rounding leaves.
+            assert!(widths[1] < 0.012 * widths[0] + 1e-13, "{kind:?} {widths:?}");
+        }
+    }
+}
+
+#[test]
+fn an_affine_form_lies_within_the_interval() {
+    for kind in kinds() {
+        for x in samples(20) {
+            let forms = formed(&x, 0.01);
+            let boxed: [Interval; INPUTS] = std::array::from_fn(|i| forms[i].range);
+            let (form, interval) =
+                (residual(kind, &frame(), &forms).range, residual(kind, &frame(), &boxed));
+            assert!(interval.hull(form) == interval, "{kind:?} {form:?} {interval:?}");
+            assert!(form.radius() < 0.9 * interval.radius(), "{kind:?} {form:?} {interval:?}");
+        }
+    }
+}
+
+#[test]
+fn an_affine_form_without_a_number_is_what_the_interval_is() {
+    let whole = AffineForm::<2>::from_interval(Interval::ENTIRE);
+    let wide = AffineForm::<2>::from_interval(Interval::new(-1.0, 2.0));
+    let one = wide.lift(1.0);
+    for (form, expected) in [
+        (whole * wide, Interval::ENTIRE),
+        (one / wide, Interval::ENTIRE),
+        (whole.square(), Interval::new(0.0, f64::INFINITY)),
+        (wide.sqrt(), wide.range.sqrt()),
+        ((-one).sqrt(), Interval::ENTIRE),
+        (whole.sin_cos().0, Interval::new(-1.0, 1.0)),
+        (one.atan2(whole), one.range.atan2(Interval::ENTIRE)),
+        (wide.select(one, -one), Interval::new(-1.0, 1.0)),
+        (one.lift(f64::NAN), Interval::ENTIRE),
+        (one / whole, Interval::ENTIRE),
+    ] {
+        assert_eq!(form.range, expected);
+    }
+    let zero = one.lift(0.0);
+    for still in [zero + zero, zero * wide, zero.scaled(3.0), zero / one] {
+        assert_eq!((still.range, still.rest), (Interval::point(0.0), 0.0));
     }
 }
 

@@ -17,7 +17,7 @@ pub type Six<S = Interval> = [S; SIX];
 pub type Square<S = Interval> = [Six<S>; SIX];
 
 /// Adds a multiple of a column.
-pub fn add_multiple(sum: &mut Six, column: &Six, factor: Interval) {
+pub fn add_multiple<S: Scalar>(sum: &mut Six<S>, column: &Six<S>, factor: S) {
     for k in 0..SIX {
         sum[k] = sum[k] + column[k] * factor;
     }

@@ -33,7 +33,7 @@ impl Region<'_> {
     }
 
     /// Coordinates of the commanded pose, those that are not commanded as in `solved`.
-    fn coordinates(&self, sides: &[[f64; 2]], solved: &Pose<f64>) -> Six {
+    pub fn coordinates(&self, sides: &[[f64; 2]], solved: &Pose<f64>) -> Six {
         let mut coordinates = solved.to_coordinates().map(point);
         for (&freedom, &[low, high]) in indices_of(&self.machine.commanded).iter().zip(sides) {
             coordinates[freedom] = Interval::new(low, high);
@@ -46,6 +46,34 @@ impl Region<'_> {
         (0..SIX).filter(|&k| self.machine.dof[k] && !self.machine.commanded[k]).collect()
     }
 
+    /// The commanded freedoms, in whose places of a displacement the joints stand.
+    pub fn slots(&self) -> Vec<usize> {
+        let machine = self.machine;
+        (0..SIX).filter(|&k| machine.dof[k] && machine.commanded[k]).collect()
+    }
+
+    /// Six unknowns as the displacement of the parasitic freedoms, and the joints.
+    pub fn split<S: Scalar>(&self, z: &Six<S>) -> (Six<S>, Vec<S>) {
+        let mut moved = [z[0].lift(0.0); SIX];
+        for k in self.parasitic() {
+            moved[k] = z[k];
+        }
+        (moved, self.slots().into_iter().map(|slot| z[slot]).collect())
+    }
+
+    /// Derivatives to the unknowns: the parasitic freedoms, and in the places of the commanded ones the
+    /// joints.
+    pub fn unknowns<S: Scalar>(&self, at: &Derivatives<S>) -> Square<S> {
+        let mut matrix = at.to_displacement;
+        let zero = matrix[0][0].lift(0.0);
+        for (joint, slot) in self.slots().into_iter().enumerate() {
+            for (i, row) in matrix.iter_mut().enumerate() {
+                row[slot] = if self.drives(joint, i) { at.closures.to_joint[i] } else { zero };
+            }
+        }
+        matrix
+    }
+
     /// The nominal command over a box of poses. `sides` are the box's, `solved` the pose in its middle.
     pub fn command(
         &self,
@@ -56,37 +84,17 @@ impl Region<'_> {
         let machine = self.machine;
         let at = self.place(sides, solved);
         let parasitic = self.parasitic();
-        let slots: Vec<usize> =
-            (0..SIX).filter(|&k| machine.dof[k] && machine.commanded[k]).collect();
+        let slots = self.slots();
         let p: Vec<Interval> = machine.nominal.iter().map(|&value| point(value)).collect();
-        let split = |z: &Six| {
-            let mut moved = [point(0.0); SIX];
-            for &k in &parasitic {
-                moved[k] = z[k];
-            }
-            let q: Vec<Interval> = slots.iter().map(|&slot| z[slot]).collect();
-            (moved, q)
-        };
         let mut middle = [0.0; SIX];
         for (&slot, &joint) in slots.iter().zip(joints) {
             middle[slot] = joint;
         }
-        // Unknown are the parasitic freedoms, and in the places of the commanded ones the joints.
-        let unknowns = |at: &Derivatives| -> Square {
-            let mut matrix = at.to_displacement;
-            for (joint, &slot) in slots.iter().enumerate() {
-                for (i, row) in matrix.iter_mut().enumerate() {
-                    row[slot] =
-                        if self.drives(joint, i) { at.closures.to_joint[i] } else { point(0.0) };
-                }
-            }
-            matrix
-        };
         let jacobian = |z: &Six| {
-            let (moved, q) = split(z);
-            unknowns(&derivatives(machine, &p, &q, &at, &moved))
+            let (moved, q) = self.split(z);
+            self.unknowns(&derivatives(machine, &p, &q, &at, &moved))
         };
-        let (moved, q) = split(&middle.map(point));
+        let (moved, q) = self.split(&middle.map(point));
         let spot: Vec<[f64; 2]> = sides.iter().map(|[a, b]| [0.5 * (a + b); 2]).collect();
         let exact =
             derivatives(machine, &p, &q, &self.place(&spot, solved), &moved).closures.residuals;
@@ -103,11 +111,11 @@ impl Region<'_> {
             let extent = Interval::new(side[0], side[1]) - point(middle[0]);
             varying.push((pull(machine, &spread, &twist), extent));
         }
-        let first = unknowns(&spread);
+        let first = self.unknowns(&spread);
         let root = prove(&middle, &exact, &varying, &first, jacobian)?;
-        let (moved, q) = split(&root.enclosure);
+        let (moved, q) = self.split(&root.enclosure);
         let over = derivatives(machine, &p, &q, &at, &moved);
-        let inverse = Inverse::of(&unknowns(&over)).ok_or(Unproven::TooWide)?;
+        let inverse = Inverse::of(&self.unknowns(&over)).ok_or(Unproven::TooWide)?;
         let length = point(machine.characteristic_length);
         let [x, y, z, a, b, c] = moved;
         let cayley = [a, b, c].map(|value| value / length);
@@ -122,7 +130,7 @@ impl Region<'_> {
                     twist[3..].copy_from_slice(&axis);
                 }
                 let opened = pull(machine, &over, &twist);
-                let (own, rates) = split(&inverse.times(&opened).map(|value| -value));
+                let (own, rates) = self.split(&inverse.times(&opened).map(|value| -value));
                 for k in 0..3 {
                     twist[k] = twist[k] + own[k];
                 }
@@ -154,8 +162,8 @@ impl Region<'_> {
 }
 
 /// What a twist of the platform changes of the residuals.
-fn pull(machine: &Machine, at: &Derivatives, twist: &Six) -> Six {
-    let mut result = [point(0.0); SIX];
+pub fn pull<S: Scalar>(machine: &Machine, at: &Derivatives<S>, twist: &Six<S>) -> Six<S> {
+    let mut result = [twist[0].lift(0.0); SIX];
     for i in 0..machine.closure_count() {
         for k in 0..SIX {
             result[i] = result[i] + at.closures.to_twist[i][k] * twist[k];

@@ -5,12 +5,13 @@
 //! pose of a region, there is exactly one platform pose near the commanded one, and encloses it. How
 //! far it moves per unit of each deviation is then enclosed by implicit differentiation.
 
-mod affine;
 mod at_pose;
 mod boxes;
 mod closures;
 mod command;
 mod directions;
+mod first_order;
+mod forms;
 mod over_region;
 mod pose_box;
 mod rates;
@@ -18,14 +19,13 @@ mod region;
 mod root;
 mod targets;
 
-pub use affine::Affine;
 pub use at_pose::{Extent, PoseBound};
 pub use boxes::{Effort, bound_in_boxes};
 pub use over_region::{RegionBound, bound_over_region, can_be_enclosed};
-pub use region::Region;
+pub use region::{Affine, Region};
 
 use crate::linear::SIX;
-use crate::scalar::Interval;
+use crate::scalar::{Enclosing, Interval};
 use closures::Six;
 
 /// What the variables of a box of deviations move: column c moves `parameters[c]` by `swing[c]` times
@@ -47,8 +47,12 @@ pub struct Deviating {
 
 impl Deviating {
     /// Derivatives to the variables that are asked for, from those to a parameter; of the others zero.
-    fn columns(&self, asked: impl Fn(usize) -> bool, gradient: impl Fn(usize) -> Six) -> Vec<Six> {
-        let mut columns = vec![[point(0.0); SIX]; self.count];
+    fn columns<S: Enclosing>(
+        &self,
+        asked: impl Fn(usize) -> bool,
+        gradient: impl Fn(usize) -> Six<S>,
+    ) -> Vec<Six<S>> {
+        let mut columns = vec![[S::from_interval(point(0.0)); SIX]; self.count];
         let moved = self.parameters.iter().zip(&self.variables).zip(&self.swing);
         for ((&parameter, &variable), &swing) in moved {
             if !asked(variable) {

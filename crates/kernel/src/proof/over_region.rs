@@ -6,18 +6,20 @@
 
 use super::at_pose::{Extent, along, displacement_numbers};
 use super::pose_box::Over;
-use super::rates::{reach, reach_more};
+use super::rates::reach_more;
 use super::region::Region;
 use super::targets::{AS_LOW_AS_CAN_BE, Closeness, TARGETS, targets};
 use super::{Deviating, Unproven, point};
 use crate::batch::{displacement, share_out};
-use crate::kinematics::{Sample, commanded_pose, forward, inverse, limbs};
+use crate::kinematics::{Inverse, Sample, commanded_pose, forward, inverse, limbs};
 use crate::linear::SIX;
 use crate::machine::{Machine, indices_of};
 use crate::scalar::Interval;
 use crate::spatial::Pose;
 use crate::status::Status;
 
+/// Freedoms up to which affine forms are shorter.
+const FEW: usize = 3;
 /// Boxes that are looked at together.
 const BATCH: usize = 32;
 /// A box of less than this share of the region along every axis is given up.
@@ -74,47 +76,12 @@ impl Region<'_> {
             let status = solved.status;
             return CellBounds { bound: Err(Unproven::NearSingular), reached, middle, status };
         }
-        let spot: Vec<[f64; 2]> = middle.iter().map(|&value| [value, value]).collect();
-        let bounded = || -> Result<([f64; TARGETS], [f64; TARGETS]), Unproven> {
-            let command = self.command(sides, &solved.pose, &solved.joints)?;
-            let over = self.over(&command)?;
-            let spot_command = self.command(&spot, &solved.pose, &solved.joints)?;
-            let own = self.over(&spot_command)?;
-            let reached = self.reached(&own, &solved.joints, &solved.pose);
-            let halves: Vec<Interval> = sides
-                .iter()
-                .zip(&spot)
-                .map(|(side, middle)| Interval::new(side[0], side[1]) - point(middle[0]))
-                .collect();
-            let rates = self.rates(&command, &over)?;
-            let bounds = |most: &dyn Fn(&[f64; SIX]) -> f64| {
-                let closeness = Closeness { fine: FINE, enough: AS_LOW_AS_CAN_BE };
-                targets(machine, &over.whole, &closeness, most).values
-            };
-            let mut bound = bounds(&|u| reach(u, &own, &rates, &halves));
-            let direct = bounds(&|u| reach(u, &over, &[], &[]));
-            for (bound, direct) in bound.iter_mut().zip(direct) {
-                *bound = bound.min(direct);
+        let bounded = || {
+            if sides.len() <= FEW {
+                self.bounded::<FEW>((sides, &middle), &solved, allowed)
+            } else {
+                self.bounded::<SIX>((sides, &middle), &solved, allowed)
             }
-            if (0..TARGETS).any(|target| bound[target] > allowed[target]) {
-                let extent = Extent {
-                    machine,
-                    joints: &solved.joints,
-                    pose: solved.pose,
-                    command: (spot_command.joints, spot_command.at),
-                    shift: own.shifts.clone(),
-                    deviating: self.deviating,
-                };
-                let part = extent.whole().map_err(|not| not.why)?;
-                let finer = bounds(&|u| {
-                    let more = reach_more(u, &over, &rates, &halves);
-                    (point(part.most(u)) + point(more)).upper
-                });
-                for (bound, finer) in bound.iter_mut().zip(finer) {
-                    *bound = bound.min(finer);
-                }
-            }
-            Ok((bound, reached))
         };
         match bounded() {
             Ok((bound, reached)) => {
@@ -122,6 +89,61 @@ impl Region<'_> {
             }
             Err(why) => CellBounds { bound: Err(why), reached, middle, status: Status::Ok },
         }
+    }
+
+    /// Bounds over a box that holds the commanded freedoms `middle`, and what is reached in it.
+    fn bounded<const M: usize>(
+        &self,
+        (sides, middle): (&[[f64; 2]], &[f64]),
+        solved: &Inverse,
+        allowed: &[f64; TARGETS],
+    ) -> Result<([f64; TARGETS], [f64; TARGETS]), Unproven> {
+        let machine = self.machine;
+        let spot: Vec<[f64; 2]> = middle.iter().map(|&value| [value, value]).collect();
+        let halves: Vec<Interval> = sides
+            .iter()
+            .zip(middle)
+            .map(|(side, &middle)| Interval::new(side[0], side[1]) - point(middle))
+            .collect();
+        let command = self.command(sides, &solved.pose, &solved.joints)?;
+        let over = self.over(&command)?;
+        let spot_command = self.command(&spot, &solved.pose, &solved.joints)?;
+        let own = self.over(&spot_command)?;
+        let reached = self.reached(&own, &solved.joints, &solved.pose);
+        let forms = self.forms::<M>(&spot_command, &command, (sides, &halves), &solved.pose)?;
+        let first = self.first_order(&forms, &over)?;
+        let bounds = |most: &dyn Fn(&[f64; SIX]) -> f64| {
+            let closeness = Closeness { fine: FINE, enough: AS_LOW_AS_CAN_BE };
+            targets(machine, &over.whole, &closeness, most).values
+        };
+        let closed = |bound: &[f64; TARGETS]| bound.iter().zip(allowed).all(|(a, b)| a <= b);
+        let mut bound = bounds(&|u| {
+            let [linear, beyond] = first.reach(u);
+            (point(linear) + point(beyond)).upper
+        });
+        // The exact extent at the middle where nothing is allowed yet, or where it is only what is beyond the
+        // first order that is too much.
+        let nothing_yet = allowed.contains(&f64::NEG_INFINITY);
+        if nothing_yet || (!closed(&bound) && closed(&bounds(&|u| first.reach(u)[0]))) {
+            let extent = Extent {
+                machine,
+                joints: &solved.joints,
+                pose: solved.pose,
+                command: (spot_command.joints, spot_command.at),
+                shift: own.shifts.clone(),
+                deviating: self.deviating,
+            };
+            let part = extent.whole().map_err(|not| not.why)?;
+            let rates = self.rates(&command, &forms, &over)?;
+            let finer = bounds(&|u| {
+                let more = reach_more(u, &over, &rates, &halves);
+                (point(part.most(u)) + point(more)).upper
+            });
+            for (bound, finer) in bound.iter_mut().zip(finer) {
+                *bound = bound.min(finer);
+            }
+        }
+        Ok((bound, reached))
     }
 
     /// The exact error at the vertices that are worst to first order.
@@ -212,7 +234,7 @@ pub fn bound_over_region(
     };
     let mut closed = [f64::NEG_INFINITY; TARGETS];
     // Nothing is reached yet, so the first box is bounded as closely as possible.
-    let mut allowed = [f64::NEG_INFINITY; TARGETS];
+    let mut allowed = AS_LOW_AS_CAN_BE;
     let mut open = vec![Cell { sides: region.sides.clone(), bounds: None }];
     loop {
         // The boxes not looked at yet, side by side.

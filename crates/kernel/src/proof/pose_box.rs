@@ -2,10 +2,9 @@
 //!
 //! Everything is an enclosure over all poses of the box and all machines, proved to exist first.
 
-use super::affine::Affine;
 use super::closures::{Derivatives, Six, add_multiple, derivatives};
 use super::command::Command;
-use super::region::Region;
+use super::region::{Affine, Region};
 use super::root::{Inverse, Varying, prove};
 use super::{Deviating, Unproven, point};
 use crate::kinematics::{Limb, tool_point};
@@ -110,12 +109,17 @@ impl Region<'_> {
         Ok(self.yielding.iter().map(deflection).collect())
     }
 
-    /// Forces of the closures under the wrench, N.
-    pub fn forces(&self, inverse: &Inverse) -> Six {
+    /// The wrench on the platform as rows of the closures to the displacement have it, N.
+    pub fn scaled_wrench(&self) -> Six {
         let mut wrench = self.wrench.map(point);
         for value in &mut wrench[3..] {
             *value = *value / point(self.machine.characteristic_length);
         }
-        inverse.row_times(&wrench).map(|force| -force)
+        wrench
+    }
+
+    /// Forces of the closures under the wrench, N.
+    pub fn forces(&self, inverse: &Inverse) -> Six {
+        inverse.row_times(&self.scaled_wrench()).map(|force| -force)
     }
 }

@@ -4,16 +4,17 @@
 use super::at_pose::along;
 use super::closures::{Placed, Six, add_multiple, derivatives, turned};
 use super::command::Command;
+use super::forms::{Equations, Forms};
 use super::pose_box::Over;
 use super::region::Region;
 use super::root::Inverse;
 use super::{Unproven, point};
 use crate::linear::SIX;
-use crate::scalar::{Dual, Interval};
+use crate::scalar::{AffineForm, Dual, Interval, Scalar};
 use crate::spatial::{cross, rotate};
 
-/// An interval and its rate of change.
-pub type Tangent = Dual<Interval, 1>;
+/// A number and its rate of change.
+type Tangent<S = Interval> = Dual<S, 1>;
 
 /// How the known part of a displacement and its slopes change per unit of a commanded freedom.
 pub struct Rates {
@@ -22,7 +23,7 @@ pub struct Rates {
 }
 
 /// `value`, changing at `rate`.
-fn changing(value: Interval, rate: Interval) -> Tangent {
+fn changing<S>(value: S, rate: S) -> Tangent<S> {
     Dual { value, parts: [rate] }
 }
 
@@ -34,7 +35,12 @@ impl Region<'_> {
     /// whose closures' rows differ a little, is off by what the difference leaves open. The difference is
     /// taken along the way from the nominal machine to the actual one, by dual numbers, so that it is as
     /// small as the deviations are; and it holds anywhere on that way, where a share of it has happened.
-    fn changes(&self, command: &Command, over: &Over) -> Result<Vec<Six>, Unproven> {
+    fn changes(
+        &self,
+        command: &Command,
+        over: &Over,
+        shift_rates: &[Vec<(usize, Interval)>],
+    ) -> Vec<Six> {
         let machine = self.machine;
         let Command { joints, at, rates } = command;
         let still = |value: Interval| changing(value, point(0.0));
@@ -75,63 +81,87 @@ impl Region<'_> {
                     }
                 }
             }
-            for (index, rate) in self.shift_rates(command, freedom)? {
+            for &(index, rate) in &shift_rates[freedom] {
                 let gradient = along.closures.to_parameter(machine, index).map(|one| one.value);
                 add_multiple(&mut open, &gradient, partly(rate));
             }
             result.push(over.inverse.times(&open).map(|value| -value));
         }
-        Ok(result)
+        result
     }
 
     /// How the known part of the displacement and the slopes change per unit of each commanded freedom,
-    /// over a box of poses and all machines.
+    /// over a box of poses and all machines, and the slopes themselves.
     ///
     /// S = -J^-1 G gives S' = -J^-1 (J' S + G'), where J and G change because the nominal platform and its
-    /// joints move, and because the displacement and the known deviations change a little.
-    pub fn rates(&self, command: &Command, over: &Over) -> Result<Vec<Rates>, Unproven> {
+    /// joints move, and because the displacement and the known deviations change a little. How they differ
+    /// from pose to pose is in the affine forms; what differs between machines is in their remainders.
+    pub fn rates<const M: usize>(
+        &self,
+        command: &Command,
+        forms: &Forms<M>,
+        over: &Over,
+    ) -> Result<Vec<Rates>, Unproven> {
         let machine = self.machine;
-        let changes = self.changes(command, over)?;
+        let form = AffineForm::<M>::from_interval;
+        let minus = |six: Six<AffineForm<M>>| six.map(|value| -value);
+        let shift_rates = (0..command.rates.len())
+            .map(|freedom| self.shift_rates(command, freedom))
+            .collect::<Result<Vec<_>, _>>()?;
+        let changes = self.changes(command, over, &shift_rates);
+        let mut slopes: Option<(Six<AffineForm<M>>, Vec<Six<AffineForm<M>>>)> = None;
         let mut result = Vec::with_capacity(changes.len());
         for (freedom, change) in changes.iter().enumerate() {
-            let (twist, speeds) = &command.rates[freedom];
-            let shift_rates = self.shift_rates(command, freedom)?;
-            let mut p: Vec<Tangent> =
-                over.between.iter().map(|&value| changing(value, point(0.0))).collect();
-            for &(index, rate) in &shift_rates {
+            let (twist, speeds) = &forms.rates[freedom];
+            let mut p: Vec<Tangent<AffineForm<M>>> =
+                over.between.iter().map(|&value| Dual::constant(form(value))).collect();
+            for &(index, rate) in &shift_rates[freedom] {
                 // Of a machine on the way from the nominal one to this: any share of it.
-                p[index].parts[0] = p[index].parts[0] + partly(rate);
+                p[index].parts[0] = p[index].parts[0] + form(partly(rate));
             }
-            let q: Vec<Tangent> =
-                command.joints.iter().zip(speeds).map(|(&q, &rate)| changing(q, rate)).collect();
-            let mut away = over.whole.map(|value| changing(value, point(0.0)));
+            let q: Vec<Tangent<AffineForm<M>>> =
+                forms.joints.iter().zip(speeds).map(|(&q, &rate)| changing(q, rate)).collect();
+            let mut away = over.whole.map(|value| Dual::constant(form(value)));
             for k in 0..SIX {
-                away[k].parts[0] = change[k];
+                away[k].parts[0] = form(change[k]);
             }
-            let at = derivatives(machine, &p, &q, &turning(&command.at, twist), &away);
-            let follow = |slope: &Six, column: &Six| {
+            let at = derivatives(machine, &p, &q, &turning(&forms.at, twist), &away);
+            let values = at.to_displacement.map(|row| row.map(|one| one.value));
+            let equations = Equations::of(&values).ok_or(Unproven::TooWide)?;
+            let gradient = |parameter| at.closures.to_parameter(machine, parameter);
+            let value_of = |parameter| gradient(parameter).map(|one| one.value);
+            let change_of = |parameter| gradient(parameter).map(|one| one.parts[0]);
+            let (known, own) = slopes.get_or_insert_with(|| {
+                let mut known = [form(point(0.0)); SIX];
+                for &(index, shift) in &over.shifts {
+                    add_multiple(&mut known, &value_of(index), form(shift));
+                }
+                let columns = self.deviating.columns(|_| true, value_of);
+                (
+                    minus(equations.solve(&known)),
+                    columns.iter().map(|column| minus(equations.solve(column))).collect(),
+                )
+            });
+            let follow = |slope: &Six<AffineForm<M>>, column: &Six<AffineForm<M>>| -> Six {
                 let mut open = *column;
                 for (i, open) in open.iter_mut().enumerate() {
                     for k in 0..SIX {
                         *open = *open + at.to_displacement[i][k].parts[0] * slope[k];
                     }
                 }
-                over.inverse.times(&open).map(|value| -value)
+                equations.solve(&open).map(|value| -value.range)
             };
-            let change_of =
-                |parameter| at.closures.to_parameter(machine, parameter).map(|one| one.parts[0]);
-            let mut known = [point(0.0); SIX];
+            let mut opened = [form(point(0.0)); SIX];
             for &(index, shift) in &over.shifts {
-                add_multiple(&mut known, &change_of(index), shift);
+                add_multiple(&mut opened, &change_of(index), form(shift));
             }
-            for &(index, rate) in &shift_rates {
-                let gradient = at.closures.to_parameter(machine, index).map(|one| one.value);
-                add_multiple(&mut known, &gradient, rate);
+            for &(index, rate) in &shift_rates[freedom] {
+                add_multiple(&mut opened, &value_of(index), form(rate));
             }
             let columns = self.deviating.columns(|_| true, change_of);
             result.push(Rates {
-                known: follow(&over.known, &known),
-                slopes: over.slopes.iter().zip(&columns).map(|(s, c)| follow(s, c)).collect(),
+                known: follow(known, &opened),
+                slopes: own.iter().zip(&columns).map(|(s, c)| follow(s, c)).collect(),
             });
         }
         Ok(result)
@@ -193,37 +223,6 @@ impl Region<'_> {
     }
 }
 
-/// How far displacements reach along a direction: at the middle of a box of poses by the slopes there, and
-/// away from it by their rates.
-///
-/// sum_v |S_v + sum_k S'_vk d_k|, where d is the same for all variables v: those whose sign is certain add
-/// up with their signs before the size is taken.
-pub fn reach(direction: &[f64; SIX], at: &Over, rates: &[Rates], halves: &[Interval]) -> f64 {
-    let mut bound = point(along(direction, &at.known).upper);
-    let mut together: Vec<Interval> =
-        rates.iter().map(|rate| along(direction, &rate.known)).collect();
-    for (variable, slope) in at.slopes.iter().enumerate() {
-        let slope = along(direction, slope);
-        let mut reached = slope;
-        for (rate, &half) in rates.iter().zip(halves) {
-            reached = reached + along(direction, &rate.slopes[variable]) * half;
-        }
-        if reached.lower >= 0.0 || reached.upper <= 0.0 {
-            let sign = if reached.lower >= 0.0 { 1.0 } else { -1.0 };
-            bound = bound + slope * point(sign);
-            for (sum, rate) in together.iter_mut().zip(rates) {
-                *sum = *sum + along(direction, &rate.slopes[variable]) * point(sign);
-            }
-        } else {
-            bound = bound + point(reached.magnitude());
-        }
-    }
-    for (sum, &half) in together.iter().zip(halves) {
-        bound = bound + *sum * half;
-    }
-    bound.upper
-}
-
 /// How much farther displacements reach along a direction away from the middle of a box of poses than in
 /// it, where every variable whose slope is certain over all of the box is at its end.
 pub fn reach_more(
@@ -253,11 +252,10 @@ pub fn reach_more(
 }
 
 /// A platform that moves at a twist: R' = [w]x R.
-fn turning(at: &Placed, twist: &Six) -> Placed<Tangent> {
-    let still = |value: Interval| changing(value, point(0.0));
+fn turning<S: Scalar>(at: &Placed<S>, twist: &Six<S>) -> Placed<Tangent<S>> {
     let mut result = Placed {
-        position: at.position.map(still),
-        rotation: at.rotation.map(|row| row.map(still)),
+        position: at.position.map(Dual::constant),
+        rotation: at.rotation.map(|row| row.map(Dual::constant)),
     };
     for j in 0..3 {
         result.position[j].parts[0] = twist[j];

@@ -1,9 +1,9 @@
 //! A region of commanded poses, what deviates in it, and how far its bounds are taken.
 
-use super::Deviating;
-use super::affine::Affine;
+use super::{Deviating, point};
 use crate::linear::SIX;
 use crate::machine::Machine;
+use crate::scalar::{Enclosing, Interval};
 
 /// A region and what deviates in it.
 #[derive(Clone, Debug)]
@@ -24,4 +24,30 @@ pub struct Region<'a> {
     pub gap: f64,
     /// Boxes that may be looked at.
     pub most_boxes: usize,
+}
+
+/// A number for one parameter, known at every pose: `constant + per_length` times the present length of
+/// a strut.
+#[derive(Clone, Copy, Debug)]
+pub struct Affine {
+    /// Which parameter.
+    pub parameter: usize,
+    /// Lowest and highest.
+    pub constant: [f64; 2],
+    /// Per metre of the strut.
+    pub per_length: f64,
+    /// Which strut.
+    pub strut: usize,
+}
+
+impl Affine {
+    /// At these lengths of the struts.
+    pub fn at<S: Enclosing>(&self, lengths: &[S]) -> S {
+        let [low, high] = self.constant;
+        let constant = S::from_interval(Interval::new(low, high));
+        if self.per_length == 0.0 {
+            return constant;
+        }
+        constant + S::from_interval(point(self.per_length)) * lengths[self.strut]
+    }
 }

@@ -157,11 +157,15 @@ impl Inverse {
         if !approximate.iter().flatten().all(|value| value.is_finite()) {
             return None;
         }
-        let first = distance(&approximate, matrix);
-        let (weights, size) = shrunk(&first)?;
+        Self::within(approximate, &distance(&approximate, matrix))
+    }
+
+    /// Of all matrices A with |I - Y A| <= B, entry by entry, where Y is `approximate`.
+    pub fn within(approximate: Matrix6<f64>, first: &Matrix6<f64>) -> Option<Self> {
+        let (weights, size) = shrunk(first)?;
         // B + B^2 + ... + B^8 by doubling, and B^9 (I + B + ...) by the norm.
-        let second = squared(&first);
-        let mut excess = with_product(&first, &first);
+        let second = squared(first);
+        let mut excess = with_product(first, first);
         excess = with_product(&excess, &second);
         excess = with_product(&excess, &squared(&second));
         let mut power = point(size);
@@ -181,6 +185,17 @@ impl Inverse {
     /// The largest share of one place that any of the inverses adds to another.
     pub fn excess(&self) -> f64 {
         self.excess.iter().flatten().copied().fold(0.0, f64::max)
+    }
+
+    /// `B (I - B)^-1 B` of the B that these inverses are `within`, from above.
+    pub fn excess_beyond(&self, first: &Matrix6<f64>) -> Matrix6<f64> {
+        let mut result = *first;
+        for i in 0..SIX {
+            for j in 0..SIX {
+                result[i][j] = sum_above((0..SIX).map(|k| (first[i][k], self.excess[k][j])));
+            }
+        }
+        result
     }
 
     /// The products of the inverses with a vector.

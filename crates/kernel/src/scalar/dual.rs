@@ -1,6 +1,6 @@
 //! A value with `N` exact directional derivatives, over any other scalar.
 
-use super::Scalar;
+use super::{Enclosing, Interval, Scalar};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `value + sum of parts[k] e_k` with `e_j e_k = 0`: forward-mode differentiation.
@@ -154,6 +154,15 @@ impl<S: Scalar, const N: usize> Scalar for Dual<S, N> {
             parts[k] = self.value.select(then.parts[k], otherwise.parts[k]);
         }
         Dual { value: self.value.select(then.value, otherwise.value), parts }
+    }
+}
+
+impl<const N: usize> Enclosing for Dual<Interval, N> {
+    fn from_interval(value: Interval) -> Self {
+        Dual::constant(value)
+    }
+    fn scaled(self, factor: f64) -> Self {
+        Dual { value: self.value.scaled(factor), parts: self.parts.map(|one| one.scaled(factor)) }
     }
 }
 

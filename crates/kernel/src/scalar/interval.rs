@@ -527,6 +527,23 @@ impl Scalar for Interval {
     }
 }
 
+/// A scalar that encloses all values over a box.
+pub trait Enclosing: Scalar {
+    /// Anything in the interval, at any pose.
+    fn from_interval(value: Interval) -> Self;
+    /// The product with one number.
+    fn scaled(self, factor: f64) -> Self;
+}
+
+impl Enclosing for Interval {
+    fn from_interval(value: Interval) -> Self {
+        value
+    }
+    fn scaled(self, factor: f64) -> Self {
+        Interval::scaled(self, factor)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,19 +6,22 @@
 //! | [`Lanes`] | the residuals of eight samples at once |
 //! | [`Dual`] | the residual and its exact derivatives |
 //! | [`Interval`] | an enclosure of all residuals over a box |
+//! | [`AffineForm`] | the same, of first order in what the box's variables have in common |
 //! | [`Trace`] | the operations themselves, printable as C |
 //!
 //! A formula never branches on a scalar's value: what must not be a branch is a named method
 //! ([`Scalar::select`], [`Scalar::sin_cos`], ...), so that each member can answer in its own way.
 
+mod affine_form;
 mod dual;
 mod float;
 mod interval;
 mod lanes;
 mod trace;
 
+pub use affine_form::AffineForm;
 pub use dual::Dual;
-pub use interval::Interval;
+pub use interval::{Enclosing, Interval};
 pub use lanes::{LANES, Lanes};
 pub use trace::{Tape, Trace};
 

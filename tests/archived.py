@@ -25,7 +25,7 @@ Key = tuple[str, str]
 """A variable, and the error source that it is of or ""."""
 
 RELATIVE = 3e-9
-"""Of the largest number of a variable (and source): what two processors may differ by, in a fit most."""
+"""Of the largest number of a variable (and source): what processors may differ by, a fit most."""
 ROUNDING = 1e-9
 """A smaller number is of rounding: mm, inches, degrees, shares; in SI a thousandth of it, and of
 squares a thousandth again, a millionth in SI: of errors of a micrometre or a microradian."""

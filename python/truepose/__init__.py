@@ -11,12 +11,12 @@ Everything is imported when it is first used, so that `import truepose` costs no
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+TYPE_CHECKING = False  # to type checkers true; `typing` is not imported for it
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
+    from typing import Any
 
     from truepose import errors
     from truepose._kernel import threads
@@ -100,6 +100,8 @@ def load(path: str | Path, settings: Mapping[str, str] | Sequence[str] = ()) -> 
 if not TYPE_CHECKING:  # type checkers know the names above, and refuse all others
 
     def __getattr__(name: str) -> Any:
+        from importlib import import_module
+
         if name in _WHERE:
             value = getattr(import_module(_WHERE[name]), name)
         elif name == "errors":

@@ -46,6 +46,12 @@ class GuardedGroup(click.Group):
             raise click.UsageError(f"No such command '{args[0]}'.{hint}", ctx)
         return super().resolve_command(ctx, args)
 
+    def get_help(self, ctx: click.Context) -> str:
+        """As click, never wider than the page that was written before (`truepose.__main__`)."""
+        formatter = click.HelpFormatter()
+        self.format_help(ctx, formatter)
+        return formatter.getvalue().rstrip("\n")
+
     def make_context(
         self,
         info_name: str | None,

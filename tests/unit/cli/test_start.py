@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
+import truepose
 from command_line import call
+from truepose.__main__ import main as program
 from truepose.cli import COMMANDS
+
+PAGE = Path(truepose.__file__).with_name("help.txt")
 
 HEAVY = ("numpy", "xarray", "pydantic", "pint", "plotly", "jinja2", "rich", "truepose._kernel")
 
@@ -24,6 +31,44 @@ def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert "Usage: truepose" in done.stdout
+
+
+@pytest.mark.parametrize("columns", ["80", "200", "79", "40"])
+@pytest.mark.parametrize("asked", ["-h", "--help"])
+def test_the_page_written_before_is_the_help(
+    asked: str,
+    columns: str,
+    golden: Callable[[str, str], str],
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", columns)
+    shown = call(capsys, asked).out
+    if columns == "80":
+        assert golden(str(PAGE), shown) == shown
+    monkeypatch.setattr(sys, "argv", ["truepose", asked])
+    with suppress(SystemExit):
+        program()
+    assert capsys.readouterr().out == shown
+
+
+@pytest.mark.parametrize("asked", ["-h", "--help"])
+def test_the_help_needs_the_interpreter_alone(asked: str) -> None:
+    script = (
+        "import sys; bare = set(sys.modules); from truepose.__main__ import main; main(); "
+        "print(*sorted(set(sys.modules) - bare), file=sys.stderr)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, asked], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0
+    assert set(done.stderr.split()) <= {
+        "__future__",
+        "truepose",
+        "truepose.__main__",
+        "encodings.ascii",
+    }
+    assert done.stdout == PAGE.read_text("ascii")
 
 
 @pytest.mark.parametrize("form", ["table", "json", "csv"])

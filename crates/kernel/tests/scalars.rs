@@ -191,6 +191,36 @@ fn an_affine_form_contains_samples_and_is_off_by_second_order() {
 }
 
 #[test]
+fn the_mean_of_an_affine_form_over_the_way_contains_that_of_samples() {
+    const SIZE: f64 = 1e-2;
+    // Gauss's rule with three points.
+    let points = [(0.5 - 0.15_f64.sqrt(), 5.0), (0.5, 8.0), (0.5 + 0.15_f64.sqrt(), 5.0)];
+    for kind in kinds() {
+        for x in samples(20) {
+            let whole = residual(kind, &frame(), &formed(&x, SIZE));
+            let mean = whole.mean_from_middle();
+            for e in [[1.0, -1.0, 1.0], [-1.0, -1.0, -1.0], [0.0, 1.0, 0.3]] {
+                let at = |share: f64| -> f64 {
+                    let moved: [f64; INPUTS] = std::array::from_fn(|i| {
+                        x[i] + (0..3).map(|k| share * SIZE * input_slope(i, k) * e[k]).sum::<f64>()
+                    });
+                    residual(kind, &frame(), &moved)
+                };
+                let value = points.iter().map(|&(share, weight)| weight * at(share)).sum::<f64>();
+                let linear = mean.middle + (0..3).map(|k| mean.slopes[k] * e[k]).sum::<f64>();
+                assert!((value / 18.0 - linear).abs() <= mean.rest + 1e-9, "{kind:?}");
+                assert!(mean.range.hull(whole.range) == whole.range, "{kind:?}");
+            }
+            // As exact as the whole: a form that is wider would contain anything.
+            assert!(mean.rest <= whole.rest * (1.0 + 1e-12) + 1e-300, "{kind:?}");
+        }
+    }
+    let one = AffineForm::<3>::variable(1);
+    assert_eq!((one.middle, one.slopes, one.rest), (0.0, [0.0, 1.0, 0.0], 0.0));
+    assert_eq!(one.range, Interval::new(-1.0, 1.0));
+}
+
+#[test]
 fn an_affine_form_lies_within_the_interval() {
     for kind in kinds() {
         for x in samples(20) {

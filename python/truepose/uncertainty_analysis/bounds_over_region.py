@@ -30,7 +30,7 @@ from truepose.sources import PoseBlock, Source
 from truepose.uncertainty_analysis.length_law import law_of_length
 from truepose.uncertainty_analysis.truncation import Ends
 
-MOST_BOXES = 10_000
+MOST_BOXES = 200_000
 """Parts of a region that are looked at before giving up."""
 
 _ALL = ("component",)

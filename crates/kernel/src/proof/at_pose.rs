@@ -295,7 +295,7 @@ impl Part<'_> {
     }
 
     /// Where the machine of certain variables of the part is; none where no solution is found.
-    fn root(&self, variables: &[Interval]) -> Option<Six> {
+    pub fn root(&self, variables: &[Interval]) -> Option<Six> {
         let Extent { machine, joints, pose, command: (q, at), .. } = self.extent;
         let p = self.extent.parameters(variables);
         let nearly: Vec<f64> = p.iter().map(|one| one.midpoint()).collect();

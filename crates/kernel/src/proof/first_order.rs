@@ -19,6 +19,8 @@ use crate::scalar::{AffineForm, Dual, Interval};
 
 /// How far the platform goes over a box of poses.
 pub struct FirstOrder<const M: usize> {
+    /// Known deviations of the parameters.
+    pub shifts: Vec<(usize, AffineForm<M>)>,
     /// With the known deviations, of the nominal machine,
     known: Six<AffineForm<M>>,
     /// and per unit of each variable.
@@ -29,7 +31,10 @@ pub struct FirstOrder<const M: usize> {
 }
 
 /// A product of plain numbers and forms, summed.
-fn formed_along<const M: usize>(direction: &[f64; SIX], six: &Six<AffineForm<M>>) -> AffineForm<M> {
+pub fn formed_along<const M: usize>(
+    direction: &[f64; SIX],
+    six: &Six<AffineForm<M>>,
+) -> AffineForm<M> {
     let mut sum = AffineForm::from_interval(point(0.0));
     for (&factor, one) in direction.iter().zip(six) {
         if factor != 0.0 {
@@ -61,40 +66,40 @@ impl Region<'_> {
         let slopes: Vec<Six<AffineForm<M>>> =
             columns.iter().map(|column| minus(equations.solve(column))).collect();
         // Along the way, for any machine.
-        let p: Vec<Dual<Interval, 1>> = over
+        let p: Vec<Dual<AffineForm<M>, 1>> = over
             .between
             .iter()
             .zip(&machine.nominal)
-            .map(|(&one, &nominal)| Dual { value: one, parts: [one - point(nominal)] })
+            .map(|(&one, &nominal)| Dual { value: form(one), parts: [form(one - point(nominal))] })
             .collect();
-        let q: Vec<Dual<Interval, 1>> =
-            joints.iter().map(|joint| Dual::constant(joint.range)).collect();
-        let still = |one: AffineForm<M>| Dual::constant(one.range);
+        let q: Vec<Dual<AffineForm<M>, 1>> = joints.iter().map(|&q| Dual::constant(q)).collect();
         let place = Placed {
-            position: at.position.map(still),
-            rotation: at.rotation.map(|row| row.map(still)),
+            position: at.position.map(Dual::constant),
+            rotation: at.rotation.map(|row| row.map(Dual::constant)),
         };
         // The displacement at tau is tau times a mean of S d.
-        let mut away = over.whole.map(Dual::constant);
+        let mut away = over.whole.map(|whole| Dual::constant(form(whole)));
         for k in 0..SIX {
             let more = over.slopes.iter().map(|slope| Interval::symmetric(slope[k].magnitude()));
-            away[k].parts[0] = more.fold(over.known[k], |sum, one| sum + one);
+            away[k].parts[0] = form(more.fold(over.known[k], |sum, one| sum + one));
         }
         let along = derivatives(machine, &p, &q, &place, &away);
-        let differs = |slope: &Six<AffineForm<M>>, column: &Six| {
+        let values = along.to_displacement.map(|row| row.map(|one| one.value));
+        let of_any = Equations::of(&values).ok_or(Unproven::TooWide)?;
+        let differs = |slope: &Six<AffineForm<M>>, column: &Six<AffineForm<M>>| {
             let mut open = *column;
             for (i, open) in open.iter_mut().enumerate() {
                 for k in 0..SIX {
-                    *open = *open + along.to_displacement[i][k].parts[0] * slope[k].range;
+                    *open = *open + along.to_displacement[i][k].parts[0] * slope[k];
                 }
             }
-            over.inverse.times(&open).map(|value| value.scaled(-0.5))
+            of_any.solve(&open).map(|value| value.range.scaled(-0.5))
         };
         let change_of =
             |parameter| along.closures.to_parameter(machine, parameter).map(|one| one.parts[0]);
-        let mut changed = [point(0.0); SIX];
+        let mut changed = [form(point(0.0)); SIX];
         for &(index, shift) in &shifts {
-            add_multiple(&mut changed, &change_of(index), shift.range);
+            add_multiple(&mut changed, &change_of(index), shift);
         }
         let columns = self.deviating.columns(|_| true, change_of);
         Ok(FirstOrder {
@@ -106,6 +111,7 @@ impl Region<'_> {
                 .collect(),
             known,
             slopes,
+            shifts,
         })
     }
 
@@ -164,5 +170,17 @@ impl<const M: usize> FirstOrder<M> {
             beyond = beyond + point(along(direction, more).magnitude());
         }
         [(sum.range + uncertain).upper, beyond.upper]
+    }
+
+    /// The end of each variable at which machines of the box go farthest along a direction; 0 where that is not
+    /// certain.
+    pub fn certain_ends(&self, direction: &[f64; SIX]) -> Vec<i8> {
+        let end = |(slope, more): (&Six<AffineForm<M>>, &Six)| {
+            // What is beyond is a mean over the way, whose end may be twice as far.
+            let more = along(direction, more);
+            let any = formed_along(direction, slope).range + more.scaled(2.0).hull(point(0.0));
+            i8::from(any.lower >= 0.0) - i8::from(any.upper <= 0.0)
+        };
+        self.slopes.iter().zip(&self.more).map(end).collect()
     }
 }

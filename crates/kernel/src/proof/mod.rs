@@ -18,6 +18,7 @@ mod rates;
 mod region;
 mod root;
 mod targets;
+mod worst_machine;
 
 pub use at_pose::{Extent, PoseBound};
 pub use boxes::{Effort, bound_in_boxes};

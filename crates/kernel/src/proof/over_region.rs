@@ -6,7 +6,6 @@
 
 use super::at_pose::{Extent, along, displacement_numbers};
 use super::pose_box::Over;
-use super::rates::reach_more;
 use super::region::Region;
 use super::targets::{AS_LOW_AS_CAN_BE, Closeness, TARGETS, targets};
 use super::{Deviating, Unproven, point};
@@ -25,7 +24,7 @@ const BATCH: usize = 32;
 /// A box of less than this share of the region along every axis is given up.
 const SMALLEST: f64 = 1e-4;
 /// Magnitudes are refined until they lie at most this above the farthest reach.
-const FINE: f64 = 1.01;
+const FINE: f64 = 1.005;
 /// A component below this share of its magnitude is closed to the gap of this share.
 const MINOR: f64 = 0.1;
 
@@ -113,19 +112,20 @@ impl Region<'_> {
         let forms = self.forms::<M>(&spot_command, &command, (sides, &halves), &solved.pose)?;
         let first = self.first_order(&forms, &over)?;
         let bounds = |most: &dyn Fn(&[f64; SIX]) -> f64| {
-            let closeness = Closeness { fine: FINE, enough: AS_LOW_AS_CAN_BE };
+            let closeness = Closeness { fine: FINE, enough: *allowed };
             targets(machine, &over.whole, &closeness, most).values
         };
         let closed = |bound: &[f64; TARGETS]| bound.iter().zip(allowed).all(|(a, b)| a <= b);
-        let mut bound = bounds(&|u| {
+        let reach = |u: &[f64; SIX]| {
             let [linear, beyond] = first.reach(u);
             (point(linear) + point(beyond)).upper
-        });
-        // The exact extent at the middle where nothing is allowed yet, or where it is only what is beyond the
+        };
+        let mut bound = bounds(&reach);
+        // One machine at a time where nothing is allowed yet, or where it is only what is beyond the
         // first order that is too much.
         let nothing_yet = allowed.contains(&f64::NEG_INFINITY);
         if nothing_yet || (!closed(&bound) && closed(&bounds(&|u| first.reach(u)[0]))) {
-            let extent = Extent {
+            let at_middle = Extent {
                 machine,
                 joints: &solved.joints,
                 pose: solved.pose,
@@ -133,14 +133,16 @@ impl Region<'_> {
                 shift: own.shifts.clone(),
                 deviating: self.deviating,
             };
-            let part = extent.whole().map_err(|not| not.why)?;
-            let rates = self.rates(&command, &forms, &over)?;
-            let finer = bounds(&|u| {
-                let more = reach_more(u, &over, &rates, &halves);
-                (point(part.most(u)) + point(more)).upper
-            });
-            for (bound, finer) in bound.iter_mut().zip(finer) {
-                *bound = bound.min(finer);
+            let known = (&at_middle, &command, &forms, &over, &first);
+            if let Ok(worst) = self.worst_machines(known, &halves) {
+                let finer = bounds(&|u| {
+                    let coarse = reach(u);
+                    let enough = coarse * FINE * FINE <= enough_along(machine, allowed, u);
+                    if enough { coarse } else { coarse.min(worst.reach(u)) }
+                });
+                for (bound, finer) in bound.iter_mut().zip(finer) {
+                    *bound = bound.min(finer);
+                }
             }
         }
         Ok((bound, reached))
@@ -260,7 +262,9 @@ pub fn bound_over_region(
                 }
             }
         }
-        allowed = allowed_bounds(&result.reached, region.gap);
+        if !result.reached.contains(&f64::NEG_INFINITY) {
+            allowed = allowed_bounds(&result.reached, region.gap);
+        }
         let excess = |bound: &[f64; TARGETS]| {
             (0..TARGETS)
                 .map(|target| bound[target] - allowed[target])
@@ -319,6 +323,20 @@ pub fn bound_over_region(
             }
         }
     }
+}
+
+/// How far displacements may reach along a direction where no bound in which that reach takes part may be above
+/// the allowed one.
+fn enough_along(machine: &Machine, allowed: &[f64; TARGETS], direction: &[f64; SIX]) -> f64 {
+    let mut enough = f64::INFINITY;
+    for (k, part) in direction.iter().enumerate().filter(|&(_, &part)| part != 0.0) {
+        let unit = if k < 3 { 1.0 } else { machine.characteristic_length };
+        enough = enough.min(unit * allowed[2 * SIX + k / 3]);
+        if part.abs() == 1.0 {
+            enough = enough.min(unit * allowed[k + if *part > 0.0 { 0 } else { SIX }]);
+        }
+    }
+    enough
 }
 
 /// The highest bound of each target that closes it.

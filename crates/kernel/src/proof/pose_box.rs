@@ -19,6 +19,8 @@ pub struct Over {
     pub slopes: Vec<Six>,
     /// Displacements of all machines in the box, and of the nominal one.
     pub whole: Six,
+    /// Where there is no other root of any of them.
+    pub unique_in: Six,
     /// All parameters between nominal and actual.
     pub between: Vec<Interval>,
     /// Of the closures to the displacement, over all that.
@@ -77,6 +79,7 @@ impl Region<'_> {
             slopes: columns.iter().map(|column| minus(inverse.times(column))).collect(),
             shifts,
             whole,
+            unique_in: root.unique_in,
             between: p,
             inverse,
         })

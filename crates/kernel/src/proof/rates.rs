@@ -1,7 +1,6 @@
 //! Over a box of commanded poses: how fast the displacement and its slopes change with the pose, by dual
 //! numbers on intervals.
 
-use super::at_pose::along;
 use super::closures::{Placed, Six, add_multiple, derivatives, turned};
 use super::command::Command;
 use super::forms::{Equations, Forms};
@@ -22,6 +21,9 @@ pub struct Rates {
     pub slopes: Vec<Six>,
 }
 
+/// How known deviations change per unit of a commanded freedom: by parameter.
+pub type ShiftRates = Vec<(usize, Interval)>;
+
 /// `value`, changing at `rate`.
 fn changing<S>(value: S, rate: S) -> Tangent<S> {
     Dual { value, parts: [rate] }
@@ -35,12 +37,7 @@ impl Region<'_> {
     /// whose closures' rows differ a little, is off by what the difference leaves open. The difference is
     /// taken along the way from the nominal machine to the actual one, by dual numbers, so that it is as
     /// small as the deviations are; and it holds anywhere on that way, where a share of it has happened.
-    fn changes(
-        &self,
-        command: &Command,
-        over: &Over,
-        shift_rates: &[Vec<(usize, Interval)>],
-    ) -> Vec<Six> {
+    pub fn changes(&self, command: &Command, over: &Over, shift_rates: &[ShiftRates]) -> Vec<Six> {
         let machine = self.machine;
         let Command { joints, at, rates } = command;
         let still = |value: Interval| changing(value, point(0.0));
@@ -98,24 +95,21 @@ impl Region<'_> {
     /// from pose to pose is in the affine forms; what differs between machines is in their remainders.
     pub fn rates<const M: usize>(
         &self,
-        command: &Command,
         forms: &Forms<M>,
         over: &Over,
+        shifts: &[ShiftRates],
+        changes: &[Six],
     ) -> Result<Vec<Rates>, Unproven> {
         let machine = self.machine;
         let form = AffineForm::<M>::from_interval;
         let minus = |six: Six<AffineForm<M>>| six.map(|value| -value);
-        let shift_rates = (0..command.rates.len())
-            .map(|freedom| self.shift_rates(command, freedom))
-            .collect::<Result<Vec<_>, _>>()?;
-        let changes = self.changes(command, over, &shift_rates);
         let mut slopes: Option<(Six<AffineForm<M>>, Vec<Six<AffineForm<M>>>)> = None;
         let mut result = Vec::with_capacity(changes.len());
         for (freedom, change) in changes.iter().enumerate() {
             let (twist, speeds) = &forms.rates[freedom];
             let mut p: Vec<Tangent<AffineForm<M>>> =
                 over.between.iter().map(|&value| Dual::constant(form(value))).collect();
-            for &(index, rate) in &shift_rates[freedom] {
+            for &(index, rate) in &shifts[freedom] {
                 // Of a machine on the way from the nominal one to this: any share of it.
                 p[index].parts[0] = p[index].parts[0] + form(partly(rate));
             }
@@ -155,7 +149,7 @@ impl Region<'_> {
             for &(index, shift) in &over.shifts {
                 add_multiple(&mut opened, &change_of(index), form(shift));
             }
-            for &(index, rate) in &shift_rates[freedom] {
+            for &(index, rate) in &shifts[freedom] {
                 add_multiple(&mut opened, &value_of(index), form(rate));
             }
             let columns = self.deviating.columns(|_| true, change_of);
@@ -168,11 +162,7 @@ impl Region<'_> {
     }
 
     /// How the known deviations change per unit of a commanded freedom.
-    fn shift_rates(
-        &self,
-        command: &Command,
-        freedom: usize,
-    ) -> Result<Vec<(usize, Interval)>, Unproven> {
+    pub fn shift_rates(&self, command: &Command, freedom: usize) -> Result<ShiftRates, Unproven> {
         let machine = self.machine;
         if !self.varies() {
             return Ok(Vec::new());
@@ -221,34 +211,6 @@ impl Region<'_> {
     pub fn varies(&self) -> bool {
         !self.yielding.is_empty() || self.shift.iter().any(|shift| shift.per_length != 0.0)
     }
-}
-
-/// How much farther displacements reach along a direction away from the middle of a box of poses than in
-/// it, where every variable whose slope is certain over all of the box is at its end.
-pub fn reach_more(
-    direction: &[f64; SIX],
-    over: &Over,
-    rates: &[Rates],
-    halves: &[Interval],
-) -> f64 {
-    let mut bound = point(0.0);
-    for (rate, &half) in rates.iter().zip(halves) {
-        let mut sum = along(direction, &rate.known);
-        for (slope, rate) in over.slopes.iter().zip(&rate.slopes) {
-            let slope = along(direction, slope);
-            let rate = along(direction, rate);
-            sum = sum
-                + if slope.lower >= 0.0 {
-                    rate
-                } else if slope.upper <= 0.0 {
-                    -rate
-                } else {
-                    Interval::symmetric(rate.magnitude())
-                };
-        }
-        bound = bound + sum * half;
-    }
-    bound.upper
 }
 
 /// A platform that moves at a twist: R' = [w]x R.

@@ -56,6 +56,31 @@ impl<const M: usize> AffineForm<M> {
         Self::collected(middle.midpoint(), slopes, rest, size, range)
     }
 
+    /// Variable k itself.
+    #[inline]
+    pub fn variable(k: usize) -> Self {
+        let mut one = Self::from_interval(Interval::symmetric(1.0));
+        (one.slopes[k], one.rest) = (1.0, 0.0);
+        one
+    }
+
+    /// Its mean over the straight way from the middle of the box to a point: of the linear part a half.
+    #[inline]
+    pub fn mean_from_middle(self) -> Self {
+        let mut slopes = self.slopes;
+        for k in 0..M {
+            slopes[k] *= 0.5;
+        }
+        // Half of a number is exact unless it underflows.
+        Self::collected(self.middle, slopes, self.rest, f64::MIN_POSITIVE, self.range)
+    }
+
+    /// Exactly nothing, as much of what is differentiated is.
+    #[inline(always)]
+    fn is_zero(&self) -> bool {
+        self.range.lower == 0.0 && self.range.upper == 0.0
+    }
+
     /// How far it can be from the middle, but for rounding.
     #[inline]
     fn deviation(&self) -> f64 {
@@ -128,6 +153,12 @@ impl<const M: usize> Add for AffineForm<M> {
     type Output = Self;
     #[inline(never)]
     fn add(self, other: Self) -> Self {
+        if self.is_zero() {
+            return other;
+        }
+        if other.is_zero() {
+            return self;
+        }
         let mut slopes = self.slopes;
         for k in 0..M {
             slopes[k] += other.slopes[k];
@@ -151,6 +182,9 @@ impl<const M: usize> Mul for AffineForm<M> {
     #[inline(never)]
     fn mul(self, other: Self) -> Self {
         let range = self.range * other.range;
+        if range.lower == 0.0 && range.upper == 0.0 {
+            return Self::from_interval(range);
+        }
         let (a, b) = (self.deviation(), other.deviation());
         let mut slopes = [0.0; M];
         // Of a e_k times b e_k the square lies between 0 and 1: half of it is known.

@@ -224,13 +224,17 @@ class Machine:
         columns: Sequence[tuple[int, int, float]],
         gap: float,
         most_boxes: int,
+        earlier: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike, ArrayLike, int] | None,
         progress: Callable[[int, float], bool],
     ) -> dict[str, Any]:
         """Proven bounds over a region of commanded poses with these `sides` (n_commanded, 2).
 
         `shifts` and `yielding`, a known deviation and a compliance under `wrench` (6,): parameter,
         (low, high) of a constant, per length of a strut, which strut. `columns`: parameter,
-        variable, swing. Where `progress(boxes, gap)` returns False the search ends.
+        variable, swing. `earlier`: how far an earlier search was, `part_sides`, `part_bound`,
+        `finished`, `reached`, `at` and `boxes` of its dict. Where `progress(boxes, share)`, told
+        which share of the region is finished, returns False the search ends; so it does at
+        Ctrl-C, with `interrupted` True. Raises KeyboardInterrupt where nothing is proven by then.
         """
 
     def base_loads_at(

@@ -125,6 +125,7 @@ CATALOGUE: dict[str, str] = {
     "bad-poses": "the poses given are not finite numbers of the right shape",
     "bad-region": "a region of the workspace that cannot be read, or is none",
     "region-out-of-reach": "a region with poses that the machine cannot be commanded to",
+    "bad-resume": "a result that a search for bounds cannot go on from",
     "bad-gap": "a gap that bounds cannot be closed to",
     "bad-truncation": "a number of standard deviations that a distribution cannot be cut at",
     "no-proof": "bounds are wanted where the method has no proof to give",

@@ -3,13 +3,15 @@
 use crate::arrays::Input;
 use crate::machine::Machine;
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use truepose_kernel::batch::share_out;
+use truepose_kernel::linear::SIX;
 use truepose_kernel::machine::{indices_of, parts};
 use truepose_kernel::proof::{
-    self, Affine, Deviating, Effort, Extent, PoseBound, Region, RegionBound, Unproven,
+    self, Affine, Deviating, Effort, Extent, Part, PoseBound, Region, RegionBound, Search, TARGETS,
+    Unproven,
 };
 use truepose_kernel::spatial::Pose;
 
@@ -124,13 +126,20 @@ impl Machine {
         (lower, upper, magnitudes, status, boxes).into_bound_py_any(py)
     }
 
-    /// Bounds of the error over a region of commanded poses, as a dict: `lower`, `upper`, `reached_lower`,
-    /// `reached_upper` (n_component,), `magnitude`, `reached_magnitude` (n_quantity,), where each is reached
-    /// (`lower_at`, `upper_at`, `magnitude_at`, rows of commanded freedoms), `boxes`, `status` and `where`.
+    /// Bounds of the error over a region of commanded poses, as a dict.
+    ///
+    /// In rows of targets (lower ends of the n_component components, upper ends, n_quantity magnitudes):
+    /// `bound` and `reached`, and where each is (`at`, a row of commanded freedoms a target); `gap`,
+    /// `boxes`, `status`, and `where` something is unproven or out of reach. What is not finished: the
+    /// ends of each part (`part_sides`, (n_part, n_commanded, 2)) and its bounds (`part_bound`), and the
+    /// bounds over all other parts (`finished`).
     ///
     /// `sides` (n_commanded, 2). `shifts` and `yielding`: (parameter, (low, high), per length, strut), a
     /// known deviation and a compliance under the `wrench` (6,). `columns`: (parameter, variable, swing).
-    /// `progress(boxes, gap)` is called now and then; where it returns False the search stops.
+    /// `earlier`: a search that goes on, (part_sides, part_bound, finished, reached, at, boxes).
+    /// `progress(boxes, share)` is called now and then, with the share of the region that is finished;
+    /// where it returns False the search stops. Ctrl-C stops it, too: then `interrupted` is True, or
+    /// KeyboardInterrupt is raised where nothing is proven yet.
     #[allow(clippy::too_many_arguments)] // Python's signature
     fn bounds_over<'py>(
         &self,
@@ -142,6 +151,7 @@ impl Machine {
         columns: Vec<(usize, usize, f64)>,
         gap: f64,
         most_boxes: usize,
+        earlier: Option<Earlier>,
         progress: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let machine = &self.inner;
@@ -180,54 +190,112 @@ impl Machine {
             gap,
             most_boxes,
         };
+        let search = match earlier {
+            Some(earlier) => self.search_of(earlier)?,
+            None => Search::new(&region),
+        };
         let progress = progress.clone().unbind();
-        let mut interrupted: Option<PyErr> = None;
+        let mut stopped: Option<PyErr> = None;
         let bound = py.detach(|| {
-            proof::bound_over_region(&region, |boxes, gap| {
+            proof::bound_over_region(&region, search, |boxes, share| {
                 Python::attach(|py| {
                     let asked = py
                         .check_signals()
-                        .and_then(|()| progress.call1(py, (boxes, gap))?.extract::<bool>(py));
+                        .and_then(|()| progress.call1(py, (boxes, share))?.extract::<bool>(py));
                     asked.unwrap_or_else(|error| {
-                        interrupted = Some(error);
+                        stopped = Some(error);
                         false
                     })
                 })
             })
         });
-        if let Some(error) = interrupted {
+        let interrupted = stopped.is_some();
+        if let Some(error) = stopped
+            && (bound.unproven.is_some() || !error.is_instance_of::<PyKeyboardInterrupt>(py))
+        {
             return Err(error);
         }
-        self.over_region(py, &bound)
+        let table = self.over_region(py, &bound)?;
+        table.set_item("interrupted", interrupted)?;
+        Ok(table)
     }
 }
 
+/// A search that goes on: ends of its parts, their bounds, those of the finished ones, what is reached,
+/// where, and the boxes looked at.
+type Earlier = (Vec<Vec<[f64; 2]>>, Vec<Vec<f64>>, Vec<f64>, Vec<f64>, Vec<Vec<f64>>, usize);
+
 impl Machine {
+    /// The targets of a row, with the sign that they have in it.
+    fn row(&self) -> Vec<(usize, f64)> {
+        let components = indices_of(&self.inner.dof);
+        let lower = components.iter().map(|k| (SIX + k, -1.0));
+        let upper = components.iter().map(|&k| (k, 1.0));
+        let magnitudes = parts(&self.inner.dof).into_iter().map(|part| (2 * SIX + part, 1.0));
+        lower.chain(upper).chain(magnitudes).collect()
+    }
+
+    fn search_of(&self, earlier: Earlier) -> PyResult<Search> {
+        let (sides, bounds, finished, reached, at, boxes) = earlier;
+        let row = self.row();
+        let width = self.inner.commanded_count();
+        let fit = sides.len() == bounds.len()
+            && sides.iter().chain([&vec![[0.0; 2]; width]]).all(|sides| sides.len() == width)
+            && bounds.iter().chain([&finished, &reached]).all(|values| values.len() == row.len())
+            && at.len() == row.len()
+            && at.iter().all(|place| place.len() == width);
+        if !fit {
+            return Err(PyValueError::new_err("the earlier search does not fit the machine"));
+        }
+        // What is no freedom does not err.
+        let targets = |values: &[f64]| {
+            let mut targets = [0.0; TARGETS];
+            for (&(target, sign), value) in row.iter().zip(values) {
+                targets[target] = sign * value;
+            }
+            targets
+        };
+        let mut poses = vec![vec![f64::NAN; width]; TARGETS];
+        for (&(target, _), place) in row.iter().zip(at) {
+            poses[target] = place;
+        }
+        Ok(Search {
+            parts: sides
+                .into_iter()
+                .zip(&bounds)
+                .map(|(sides, bound)| Part::known(sides, targets(bound)))
+                .collect(),
+            finished: targets(&finished),
+            reached: targets(&reached),
+            at: poses,
+            boxes,
+        })
+    }
+
     fn over_region<'py>(
         &self,
         py: Python<'py>,
         bound: &RegionBound,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let components = indices_of(&self.inner.dof);
-        let parts = parts(&self.inner.dof);
-        let upper = components.clone();
-        let lower: Vec<usize> = components.iter().map(|k| 6 + k).collect();
-        let magnitudes: Vec<usize> = parts.iter().map(|part| 12 + part).collect();
-        let of = |values: &[f64], targets: &[usize], sign: f64| -> Vec<f64> {
-            targets.iter().map(|&target| sign * values[target]).collect()
+        let row = self.row();
+        let of = |values: &[f64]| -> Vec<f64> {
+            row.iter().map(|&(target, sign)| sign * values[target]).collect()
         };
-        let at = |targets: &[usize]| -> Vec<Vec<f64>> {
-            targets.iter().map(|&target| bound.at[target].clone()).collect()
-        };
+        let search = &bound.search;
+        let nothing = [f64::INFINITY; TARGETS];
+        let parts = &search.parts;
+        let part_bound: Vec<Vec<f64>> =
+            parts.iter().map(|part| of(&part.bound.unwrap_or(nothing))).collect();
+        let at: Vec<&[f64]> = row.iter().map(|&(target, _)| search.at[target].as_slice()).collect();
+        let sides: Vec<&[[f64; 2]]> = parts.iter().map(|part| part.sides.as_slice()).collect();
         let table = PyDict::new(py);
-        for (name, targets, sign) in
-            [("lower", &lower, -1.0), ("upper", &upper, 1.0), ("magnitude", &magnitudes, 1.0)]
-        {
-            table.set_item(name, of(&bound.bound, targets, sign))?;
-            table.set_item(format!("reached_{name}"), of(&bound.reached, targets, sign))?;
-            table.set_item(format!("{name}_at"), at(targets))?;
-        }
-        table.set_item("boxes", bound.boxes)?;
+        table.set_item("bound", of(&bound.bound))?;
+        table.set_item("reached", of(&search.reached))?;
+        table.set_item("at", at)?;
+        table.set_item("part_sides", sides)?;
+        table.set_item("part_bound", part_bound)?;
+        table.set_item("finished", of(&search.finished))?;
+        table.set_item("boxes", search.boxes)?;
         table.set_item("gap", bound.gap)?;
         let (status, place) = match (&bound.out_of_reach, &bound.unproven) {
             (Some((status, place)), _) => (status.name(), Some(place.clone())),

@@ -45,7 +45,7 @@ def progress(
         seconds = time.monotonic() - begun
         if not bar.live.is_started and seconds > PATIENCE and (done < total or total < 1):
             bar.start()
-            if first:
+            if first or (done >= 1 and total >= 1):
                 bar.console.print(estimate(what, done, total, unit, seconds, first), markup=False)
         known = total if total >= 1 else None
         bar.update(task, completed=done, total=known, state=state(done, known, unit, seconds))
@@ -90,10 +90,12 @@ def estimate(what: str, done: int, total: int, unit: str, seconds: float, first:
 
     After `done` of `total`, if that is known, in `seconds`.
     """
-    known = ""
+    said = []
     if done >= 1 and total >= 1:
-        known = f"about {_clock(seconds / done * total)} for {_short(total)} {unit}, "
-    return f"{what}: {known}{first} first; Ctrl-C gives what is done by then"
+        said.append(f"about {_clock(seconds / done * total)} for {_short(total)} {unit}")
+    if first:
+        said.append(f"{first} first; Ctrl-C gives what is done by then")
+    return f"{what}: {', '.join(said)}"
 
 
 def state(done: int, total: int | None, unit: str, seconds: float) -> str:

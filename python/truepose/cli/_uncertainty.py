@@ -18,6 +18,7 @@ from truepose.files.units import UnitSystem
 from truepose.files.wording import counted
 from truepose.reporting import reading, uncertainty_tables
 from truepose.reporting.display import is_position, nearest_middle, where_highest
+from truepose.reporting.formats import netcdf
 from truepose.reporting.study import Study
 from truepose.runs.poses import broken
 from truepose.runs.quantities import quantities
@@ -52,7 +53,7 @@ def sample(request: Request, machine: Machine, **asked: Any) -> xr.Dataset:
     """The error sampled over the file's workspace; after Ctrl-C, what there is by then."""
     with progress("Monte Carlo", "samples", first="the worst poses") as report:
         result = truepose.monte_carlo(machine, progress=report, **asked)
-    if result.attrs["interrupted"]:
+    if result.attrs.get("interrupted"):
         count = int(result["samples"].sum())
         click.echo(
             f"Interrupted after {count:,} samples over {counted(result.sizes['pose'], 'pose')}: "
@@ -67,17 +68,22 @@ def bound(
     request: Request,
     machine: Machine,
     region: str | None,
-    gap: float | None,
-    truncate: float | None,
+    **asked: Any,
 ) -> xr.Dataset:
-    """The proven bounds over the file's poses, or over a region given as text."""
-    asked: dict[str, Any] = {} if truncate is None else {"truncate": truncate}
-    if gap is not None:
-        asked["gap"] = gap
+    """The proven bounds over the file's poses, or over a region given as text.
+
+    After Ctrl-C what is proven by then. Of what is `asked`, None is what was not.
+    """
+    asked = {name: value for name, value in asked.items() if value is not None}
     if region is not None:
         asked["region"] = read_region(machine, region)
-    with progress("bounds", "poses" if region is None else "boxes") as report:
+    if "resume" in asked:
+        asked["resume"] = netcdf.read(asked["resume"])
+    of = ("poses", "the worst poses") if region is None else ("boxes", "the highest bounds")
+    with progress("bounds", of[0], first=of[1]) as report:
         result = truepose.bounds(machine, progress=report, **asked)
+    if result.attrs.get("interrupted"):
+        click.echo(uncertainty_tables.interrupted_bounds(result), err=True)
     if region is None:
         _steps.refuse_left_out_of(request, machine, result)
     return result

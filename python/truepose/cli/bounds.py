@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
 
+from truepose.cli._ending import INTERRUPTED
 from truepose.cli._options import (
     Request,
     accuracy_option,
@@ -41,19 +43,33 @@ from truepose.cli._options import (
         help="Take a distribution without ends, such as a normal one, to end at K standard "
         "deviations.  [default: its stated k sigma]",
     ),
+    click.option(
+        "--resume",
+        metavar="FILE.nc",
+        type=click.Path(path_type=Path),
+        help="Over a region: go on from the result that an interrupted search, or one that ran "
+        "out of boxes, wrote with --output.",
+    ),
     set_option,
     format_option,
     output_option,
     strict_option,
     accuracy_option,
 )
-def command(region: str | None, gap: float | None, truncate: float | None, **options: Any) -> int:
+def command(
+    region: str | None,
+    gap: float | None,
+    truncate: float | None,
+    resume: Path | None,
+    **options: Any,
+) -> int:
     """Prove what the error cannot exceed.
 
     Encloses the error of every machine inside the bands, by interval arithmetic with rounding
     included, and proves that each has exactly one pose near the commanded one. Where there is no
-    proof it says so. With --require-accuracy the exit code is 1 when it is not proven that the
-    accuracy asked is kept.
+    proof it says so. Ctrl-C gives what is proven by then: the worst poses, or bounds over the whole
+    region that are not as close yet. With --require-accuracy the exit code is 1 when it is not
+    proven that the accuracy asked is kept.
     """
     from truepose.cli import _steps, _uncertainty
     from truepose.reporting import uncertainty_tables
@@ -62,8 +78,11 @@ def command(region: str | None, gap: float | None, truncate: float | None, **opt
 
     request = Request(**options)
     machine = _steps.read_machine(request)
-    proven = _uncertainty.bound(request, machine, region, gap, truncate)
+    proven = _uncertainty.bound(request, machine, region, gap=gap, truncate=truncate, resume=resume)
     result, tables = Result("bounds", machine, proven), uncertainty_tables.bounds(machine, proven)
+    if proven.attrs.get("interrupted"):
+        _steps.deliver(request, result, tables)
+        return INTERRUPTED
     if region is None and truncate is None:
         answers = _steps.answers_of(machine, BEFORE)
         _steps.deliver(request, result, tables, answers)

@@ -6,6 +6,7 @@ the functions return it. In the units for people (`truepose.files.shown_units`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -300,9 +301,25 @@ def _region(machine: Machine, result: xr.Dataset) -> Table:
         tuple(rows),
         words=2,
         note=proof
+        + (" Interrupted." if result.attrs.get("interrupted") else "")
         + open_
         + " Every pose in the region, not only those of a grid; the error's sign left "
         "out." + _taken_to_end(result),
+    )
+
+
+def interrupted_bounds(result: xr.Dataset) -> str:
+    """What bounds hold for that were stopped before their end."""
+    if "pose" in result.sizes:
+        return (
+            f"Interrupted after {counted(result.sizes['pose'], 'pose')}, those of the largest "
+            "first-order deviation: the bounds are of these."
+        )
+    percent = math.ceil(1000.0 * float(result.attrs["gap_reached"])) / 10.0
+    return (
+        f"Interrupted after {int(result['boxes'].values):,} boxes: the bounds hold over the whole "
+        f"region, and lie up to {percent} % above what is reached. Where they were written to a "
+        ".nc file (--output), --resume goes on from there."
     )
 
 

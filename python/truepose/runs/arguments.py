@@ -184,6 +184,10 @@ KINDS: dict[str, Kind] = {
     "Condition | None": _or_none(_CONDITION),
     "Progress | None": _or_none(_CALLABLE),
     "Mapping[str, Input] | None": _or_none(_MAPPING),
+    "xr.Dataset | None": (
+        lambda value: value is None or type(value).__name__ == "Dataset",
+        "an xarray.Dataset, as a function of truepose returns it, or None",
+    ),
     "Mapping[str, Sequence[float]] | None": _or_none(_INTERVALS),
     "Mapping[str, str] | Sequence[str]": _SETTINGS,
     "Positions | None": _or_none(_POSITIONS),

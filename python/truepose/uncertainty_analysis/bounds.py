@@ -9,13 +9,13 @@ sphere: along an error the most that it can do is the length of its three effect
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from truepose.arrays import Floats
+from truepose.arrays import Flags, Floats
 from truepose.error_budget.worst import worst
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
@@ -28,7 +28,7 @@ from truepose.runs.poses import (
     of_band,
 )
 from truepose.runs.quantities import quantities
-from truepose.runs.run import Run, in_parts
+from truepose.runs.run import Run
 from truepose.runs.variables import Variables
 from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.bounds_over_region import (
@@ -37,6 +37,7 @@ from truepose.uncertainty_analysis.bounds_over_region import (
     required_gap,
 )
 from truepose.uncertainty_analysis.corners import worst_corners
+from truepose.uncertainty_analysis.region_search import bad_resume
 from truepose.uncertainty_analysis.truncation import Ends
 
 _EACH = ("pose", "component")
@@ -74,6 +75,7 @@ def bounds(
     region: Mapping[str, Sequence[float]] | None = None,
     gap: float = 0.05,
     truncate: float | None = None,
+    resume: xr.Dataset | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Proven bounds of the error over every combination of deviations in their bands.
@@ -84,7 +86,12 @@ def bounds(
     that the region may be divided into run out: `gap_reached` says how far they lie. A distribution
     without ends (normal, Student's) is taken at its band of k standard deviations, or at `truncate`
     standard deviations; the attributes `truncate` and `unbounded` say so. `progress` is called with
-    (poses or boxes done, all or 0).
+    (poses or boxes done, all or 0 where that is not known; of boxes it is an estimate).
+
+    Ctrl-C gives what is proven so far, with the attribute `interrupted` at 1: the poses done, of a
+    block of poses the worst to first order first; of a region bounds that hold in all of it and lie
+    farther above what is reached. `resume` goes on from such a result over the same region, also
+    from one whose parts ran out.
 
     `status` is "proven", or says why nothing is: "near_singular", "box_too_wide" (the bands are too
     wide for the method, at a pose divided into many parts, or a part of the region could not be
@@ -92,8 +99,9 @@ def bounds(
     was met that cannot be assembled is left out as `band`. The Dataset, SI, is described in
     docs/results.md.
 
-    Raises `RequestError`: bad-truncation, bad-gap, bad-region, region-out-of-reach, no-proof (a
-    machine or a source that cannot be enclosed), bad-poses, no-workspace, no-source, no-pose-left.
+    Raises `RequestError`: bad-truncation, bad-gap, bad-region, bad-resume, region-out-of-reach,
+    no-proof (a machine or a source that cannot be enclosed), bad-poses, no-workspace, no-source,
+    no-pose-left.
     """
     given = machine.condition if condition is None else condition
     ends = Ends.of(truncate)
@@ -104,6 +112,8 @@ def bounds(
             "as many closures as freedoms: there the pose is a root, which can be enclosed",
         )
     if region is None:
+        if resume is not None:
+            raise bad_resume("bounds are asked for at poses", "no region", "the same region")
         return _at_poses(machine, poses, given, ends, progress)
     if poses is not None:
         raise RequestError(
@@ -114,7 +124,7 @@ def bounds(
                 expected="poses or a region",
             )
         )
-    return bounds_over_region(machine, given, region, required_gap(gap), ends, progress)
+    return bounds_over_region(machine, given, region, required_gap(gap), ends, resume, progress)
 
 
 def _at_poses(
@@ -126,20 +136,62 @@ def _at_poses(
 ) -> xr.Dataset:
     run = Run(machine, poses, condition)
     run.begin(SCHEMA)
+    done, interrupted = 0, False
     for block, every in run.with_variables():
         every = ends.truncated(every)
-        for part, variables in in_parts(block, every, POSES):
-            value, effects, status = first_order(machine, part, variables)
-            usable = run.keep(part.indices, of_band(status))
-            if usable.any():
-                order = (value[usable], effects[usable])
-                some = part.select(usable)
-                run.fill(some, *_bounded(machine, some, variables.select(usable), order))
-            if progress is not None:
-                progress(int(part.indices[-1]) + 1, len(run.poses))
+        found: list[_Found] = []
+        try:
+            value, effects, status = first_order(machine, block, every)
+            usable = run.keep(block.indices, of_band(status))
+            block, every, value = block.select(usable), every.select(usable), value[usable]
+            effects = effects[usable]
+            for part in _worst_first(machine, value, effects):
+                some = block.select(part)
+                order = (value[part], effects[part])
+                found.append((part, *_bounded(machine, some, every.select(part), order)))
+                done += int(part.sum())
+                if progress is not None:
+                    progress(done, len(run.poses))
+        except KeyboardInterrupt:
+            interrupted = True
+        _fill(run, block, found)
+        if interrupted:
+            break
+    if interrupted and run.rows.count == 0:
+        raise KeyboardInterrupt
     dataset = run.dataset(coords=quantity_coords(machine))
     dataset["status"] = dataset["status"].astype(str)
-    return dataset.assign_attrs(ends.attrs)
+    # Poses that were not come to are neither used nor left out.
+    return dataset.assign_attrs(
+        ends.attrs, interrupted=int(interrupted), poses_left_out=dataset.sizes["left_out"]
+    )
+
+
+_Found = tuple[Flags, dict[str, np.ndarray], np.ndarray]
+"""Which poses of a block, their values, and the status of each."""
+
+
+def _worst_first(machine: Machine, value: Floats, effects: Floats) -> Iterator[Flags]:
+    """Which poses (n,) come next, some at a time: the largest worst case to first order first.
+
+    That of the tool's position, or of its rotation where it only turns.
+    """
+    chosen = next(iter(quantities(machine.components).values()))
+    most = np.abs(value[:, chosen]) + np.abs(effects[:, chosen]).sum(axis=2)
+    rank = np.argsort(np.argsort(-np.linalg.norm(most, axis=1), kind="stable"))
+    for first in range(0, rank.size, POSES):
+        yield (rank >= first) & (rank < first + POSES)
+
+
+def _fill(run: Run, block: PoseBlock, found: Sequence[_Found]) -> None:
+    """Write what was found at some poses of a block, in the order of the block."""
+    if not found:
+        return
+    parts, values, statuses = zip(*found, strict=True)
+    order = np.argsort(np.concatenate([np.flatnonzero(part) for part in parts]))
+    together = {name: np.concatenate([one[name] for one in values])[order] for name in values[0]}
+    chosen: Flags = np.logical_or.reduce(parts)
+    run.fill(block.select(chosen), together, np.concatenate(statuses)[order])
 
 
 def proven_bounds(

@@ -22,16 +22,24 @@ from truepose.arrays import Floats, Indices
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Condition, Machine
-from truepose.runs.dataset import Schema, Variable, region_dataset
+from truepose.runs.dataset import Schema, Variable, provenance, region_dataset
 from truepose.runs.poses import PoseRun, Progress, faults_text, pose_in_words, required_sources
-from truepose.runs.quantities import quantities
 from truepose.runs.variables import Variables, variables_at
 from truepose.sources import PoseBlock, Source
 from truepose.uncertainty_analysis.length_law import law_of_length
+from truepose.uncertainty_analysis.region_search import (
+    UNFINISHED,
+    by_name,
+    earlier,
+    unfinished,
+)
 from truepose.uncertainty_analysis.truncation import Ends
 
 MOST_BOXES = 200_000
 """Parts of a region that are looked at before giving up."""
+
+KNOWN = 0.05
+"""Share of a region that must be finished to tell how many parts it may take in all."""
 
 _ALL = ("component",)
 _SIZE = ("quantity",)
@@ -93,11 +101,12 @@ def bounds_over_region(
     region: Mapping[str, Sequence[float]],
     gap: float,
     ends: Ends,
+    resume: xr.Dataset | None,
     progress: Progress | None,
 ) -> xr.Dataset:
     """Proven bounds over every commanded pose of a region; see `uncertainty_analysis.bounds`.
 
-    Raises `RequestError`: bad-region, region-out-of-reach, no-proof, no-source.
+    Raises `RequestError`: bad-region, region-out-of-reach, no-proof, no-source, bad-resume.
     """
     if not machine.kernel.can_be_enclosed:
         raise no_proof(
@@ -117,6 +126,11 @@ def bounds_over_region(
     every = variables_at(machine, block, sources)
     variables = ends.truncated(every)
     shifts.extend(_middles(every))
+    asked = {name: list(side) for name, side in zip(machine.commanded, sides, strict=True)}
+    question = ends.attrs | {"gap": gap, "region": str(asked)}
+    goes_on = None
+    if resume is not None:
+        goes_on = earlier(machine, resume, provenance(machine, condition) | question)
     proof = machine.kernel.bounds_over(
         sides,
         shifts,
@@ -132,32 +146,33 @@ def bounds_over_region(
         ),
         gap,
         MOST_BOXES,
-        _going_on(progress),
+        goes_on,
+        _told(progress),
     )
     status = str(proof["status"])
     if status in STATUS:
         raise _out_of_reach(machine, np.array(proof["where"]), status)
     proven = status == "proven"
-    count, kinds = len(machine.components), len(quantities(machine.components))
+    bound, reached = (np.asarray(proof[name], np.float64) for name in ("bound", "reached"))
     missing = np.full(len(machine.commanded), np.nan)
+    found = by_name(machine, np.where(proven, bound, np.nan))
+    found |= by_name(machine, np.where(np.isfinite(reached), reached, np.nan), "reached_")
+    where = by_name(machine, np.asarray(proof["at"], np.float64).T)
+    rest = unfinished(machine, proof) if proven else {}
     values = {
-        "lower": proof["lower"] if proven else np.full(count, np.nan),
-        "upper": proof["upper"] if proven else np.full(count, np.nan),
-        "magnitude": proof["magnitude"] if proven else np.full(kinds, np.nan),
-        "reached_lower": _finite(proof["reached_lower"]),
-        "reached_upper": _finite(proof["reached_upper"]),
-        "reached_magnitude": _finite(proof["reached_magnitude"]),
-        "where_lower": proof["lower_at"],
-        "where": proof["upper_at"],
-        "where_magnitude": proof["magnitude_at"],
+        **found,
+        **rest,
+        "where_lower": where["lower"].T,
+        "where": where["upper"].T,
+        "where_magnitude": where["magnitude"].T,
         "where_unproven": missing if proven else proof["where"],
         "boxes": proof["boxes"],
         "status": status,
     }
-    result = region_dataset(machine, condition, SCHEMA, values)
-    asked = {name: list(side) for name, side in zip(machine.commanded, sides, strict=True)}
+    schema = {**SCHEMA, **UNFINISHED} if rest else SCHEMA
+    result = region_dataset(machine, condition, schema, values)
     return result.assign_attrs(
-        ends.attrs | {"gap": gap, "gap_reached": float(proof["gap"]), "region": str(asked)}
+        question | {"gap_reached": float(proof["gap"]), "interrupted": int(proof["interrupted"])}
     )
 
 
@@ -166,11 +181,6 @@ def _middles(variables: Variables) -> list[Affine]:
     offsets = variables.half_width[0] * variables.domain.middle[variables.variable_of]
     columns = zip(variables.columns.tolist(), offsets.tolist(), strict=True)
     return [(column, (value, value), 0.0, 0) for column, value in columns if value != 0.0]
-
-
-def _finite(values: Sequence[float]) -> Floats:
-    array = np.asarray(values, np.float64)
-    return np.where(np.isfinite(array), array, np.nan)
 
 
 def _sides(machine: Machine, region: Mapping[str, Sequence[float]]) -> list[tuple[float, float]]:
@@ -303,12 +313,15 @@ def _unknown(machine: Machine, source: Source, why: str) -> RequestError:
     )
 
 
-def _going_on(progress: Progress | None) -> Callable[[int, float], bool]:
-    """What the kernel calls between parts of its work: tells progress, and always goes on."""
+def _told(progress: Progress | None) -> Callable[[int, float], bool]:
+    """What the kernel calls between parts of its work: tells progress, and goes on.
 
-    def told(boxes: int, _: float) -> bool:
+    The number of boxes in all is that at which the whole region is finished, at the rate so far.
+    """
+
+    def told(boxes: int, share: float) -> bool:
         if progress is not None:
-            progress(boxes, 0)
+            progress(boxes, round(boxes / share) if share >= KNOWN else 0)
         return True
 
     return told

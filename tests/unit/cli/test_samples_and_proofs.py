@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import truepose
-from command_line import MACHINES, PLANAR, call
+from command_line import MACHINES, PLANAR, Outcome, call
 from sweeps import sweep
 from truepose.errors import RequestError
 
@@ -162,13 +163,13 @@ TOLD = """
 import importlib, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 import truepose
-name = sys.argv.pop(1)
+name, after = sys.argv.pop(1), int(sys.argv.pop(1))
 whole = getattr(importlib.import_module(f"truepose.uncertainty_analysis.{name}"), name)
 
 def told(*arguments, progress, **settings):
     said = []
     def tell(done, total):
-        if not said:
+        if not said and done >= after:
             said.append(print("begun", flush=True))
     return whole(*arguments, progress=tell, **settings)
 
@@ -178,10 +179,13 @@ main()
 """
 
 
-def interrupted(function: str, *arguments: str) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr of a command that gets Ctrl-C in the middle of a function."""
+def interrupted(function: str, *arguments: str, after: int = 0) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a command that gets Ctrl-C in the middle of a function.
+
+    It gets it once so many poses, samples or boxes are done.
+    """
     process = subprocess.Popen(
-        [sys.executable, "-c", TOLD, function, *arguments],
+        [sys.executable, "-c", TOLD, function, str(after), *arguments],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stdout is not None
@@ -244,13 +248,83 @@ def test_where_the_method_has_no_proof(
     assert because in outcome.err
 
 
-def test_ctrl_c_ends_a_long_proof(tmp_path: Path) -> None:
-    output = tmp_path / "found.json"
+def test_ctrl_c_in_the_middle_of_a_proof_gives_bounds_that_hold(tmp_path: Path) -> None:
+    first, second = tmp_path / "first.nc", tmp_path / "second.json"
     region = ["--region", "x=200:400,y=100:300", "--gap", "0.001"]
-    asked = ["bounds", str(PLANAR), *region, "--output", str(output)]
-    code, _, errors = interrupted("bounds", *asked)
-    assert (code, errors) == (130, "Interrupted: no file was changed.\n")
+    asked = ["bounds", str(PLANAR), *region]
+    code, shown, errors = interrupted("bounds", *asked, "--output", str(first), after=500)
+    assert code == 130, errors
+    assert errors.startswith("Interrupted after ")
+    assert "the bounds hold over the whole region, and lie up to" in errors
+    assert "Interrupted. The gap asked, 0.1 %, was not reached." in shown
+    code, _, errors = interrupted(
+        "bounds", *asked, "--resume", str(first), "--output", str(second), after=2000
+    )
+    assert code == 130, errors
+    boxes = json.loads(second.read_text("utf-8"))["variables"]["boxes"]["values"]
+    assert 2000 <= boxes < 6000
+    with xr.open_dataset(first, engine="h5netcdf") as before:
+        assert 500 <= int(before.boxes) < boxes
+
+
+def stopped_bounds(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *options: object, at: int
+) -> Outcome:
+    """`truepose bounds` of the planar machine, with Ctrl-C once so many are done."""
+    whole = truepose.bounds
+
+    def stopped(*given: Any, **asked: Any) -> Any:
+        def stop(done: int, total: int) -> None:
+            if done >= at:
+                raise KeyboardInterrupt
+
+        return whole(*given, **{**asked, "progress": stop})
+
+    with monkeypatch.context() as patched:
+        patched.setattr(truepose, "bounds", stopped, raising=False)
+        return call(capsys, "bounds", PLANAR, *options)
+
+
+def test_ctrl_c_of_bounds_at_poses_gives_the_worst(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    output = tmp_path / "found.json"
+    outcome = stopped_bounds(monkeypatch, capsys, "--output", output, at=16)
+    assert outcome.code == 130
+    assert "Interrupted after 16 poses, those of the largest first-order" in outcome.err
+    document = json.loads(output.read_text("utf-8"))
+    assert document["attributes"]["interrupted"] == 1
+    assert len(document["variables"]["magnitude"]["values"]) == 16
+
+
+def test_ctrl_c_before_anything_is_proven_changes_no_file(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    wide = ["--region", "x=200:400,y=100:300", "--set", "strut.1.length_tolerance=20"]
+    outcome = stopped_bounds(monkeypatch, capsys, *wide, "--output", tmp_path / "f.json", at=1)
+    assert (outcome.code, outcome.err) == (130, "Interrupted: no file was changed.\n")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_no_search_goes_on_from(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    region = ["--region", "x=290:310,y=195:205", "--gap", "0.1"]
+    finished, text = tmp_path / "finished.nc", tmp_path / "text.nc"
+    assert call(capsys, "bounds", PLANAR, *region, "--output", finished).code == 0
+    text.write_text("no NetCDF")
+    for file, code in (
+        (finished, "bad-resume"),
+        (text, "file-unreadable"),
+        (tmp_path / "none.nc", "file-missing"),
+        (tmp_path, "file-is-directory"),
+    ):
+        outcome = call(capsys, "bounds", PLANAR, *region, "--resume", file)
+        assert (outcome.code, outcome.codes, outcome.out) == (2, [code], "")
+    again = call(capsys, "bounds", PLANAR, *region, "--resume", finished, "--output", finished)
+    assert (again.code, again.codes) == (2, ["output-is-input"])
+    at_poses = call(capsys, "bounds", PLANAR, "--resume", finished)
+    assert (at_poses.code, at_poses.codes) == (2, ["bad-resume"])
 
 
 def test_a_way_of_sampling_that_is_not_there() -> None:

@@ -22,6 +22,7 @@ from truepose.uncertainty_analysis.bounds import SCHEMA as BOUNDS
 from truepose.uncertainty_analysis.bounds_over_region import SCHEMA as REGION
 from truepose.uncertainty_analysis.monte_carlo import ELLIPSE, MACHINE
 from truepose.uncertainty_analysis.monte_carlo import SCHEMA as MONTE_CARLO
+from truepose.uncertainty_analysis.region_search import UNFINISHED
 from truepose.uncertainty_analysis.shares import CORRELATED
 from truepose.uncertainty_analysis.shares import SCHEMA as SHARES
 from truepose.uncertainty_analysis.uncertainty import SCHEMA as UNCERTAINTY
@@ -84,11 +85,11 @@ SCHEMAS = {
     "Uncertainty": {**UNCERTAINTY, **VALIDATION},
     "Worst case": WORST_CASE,
     "Bounds": BOUNDS,
-    "Bounds over a region": REGION,
+    "Bounds over a region": {**REGION, **UNFINISHED},
     "Shares": {**SHARES, **CORRELATED},
 }
 # What only some Datasets of a kind have.
-NOT_HERE = {"Shares": CORRELATED.keys()}
+NOT_HERE = {"Shares": CORRELATED.keys(), "Bounds over a region": UNFINISHED.keys()}
 SEEDED = ("Monte Carlo", "Uncertainty", "Shares")
 MACHINES_OF = {
     "Internal forces": ["overconstrained"],

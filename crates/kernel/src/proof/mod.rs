@@ -7,6 +7,7 @@
 
 mod at_pose;
 mod boxes;
+mod branch_and_bound;
 mod closures;
 mod command;
 mod directions;
@@ -22,8 +23,10 @@ mod worst_machine;
 
 pub use at_pose::{Extent, PoseBound};
 pub use boxes::{Effort, bound_in_boxes};
-pub use over_region::{RegionBound, bound_over_region, can_be_enclosed};
+pub use branch_and_bound::{Part, RegionBound, Search, bound_over_region};
+pub use over_region::can_be_enclosed;
 pub use region::{Affine, Region};
+pub use targets::TARGETS;
 
 use crate::linear::SIX;
 use crate::scalar::{Enclosing, Interval};

@@ -1,0 +1,287 @@
+//! Bounds of the error over a region of commanded poses, by branch and bound: the part of the region with
+//! the highest bound is halved until no bound lies above an error reached somewhere by more than the gap.
+
+use super::Unproven;
+use super::over_region::{Look, middle_of};
+use super::region::Region;
+use super::targets::{AS_LOW_AS_CAN_BE, TARGETS};
+use crate::batch::share_out;
+use crate::linear::SIX;
+use crate::status::Status;
+
+/// Parts that are halved together.
+const BATCH: usize = 32;
+/// A part of less than this share of the region along every axis is not halved.
+const SMALLEST: f64 = 1e-4;
+/// A component below this share of its magnitude is closed to the gap of this share.
+const MINOR: f64 = 0.1;
+
+/// A part of a region.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Lowest and highest value of each commanded freedom.
+    pub sides: Vec<[f64; 2]>,
+    /// What is proven of the targets in it, if anything is: of itself, or of what it is a part of.
+    pub bound: Option<[f64; TARGETS]>,
+    state: State,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum State {
+    Fresh,
+    Proven,
+    Unproven(Unproven),
+}
+
+impl Part {
+    /// A part that was looked at, of which a bound is known.
+    pub fn known(sides: Vec<[f64; 2]>, bound: [f64; TARGETS]) -> Part {
+        Part { sides, bound: Some(bound), state: State::Proven }
+    }
+
+    /// What a look at it found, where that is closer than what is known.
+    fn take(&mut self, found: Result<[f64; TARGETS], Unproven>) {
+        match found {
+            Ok(mut own) => {
+                for (own, known) in own.iter_mut().zip(self.bound.iter().flatten()) {
+                    *own = own.min(*known);
+                }
+                self.bound = Some(own);
+                self.state = State::Proven;
+            }
+            Err(why) => self.state = State::Unproven(why),
+        }
+    }
+
+    /// The widest side, relative to the region's.
+    fn widest(&self, region: &Region<'_>) -> f64 {
+        (0..self.sides.len()).map(|k| self.share(region, k)).fold(0.0, f64::max)
+    }
+
+    /// A side, relative to the region's.
+    fn share(&self, region: &Region<'_>, k: usize) -> f64 {
+        let ([low, high], [from, to]) = (self.sides[k], region.sides[k]);
+        if to > from { (high - low) / (to - from) } else { 0.0 }
+    }
+
+    /// Its share of the region.
+    fn volume(&self, region: &Region<'_>) -> f64 {
+        let extended = (0..self.sides.len()).filter(|&k| region.sides[k][1] > region.sides[k][0]);
+        extended.map(|k| self.share(region, k)).product()
+    }
+
+    /// Halved along its widest side, relative to the region's.
+    fn halves(&self, region: &Region<'_>) -> [Part; 2] {
+        let share = |&k: &usize| self.share(region, k);
+        let widest =
+            (0..self.sides.len()).max_by(|a, b| share(a).total_cmp(&share(b))).unwrap_or(0);
+        let middle = middle_of(&self.sides)[widest];
+        [0, 1].map(|half| {
+            let mut sides = self.sides.clone();
+            sides[widest][1 - half] = middle;
+            Part { sides, bound: self.bound, state: State::Fresh }
+        })
+    }
+}
+
+/// How far a search is.
+#[derive(Clone, Debug)]
+pub struct Search {
+    /// Parts of the region that are not finished.
+    pub parts: Vec<Part>,
+    /// Bounds of the targets over the parts that are.
+    pub finished: [f64; TARGETS],
+    /// What is reached of each target.
+    pub reached: [f64; TARGETS],
+    /// Where: commanded freedoms.
+    pub at: Vec<Vec<f64>>,
+    /// Boxes looked at.
+    pub boxes: usize,
+}
+
+impl Search {
+    /// Before its beginning.
+    pub fn new(region: &Region<'_>) -> Search {
+        let whole = Part { sides: region.sides.clone(), bound: None, state: State::Fresh };
+        Search {
+            parts: vec![whole],
+            finished: AS_LOW_AS_CAN_BE,
+            reached: AS_LOW_AS_CAN_BE,
+            at: vec![vec![f64::NAN; region.sides.len()]; TARGETS],
+            boxes: 0,
+        }
+    }
+
+    /// The highest bounds that close the targets; as low as can be before all are reached.
+    fn allowed(&self, gap: f64) -> [f64; TARGETS] {
+        if self.reached.contains(&f64::NEG_INFINITY) {
+            AS_LOW_AS_CAN_BE
+        } else {
+            allowed_bounds(&self.reached, gap)
+        }
+    }
+
+    /// Look at the parts that are fresh, side by side; a pose that the machine cannot be commanded to.
+    fn look(&mut self, region: &Region<'_>) -> Result<(), (Status, Vec<f64>)> {
+        let allowed = self.allowed(region.gap);
+        let fresh = self.parts.iter_mut().filter(|part| matches!(part.state, State::Fresh));
+        let mut looks: Vec<(&mut Part, Option<Look>)> = fresh.map(|part| (part, None)).collect();
+        let count = looks.len();
+        share_out(&mut looks, count, 1, |_, looks| {
+            for (part, look) in looks {
+                *look = Some(region.look(&part.sides, &allowed));
+            }
+        });
+        self.boxes += count;
+        for (part, look) in looks {
+            let Some(look) = look else { continue };
+            let middle = middle_of(&part.sides);
+            if look.status != Status::Ok {
+                return Err((look.status, middle));
+            }
+            part.take(look.bound);
+            for target in 0..TARGETS {
+                if look.reached[target] > self.reached[target] {
+                    self.reached[target] = look.reached[target];
+                    self.at[target].clone_from(&middle);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Finish the parts that cannot rise above the allowed bounds, and bring the others into order, the
+    /// highest bound first.
+    fn finish(&mut self, gap: f64) {
+        let allowed = self.allowed(gap);
+        let mut rest: Vec<(f64, Part)> = Vec::with_capacity(self.parts.len());
+        for part in std::mem::take(&mut self.parts) {
+            match part.bound {
+                Some(bound) if (0..TARGETS).all(|target| bound[target] <= allowed[target]) => {
+                    raise(&mut self.finished, &bound);
+                }
+                Some(bound) => rest.push((relative_excess(&bound, &allowed), part)),
+                None => rest.push((f64::INFINITY, part)),
+            }
+        }
+        rest.sort_by(|a, b| b.0.total_cmp(&a.0));
+        self.parts = rest.into_iter().map(|(_, part)| part).collect();
+    }
+
+    /// Which share of the region is finished.
+    fn finished_share(&self, region: &Region<'_>) -> f64 {
+        1.0 - self.parts.iter().map(|part| part.volume(region)).sum::<f64>()
+    }
+}
+
+/// What is proven over a region, and how far the search for it is.
+#[derive(Clone, Debug)]
+pub struct RegionBound {
+    /// Bounds of the targets: components upwards, downwards (turned), magnitudes; infinite where nothing
+    /// is proven.
+    pub bound: [f64; TARGETS],
+    /// By how much the bounds lie above the errors reached, in the measure of [`Region::gap`].
+    pub gap: f64,
+    /// Why a part of the region is not proven, and its middle.
+    pub unproven: Option<(Unproven, Vec<f64>)>,
+    /// A pose of the region that the machine cannot be commanded to.
+    pub out_of_reach: Option<(Status, Vec<f64>)>,
+    /// What a search that goes on begins with.
+    pub search: Search,
+}
+
+/// Bounds over a region, from where `search` is.
+///
+/// `progress(boxes, share)` is called between batches with the share of the region that is finished;
+/// false stops the search.
+pub fn bound_over_region(
+    region: &Region<'_>,
+    mut search: Search,
+    mut progress: impl FnMut(usize, f64) -> bool,
+) -> RegionBound {
+    let most_boxes = search.boxes + region.most_boxes;
+    let none = [f64::INFINITY; TARGETS];
+    loop {
+        if let Err(place) = search.look(region) {
+            let out_of_reach = Some(place);
+            return RegionBound {
+                bound: none,
+                gap: f64::INFINITY,
+                unproven: None,
+                out_of_reach,
+                search,
+            };
+        }
+        search.finish(region.gap);
+        let stop = search.parts.first().is_none_or(|first| first.widest(region) < SMALLEST)
+            || search.boxes >= most_boxes
+            || !progress(search.boxes, search.finished_share(region));
+        let given_up = search
+            .parts
+            .iter()
+            .find(|part| part.bound.is_none() && (stop || part.widest(region) < SMALLEST));
+        if let Some(part) = given_up {
+            let why = match part.state {
+                State::Unproven(why) => why,
+                _ => Unproven::TooWide,
+            };
+            let unproven = Some((why, middle_of(&part.sides)));
+            return RegionBound {
+                bound: none,
+                gap: f64::INFINITY,
+                unproven,
+                out_of_reach: None,
+                search,
+            };
+        }
+        if stop {
+            let mut bound = search.finished;
+            for part in &search.parts {
+                raise(&mut bound, &part.bound.unwrap_or(none));
+            }
+            let gap = gap_of(&bound, &search.reached);
+            return RegionBound { bound, gap, unproven: None, out_of_reach: None, search };
+        }
+        let rest = search.parts.split_off(search.parts.len().min(BATCH));
+        search.parts = search.parts.iter().flat_map(|part| part.halves(region)).collect();
+        search.parts.extend(rest);
+    }
+}
+
+/// The higher of two bounds, each.
+fn raise(highest: &mut [f64; TARGETS], bound: &[f64; TARGETS]) {
+    for (highest, &bound) in highest.iter_mut().zip(bound) {
+        *highest = highest.max(bound);
+    }
+}
+
+/// The highest bound of each target that closes it.
+fn allowed_bounds(reached: &[f64; TARGETS], gap: f64) -> [f64; TARGETS] {
+    let mut allowed = [0.0; TARGETS];
+    for target in 0..TARGETS {
+        let part = if target < 2 * SIX { target % SIX / 3 } else { target - 2 * SIX };
+        let magnitude = reached[2 * SIX + part];
+        let scale = reached[target].abs().max(MINOR * magnitude);
+        allowed[target] = reached[target] + gap * scale;
+    }
+    allowed
+}
+
+/// What the highest of the targets' gaps is.
+fn gap_of(bound: &[f64; TARGETS], reached: &[f64; TARGETS]) -> f64 {
+    let unit = allowed_bounds(reached, 1.0);
+    (0..TARGETS)
+        .filter(|&target| unit[target] > reached[target])
+        .map(|target| (bound[target] - reached[target]) / (unit[target] - reached[target]))
+        .fold(0.0, f64::max)
+}
+
+/// By how much the worst target lies above its allowed bound, relative to that.
+fn relative_excess(bound: &[f64; TARGETS], allowed: &[f64; TARGETS]) -> f64 {
+    (0..TARGETS)
+        .map(|target| {
+            let scale = allowed[target].abs().max(f64::MIN_POSITIVE);
+            (bound[target] - allowed[target]) / scale
+        })
+        .fold(0.0, f64::max)
+}

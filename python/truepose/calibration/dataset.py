@@ -10,7 +10,6 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from truepose.arrays import Flags, Floats
 from truepose.calibration.acceptance import sentences
@@ -30,6 +29,8 @@ from truepose.runs.dataset import (
 from truepose.runs.quantities import POSITIONS, quantities
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from truepose.calibration.acceptance import Reason
     from truepose.calibration.acceptance.tool_uncertainty import ToolUncertainty
     from truepose.calibration.calibrate import Calibration
@@ -123,6 +124,8 @@ SCHEMA: Schema = {
 
 def dataset_of(calibration: Calibration) -> xr.Dataset:
     """Everything that a calibration found, SI; `docs/results.md` has the schema."""
+    import xarray as xr
+
     machine = calibration.machine
     values = {
         **_unknown_values(calibration),

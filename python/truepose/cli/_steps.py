@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -17,7 +17,6 @@ import truepose
 from truepose.cli._options import Request
 from truepose.cli._progress import progress, waiting
 from truepose.cli._show import show_answers, show_tables
-from truepose.compensation.compensate import against_nominal
 from truepose.errors import Problem, RequestError
 from truepose.files.document import MACHINE_FILE
 from truepose.files.text_file import read_text
@@ -27,15 +26,15 @@ from truepose.reporting import formats
 from truepose.reporting.accuracy import gains, told
 from truepose.reporting.display import nearest_middle, pose_text, where_highest
 from truepose.reporting.result import Result
-from truepose.reporting.study import Study, warnings_of
+from truepose.reporting.study import Study
 from truepose.reporting.table import Table
 from truepose.runs.poses import faults_text, reason_text
-from truepose.verdict import witness_file
 from truepose.verdict.answer import BEFORE, NOT_MET, STATES
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from truepose.error_budget.evaluate import Evaluation
     from truepose.machine import Machine
     from truepose.verdict.answer import Answer
 
@@ -55,6 +54,8 @@ def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMAT
     if request.output is not None:
         require_writable(request.output, endings, [request.machine_file])
     if request.witness is not None:
+        from truepose.verdict import witness_file
+
         require_writable(request.witness, [witness_file.ENDING], [request.machine_file])
     machine = truepose.load(request.machine_file, settings=request.settings)
     if request.require_accuracy and not machine.accuracy.asks:
@@ -82,21 +83,31 @@ def machine_text(request: Request) -> str:
 
 def evaluate(request: Request, machine: Machine) -> xr.Dataset:
     """The error budget over the file's workspace; what it warns of goes to stderr."""
+    return evaluation(request, machine).dataset()
+
+
+def evaluation(request: Request, machine: Machine) -> Evaluation:
+    """The same before it is a Dataset, which takes longer to import than to evaluate."""
+    from truepose.error_budget.evaluate import evaluate
+
     with progress("error budget") as report:
-        result = truepose.budget(machine, progress=report)
-    refuse_left_out_of(request, machine, result)
-    show_warnings(result)
+        result = evaluate(machine, progress=report)
+    indices, status = result.run.left_out.sorted()
+    refuse_left_out(request, machine, indices, result.run.poses[indices], status)
+    show_warnings(result.warnings)
     return result
 
 
-def show_warnings(result: xr.Dataset) -> None:
+def show_warnings(warnings: Iterable[Mapping[str, str]]) -> None:
     """What a result warns of, on stderr."""
-    for warning in warnings_of(result):
+    for warning in warnings:
         click.echo(f"warning[{warning['code']}]: {warning['sentence']}", err=True)
 
 
 def correct(request: Request, machine: Machine) -> xr.Dataset:
     """The compensation over the file's workspace, of any file: who commands asks for more."""
+    from truepose.compensation.compensate import against_nominal
+
     with progress("compensation") as report:
         result = against_nominal(machine, progress=report)
     refuse_left_out_of(request, machine, result)
@@ -202,6 +213,8 @@ def write_witness(request: Request, answers: Sequence[Answer], state: str) -> bo
     path = request.witness
     if path is None:
         return True
+    from truepose.verdict import witness_file
+
     for answer in answers:
         if answer.state == state and answer.answer == NOT_MET and answer.example is not None:
             example, original = answer.example, request.machine_file

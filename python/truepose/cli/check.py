@@ -44,7 +44,6 @@ def command(**options: Any) -> int:
     from truepose.files.writing import replacing, written_together
     from truepose.reporting import inputs
     from truepose.reporting.accuracy import gains, told
-    from truepose.reporting.study import warnings_of
     from truepose.reporting.workspace_check import check_workspace
     from truepose.verdict.answer import AFTER, BEFORE, met
 
@@ -60,7 +59,7 @@ def command(**options: Any) -> int:
     if asked or any(inputs.acting(machine)):
         answers = _steps.answers_of(machine)
         try:
-            warnings = warnings_of(_steps.evaluate(request, machine))
+            warnings = _steps.evaluation(request, machine).warnings
         except RequestError as error:
             # There are poses, as there are answers; only no budget of what bands leave of them.
             if [problem.code for problem in error.problems] != ["no-pose-left"]:

@@ -40,6 +40,7 @@ def command(**options: Any) -> int:
     from truepose.cli import _steps
     from truepose.reporting import tables
     from truepose.reporting.result import Result
+    from truepose.reporting.study import warnings_of
     from truepose.runs.controller_geometry import require_known_controller
     from truepose.verdict.answer import AFTER, met
 
@@ -48,7 +49,7 @@ def command(**options: Any) -> int:
     require_known_controller(machine)
     study = _steps.study_of(request, machine)
     assert study.compensation is not None
-    _steps.show_warnings(study.compensation)
+    _steps.show_warnings(warnings_of(study.compensation))
     answers = study.accuracy
     _steps.deliver(
         request,

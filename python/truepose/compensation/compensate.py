@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.compensation.corrected import corrected_deviations
@@ -32,6 +32,9 @@ from truepose.runs.quantities import quantities
 from truepose.runs.run import Run
 from truepose.runs.variables import variables_of
 from truepose.sources import Deviation, PoseBlock, Source
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _ALL = ("pose", "component")
 

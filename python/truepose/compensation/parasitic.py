@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from truepose.files.dimensions import FREEDOMS
 from truepose.machine import Machine
 from truepose.runs.controller_geometry import ROUNDING
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 CODE = "parasitic-remains"
 

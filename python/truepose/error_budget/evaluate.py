@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.error_budget import bands, comparison, worst
@@ -21,6 +21,9 @@ from truepose.runs.quantities import quantities
 from truepose.runs.run import Run
 from truepose.runs.variables import variables_of
 from truepose.sources import Deviation, PoseBlock, Source
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _EACH = ("pose", "source", "component")
 _ALL = ("pose", "component")
@@ -129,6 +132,43 @@ def budget(
     the condition asks for what the machine does not say (no-stiffness, no-expansion). What it warns
     of (guide-taken-rigid) is in the attribute `warnings`.
     """
+    return evaluate(machine, poses, condition, progress).dataset()
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The budget over poses before it is a Dataset."""
+
+    run: Run
+    """The poses, their rows, and what was left out."""
+    over_all: Mapping[str, Any]
+    """The variables of `SCHEMA` that have no pose."""
+    distributions: Sequence[str]
+    """Of each source."""
+    warnings: list[dict[str, str]]
+    """What the result warns of: `code` and `sentence` of each."""
+
+    def dataset(self) -> xr.Dataset:
+        """The Dataset of `budget`."""
+        names = [source.name for source in self.run.sources]
+        coords = {
+            "source": label("source", names, "error source"),
+            "distribution": label(
+                "source", list(self.distributions), "distribution inside the band"
+            ),
+            **quantity_coords(self.run.machine, "what is compared"),
+        }
+        dataset = self.run.dataset(over_all=self.over_all, coords=coords)
+        return dataset.assign_attrs(warnings=json.dumps(self.warnings))
+
+
+def evaluate(
+    machine: Machine,
+    poses: ArrayLike | None = None,
+    condition: Condition | None = None,
+    progress: Progress | None = None,
+) -> Evaluation:
+    """The work of `budget`, with its arguments and its errors."""
     run = Run(machine, poses, condition, progress)
     sources = run.sources
     kinds = quantities(machine.components)
@@ -166,18 +206,9 @@ def budget(
         "rank": comparison.rank(shares),
         "verdict": comparison.verdict(statistics.highest, kinds, machine.accuracy),
     }
-    coords = {
-        "source": label("source", [source.name for source in sources], "error source"),
-        "distribution": label(
-            "source",
-            [" / ".join(names) or "none" for names in distributions],
-            "distribution inside the band",
-        ),
-        **quantity_coords(machine, "what is compared"),
-    }
-    dataset = run.dataset(over_all=over_all, coords=coords)
-    dataset.attrs["warnings"] = json.dumps(guides.warnings())
-    return dataset
+    return Evaluation(
+        run, over_all, [" / ".join(names) or "none" for names in distributions], guides.warnings()
+    )
 
 
 def _evaluate(
@@ -240,4 +271,4 @@ def _evaluate(
     return values, shifted, at_edges
 
 
-__all__ = ["SCHEMA", "budget"]
+__all__ = ["SCHEMA", "Evaluation", "budget", "evaluate"]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
@@ -17,6 +17,9 @@ from truepose.runs.dataset import Schema, Variable, label
 from truepose.runs.poses import BLOCK, OK, Progress
 from truepose.runs.run import Run
 from truepose.sources import PoseBlock, Thermal
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SCHEMA: Schema = {
     "error": Variable(

@@ -15,10 +15,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
@@ -35,6 +34,9 @@ from truepose.runs.poses import (
 from truepose.runs.run import Run
 from truepose.sources import Clearance, Deviation, Elastic, Loads, PoseBlock, Source
 from truepose.sources.clearance import half_clearances
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FITS = 1e-9
 """Force, in that of a misfit as large as the deviation, at or below which it is rounding."""

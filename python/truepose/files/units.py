@@ -1,6 +1,7 @@
 """Units: numbers and text of a machine file to SI, and SI back to the file's own units.
 
-The only module that knows pint, which it imports when the first unit is read.
+The only module that knows pint, which it imports when the first unit is read that is not one of
+`common_units`.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.errors import ReadingError
+from truepose.files.common_units import COMMON
 from truepose.files.dimensions import DIMENSIONS, Dimension
 from truepose.files.limits import (
     HIGHEST_POWER,
@@ -211,6 +213,14 @@ def unit_of(text: str, wanted: Dimension, *, found: str | None = None) -> FileUn
 
     Raises `QuantityError` (`unknown-unit`, `wrong-dimension`); `found` is what it then shows.
     """
+    common = COMMON[wanted.name].get(text)
+    if common is not None:
+        return FileUnit(text, *common)
+    return parsed_unit(text, wanted, found=found)
+
+
+def parsed_unit(text: str, wanted: Dimension, *, found: str | None = None) -> FileUnit:
+    """The same of any unit, as pint knows it."""
     found = found or shown_value(text)
     unit = _parsed(text)
     if unit is None:

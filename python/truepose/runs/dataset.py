@@ -1,6 +1,7 @@
 """Results as labelled data: the schema, the rows filled block by block, and the Dataset.
 
-`docs/results.md` is the schema in words; a test holds the two together.
+`docs/results.md` is the schema in words; a test holds the two together. xarray is imported where a
+Dataset is made: a command that makes none starts in less time.
 """
 
 from __future__ import annotations
@@ -8,10 +9,9 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from truepose.arrays import Flags, Floats, Indices
 from truepose.machine import Condition, Machine
@@ -19,6 +19,9 @@ from truepose.runs.poses import SkippedPoses
 from truepose.runs.quantities import POSITIONS, quantities
 from truepose.sources import PoseBlock, not_included_text
 from truepose.version import version
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,8 @@ def assemble(
     coords: Mapping[str, xr.Variable] | None = None,
 ) -> xr.Dataset:
     """The Dataset of `schema`: `rows` over poses, `over_all` what has no pose, more `coords`."""
+    import xarray as xr
+
     values, units = {**rows.arrays, **(over_all or {})}, _units(machine)
     data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
@@ -141,6 +146,8 @@ def region_dataset(
     machine: Machine, condition: Condition, schema: Schema, values: Mapping[str, Any]
 ) -> xr.Dataset:
     """The Dataset of a result over a continuous region, which has no dim pose."""
+    import xarray as xr
+
     units = _units(machine)
     data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
@@ -155,6 +162,8 @@ def region_dataset(
 
 def label(dim: str, values: Any, long_name: str, units: str = "1") -> xr.Variable:
     """A coordinate along one dim."""
+    import xarray as xr
+
     return xr.Variable((dim,), values, {"long_name": long_name, "units": units})
 
 
@@ -200,6 +209,8 @@ def data_variable(
     variable: Variable, values: Any, units: Mapping[str, Sequence[str]]
 ) -> xr.Variable:
     """`values` as a labelled variable, `units` as in `units_of`."""
+    import xarray as xr
+
     of_unit = units_of(variable.units, units)
     attrs = {"units": of_unit.pop("units"), "long_name": variable.long_name, **of_unit}
     return xr.Variable(variable.dims, values, attrs)

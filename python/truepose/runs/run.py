@@ -13,10 +13,9 @@ A command takes the blocks of a `Run`, computes its variables there, and fills t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags
@@ -34,6 +33,9 @@ from truepose.runs.poses import (
 )
 from truepose.runs.variables import Variables, variables_at
 from truepose.sources import PoseBlock, Source
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class Run(PoseRun):

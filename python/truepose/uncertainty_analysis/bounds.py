@@ -10,9 +10,9 @@ sphere: along an error the most that it can do is the length of its three effect
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats
@@ -39,6 +39,9 @@ from truepose.uncertainty_analysis.bounds_over_region import (
 from truepose.uncertainty_analysis.corners import worst_corners
 from truepose.uncertainty_analysis.region_search import bad_resume
 from truepose.uncertainty_analysis.truncation import Ends
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _EACH = ("pose", "component")
 _SIZE = ("pose", "quantity")

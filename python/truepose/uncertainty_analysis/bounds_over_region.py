@@ -13,9 +13,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from truepose._kernel import STATUS
 from truepose.arrays import Floats, Indices
@@ -34,6 +34,9 @@ from truepose.uncertainty_analysis.region_search import (
     unfinished,
 )
 from truepose.uncertainty_analysis.truncation import Ends
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MOST_BOXES = 200_000
 """Parts of a region that are looked at before giving up."""

@@ -10,10 +10,9 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose._kernel import Points, Study
@@ -30,6 +29,9 @@ from truepose.sources import PoseBlock
 from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.functions import derivatives
 from truepose.uncertainty_analysis.functions.inputs import Correlation, Input, correlation_matrix
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 KEPT = 4
 """Sets of points that the poses of a block share, kept at a time."""

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose._kernel import Study, Tallies
@@ -56,6 +55,8 @@ from truepose.uncertainty_analysis.sampler import Draws, Random, Sampler, sobol
 from truepose.uncertainty_analysis.stopping_rule import BATCH, Adaptive, FixedNumber, StoppingRule
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from truepose.uncertainty_analysis.functions.inputs import Correlation, Input
 
 POSES = 256

@@ -7,16 +7,18 @@ the sizes of position and orientation. A result has them by name.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.machine import Machine
 from truepose.runs.dataset import Schema, Variable
 from truepose.runs.quantities import quantities
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 UNFINISHED: Schema = {
     "part_from": Variable(("part", "commanded"), "commanded", "lower ends of an unfinished part"),

@@ -24,7 +24,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats, Indices
@@ -47,6 +46,8 @@ from truepose.uncertainty_analysis.model import FunctionModel, Model, Models, mo
 from truepose.uncertainty_analysis.random_points import Drawing
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from truepose.uncertainty_analysis.functions.inputs import Correlation, Input
 
 _EACH = ("pose", "parameter", "component")
@@ -180,6 +181,8 @@ def over_position(dataset: xr.Dataset) -> xr.DataArray:
         shares = shares.isel(component=chosen)
         weight = dataset["standard_deviation"].isel(component=chosen) ** 2
     else:
+        import xarray as xr
+
         weight = xr.ones_like(dataset["standard_deviation"])
     weight = weight.where(shares.notnull().all("parameter"), 0.0)
     over = [dim for dim in shares.dims if dim != "parameter"]

@@ -13,10 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats, Indices
@@ -47,6 +46,9 @@ from truepose.uncertainty_analysis.functions.second_order_terms import second_or
 from truepose.uncertainty_analysis.model import FunctionModel
 from truepose.uncertainty_analysis.monte_carlo import monte_carlo
 from truepose.uncertainty_analysis.validity import LinearAnswer, Sampled, compare
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 ROUNDING = 1e-12
 """Of the machine's characteristic length, or rad, or an output: what solving a pose leaves."""

@@ -13,10 +13,9 @@ correlation does not narrow the worst case: every corner is taken to happen.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats, Indices
@@ -46,6 +45,9 @@ from truepose.uncertainty_analysis.functions.dataset import function_dataset
 from truepose.uncertainty_analysis.functions.inputs import Input
 from truepose.uncertainty_analysis.model import FunctionModel
 from truepose.uncertainty_analysis.truncation import Endless
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _EACH = ("pose", "component")
 _SIZE = ("pose", "quantity")

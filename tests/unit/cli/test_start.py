@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import truepose
-from command_line import call
+from command_line import MACHINES, call
 from truepose.__main__ import main as program
 from truepose.cli import COMMANDS
 
@@ -31,6 +31,21 @@ def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert "Usage: truepose" in done.stdout
+
+
+@pytest.mark.parametrize("form", ["table", "json", "csv"])
+def test_a_check_makes_no_dataset(form: str) -> None:
+    """Importing what makes one takes as long as the check itself."""
+    heavy = ("xarray", "pandas", "pint", "scipy", "plotly", "jinja2")
+    program = (
+        "import sys; from truepose.cli import run; run(sys.argv[1:]); "
+        f"sys.exit(','.join(name for name in {heavy} if name in sys.modules) or 0)"
+    )
+    asked = ["check", str(MACHINES / "hexapod.toml"), "--format", form]
+    done = subprocess.run(
+        [sys.executable, "-c", program, *asked], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("columns", ["80", "200", "79", "40"])

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Flags, Floats, Indices
@@ -51,6 +51,9 @@ from truepose.runs.dataset import (
 )
 from truepose.runs.quantities import POSITIONS
 from truepose.uncertainty_analysis.arguments import required_seed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 DOMINATED = 0.5
 """An unknown of which the readings give less than this share of the information is called
@@ -422,6 +425,8 @@ def _dataset(plan: Plan) -> xr.Dataset:
         "quantity": [str(unit) for unit in quantity_coords(machine)["quantity_units"].values],
         "sought": list(unknowns.units),
     }
+
+    import xarray as xr
 
     def variable(dims: tuple[str, ...], values: ArrayLike, unit: str, meaning: str) -> xr.Variable:
         return data_variable(Variable(dims, unit, meaning), values, units)

@@ -18,9 +18,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
@@ -37,6 +37,9 @@ from truepose.machine import Machine
 from truepose.probability.quantiles import normal_quantile
 from truepose.runs.poses import PoseRun, SkippedPoses, no_pose_left, requested_poses
 from truepose.version import version
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 ALPHA = 0.05
 """Probability that a machine that did not change is said to have changed, at most."""

@@ -8,12 +8,13 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from truepose.runs.dataset import Schema, data_variable, label
 from truepose.version import version
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from truepose.uncertainty_analysis.model import FunctionModel
 
 
@@ -28,6 +29,8 @@ def function_dataset(
 
     A variable of `schema` that has a dim pose has it not here.
     """
+    import xarray as xr
+
     # One text for all outputs: no coordinate has the unit of each.
     of_outputs = [", ".join(dict.fromkeys(model.output_units))]
     units = dict.fromkeys(("component", "covariance"), of_outputs)

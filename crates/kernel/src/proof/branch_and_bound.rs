@@ -9,8 +9,9 @@ use crate::batch::share_out;
 use crate::linear::SIX;
 use crate::status::Status;
 
-/// Parts that are halved together.
+/// Parts that are halved together, and most of them where many wait.
 const BATCH: usize = 32;
+const LARGEST_BATCH: usize = 256;
 /// A part of less than this share of the region along every axis is not halved.
 const SMALLEST: f64 = 1e-4;
 /// A component below this share of its magnitude is closed to the gap of this share.
@@ -242,8 +243,15 @@ pub fn bound_over_region(
             let gap = gap_of(&bound, &search.reached);
             return RegionBound { bound, gap, unproven: None, out_of_reach: None, search };
         }
-        let rest = search.parts.split_off(search.parts.len().min(BATCH));
-        search.parts = search.parts.iter().flat_map(|part| part.halves(region)).collect();
+        let halved =
+            search.parts.len().min(BATCH.max(search.parts.len() / BATCH).min(LARGEST_BATCH));
+        let rest = search.parts.split_off(halved);
+        let halves: Vec<[Part; 2]> = search.parts.iter().map(|part| part.halves(region)).collect();
+        // The two halves of a part take as long, and are looked at by different threads.
+        let (lower, upper): (Vec<Part>, Vec<Part>) =
+            halves.into_iter().map(<(Part, Part)>::from).unzip();
+        search.parts = lower;
+        search.parts.extend(upper);
         search.parts.extend(rest);
     }
 }

@@ -15,6 +15,7 @@ use crate::machine::{Machine, indices_of};
 use crate::scalar::Interval;
 use crate::spatial::Pose;
 use crate::status::Status;
+use std::cell::Cell;
 
 /// Freedoms up to which affine forms are shorter.
 const FEW: usize = 3;
@@ -104,10 +105,17 @@ impl Region<'_> {
             };
             let known = (&at_middle, &command, &forms, &over, &first);
             if let Ok(worst) = self.worst_machines(known, &halves) {
+                // Where one direction is too far, the box is not closed, whatever the others are.
+                let in_vain = Cell::new(false);
                 let finer = bounds(&|u| {
                     let coarse = reach(u);
-                    let enough = coarse * FINE * FINE <= enough_along(machine, allowed, u);
-                    if enough { coarse } else { coarse.min(worst.reach(u)) }
+                    let enough = enough_along(machine, allowed, u);
+                    if in_vain.get() || coarse * FINE * FINE <= enough {
+                        return coarse;
+                    }
+                    let finer = coarse.min(worst.reach(u));
+                    in_vain.set(!nothing_yet && finer > enough);
+                    finer
                 });
                 for (bound, finer) in bound.iter_mut().zip(finer) {
                     *bound = bound.min(finer);

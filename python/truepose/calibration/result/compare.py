@@ -245,6 +245,8 @@ def _dataset(
     displacement: Floats,
     covariance: Floats,
 ) -> xr.Dataset:
+    import xarray as xr
+
     turning = np.array([name.startswith("r") for name in old.components])
     uncertainty = np.sqrt(np.maximum(np.einsum("ncc->nc", covariance), 0.0))
     sizes, along = [], []

@@ -24,7 +24,7 @@ computes everything from it.
 | 0 | done |
 | 1 | answered with no: `check`, `calibrate`, `compare`, `gcode`, any with `--require-accuracy` |
 | 2 | bad input; every problem is on stderr, with `--format json` on stdout too |
-| 130 | interrupted (Ctrl-C): no file was changed, but `montecarlo`, `shares`, `bounds` give what is done |
+| 130 | interrupted (Ctrl-C): no file changed; `montecarlo`, `shares`, `bounds` give what is done |
 | 141 | the reader of the output went away |
 
 Tables speak the machine file's units, smaller ones for errors: mm and µm, or in and µin; degrees

@@ -70,23 +70,37 @@ class ExactError:
         self._shift = np.zeros((len(shift), every.size))
         self._shift[:, np.searchsorted(every, parameters)] = shift
         self._place = np.searchsorted(every, variables.columns)
+        own = np.arange(every.size)
+        self._is_plain = np.array_equal(self._place, own) and np.array_equal(
+            variables.variable_of, own
+        )
+        """Whether each parameter has one variable, in the same order, and none has none."""
 
     def __call__(self, poses: Indices, t: Floats) -> tuple[Floats, np.ndarray]:
         """Errors (s, m) and kernel status (s,) at poses (s,) of the block, variables (s, v)."""
+        return displacement(
+            self._machine,
+            self._block.joints[poses],
+            self._block.placements[poses],
+            (self._parameters, self._deviations(poses, t)),
+        )
+
+    def _deviations(self, poses: Indices, t: Floats) -> Floats:
+        """(s, k) of the parameters."""
+        half, shift = _at(self._variables.half_width, poses), _at(self._shift, poses)
+        if self._is_plain:
+            values = t * half
+            values += shift
+            return values
         moved = t[:, self._variables.variable_of]
-        moved *= _at(self._variables.half_width, poses)
-        values = _at(self._shift, poses) + np.zeros((len(t), 1))
+        moved *= half
+        values = shift + np.zeros((len(t), 1))
         if np.unique(self._place).size == self._place.size:
             values[:, self._place] += moved
         else:
             for column, place in enumerate(self._place):
                 values[:, place] += moved[:, column]
-        return displacement(
-            self._machine,
-            self._block.joints[poses],
-            self._block.placements[poses],
-            (self._parameters, values),
-        )
+        return values
 
 
 def rows_of(table: Floats, poses: slice) -> Floats:

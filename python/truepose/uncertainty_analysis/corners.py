@@ -213,8 +213,9 @@ def _elsewhere(short: Flags, domain: Domain) -> tuple[Indices, Indices, Floats]:
 def _distinct(norms: Floats, patterns: Floats) -> Indices:
     """Up to `STARTS` patterns (d, v) that differ, of the largest `norms` (d,)."""
     chosen: dict[bytes, int] = {}
+    rounded = np.round(patterns, ALIKE)
     for at in np.argsort(-norms, kind="stable"):
-        chosen.setdefault(np.round(patterns[at], ALIKE).tobytes(), int(at))
+        chosen.setdefault(rounded[at].tobytes(), int(at))
         if len(chosen) == STARTS:
             break
     return np.array(list(chosen.values()), np.intp)

@@ -138,8 +138,7 @@ impl Machine {
     /// known deviation and a compliance under the `wrench` (6,). `columns`: (parameter, variable, swing).
     /// `earlier`: a search that goes on, (part_sides, part_bound, finished, reached, at, boxes).
     /// `progress(boxes, share)` is called now and then, with the share of the region that is finished;
-    /// where it returns False the search stops. Ctrl-C stops it, too: then `interrupted` is True, or
-    /// KeyboardInterrupt is raised where nothing is proven yet.
+    /// where it returns False the search stops. Ctrl-C stops it, too: then `interrupted` is True.
     #[allow(clippy::too_many_arguments)] // Python's signature
     fn bounds_over<'py>(
         &self,
@@ -211,7 +210,7 @@ impl Machine {
         });
         let interrupted = stopped.is_some();
         if let Some(error) = stopped
-            && (bound.unproven.is_some() || !error.is_instance_of::<PyKeyboardInterrupt>(py))
+            && !error.is_instance_of::<PyKeyboardInterrupt>(py)
         {
             return Err(error);
         }
@@ -263,7 +262,10 @@ impl Machine {
             parts: sides
                 .into_iter()
                 .zip(&bounds)
-                .map(|(sides, bound)| Part::known(sides, targets(bound)))
+                .map(|(sides, bound)| {
+                    let proven = bound.iter().all(|value| value.is_finite());
+                    Part::known(sides, proven.then(|| targets(bound)))
+                })
                 .collect(),
             finished: targets(&finished),
             reached: targets(&reached),

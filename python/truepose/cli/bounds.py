@@ -68,8 +68,8 @@ def command(
     Encloses the error of every machine inside the bands, by interval arithmetic with rounding
     included, and proves that each has exactly one pose near the commanded one. Where there is no
     proof it says so. Ctrl-C gives what is proven by then: the worst poses, or bounds over the whole
-    region that are not as close yet. With --require-accuracy the exit code is 1 when it is not
-    proven that the accuracy asked is kept.
+    region that are not as close yet; --resume goes on. With --require-accuracy the exit code is 1
+    when it is not proven that the accuracy asked is kept.
     """
     from truepose.cli import _steps, _uncertainty
     from truepose.reporting import uncertainty_tables

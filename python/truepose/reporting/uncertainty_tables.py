@@ -315,11 +315,22 @@ def interrupted_bounds(result: xr.Dataset) -> str:
             f"Interrupted after {counted(result.sizes['pose'], 'pose')}, those of the largest "
             "first-order deviation: the bounds are of these."
         )
-    percent = math.ceil(1000.0 * float(result.attrs["gap_reached"])) / 10.0
+    boxes = int(result["boxes"].values)
+    if str(result["status"].values) == PROVEN:
+        percent = math.ceil(1000.0 * float(result.attrs["gap_reached"])) / 10.0
+        so_far = (
+            "the bounds hold over the whole region, and lie up to "
+            f"{percent} % above what is reached"
+        )
+    else:
+        open_parts = int(result["part_magnitude"].isnull().any("quantity").sum())
+        so_far = (
+            f"of {counted(open_parts, 'part')} of the region nothing is proven yet, so that there "
+            "are no bounds over the whole"
+        )
     return (
-        f"Interrupted after {int(result['boxes'].values):,} boxes: the bounds hold over the whole "
-        f"region, and lie up to {percent} % above what is reached. Where they were written to a "
-        ".nc file (--output), --resume goes on from there."
+        f"Interrupted after {boxes:,} box{'' if boxes == 1 else 'es'}: {so_far}. Where the result "
+        "was written to a .nc file (--output), --resume goes on from there."
     )
 
 

@@ -93,8 +93,8 @@ def bounds(
 
     Ctrl-C gives what is proven so far, with the attribute `interrupted` at 1: the poses done, of a
     block of poses the worst to first order first; of a region bounds that hold in all of it and lie
-    farther above what is reached. `resume` goes on from such a result over the same region, also
-    from one whose parts ran out.
+    farther above what is reached, or none while a part is without any. `resume` goes on from such a
+    result over the same region, also from one whose parts ran out.
 
     `status` is "proven", or says why nothing is: "near_singular", "box_too_wide" (the bands are too
     wide for the method, at a pose divided into many parts, or a part of the region could not be

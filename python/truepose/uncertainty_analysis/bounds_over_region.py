@@ -161,7 +161,7 @@ def bounds_over_region(
     found = by_name(machine, np.where(proven, bound, np.nan))
     found |= by_name(machine, np.where(np.isfinite(reached), reached, np.nan), "reached_")
     where = by_name(machine, np.asarray(proof["at"], np.float64).T)
-    rest = unfinished(machine, proof) if proven else {}
+    rest = unfinished(machine, proof)
     values = {
         **found,
         **rest,

@@ -23,9 +23,15 @@ if TYPE_CHECKING:
 UNFINISHED: Schema = {
     "part_from": Variable(("part", "commanded"), "commanded", "lower ends of an unfinished part"),
     "part_to": Variable(("part", "commanded"), "commanded", "upper ends of an unfinished part"),
-    "part_lower": Variable(("part", "component"), "component", "proven bound in the part"),
-    "part_upper": Variable(("part", "component"), "component", "proven bound in the part"),
-    "part_magnitude": Variable(("part", "quantity"), "quantity", "proven bound in the part"),
+    "part_lower": Variable(
+        ("part", "component"), "component", "proven bound in the part, missing without any"
+    ),
+    "part_upper": Variable(
+        ("part", "component"), "component", "proven bound in the part, missing without any"
+    ),
+    "part_magnitude": Variable(
+        ("part", "quantity"), "quantity", "proven bound in the part, missing without any"
+    ),
     "finished_lower": Variable(
         ("component",), "component", "proven bound in all other parts, missing without any"
     ),
@@ -66,14 +72,17 @@ def unfinished(machine: Machine, proof: Mapping[str, Any]) -> dict[str, Floats]:
     if not len(proof["part_sides"]):
         return {}
     sides = np.asarray(proof["part_sides"], np.float64)
-    finished = np.asarray(proof["finished"], np.float64)
-    finished = np.where(np.isfinite(finished), finished, np.nan)
     return {
         "part_from": sides[..., 0],
         "part_to": sides[..., 1],
-        **by_name(machine, np.asarray(proof["part_bound"], np.float64), "part_"),
-        **by_name(machine, finished, "finished_"),
+        **by_name(machine, _finite_or_missing(proof["part_bound"]), "part_"),
+        **by_name(machine, _finite_or_missing(proof["finished"]), "finished_"),
     }
+
+
+def _finite_or_missing(bounds: Any) -> Floats:
+    values = np.asarray(bounds, np.float64)
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def earlier(machine: Machine, resume: xr.Dataset, asked: Mapping[str, object]) -> Earlier:
@@ -96,20 +105,23 @@ def earlier(machine: Machine, resume: xr.Dataset, asked: Mapping[str, object]) -
                 f"{asked.get(name)}",
             )
     sides = np.stack([resume["part_from"].values, resume["part_to"].values], axis=-1)
-    finished = _row(machine, resume, "finished_{}")
-    none = -np.inf * np.repeat(
-        [-1.0, 1.0], [len(machine.components), finished.size - len(machine.components)]
-    )
     return (
         sides,
         _row(machine, resume, "part_{}"),
-        np.where(np.isfinite(finished), finished, none),
-        _row(machine, resume, "reached_{}"),
+        _or_none(machine, _row(machine, resume, "finished_{}")),
+        _or_none(machine, _row(machine, resume, "reached_{}")),
         np.concatenate(
             [resume[name].values for name in ("where_lower", "where", "where_magnitude")]
         ),
         int(resume["boxes"]),
     )
+
+
+def _or_none(machine: Machine, row: Floats) -> Floats:
+    """A row of targets in which what is missing is as low as can be, of lower ends as high."""
+    n = len(machine.components)
+    none = np.repeat([np.inf, -np.inf], [n, row.size - n])
+    return np.where(np.isfinite(row), row, none)
 
 
 def _row(machine: Machine, resume: xr.Dataset, name: str) -> Floats:

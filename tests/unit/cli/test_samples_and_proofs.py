@@ -297,13 +297,18 @@ def test_ctrl_c_of_bounds_at_poses_gives_the_worst(
     assert len(document["variables"]["magnitude"]["values"]) == 16
 
 
-def test_ctrl_c_before_anything_is_proven_changes_no_file(
+def test_ctrl_c_before_anything_is_proven_says_so_and_the_search_goes_on(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     wide = ["--region", "x=200:400,y=100:300", "--set", "strut.1.length_tolerance=20"]
-    outcome = stopped_bounds(monkeypatch, capsys, *wide, "--output", tmp_path / "f.json", at=1)
-    assert (outcome.code, outcome.err) == (130, "Interrupted: no file was changed.\n")
-    assert list(tmp_path.iterdir()) == []
+    output = tmp_path / "part.nc"
+    outcome = stopped_bounds(monkeypatch, capsys, *wide, "--output", output, at=1)
+    assert outcome.code == 130
+    assert "Interrupted after 1 box: of 1 part of the region nothing is proven yet" in outcome.err
+    assert "Not proven" in outcome.out
+    further = stopped_bounds(monkeypatch, capsys, *wide, "--resume", output, at=20)
+    assert further.code == 130
+    assert "Interrupted after 31 boxes: of 16 parts of the region" in further.err
 
 
 def test_a_file_that_no_search_goes_on_from(

@@ -13,6 +13,7 @@ import truepose as tp
 from build_machine import MACHINES
 from truepose.errors import RequestError
 from truepose.machine import Machine
+from truepose.reporting.uncertainty_tables import interrupted_bounds
 from truepose.runs.poses import Progress
 from truepose.uncertainty_analysis import bounds_over_region
 from truepose.uncertainty_analysis.region_search import UNFINISHED
@@ -94,15 +95,25 @@ def test_a_search_that_ran_out_of_parts_goes_on(monkeypatch: pytest.MonkeyPatch)
     xr.testing.assert_identical(tp.bounds(machine, region=WHOLE, gap=FINE, resume=part), whole)
 
 
-def test_before_anything_is_proven_there_is_nothing_to_give() -> None:
+def test_while_a_part_is_without_a_proof_there_are_no_bounds_but_the_search_goes_on() -> None:
     machine = tp.load(MACHINES / "linear_delta.toml")
     middle = machine.poses().mean(axis=0)
-    region = {
-        name: (value - 0.05, value + 0.05)
-        for name, value in zip(machine.commanded, middle.tolist(), strict=True)
+    asked: dict[str, Any] = {
+        "region": {
+            name: (value - 0.006, value + 0.006)
+            for name, value in zip(machine.commanded, middle.tolist(), strict=True)
+        },
+        "gap": 0.3,
     }
-    with pytest.raises(KeyboardInterrupt):
-        tp.bounds(machine, region=region, progress=stopped_at(1))
+    part = tp.bounds(machine, **asked, progress=stopped_at(1))
+    assert (part.attrs["interrupted"], str(part.status.values)) == (1, "box_too_wide")
+    assert part.magnitude.isnull().all()
+    assert part.upper.isnull().all()
+    assert part.part_magnitude.isnull().any()
+    assert "of 1 part of the region nothing is proven yet" in interrupted_bounds(part)
+    whole = tp.bounds(machine, **asked)
+    xr.testing.assert_identical(tp.bounds(machine, **asked, resume=part), whole)
+    assert str(whole.status.values) == "proven"
 
 
 def test_what_goes_wrong_in_the_progress_is_raised() -> None:

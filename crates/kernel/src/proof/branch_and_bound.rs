@@ -35,9 +35,13 @@ enum State {
 }
 
 impl Part {
-    /// A part that was looked at, of which a bound is known.
-    pub fn known(sides: Vec<[f64; 2]>, bound: [f64; TARGETS]) -> Part {
-        Part { sides, bound: Some(bound), state: State::Proven }
+    /// A part that was looked at, and its bound, if there is one.
+    pub fn known(sides: Vec<[f64; 2]>, bound: Option<[f64; TARGETS]>) -> Part {
+        let state = match bound {
+            Some(_) => State::Proven,
+            None => State::Unproven(Unproven::TooWide),
+        };
+        Part { sides, bound, state }
     }
 
     /// What a look at it found, where that is closer than what is known.

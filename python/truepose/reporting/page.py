@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from importlib.resources import files
+from importlib.util import find_spec
 from pathlib import Path
 
 import jinja2
-import plotly.graph_objects as go
-from plotly.offline import get_plotlyjs
 
 from truepose.calibration.acceptance.sentences import sentence
 from truepose.files.writing import replacing
 from truepose.reporting import calibration, how_far, inputs, tables, uncertainty_tables
 from truepose.reporting.accuracy import gains, told
 from truepose.reporting.figures import DrawnFigure, draw
+from truepose.reporting.figures._json import as_json
 from truepose.reporting.study import Study
 
 LIMITS = (
@@ -24,6 +24,21 @@ LIMITS = (
     "and holds at the poses that it names. Loads and temperatures act on the nominal machine at "
     "the commanded pose."
 )
+
+
+def _folder_of_plotly() -> Path:
+    """Where the package plotly keeps its files, of which no module is run: that takes long.
+
+    Raises `ImportError` where the package is not there.
+    """
+    found = find_spec("plotly")
+    if found is None or not found.submodule_search_locations:
+        raise ImportError("no plotly", name="plotly")
+    return Path(found.submodule_search_locations[0], "package_data")
+
+
+# Looked for at once, so that a report without it is refused before it is worked out.
+PLOTLY = _folder_of_plotly()
 FIGURE_SETTINGS = {"displaylogo": False, "responsive": True, "displayModeBar": "hover"}
 
 
@@ -37,6 +52,7 @@ def render(study: Study, machine_text: str = "") -> str:
         loader=jinja2.FunctionLoader(_resource),
     )
     environment.filters["capitalise"] = sentence
+    environment.filters["as_json"] = as_json
     results = [tables.ranking(study), tables.highest_absolute(study), tables.highest_percent(study)]
     if study.compensation is not None:
         results.append(tables.compensation(study))
@@ -46,19 +62,16 @@ def render(study: Study, machine_text: str = "") -> str:
     left_out = tables.poses_left_out(study)
     if left_out is not None:
         results.append(left_out)
-    drawn = [
-        (drawn_figure, _embedded(drawn_figure.name, drawn_figure.figure))
-        for drawn_figure in draw(study)
-    ]
+    drawn = list(draw(study))
     return environment.get_template("page.html.jinja").render(
         study=study,
         machine=study.machine,
         attrs=study.budget.attrs,
         answers=told(study.machine, study.accuracy),
         gains=gains(study.accuracy),
-        figures=[pair for pair in drawn if not _of_calibration(pair[0])],
+        figures=[each for each in drawn if not _of_calibration(each)],
         calibration=None if study.calibration is None else study.calibration.attrs,
-        calibration_figures=[pair for pair in drawn if _of_calibration(pair[0])],
+        calibration_figures=[each for each in drawn if _of_calibration(each)],
         calibration_tables=[]
         if study.calibration is None
         else calibration.of_page(study.calibration, study.units),
@@ -72,7 +85,9 @@ def render(study: Study, machine_text: str = "") -> str:
         machine_text=machine_text,
         limits=LIMITS,
         css=_resource("page.css"),
-        plotly_js=get_plotlyjs(),
+        plotly_js=_of_plotly("plotly.min.js"),
+        figure_template=_of_plotly("templates", "plotly_white.json"),
+        figure_settings=FIGURE_SETTINGS,
     )
 
 
@@ -92,12 +107,5 @@ def _resource(name: str) -> str:
     return files("truepose.reporting").joinpath(name).read_text(encoding="utf-8")
 
 
-def _embedded(name: str, figure: go.Figure) -> str:
-    """A figure as HTML that uses the library inlined once in the page."""
-    html: str = figure.to_html(
-        full_html=False,
-        include_plotlyjs=False,
-        div_id=f"figure-{name}",
-        config=FIGURE_SETTINGS,
-    )
-    return html
+def _of_plotly(*path: str) -> str:
+    return PLOTLY.joinpath(*path).read_text(encoding="utf-8")

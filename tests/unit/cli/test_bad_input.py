@@ -120,12 +120,16 @@ def test_a_folder_without_permission(
     assert f"no write permission for {tmp_path}" in outcome.err
 
 
+@pytest.mark.parametrize("package", ["jinja2", "plotly"])
 def test_packages_that_are_not_installed(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    package: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.delitem(sys.modules, "truepose.reporting.page", raising=False)
     monkeypatch.delattr("truepose.reporting.page", raising=False)
-    monkeypatch.setitem(sys.modules, "jinja2", None)
+    monkeypatch.setitem(sys.modules, package, None)
     outcome = call(capsys, "report", PLANAR, "--output", tmp_path / "page.html")
     assert outcome.code == 2
     assert "extra-missing" in outcome.codes

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from checked_figures import checked
 from made_calibration import UNKNOWNS, calibration
 from made_study import MADE_UNITS, hexapod_study, planar_study
 from truepose.reporting import calibration as told
@@ -188,7 +189,7 @@ def test_a_tool_that_nothing_limits_is_open_and_one_without_a_before_has_a_dash(
     drawn = replace(study, calibration=found)
     assert "no before" in calibration_tool.caption(drawn)
     assert "nothing limits" in calibration_tool.caption(drawn)
-    assert len(calibration_tool.figure(drawn).data) == 1
+    assert len(checked(calibration_tool.figure(drawn)).data) == 1
 
 
 def test_suspicions_outliers_and_what_to_measure(study: Study) -> None:
@@ -208,20 +209,20 @@ def test_a_large_machine_is_cut(study: Study, monkeypatch: pytest.MonkeyPatch) -
     assert "2 more are in the files" in table.note
     monkeypatch.setattr(calibration_unknowns, "MOST_DRAWN", 3)
     assert "the 3 of 4 unknowns" in calibration_unknowns.caption(study)
-    assert len(calibration_unknowns.figure(study).data[0].y) == 3
+    assert len(checked(calibration_unknowns.figure(study)).data[0].y) == 3
     monkeypatch.setattr(calibration_correlation, "MOST_DRAWN", 2)
     assert "the first 2 unknowns" in calibration_correlation.caption(study)
 
 
 @pytest.mark.parametrize("figure", FIGURES)
 def test_figures_show_the_dataset(figure: object, study: Study) -> None:
-    drawn = figure.figure(study)  # type: ignore[attr-defined]
+    drawn = checked(figure.figure(study))  # type: ignore[attr-defined]
     assert drawn.data
     assert figure.caption(study).endswith(".")  # type: ignore[attr-defined]
 
 
 def test_residuals_are_drawn_in_micrometres_by_line(study: Study) -> None:
-    drawn = calibration_residuals.figure(study)
+    drawn = checked(calibration_residuals.figure(study))
     before = next(each for each in drawn.data if each.name == "before")
     np.testing.assert_allclose(
         before.y, 1e6 * study.calibrated["residual_before"].values[::2], rtol=1e-6
@@ -235,13 +236,13 @@ def test_one_wrong_reading_does_not_flatten_the_others(study: Study) -> None:
     for name in ("residual_after", "normalised_after", "standardised", "held_out_after"):
         found[name].values[0] = 1e3
     shown = replace(study, calibration=found)
-    low, high = calibration_residuals.figure(shown).layout.yaxis2.range
+    low, high = checked(calibration_residuals.figure(shown)).layout.yaxis2.range
     assert -100 < low < high < 100
     assert "further out" in calibration_residuals.caption(shown)
 
 
 def test_changes_are_in_half_bands(study: Study) -> None:
-    drawn = calibration_unknowns.figure(study)
+    drawn = checked(calibration_unknowns.figure(study))
     change = drawn.data[-1]
     np.testing.assert_allclose(change.x, [2.0, -0.5, 0.5, np.nan])
     assert change.text[0] == "+0.200 mm"
@@ -275,10 +276,12 @@ def test_a_row_without_a_pose_is_at_no_place_of_the_map(study: Study) -> None:
     last = found["observation_row"].values == len(found["row"]) - 1
     fewer = found.isel(row=slice(-1), observation=~last)
     drawn, expected = (
-        calibration_map.figure(replace(study, calibration=each)).to_json()
+        checked(calibration_map.figure(replace(study, calibration=each))).to_json()
         for each in (without, fewer)
     )
     assert drawn == expected
     nowhere = {name: ("row", np.full(len(found["row"]), np.nan)) for name in names}
-    empty = calibration_map.figure(replace(study, calibration=found.assign_coords(nowhere)))
+    empty = checked(
+        calibration_map.figure(replace(study, calibration=found.assign_coords(nowhere)))
+    )
     assert not len(empty.data[0].x)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import re
 
-import plotly.graph_objects as go
 import pytest
 
 import truepose
@@ -13,6 +12,7 @@ from build_machine import MACHINES
 from truepose.cli import _steps, _uncertainty
 from truepose.cli._options import Request
 from truepose.reporting.figures import draw
+from truepose.reporting.figures._plot import Plot, trace
 from truepose.reporting.figures._text import NO_BOX, as_text
 
 MARKUP = "<u>U</u><br>&amp;"
@@ -28,7 +28,7 @@ def texts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     file.write_text(named)
     request = Request(machine_file=file)
     study = _uncertainty.with_how_sure(_steps.study_of(request, truepose.load(file)))
-    return {drawn.name: texts_of(drawn.figure.to_plotly_json()) for drawn in draw(study)}
+    return {drawn.name: texts_of([drawn.figure.data, drawn.figure.layout]) for drawn in draw(study)}
 
 
 def texts_of(value: object) -> list[str]:
@@ -61,8 +61,11 @@ def test_the_names_are_there_as_they_stand_in_the_file(texts: dict[str, list[str
 
 
 def test_lines_end_where_the_text_says_so() -> None:
-    trace = go.Scatter(x=[1.0], y=[2.0], name="a\nb <br>", hovertemplate=f"%{{x}} & more{NO_BOX}")
-    marked = as_text(go.Figure(trace)).data[0]
-    assert marked.name == "a<br>b &lt;br&gt;"
-    assert marked.hovertemplate == "%{x} &amp; more<extra></extra>"
-    assert list(marked.x) == [1.0]
+    hover = f"%{{x}} & more{NO_BOX}"
+    plot = Plot(trace("scatter", x=[1.0], y=[2.0], name="a\nb <br>", hovertemplate=hover))
+    plot.update_layout(title={"text": "<i>"})
+    marked = as_text(plot)
+    assert marked.data[0]["name"] == "a<br>b &lt;br&gt;"
+    assert marked.data[0]["hovertemplate"] == "%{x} &amp; more<extra></extra>"
+    assert marked.data[0]["x"] == [1.0]
+    assert marked.layout == {"title": {"text": "&lt;i&gt;"}}

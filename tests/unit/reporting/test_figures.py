@@ -8,6 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from checked_figures import checked
 from made_how_sure import shares, sure_study
 from made_study import hexapod_study, planar_study
 from sweeps import sweep
@@ -61,10 +62,11 @@ def test_every_figure_has_traces_a_title_and_a_caption(study: Study) -> None:
     drawn = list(draw(study))
     assert len(drawn) == len(FIGURES)
     for each in drawn:
-        assert each.figure.data, each.name
+        figure = checked(each.figure)
+        assert figure.data, each.name
         assert each.title
         assert each.caption.endswith(".")
-        assert each.figure.layout.height > 100
+        assert figure.layout.height > 100
 
 
 def test_figures_of_results_that_not_every_study_has_need_one(study: Study) -> None:
@@ -80,10 +82,10 @@ def trace(figure: go.Figure, name: str, nth: int = 0) -> go.Scatter:
 
 def test_lines_are_the_errors_in_micrometres(study: Study) -> None:
     for nth in range(len(study.components)):
-        upper = trace(source_errors.figure(study), "tolerance, all at upper ends", nth)
+        upper = trace(checked(source_errors.figure(study)), "tolerance, all at upper ends", nth)
         expected = study.budget["error_upper"].sel(source="tolerance").values[:, nth] * 1e6
         np.testing.assert_allclose(upper.y, expected, rtol=1e-6)
-        lower = trace(overall_error.figure(study), "all at lower ends", nth)
+        lower = trace(checked(overall_error.figure(study)), "all at lower ends", nth)
         expected = study.budget["overall_error_lower"].values[:, nth] * 1e6
         np.testing.assert_allclose(lower.y, expected, rtol=1e-6)
 
@@ -91,19 +93,19 @@ def test_lines_are_the_errors_in_micrometres(study: Study) -> None:
 def test_poses_have_the_number_that_files_give_them() -> None:
     study = planar_study()
     fewer = Study(study.machine, study.budget.isel(pose=[2, 3, 7]))
-    for each in (source_errors.figure(fewer), overall_error.figure(fewer)):
+    for each in (checked(source_errors.figure(fewer)), checked(overall_error.figure(fewer))):
         np.testing.assert_array_equal(each.data[0].x, fewer.budget["pose"].values)
 
 
 def test_bars_are_the_highest_with_the_largest_on_top(study: Study) -> None:
-    bars = ranking.figure(study).data[0]
+    bars = checked(ranking.figure(study)).data[0]
     assert list(bars.y) == ["elastic", "thermal", "tolerance"]
     expected = study.budget["highest"].sel(quantity="position", source=list(bars.y)).values
     np.testing.assert_allclose(bars.x, expected * 1e6, rtol=1e-6)
 
 
 def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: Study) -> None:
-    figure = internal_forces.figure(study)
+    figure = checked(internal_forces.figure(study))
     for name, variable in (
         ("with clearances", "highest_force"),
         ("without clearances", "highest_force_rigid"),
@@ -120,7 +122,7 @@ def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: St
 
 
 def test_maps_share_one_colour_scale(study: Study) -> None:
-    figure = workspace_maps.figure(study)
+    figure = checked(workspace_maps.figure(study))
     sizes = [study.largest, study.values("largest")[:, :, 0]]
     assert figure.layout.coloraxis.cmin == 0
     assert figure.layout.coloraxis.cmax == pytest.approx(max(map(np.max, sizes)) * 1e6)
@@ -133,7 +135,7 @@ def test_maps_share_one_colour_scale(study: Study) -> None:
 
 def test_a_heat_map_has_each_value_at_its_place() -> None:
     study = planar_study()
-    first = workspace_maps.figure(study).data[0]
+    first = checked(workspace_maps.figure(study)).data[0]
     size = study.largest * 1e6
     for pose, expected in zip(study.poses, size, strict=True):
         column = int(np.argmin(np.abs(first.x - pose[0] * 1e3)))
@@ -147,14 +149,14 @@ def test_poses_that_differ_in_what_is_not_shown_give_the_largest() -> None:
     turned = twice.budget["pose_a"].values.copy()
     turned[1::2] = 0.1
     twice.budget["pose_a"] = ("pose", turned)
-    figure = workspace_maps.figure(twice)
+    figure = checked(workspace_maps.figure(twice))
     assert len(figure.data[0].x) == 27
     assert "Over a the largest is shown." in workspace_maps.caption(twice)
 
 
 def test_the_drawing_joins_carriages_and_tool() -> None:
     study = planar_study()
-    figure = machine_drawing.figure(study)
+    figure = checked(machine_drawing.figure(study))
     struts = trace(figure, "struts")
     height = 200 + np.sqrt(500**2 - 300**2)
     np.testing.assert_allclose(struts.x[[0, 1, 3, 4]], [0, 300, 600, 300], atol=1e-3)
@@ -166,7 +168,7 @@ def test_the_drawing_joins_carriages_and_tool() -> None:
 
 def test_the_drawing_of_a_body_has_its_platform_and_frame() -> None:
     study = hexapod_study(3)
-    figure = machine_drawing.figure(study)
+    figure = checked(machine_drawing.figure(study))
     for name in ("platform", "frame"):
         outline = trace(figure, name)
         assert len(outline.x) == 7, "six corners, closed"
@@ -181,7 +183,7 @@ def test_many_poses_are_thinned_and_the_largest_stays(monkeypatch: pytest.Monkey
     monkeypatch.setattr(_style, "MOST_DRAWN", 100)
     study = planar_study(32)
     worst = int(np.argmax(study.largest))
-    line = trace(source_errors.figure(study), "thermal")
+    line = trace(checked(source_errors.figure(study)), "thermal")
     assert len(line.x) <= 101
     assert worst in line.x
     assert "one in 11 of the 1,024 poses" in source_errors.caption(study)
@@ -191,14 +193,14 @@ def test_many_poses_are_thinned_and_the_largest_stays(monkeypatch: pytest.Monkey
 @sweep
 def test_values_are_kept_in_single_precision(study: Study) -> None:
     for each in figures.draw(study):
-        for one in each.figure.data:
+        for one in checked(each.figure).data:
             for values in (one.y, getattr(one, "z", None)):
                 if isinstance(values, np.ndarray) and values.dtype.kind == "f":
                     assert values.dtype == np.float32, (each.name, one.name)
 
 
 def test_the_error_over_time_is_drawn_at_each_pose_and_over_the_temperatures(study: Study) -> None:
-    drawn = error_over_time.figure(study)
+    drawn = checked(error_over_time.figure(study))
     errors = study.time["error"].values * 1e6
     lines = [each for each in drawn.data if each.line.color == _style.source_colour(0)]
     assert len(lines) == errors.shape[1] * errors.shape[2]
@@ -219,7 +221,7 @@ def test_the_error_over_time_is_drawn_at_each_pose_and_over_the_temperatures(stu
 def test_many_times_are_thinned_and_the_last_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     study = STUDIES["planar"]
     monkeypatch.setattr(error_over_time, "MOST_DRAWN", 50)
-    x = np.asarray(error_over_time.figure(study).data[0].x)
+    x = np.asarray(checked(error_over_time.figure(study)).data[0].x)
     assert len(x) <= 51
     assert x[-1] == pytest.approx(60.0)
     assert "of 361 times" in error_over_time.caption(study)
@@ -247,7 +249,7 @@ def test_the_distribution_is_dark_inside_its_coverage_interval(study: Study) -> 
     found = study.monte_carlo
     assert found is not None
     pose = int(found["magnitude_upper"].values[:, 0].argmax())
-    drawn = distribution.figure(study)
+    drawn = checked(distribution.figure(study))
     bars = [each for each in drawn.data if isinstance(each, go.Bar) and len(each.x) > 1]
     assert len(bars) == len(study.components) + (2 if study.rotations else 1)
     first = bars[0]
@@ -263,7 +265,7 @@ def test_the_distribution_is_dark_inside_its_coverage_interval(study: Study) -> 
 
 
 def test_how_far_off_has_a_bar_for_each_number_and_state(study: Study) -> None:
-    drawn = how_far.figure(study)
+    drawn = checked(how_far.figure(study))
     rows = numbers.how_far(study)
     kinds = list(dict.fromkeys(row.quantity for row in rows))
     for key, title in numbers.NUMBERS.items():
@@ -286,7 +288,7 @@ def test_a_number_that_there_is_not_has_no_bar(study: Study) -> None:
     unbounded = tuple(without_a_bound(answer) for answer in study.accuracy)
     names = {
         each.name
-        for each in how_far.figure(replace(study, accuracy=unbounded, sampled=())).data
+        for each in checked(how_far.figure(replace(study, accuracy=unbounded, sampled=()))).data
         if each.type == "bar"
     }
     assert names == {"witness", "linear maximum"}
@@ -295,13 +297,13 @@ def test_a_number_that_there_is_not_has_no_bar(study: Study) -> None:
 def test_the_tornado_has_the_largest_on_top(study: Study) -> None:
     assert study.shares is not None
     who = variance_shares.blame(study.shares, variance_shares.spread_pose(study.shares))
-    drawn = tornado.figure(study)
+    drawn = checked(tornado.figure(study))
     for kind, name in (("first", "first order"), ("total", "total"), ("linear", "linear")):
         bars = trace(drawn, name)
         assert list(bars.y) == list(who.names)[::-1]
         np.testing.assert_allclose(bars.x, 100 * who.kinds[kind][::-1], rtol=1e-6)
     correlated = replace(study, shares=shares(study.machine, study.poses[:1], correlated=True))
-    names = {each.name for each in tornado.figure(correlated).data}
+    names = {each.name for each in checked(tornado.figure(correlated)).data}
     assert names == {"Shapley", "linear"}
     assert "Shapley shares do" in tornado.caption(correlated)
 
@@ -322,7 +324,7 @@ def test_an_ellipse_holds_what_it_says(study: Study) -> None:
 
 
 def test_ellipses_do_not_touch_and_are_to_one_scale(study: Study) -> None:
-    drawn = coverage_ellipses.figure(study)
+    drawn = checked(coverage_ellipses.figure(study))
     outlines = [each for each in drawn.data if each.legendgroup == "ellipse"]
     assert study.ellipses is not None
     spatial = study.ellipses.sizes["axis"] == 3

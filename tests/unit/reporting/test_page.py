@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
 
+import plotly.io
 import pytest
 from plotly.offline import get_plotlyjs
 
@@ -34,6 +36,13 @@ def test_it_asks_for_nothing_from_outside(planar: str) -> None:
 def test_the_library_is_there_once(planar: str) -> None:
     assert planar.count("Copyright 2012-") == get_plotlyjs().count("Copyright 2012-") == 1
     assert len(planar) < len(get_plotlyjs()) + 3e5
+
+
+def test_what_is_taken_from_plotly_is_what_it_gives_itself(planar: str) -> None:
+    assert get_plotlyjs() in planar
+    (template,) = re.findall(r"^const TEMPLATE = (.*);$", planar, flags=re.MULTILINE)
+    given = plotly.io.templates["plotly_white"].to_plotly_json()
+    assert json.loads(template) == json.loads(json.dumps(given))
 
 
 def test_every_figure_has_its_place_and_every_link_its_target(planar: str) -> None:

@@ -1,4 +1,4 @@
-"""The figures of the report: one figure is one file, `Study` in, plotly figure out.
+"""The figures of the report: one figure is one file, `Study` in, `Plot` out.
 
 A figure's module has `TITLE`, `caption(study)` and `figure(study)`. To add one: write the module
 and name it in `FIGURES`, where the order is that of the report. A figure of a result that not every
@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
-
-import plotly.graph_objects as go
 
 from truepose.reporting.figures import (
     before_after,
@@ -32,6 +30,7 @@ from truepose.reporting.figures import (
     tornado,
     workspace_maps,
 )
+from truepose.reporting.figures._plot import Plot
 from truepose.reporting.figures._text import as_text
 from truepose.reporting.study import Study
 
@@ -63,7 +62,7 @@ class DrawnFigure:
     name: str
     title: str
     caption: str
-    figure: go.Figure
+    figure: Plot
     needs: str | None = None
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from truepose.arrays import Floats, Indices
 from truepose.files.shown_units import ShownUnits
 from truepose.reporting.display import is_position
+from truepose.reporting.figures._plot import Keys, Plot, trace
 from truepose.reporting.figures._style import small
 
 
@@ -58,7 +58,7 @@ def map_trace(
     sizes: Floats,
     unit: str,
     scale: str = "coloraxis",
-) -> go.Scatter | go.Heatmap:
+) -> Keys:
     """Squares of a full grid in a plane as a heat map, anything else as coloured points.
 
     `sizes` (n_place,), in `unit`, on the colour axis `scale`.
@@ -66,7 +66,8 @@ def map_trace(
     points, values = places.points[drawn], sizes[drawn]
     if len(places.axes) == 3:
         first, second, third = places.axes
-        return go.Scatter3d(
+        return trace(
+            "scatter3d",
             x=small(points[:, 0]),
             y=small(points[:, 1]),
             z=small(points[:, 2]),
@@ -85,14 +86,16 @@ def map_trace(
     across, down = np.unique(points[:, 0]), np.unique(points[:, 1])
     if len(across) > 1 and len(down) > 1 and len(across) * len(down) == len(points):
         # Places are sorted by the first axis, then by the second.
-        return go.Heatmap(
+        return trace(
+            "heatmap",
             x=small(across),
             y=small(down),
             z=small(values.reshape(len(across), len(down)).T),
             coloraxis=scale,
             hovertemplate=hover + f"%{{z:.2f}} {unit}<extra></extra>",
         )
-    return go.Scatter(
+    return trace(
+        "scatter",
         x=small(points[:, 0]),
         y=small(points[:, 1]),
         mode="markers",
@@ -102,19 +105,18 @@ def map_trace(
     )
 
 
-def label_map_axes(figure: go.Figure, places: Places, n_map: int) -> None:
+def label_map_axes(figure: Plot, places: Places, n_map: int) -> None:
     """Names and looks of the axes of `n_map` maps, alone in their figure."""
     labels = [f"{name}, {unit}" for name, unit in zip(places.axes, places.units, strict=True)]
     same_unit = len(set(places.units)) == 1
     if len(places.axes) == 2:
-        figure.update_xaxes(title_text=labels[0], constrain="domain", showgrid=False)
-        figure.update_yaxes(title_text=labels[1], showgrid=False)
+        figure.update_xaxes(title={"text": labels[0]}, constrain="domain", showgrid=False)
+        figure.update_yaxes(title={"text": labels[1]}, showgrid=False)
         if same_unit:
             for number in range(n_map):
                 anchor = "x" if number == 0 else f"x{number + 1}"
-                figure.layout[f"yaxis{number + 1 if number else ''}"].update(
-                    scaleanchor=anchor, scaleratio=1, constrain="domain"
-                )
+                same = {"scaleanchor": anchor, "scaleratio": 1, "constrain": "domain"}
+                figure.update_layout(**{f"yaxis{number + 1 if number else ''}": same})
         return
     axis: dict[str, Any] = {
         "gridcolor": "#D5DBE5",

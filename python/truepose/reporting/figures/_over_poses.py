@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.arrays import Indices
 from truepose.reporting.display import pose_text
+from truepose.reporting.figures._plot import Plot, grid, trace
 from truepose.reporting.figures._style import finish
 from truepose.reporting.study import Study
 
@@ -23,21 +22,21 @@ def place(study: Study, component: int) -> dict[str, int]:
     return {"row": among.index(component) + 1, "col": 1 if left or not study.positions else 2}
 
 
-def panels(study: Study) -> go.Figure:
+def panels(study: Study) -> Plot:
     """Empty panels, one for each error component, sharing the pose number."""
-    columns = [len(components) for components in (study.positions, study.rotations) if components]
-    rows = max(columns)
-    return make_subplots(
+    places = [place(study, component) for component in range(len(study.components))]
+    rows = max(at["row"] for at in places)
+    return grid(
         rows=rows,
-        cols=len(columns),
-        specs=[[{} if row < count else None for count in columns] for row in range(rows)],
-        shared_xaxes=True,
+        cols=max(at["col"] for at in places),
+        spans={(at["row"], at["col"]): 1 for at in places},
+        shared_xaxes="columns",
         vertical_spacing=0.07 if rows > 1 else 0.0,
         horizontal_spacing=0.1,
     )
 
 
-def finish_panels(figure: go.Figure, study: Study) -> go.Figure:
+def finish_panels(figure: Plot, study: Study) -> Plot:
     """Name the axes of `panels` and put the common look on."""
     rows = max(len(study.positions), len(study.rotations))
     finish(
@@ -51,10 +50,12 @@ def finish_panels(figure: go.Figure, study: Study) -> go.Figure:
     figure.update_xaxes(range=[first - margin, last + margin], zeroline=False)
     for component, name in enumerate(study.components):
         at = place(study, component)
-        figure.update_yaxes(title_text=f"error in {name}, {study.units.error(name).label}", **at)
+        figure.update_yaxes(
+            title={"text": f"error in {name}, {study.units.error(name).label}"}, **at
+        )
         lowest = at["row"] == len(study.positions if at["col"] == 1 else study.rotations)
         if lowest:
-            figure.update_xaxes(title_text="pose number", showticklabels=True, **at)
+            figure.update_xaxes(title={"text": "pose number"}, showticklabels=True, **at)
     return figure
 
 
@@ -63,7 +64,7 @@ def line_mode(drawn: Indices) -> str:
     return "lines+markers" if len(drawn) <= MOST_MARKED else "lines"
 
 
-def add_pose_labels(figure: go.Figure, study: Study, drawn: Indices) -> None:
+def add_pose_labels(figure: Plot, study: Study, drawn: Indices) -> None:
     """Let the hover box of each panel say which pose the number stands for."""
     if len(drawn) > MOST_LABELLED:
         return  # the labels would weigh more than the lines
@@ -72,7 +73,8 @@ def add_pose_labels(figure: go.Figure, study: Study, drawn: Indices) -> None:
     ]
     for component in range(len(study.components)):
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=study.numbers[drawn],
                 y=np.zeros(len(drawn), dtype=np.float32),
                 text=labels,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 
 from truepose.arrays import Indices
+from truepose.reporting.figures._plot import Keys, Plot
 
 # Okabe and Ito's colours, told apart by colour-blind readers too (https://jfly.uni-koeln.de/color).
 SOURCE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31")
@@ -19,7 +19,11 @@ AXIS = "#B8C0CC"
 INK = "#1B2A41"
 FONT = "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif"
 VERDICT_COLOURS = {"dominant": "#B23A48", "relevant": "#E0A030", "negligible": "#8A94A6"}
-COLOUR_SCALE = "Viridis"
+_VIRIDIS = (
+    *("#440154", "#482878", "#3e4989", "#31688e", "#26828e"),
+    *("#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"),
+)
+COLOUR_SCALE = [[step / (len(_VIRIDIS) - 1), colour] for step, colour in enumerate(_VIRIDIS)]
 
 MOST_DRAWN = 5000
 """Traces over more poses than this are thinned, so that the file stays small."""
@@ -55,11 +59,10 @@ def thinning_note(drawn: int, total: int) -> str:
     return f" Drawn: one in {step} of the {total:,} poses, and the largest; tables use all."
 
 
-def finish(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
+def finish(figure: Plot, height: int, **layout: Any) -> Plot:
     """Put the common look on a figure."""
     figure.update_layout(
         height=height,
-        template="plotly_white",
         font={"family": FONT, "size": 13, "color": INK},
         margin={"l": 70, "r": 20, "t": 40, "b": 55},
         legend={
@@ -77,7 +80,7 @@ def finish(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
         plot_bgcolor="white",
     )
     figure.update_layout(**layout)
-    axis = {
+    axis: Keys = {
         "gridcolor": GRID,
         "zerolinecolor": AXIS,
         "linecolor": AXIS,

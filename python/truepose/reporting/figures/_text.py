@@ -10,15 +10,18 @@ import html
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
+
+from truepose.reporting.figures._plot import Plot
 
 NO_BOX = "<extra></extra>"
 """At the end of a hover text: no second box with the name of the trace."""
 
 
-def as_text(figure: go.Figure) -> go.Figure:
+def as_text(figure: Plot) -> Plot:
     """The figure with every text marked so that plotly shows it as it is."""
-    return go.Figure(_marked(figure.to_plotly_json()))
+    marked = Plot(*_marked(figure.data))
+    marked.update_layout(**_marked(figure.layout))
+    return marked
 
 
 def _marked(value: Any) -> Any:

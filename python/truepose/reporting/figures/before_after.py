@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from truepose.arrays import Floats
 from truepose.reporting.figures._over_poses import add_pose_labels, finish_panels, panels, place
+from truepose.reporting.figures._plot import Plot, trace
 from truepose.reporting.figures._style import AFTER, BEFORE, drawn_poses, small, thinning_note
 from truepose.reporting.study import Study
 
@@ -32,7 +32,7 @@ def caption(study: Study) -> str:
     )
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """One panel for each component: band and middle before and after."""
     drawn = drawn_poses(study.largest)
     figure = panels(study)
@@ -57,7 +57,8 @@ def figure(study: Study) -> go.Figure:
             common: dict[str, Any] = {"x": study.numbers[drawn], "legendgroup": name}
             _add_band(figure, place(study, component), lower, upper, name, colour, fill, common)
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     y=small(middle),
                     name=f"{name}, known error",
                     showlegend=component == 0,
@@ -73,7 +74,7 @@ def figure(study: Study) -> go.Figure:
 
 
 def _add_band(
-    figure: go.Figure,
+    figure: Plot,
     at: dict[str, int],
     lower: Floats,
     upper: Floats,
@@ -88,7 +89,8 @@ def _add_band(
         (np.maximum(lower, upper), "tonexty", "larger end"),
     ):
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 y=small(values),
                 name=f"{name}, {edge}" if filled is None else f"{name}, band",
                 showlegend=filled is not None and at == {"row": 1, "col": 1},

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 
+from truepose.reporting.figures._plot import Keys, Plot, trace
 from truepose.reporting.figures._style import finish, small
 from truepose.reporting.study import Study
 
@@ -34,15 +34,16 @@ def caption(study: Study) -> str:
     return text
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """A heat map of the correlation matrix."""
     result = study.calibrated
     names = result["unknown_label"].values[:MOST_DRAWN].tolist()
     values = result["correlation"].values[:MOST_DRAWN, :MOST_DRAWN]
     named = len(names) <= MOST_NAMED
     places = list(range(len(names)))
-    figure = go.Figure(
-        go.Heatmap(
+    figure = Plot(
+        trace(
+            "heatmap",
             x=places,
             y=places,
             z=small(values),
@@ -69,8 +70,13 @@ def figure(study: Study) -> go.Figure:
         size + min(margin, 140) + 70,
         margin={"l": margin, "r": 20, "t": 70, "b": min(margin, 140)},
     )
-    ticks = {"tickmode": "array", "tickvals": places, "ticktext": names, "tickfont": {"size": 11}}
-    common = {"showgrid": False, "zeroline": False, "ticks": "", "constrain": "domain"}
+    ticks: Keys = {
+        "tickmode": "array",
+        "tickvals": places,
+        "ticktext": names,
+        "tickfont": {"size": 11},
+    }
+    common: Keys = {"showgrid": False, "zeroline": False, "ticks": "", "constrain": "domain"}
     figure.update_xaxes(
         **(ticks if named else {"showticklabels": False}),
         tickangle=-60,

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.arrays import Floats
 from truepose.reporting.figures._maps import label_map_axes, map_trace, places_of
+from truepose.reporting.figures._plot import Plot, grid
 from truepose.reporting.figures._style import COLOUR_SCALE, finish
 from truepose.reporting.study import Study
 
@@ -29,7 +28,7 @@ def caption(_: Study) -> str:
     )
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """Two maps over the measured poses, each with its own scale."""
     result = study.calibrated
     names = study.machine.commanded
@@ -40,11 +39,11 @@ def figure(study: Study) -> go.Figure:
     of_row[posed] = places.of_pose
     kinds = [("before", "normalised_before"), ("after", "normalised_after")]
     spatial = len(places.axes) == 3
-    figure = make_subplots(
+    figure = grid(
         rows=1,
         cols=2,
-        subplot_titles=[name for name, _ in kinds],
-        specs=[[{"type": "scene" if spatial else "xy"}] * 2],
+        titles=[name for name, _ in kinds],
+        spatial=spatial,
         horizontal_spacing=GAP,
     )
     finish(figure, HEIGHT, margin=_MARGINS[spatial])
@@ -56,7 +55,7 @@ def figure(study: Study) -> go.Figure:
         figure.add_trace(trace, row=1, col=number + 1)
         highest = float(sizes[drawn].max(initial=1.0))
         figure.update_layout(
-            {
+            **{
                 axis: {
                     "colorscale": COLOUR_SCALE,
                     "cmin": 0.0,

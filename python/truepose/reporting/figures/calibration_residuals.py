@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.arrays import Floats
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.files.shown_units import Shown
+from truepose.reporting.figures._plot import Keys, Plot, grid, trace
 from truepose.reporting.figures._style import AFTER, BEFORE, OVERALL, finish, small
 from truepose.reporting.study import Study
 
@@ -37,11 +36,11 @@ def caption(study: Study) -> str:
     return text
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """One row of panels for each unit: before and after on one scale, then after alone."""
     result = study.calibrated
     units = list(dict.fromkeys(result["observation_units"].values.tolist()))
-    figure = make_subplots(
+    figure = grid(
         rows=len(units),
         cols=2,
         horizontal_spacing=0.09,
@@ -75,9 +74,8 @@ def figure(study: Study) -> go.Figure:
                     _points(at, sets["residual_before"], text, "before", BEFORE, first), **place
                 )
             else:
-                figure.add_traces(
-                    _band(at, sigma[mine] * factor), rows=[number + 1] * 2, cols=[2] * 2
-                )
+                for edge in _band(at, sigma[mine] * factor):
+                    figure.add_trace(edge, **place)
             figure.add_trace(
                 _points(at, sets["residual_after"], text, "after", AFTER, first and column == 1),
                 **place,
@@ -90,7 +88,7 @@ def figure(study: Study) -> go.Figure:
                     ),
                     **place,
                 )  # fmt: skip
-        figure.update_yaxes(title_text=f"residual, {shown}", row=number + 1, col=1)
+        figure.update_yaxes(title={"text": f"residual, {shown}"}, row=number + 1, col=1)
         fit = mine & ~_named(study)
         after = (result["normalised_after"].values * sigma)[fit] * factor
         held_out = (result["held_out_after"].values * sigma)[fit] * factor
@@ -99,7 +97,7 @@ def figure(study: Study) -> go.Figure:
         figure.update_yaxes(range=[-most, most], row=number + 1, col=2)
     finish(figure, 110 + PANEL_HEIGHT * len(units), margin={"l": 75, "r": 20, "t": 70, "b": 55})
     name = "line of the file" if in_file else "row"
-    figure.update_xaxes(title_text=name, row=len(units))
+    figure.update_xaxes(title={"text": name}, row=len(units))
     return figure
 
 
@@ -130,8 +128,9 @@ def _points(
     colour: str,
     legend: bool,
     symbol: str = "circle",
-) -> go.Scatter:
-    return go.Scatter(
+) -> Keys:
+    return trace(
+        "scatter",
         x=at,
         y=small(values),
         text=text,
@@ -144,7 +143,7 @@ def _points(
     )
 
 
-def _band(at: np.ndarray, sigma: Floats) -> list[go.Scatter]:
+def _band(at: np.ndarray, sigma: Floats) -> list[Keys]:
     """Twice the stated uncertainty either side, the largest at each row."""
     where = np.unique(at)
     half = COVERAGE * np.array([sigma[at == place].max() for place in where])
@@ -154,6 +153,6 @@ def _band(at: np.ndarray, sigma: Floats) -> list[go.Scatter]:
     common = {"x": small(where), "mode": "lines", "line": {"width": 0}, "showlegend": False,
               "hoverinfo": "skip"}  # fmt: skip
     return [
-        go.Scatter(y=small(-half), **common),
-        go.Scatter(y=small(half), fill="tonexty", fillcolor="rgba(27,42,65,0.10)", **common),
+        trace("scatter", y=small(-half), **common),
+        trace("scatter", y=small(half), fill="tonexty", fillcolor="rgba(27,42,65,0.10)", **common),
     ]

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.reporting.figures._maps import label_map_axes, map_trace, places_of
+from truepose.reporting.figures._plot import Plot, grid
 from truepose.reporting.figures._style import COLOUR_SCALE, finish
 from truepose.reporting.study import Study
 
@@ -37,7 +36,7 @@ def caption(study: Study) -> str:
     return text
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """Two maps over the workspace, each with its own scale."""
     result = study.calibrated
     names = study.machine.commanded
@@ -46,11 +45,11 @@ def figure(study: Study) -> go.Figure:
     )
     kinds = [when for when in ("before", "after") if np.isfinite(_sizes(study, when)).any()]
     spatial = len(places.axes) == 3
-    figure = make_subplots(
+    figure = grid(
         rows=1,
         cols=2,
-        subplot_titles=kinds,
-        specs=[[{"type": "scene" if spatial else "xy"}] * 2],
+        titles=kinds,
+        spatial=spatial,
         horizontal_spacing=GAP,
     )
     finish(figure, HEIGHT, margin=_MARGINS[spatial])
@@ -63,7 +62,7 @@ def figure(study: Study) -> go.Figure:
         axis = "coloraxis" if number == 0 else "coloraxis2"
         figure.add_trace(map_trace(places, drawn, sizes, unit, axis), row=1, col=number + 1)
         figure.update_layout(
-            {
+            **{
                 axis: {
                     "colorscale": COLOUR_SCALE,
                     "cmin": 0.0,

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.reporting.calibration import signed
+from truepose.reporting.figures._plot import Plot, grid, trace
 from truepose.reporting.figures._style import AFTER, AXIS, SOURCE_COLOURS, finish, small
 from truepose.reporting.study import Study
 
@@ -35,19 +34,20 @@ def caption(study: Study) -> str:
     return text
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """One line for each unknown: its bar, and its change."""
     result = study.calibrated
     drawn = _drawn(study)
     names = result["unknown_label"].values[drawn]
     share = np.nan_to_num(result["data_share"].values[drawn])
-    figure = make_subplots(rows=1, cols=2, shared_yaxes=True, horizontal_spacing=0.04)
+    figure = grid(rows=1, cols=2, shared_yaxes=True, horizontal_spacing=0.04)
     for values, name, colour in (
         (share, "from the measurements", DATA),
         (1.0 - share, "from the tolerance", PRIOR),
     ):
         figure.add_trace(
-            go.Bar(
+            trace(
+                "bar",
                 x=small(100.0 * values),
                 y=names,
                 name=name,
@@ -60,8 +60,7 @@ def figure(study: Study) -> go.Figure:
         )
     change, spread = _in_half_bands(study)
     figure.add_trace(
-        go.Scatter(
-            x=small(np.clip(change, -FURTHEST, FURTHEST)[drawn]),
+        trace("scatter", x=small(np.clip(change, -FURTHEST, FURTHEST)[drawn]),
             y=names,
             error_x={
                 "type": "data", "array": small(2.0 * spread[drawn]), "thickness": 1.2, "width": 3
@@ -82,20 +81,19 @@ def figure(study: Study) -> go.Figure:
         row=1,
         col=2,
     )  # fmt: skip
-    # After the trace: plotly draws no such band into a panel that is empty still.
-    figure.add_vrect(-1, 1, fillcolor="rgba(27,42,65,0.08)", line_width=0, row=1, col=2)
+    figure.add_vrect(-1, 1, fillcolor="rgba(27,42,65,0.08)", line={"width": 0}, row=1, col=2)
     finish(
         figure,
         130 + ROW_HEIGHT * len(drawn),
         barmode="stack",
-        legend_traceorder="normal",
+        legend={"traceorder": "normal"},
         bargap=0.25,
         margin={"l": 190, "r": 20, "t": 45, "b": 55},
     )
     figure.update_yaxes(range=[len(drawn) - 0.5, -0.5], ticks="", showgrid=False, dtick=1)
-    figure.update_xaxes(title_text="share of the value, %", range=[0, 100], row=1, col=1)
+    figure.update_xaxes(title={"text": "share of the value, %"}, range=[0, 100], row=1, col=1)
     figure.update_xaxes(
-        title_text="change, half bands", range=_range(change, spread), zeroline=True,
+        title={"text": "change, half bands"}, range=_range(change, spread), zeroline=True,
         zerolinecolor=AXIS, row=1, col=2,
     )  # fmt: skip
     return figure

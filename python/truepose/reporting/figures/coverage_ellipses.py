@@ -7,12 +7,11 @@ from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.arrays import Floats
 from truepose.files.shown_units import ShownUnits
 from truepose.reporting.display import is_position
+from truepose.reporting.figures._plot import Plot, grid, trace
 from truepose.reporting.figures._style import INK, finish, small, source_colour
 from truepose.reporting.reading import percent_text
 from truepose.reporting.study import Study
@@ -75,14 +74,14 @@ def _lost(result: xr.Dataset) -> str:
     return f" Of all samples {lost}; where too many failed, no ellipse is drawn."
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """One panel for each pair of axes, equal scale on both."""
     result = study.ellipses
     assert result is not None
     names = [str(name) for name in result["axis"].values]
     panels = _panels(study)
     times = _magnified(study)
-    figure = make_subplots(rows=1, cols=len(panels), horizontal_spacing=0.09)
+    figure = grid(rows=1, cols=len(panels), horizontal_spacing=0.09)
     for at, panel in enumerate(panels, start=1):
         drawn = [panel.places]
         for nth, pose in enumerate(panel.poses):
@@ -94,7 +93,7 @@ def figure(study: Study) -> go.Figure:
         ranges = _ranges(np.concatenate(drawn), study.units)
         where = {"row": 1, "col": at}
         figure.update_xaxes(
-            title_text=f"{names[panel.axes[0]]}, {study.units.length.label}",
+            title={"text": f"{names[panel.axes[0]]}, {study.units.length.label}"},
             range=ranges[0],
             zeroline=False,
             constrain="domain",
@@ -103,7 +102,7 @@ def figure(study: Study) -> go.Figure:
             **where,
         )
         figure.update_yaxes(
-            title_text=f"{names[panel.axes[1]]}, {study.units.length.label}",
+            title={"text": f"{names[panel.axes[1]]}, {study.units.length.label}"},
             range=ranges[1],
             zeroline=False,
             scaleanchor=f"x{at if at > 1 else ''}",
@@ -205,7 +204,7 @@ def _gap(places: Floats) -> float:
 
 
 def _draw(
-    figure: go.Figure,
+    figure: Plot,
     place: Floats,
     centre: Floats,
     outline: Floats,
@@ -223,7 +222,8 @@ def _draw(
     size = np.linalg.norm(outline, axis=1).max() * fine.per_si
     off = np.linalg.norm(centre) * fine.per_si
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=small(around[:, 0]),
             y=small(around[:, 1]),
             mode="lines",
@@ -240,7 +240,8 @@ def _draw(
         **panel,
     )
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=small(np.array([place[0], mean[0]]) * coarse),
             y=small(np.array([place[1], mean[1]]) * coarse),
             mode="lines+markers",

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.arrays import Flags, Floats
 from truepose.reporting.display import MISSING, ROUNDING, number
+from truepose.reporting.figures._plot import Plot, grid, trace
 from truepose.reporting.figures._style import GRID, INK, OVERALL, finish, small, source_colour
 from truepose.reporting.reading import at_text, percent_text, quantities, worst_pose
 from truepose.reporting.study import Study
@@ -44,17 +43,19 @@ def caption(study: Study) -> str:
     )
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """One panel for each component and magnitude: share of the samples, % a bar."""
     result = study.monte_carlo
     assert result is not None
     pose = worst_pose(result, "magnitude_upper")
     rows = _rows(study)
     columns = max(map(len, rows))
-    figure = make_subplots(
+    figure = grid(
         rows=len(rows),
         cols=columns,
-        specs=[[{} if at < len(row) else None for at in range(columns)] for row in rows],
+        spans={
+            (row, at): 1 for row, names in enumerate(rows, 1) for at in range(1, len(names) + 1)
+        },
         vertical_spacing=0.22 if len(rows) > 1 else 0.0,
         horizontal_spacing=0.07,
     )
@@ -67,9 +68,9 @@ def figure(study: Study) -> go.Figure:
             per_si = unit.per_si
             _draw(figure, levels, values * per_si, interval * per_si, mean * per_si, panel)
             title = f"|{name}|" if name in quantities(result) else f"error in {name}"
-            figure.update_xaxes(title_text=f"{title}, {unit.label}", zeroline=False, **panel)
+            figure.update_xaxes(title={"text": f"{title}, {unit.label}"}, zeroline=False, **panel)
             if at == 1:
-                figure.update_yaxes(title_text="samples, %", **panel)
+                figure.update_yaxes(title={"text": "samples, %"}, **panel)
     _add_legend(figure, percent_text(float(result.attrs["probability"])))
     finish(
         figure,
@@ -127,7 +128,7 @@ def histogram(levels: Floats, quantiles: Floats, bars: int = BARS) -> tuple[Floa
 
 
 def _draw(
-    figure: go.Figure,
+    figure: Plot,
     levels: Floats,
     quantiles: Floats,
     interval: Floats,
@@ -144,7 +145,8 @@ def _draw(
         edges, share = np.array([mean - 0.5, mean + 0.5]), np.array([1.0])
     middle = (edges[1:] + edges[:-1]) / 2
     figure.add_trace(
-        go.Bar(
+        trace(
+            "bar",
             x=small(middle),
             y=small(100.0 * share),
             width=small(np.diff(edges)),
@@ -156,7 +158,8 @@ def _draw(
         **panel,
     )
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=small([mean, mean]),
             y=small([0.0, 100.0 * share.max()]),
             mode="lines",
@@ -175,9 +178,9 @@ def _colours(middle: Floats, interval: Floats) -> list[str]:
     return [WITHIN if is_inside else OUTSIDE for is_inside in inside]
 
 
-def _add_legend(figure: go.Figure, percent: str) -> None:
+def _add_legend(figure: Plot, percent: str) -> None:
     for name, colour in ((f"{percent} coverage interval", WITHIN), ("outside of it", OUTSIDE)):
-        figure.add_trace(go.Bar(x=[None], y=[None], name=name, marker={"color": colour}))
+        figure.add_trace(trace("bar", x=[None], y=[None], name=name, marker={"color": colour}))
     figure.add_trace(
-        go.Scatter(x=[None], y=[None], name="mean", mode="lines", line={"color": OVERALL})
+        trace("scatter", x=[None], y=[None], name="mean", mode="lines", line={"color": OVERALL})
     )

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
-from plotly.subplots import make_subplots
 
 from truepose.arrays import Indices
 from truepose.reporting.display import pose_text
+from truepose.reporting.figures._plot import Plot, grid, trace
 from truepose.reporting.figures._style import MOST_DRAWN, finish, small, source_colour
 from truepose.reporting.study import Study
 
@@ -35,18 +34,20 @@ def caption(study: Study) -> str:
     )
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """One panel for each error component, and one for the temperatures."""
     columns = [components for components in (study.positions, study.rotations) if components]
     rows = max(map(len, columns))
-    specs: list[list[dict[str, int] | None]] = [
-        [{} if row < len(components) else None for components in columns] for row in range(rows)
-    ]
-    specs.append([{"colspan": len(columns)}, *[None] * (len(columns) - 1)])
-    figure = make_subplots(
+    spans = {
+        (row, column): 1
+        for column, components in enumerate(columns, start=1)
+        for row in range(1, len(components) + 1)
+    }
+    spans[rows + 1, 1] = len(columns)
+    figure = grid(
         rows=rows + 1,
         cols=len(columns),
-        specs=specs,
+        spans=spans,
         shared_xaxes="all",
         vertical_spacing=0.28 / (rows + 1),
         horizontal_spacing=0.1,
@@ -65,11 +66,11 @@ def figure(study: Study) -> go.Figure:
     )
     for column, components in enumerate(columns, start=1):
         figure.update_xaxes(showticklabels=True, row=len(components), col=column)
-    figure.update_xaxes(title_text=f"time, {unit}", showticklabels=True, row=rows + 1)
+    figure.update_xaxes(title={"text": f"time, {unit}"}, showticklabels=True, row=rows + 1)
     return figure
 
 
-def _add_errors(figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: Indices) -> None:
+def _add_errors(figure: Plot, study: Study, x: NDArray[np.float32], drawn: Indices) -> None:
     commanded = study.machine.commanded
     errors = np.asarray(study.time["error"].values)[drawn]
     errors = study.shown(errors)
@@ -78,7 +79,8 @@ def _add_errors(figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: 
         for column, components in enumerate(filter(None, (study.positions, study.rotations))):
             for row, component in enumerate(components):
                 figure.add_trace(
-                    go.Scatter(
+                    trace(
+                        "scatter",
                         x=x,
                         y=small(errors[:, pose, component]),
                         name=pose_text(at, commanded, study.units),
@@ -97,14 +99,14 @@ def _add_errors(figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: 
                 )
                 name = study.components[component]
                 figure.update_yaxes(
-                    title_text=f"error in {name}, {study.units.error(name).label}",
+                    title={"text": f"error in {name}, {study.units.error(name).label}"},
                     row=row + 1,
                     col=column + 1,
                 )
 
 
 def _add_temperatures(
-    figure: go.Figure, study: Study, x: NDArray[np.float32], drawn: Indices, row: int
+    figure: Plot, study: Study, x: NDArray[np.float32], drawn: Indices, row: int
 ) -> None:
     parts = [str(part) for part in study.time["part"].values]
     temperatures = np.asarray(study.time["temperature"].values)[drawn]
@@ -118,7 +120,8 @@ def _add_temperatures(
     for number, same in enumerate(lines.values()):
         more = f" and {len(same) - 1} more" if len(same) > 1 else ""
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=x,
                 y=small(temperatures[:, same[0]]),
                 name=parts[same[0]] + more,
@@ -129,7 +132,7 @@ def _add_temperatures(
             row=row,
             col=1,
         )
-    figure.update_yaxes(title_text=f"temperature, {study.units.degree}", row=row, col=1)
+    figure.update_yaxes(title={"text": f"temperature, {study.units.degree}"}, row=row, col=1)
 
 
 def _drawn(study: Study) -> Indices:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.reporting.accuracy import SI
+from truepose.reporting.figures._plot import Plot, grid, trace
 from truepose.reporting.figures._style import INK, finish, small
 from truepose.reporting.how_far import NUMBERS, how_far, share_note
 from truepose.reporting.study import Study
@@ -42,11 +41,11 @@ def caption(study: Study) -> str:
     )
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """Grouped bars, a panel for each quantity, a group for each state."""
     rows = how_far(study)
     kinds = list(dict.fromkeys(row.quantity for row in rows))
-    figure = make_subplots(rows=1, cols=len(kinds), horizontal_spacing=0.09)
+    figure = grid(rows=1, cols=len(kinds), horizontal_spacing=0.09)
     for column, kind in enumerate(kinds, start=1):
         unit = study.units.error(kind)
         shown = [row for row in rows if row.quantity == kind]
@@ -55,7 +54,8 @@ def figure(study: Study) -> go.Figure:
             if not np.isfinite(sizes).any():
                 continue
             figure.add_trace(
-                go.Bar(
+                trace(
+                    "bar",
                     x=[row.state for row in shown],
                     y=small(np.where(np.isfinite(sizes), sizes, np.nan) * unit.per_si),
                     name=NUMBERS[name],
@@ -68,7 +68,10 @@ def figure(study: Study) -> go.Figure:
                 col=column,
             )
         figure.update_yaxes(
-            title_text=f"largest {kind} error, {unit.label}", rangemode="tozero", row=1, col=column
+            title={"text": f"largest {kind} error, {unit.label}"},
+            rangemode="tozero",
+            row=1,
+            col=column,
         )
         _asked(figure, study, kind, column)
     finish(
@@ -82,7 +85,7 @@ def figure(study: Study) -> go.Figure:
     return figure
 
 
-def _asked(figure: go.Figure, study: Study, kind: str, column: int) -> None:
+def _asked(figure: Plot, study: Study, kind: str, column: int) -> None:
     """The accuracy asked, as a line named in the legend: beside it its name would hide bars."""
     accuracy = study.machine.accuracy
     asked = accuracy.target if SI[kind] == "m" else accuracy.angle_target
@@ -91,4 +94,4 @@ def _asked(figure: go.Figure, study: Study, kind: str, column: int) -> None:
     line = {"color": INK, "dash": "dash", "width": 1.5}
     figure.add_hline(y=asked * study.units.error(kind).per_si, line=line, row=1, col=column)
     name = f"{kind} asked, {accuracy.said(kind)}"
-    figure.add_trace(go.Scatter(x=[None], y=[None], mode="lines", line=line, name=name))
+    figure.add_trace(trace("scatter", x=[None], y=[None], mode="lines", line=line, name=name))

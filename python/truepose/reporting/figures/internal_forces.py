@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.arrays import Floats
+from truepose.reporting.figures._plot import Plot, grid, trace
 from truepose.reporting.figures._style import (
     AFTER,
     BEFORE,
@@ -36,21 +35,20 @@ def caption(study: Study) -> str:
     )
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """Bars a source and lines a closure, N."""
     result = study.strained
     order = np.argsort(result["highest_force_rigid"].values, kind="stable")
     names = [str(name) for name in result["source"].values[order]]
     bars = BAR * max(len(names), 1) + 40
-    figure = make_subplots(
-        rows=2, cols=1, row_heights=[bars, PANEL], vertical_spacing=80 / (bars + PANEL)
-    )
+    figure = grid(rows=2, cols=1, row_heights=[bars, PANEL], vertical_spacing=80 / (bars + PANEL))
     for variable, name, colour in (
         ("highest_force_rigid", "without clearances", BEFORE),
         ("highest_force", "with clearances", AFTER),
     ):
         figure.add_trace(
-            go.Bar(
+            trace(
+                "bar",
                 x=small(result[variable].values[order]),
                 y=names,
                 orientation="h",
@@ -66,7 +64,8 @@ def figure(study: Study) -> go.Figure:
     drawn = _drawn(force)
     for index, closure in enumerate(result["closure"].values):
         figure.add_trace(
-            go.Scatter(
+            trace(
+                "scatter",
                 x=result["pose"].values[drawn],
                 y=small(force[drawn, index]),
                 name=str(closure),
@@ -80,9 +79,9 @@ def figure(study: Study) -> go.Figure:
     finish(
         figure, 200 + bars + PANEL, margin={"l": 110, "r": 20, "t": 70, "b": 50}, barmode="group"
     )
-    figure.update_xaxes(title_text="highest force, N", rangemode="tozero", row=1, col=1)
-    figure.update_xaxes(title_text="pose number", zeroline=False, row=2, col=1)
-    figure.update_yaxes(title_text="force, N", row=2, col=1)
+    figure.update_xaxes(title={"text": "highest force, N"}, rangemode="tozero", row=1, col=1)
+    figure.update_xaxes(title={"text": "pose number"}, zeroline=False, row=2, col=1)
+    figure.update_yaxes(title={"text": "force, N"}, row=2, col=1)
     return figure
 
 

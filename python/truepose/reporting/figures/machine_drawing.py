@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from truepose.arrays import Floats
 from truepose.files.shown_units import Shown
 from truepose.reporting.display import nearest_middle, pose_text
 from truepose.reporting.figures._outline import Outline, is_planar, outline
+from truepose.reporting.figures._plot import Keys, Plot, trace
 from truepose.reporting.figures._style import INK, drawn_poses, finish, small
 from truepose.reporting.study import Study
 
@@ -26,20 +26,20 @@ def caption(study: Study) -> str:
     return f"Drawn to scale at {pose}, the pose of the workspace nearest its middle."
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """Guideways, struts, joints, platform and the poses evaluated, equal scale on all axes."""
     machine = study.machine
     shape = outline(machine, study.poses[_shown(study)])
     drawn = drawn_poses(study.largest)
     workspace = machine.kernel.placement_of(study.poses[drawn])[:, :3]
     planar, unit = is_planar(machine), study.units.length.label
-    figure = go.Figure()
+    figure = Plot()
     for line in _lines(shape, workspace):
         figure.add_trace(_trace(planar, study.units.length, **line))
     if planar:
         finish(figure, 520)
-        figure.update_xaxes(title_text=f"x, {unit}", constrain="domain")
-        figure.update_yaxes(title_text=f"y, {unit}", scaleanchor="x", scaleratio=1)
+        figure.update_xaxes(title={"text": f"x, {unit}"}, constrain="domain")
+        figure.update_yaxes(title={"text": f"y, {unit}"}, scaleanchor="x", scaleratio=1)
         return figure
     axis = {"gridcolor": "#D5DBE5", "backgroundcolor": "#F6F8FB", "showbackground": True}
     return finish(
@@ -126,13 +126,13 @@ def _joined(polylines: Iterable[Floats]) -> Floats:
     return np.concatenate([part for line in polylines for part in (np.asarray(line), gap)])
 
 
-def _trace(planar: bool, unit: Shown, points: Floats, **look: Any) -> go.Scatter | go.Scatter3d:
+def _trace(planar: bool, unit: Shown, points: Floats, **look: Any) -> Keys:
     x, y, z = small(points * unit.per_si).T
     places = 2 if unit.per_si > 100.0 else 4
     names = "xy" if planar else "xyz"
     hover = ", ".join(f"{n} %{{{n}:.{places}f}} {unit.label}" for n in names)
     if planar:
-        return go.Scatter(x=x, y=y, hovertemplate=hover, **look)
+        return trace("scatter", x=x, y=y, hovertemplate=hover, **look)
     if "marker" in look:  # markers look larger in three dimensions
         look["marker"] = look["marker"] | {"size": max(2, look["marker"]["size"] - 3)}
-    return go.Scatter3d(x=x, y=y, z=z, hovertemplate=hover, **look)
+    return trace("scatter3d", x=x, y=y, z=z, hovertemplate=hover, **look)

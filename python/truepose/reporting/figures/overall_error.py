@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
-
 from truepose.reporting.display import LOWER, UPPER
 from truepose.reporting.figures._over_poses import (
     add_pose_labels,
@@ -12,6 +10,7 @@ from truepose.reporting.figures._over_poses import (
     panels,
     place,
 )
+from truepose.reporting.figures._plot import Plot, trace
 from truepose.reporting.figures._style import BEFORE, OVERALL, drawn_poses, small, thinning_note
 from truepose.reporting.study import Study
 
@@ -35,7 +34,7 @@ def caption(study: Study) -> str:
     )
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """One panel for each component: all at lower ends, known error, all at upper ends."""
     drawn = drawn_poses(study.largest)
     figure = panels(study)
@@ -43,7 +42,8 @@ def figure(study: Study) -> go.Figure:
         errors = study.shown(study.values(variable)[drawn])
         for component in range(len(study.components)):
             figure.add_trace(
-                go.Scatter(
+                trace(
+                    "scatter",
                     x=study.numbers[drawn],
                     y=small(errors[:, component]),
                     name=name,

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
-
+from truepose.reporting.figures._plot import Plot, grid, trace
 from truepose.reporting.figures._style import VERDICT_COLOURS, finish, small
 from truepose.reporting.study import Study
 
@@ -23,7 +21,7 @@ def caption(study: Study) -> str:
     )
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """Horizontal bars, the largest on top: position and, where it turns, angle."""
     asked = (study.machine.accuracy.target, study.machine.accuracy.angle_target)
     parts = [("position", study.units.error("position"), study.values("highest")[:, 0], asked[0])]
@@ -32,10 +30,11 @@ def figure(study: Study) -> go.Figure:
         parts.append(("orientation", unit, study.values("highest")[:, 1], asked[1]))
     order = study.by_rank[::-1]
     verdicts = [str(study.values("verdict")[index]) for index in order]
-    figure = make_subplots(rows=1, cols=len(parts), shared_yaxes=True, horizontal_spacing=0.08)
+    figure = grid(rows=1, cols=len(parts), shared_yaxes=True, horizontal_spacing=0.08)
     for column, (part, unit, highest, target) in enumerate(parts, start=1):
         figure.add_trace(
-            go.Bar(
+            trace(
+                "bar",
                 x=small(highest[order] * unit.per_si),
                 y=[study.sources[index] for index in order],
                 orientation="h",
@@ -50,7 +49,10 @@ def figure(study: Study) -> go.Figure:
             col=column,
         )
         figure.update_xaxes(
-            title_text=f"highest {part} error, {unit.label}", rangemode="tozero", row=1, col=column
+            title={"text": f"highest {part} error, {unit.label}"},
+            rangemode="tozero",
+            row=1,
+            col=column,
         )
         if target is not None:
             figure.add_vline(
@@ -58,7 +60,9 @@ def figure(study: Study) -> go.Figure:
             )
     for verdict in dict.fromkeys(reversed(verdicts)):
         figure.add_trace(
-            go.Bar(x=[None], y=[None], name=verdict, marker={"color": VERDICT_COLOURS[verdict]})
+            trace(
+                "bar", x=[None], y=[None], name=verdict, marker={"color": VERDICT_COLOURS[verdict]}
+            )
         )
     finish(figure, 130 + 46 * len(order), bargap=0.35, margin={"l": 110, "r": 20, "t": 40, "b": 55})
     figure.update_yaxes(ticks="")

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
-
+from truepose.reporting.figures._plot import Plot, grid, trace
 from truepose.reporting.figures._style import finish, small
 from truepose.reporting.reading import at_text
 from truepose.reporting.study import Study
@@ -49,7 +47,7 @@ def caption(study: Study) -> str:
     )
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """Horizontal bars, %, of position and, where the platform turns, of orientation."""
     result = study.shares
     assert result is not None
@@ -62,14 +60,12 @@ def figure(study: Study) -> go.Figure:
     shared = [blame(result, pose, "parameter", part) for part in parts]
     # The names of the right panel stand between both.
     longest = max(map(len, _shortened(shared[-1].names[:MOST_BARS])))
-    figure = make_subplots(
-        rows=1, cols=len(parts), horizontal_spacing=0.04 + longest * LETTER / PAGE
-    )
+    figure = grid(rows=1, cols=len(parts), horizontal_spacing=0.04 + longest * LETTER / PAGE)
     rows = min(len(shared[0].names), MOST_BARS)
     for at, (part, who) in enumerate(zip(parts, shared, strict=True), start=1):
         _draw(figure, who, at)
         figure.update_xaxes(
-            title_text=f"share of the {part}'s variance, %", rangemode="tozero", row=1, col=at
+            title={"text": f"share of the {part}'s variance, %"}, rangemode="tozero", row=1, col=at
         )
     finish(
         figure,
@@ -82,7 +78,7 @@ def figure(study: Study) -> go.Figure:
     return figure
 
 
-def _draw(figure: go.Figure, who: Blame, column: int) -> None:
+def _draw(figure: Plot, who: Blame, column: int) -> None:
     drawn = slice(0, MOST_BARS)
     names = _shortened(who.names[drawn])[::-1]
     kinds = ["shapley"] if "shapley" in who.kinds else ["total", "first"]
@@ -90,7 +86,8 @@ def _draw(figure: go.Figure, who: Blame, column: int) -> None:
         name, colour = LOOKS[kind]
         half = who.confidence.get(kind)
         figure.add_trace(
-            go.Bar(
+            trace(
+                "bar",
                 x=small(100.0 * who.kinds[kind][drawn][::-1]),
                 y=names,
                 orientation="h",
@@ -114,7 +111,8 @@ def _draw(figure: go.Figure, who: Blame, column: int) -> None:
             col=column,
         )
     figure.add_trace(
-        go.Scatter(
+        trace(
+            "scatter",
             x=small(100.0 * who.kinds["linear"][drawn][::-1]),
             y=names,
             mode="markers",

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 
 from truepose.arrays import Floats, Indices
 from truepose.reporting.figures._maps import Places, label_map_axes, map_trace, places_of
+from truepose.reporting.figures._plot import Plot, grid
 from truepose.reporting.figures._style import COLOUR_SCALE, drawn_poses, finish, thinning_note
 from truepose.reporting.study import Study
 
@@ -53,7 +52,7 @@ def caption(study: Study) -> str:
     return text + thinning_note(drawn, len(places.points))
 
 
-def figure(study: Study) -> go.Figure:
+def figure(study: Study) -> Plot:
     """A map for all sources together, one for each source, one for what compensation leaves."""
     places = places_of(study.poses, study.machine.commanded, study.units)
     maps, unit = _maps(study, places), study.units.small_length
@@ -61,11 +60,11 @@ def figure(study: Study) -> go.Figure:
     spatial = len(places.axes) == 3
     columns = min(PER_ROW, len(maps))
     rows = -(-len(maps) // columns)
-    figure = make_subplots(
+    figure = grid(
         rows=rows,
         cols=columns,
-        subplot_titles=[map_.title for map_ in maps],
-        specs=[[{"type": "scene" if spatial else "xy"}] * columns] * rows,
+        titles=[map_.title for map_ in maps],
+        spatial=spatial,
         horizontal_spacing=0.03 if spatial else 0.09,
         vertical_spacing=0.08 if spatial else 0.3 / rows,
     )

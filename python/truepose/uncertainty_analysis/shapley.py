@@ -116,7 +116,7 @@ class Walks:
         self, evaluate: Evaluate, slopes: Floats, *, confidence: float, floor: Floats
     ) -> ShapleyShares:
         """Shapley shares of every cause; see the function of this name."""
-        sums = Sums(self._seed, slopes.shape[1])
+        sums = Sums()
         failed = points = 0
         for part in self._parts():
             values, flags = evaluate(part.variables)
@@ -131,16 +131,17 @@ class Walks:
             taken = _taken(on_the_way) - _taken(linear)
             by_cause = np.empty_like(taken)
             np.put_along_axis(by_cause, part.order[:, :, np.newaxis], taken, axis=1)
-            sums.add(by_cause[good])
+            rows = by_cause[good]
+            sums.add(rows.swapaxes(1, 2), rows.sum(axis=1, keepdims=True))
         linear_parts = self._linear.parts(slopes)
         # The components of a direction are not correlated, so that their linear parts add up.
-        shares = sums.means() + np.stack(
-            [linear_parts[members].sum(axis=0) for members in self._causes]
-        )
+        exact = np.stack([linear_parts[members].sum(axis=0) for members in self._causes])
         # Of its own sum, so that the shares add up to one.
-        variance = shares.sum(axis=1)
-        defined = (np.sqrt(np.maximum(variance[0], 0.0)) > floor) & (sums.count >= LEAST)
-        return ShapleyShares(estimate(shares, variance, defined, confidence), failed, points)
+        variance = (sums.means + exact).sum(axis=0)
+        defined = (np.sqrt(np.maximum(variance, 0.0)) > floor) & (sums.count >= LEAST)
+        of_variance = np.ones((1, variance.size))
+        of_all = estimate(sums, exact, variance, of_variance, defined, confidence)
+        return ShapleyShares(of_all, failed, points)
 
     @cached_property
     def _linear(self) -> LinearShares:

@@ -141,7 +141,7 @@ def shares(
     `samples` base samples are drawn, plain random (Philox), from `seed` and the variable alone: the
     same for all poses, whatever else acts. Each needs 2 + (variables) + (sources) exact errors,
     more where variables are correlated. `confidence` is the probability of the intervals whose half
-    widths stand beside the indices (bootstrap over base samples). A base sample at one point of
+    widths stand beside the indices (jackknife over base samples). A base sample at one point of
     which the machine does not close is left out as a whole and counted in `failed`; a pose with too
     few others is left out as `band`. Ctrl-C gives
     the poses done so far, if any, with the attribute `interrupted` at 1.

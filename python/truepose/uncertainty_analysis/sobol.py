@@ -16,28 +16,26 @@ From every estimate the same estimate of a linear function of the coordinates is
 same points, and the exact value put in its place (control variate): a model that is nearly linear
 has its indices to several digits from a thousand points, and a linear one exactly.
 
-Half widths come from the Poisson bootstrap over base samples: every sample is counted a random
-number of times, of mean one, a hundred times over. It needs sums only, so that memory does not
-grow with the number of samples.
+Half widths come from the infinitesimal jackknife over base samples (Efron 1982, chapter 6): the
+variance of an index is that of what each sample moves it by, to first order. It is what a bootstrap
+has in the mean, without the noise of one, and needs sums only, so that memory does not grow with
+the number of samples.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from statistics import NormalDist
+from functools import cache, cached_property
 
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
-from truepose.uncertainty_analysis.random_points import Drawing, generator
+from truepose.probability.quantiles import student_quantile
+from truepose.uncertainty_analysis.random_points import Drawing
 
 Evaluate = Callable[[Floats], tuple[Floats, Flags]]
 """Values (s, m) of the model's outputs at variables t (s, n_variable), and which are good (s,)."""
-
-REPLICATES = 100
-"""Times that the bootstrap counts the samples anew."""
 
 STACK = 1 << 16
 """Most points that are evaluated, and kept, at a time."""
@@ -48,7 +46,7 @@ LEAST = 8
 RANK = 1e-9
 """Relative eigenvalue below which a correlation matrix is singular."""
 
-BASE, OTHER, WALK_BASE, WALK_OTHER, ORDER, COUNTS = range(6)
+BASE, OTHER, WALK_BASE, WALK_OTHER, ORDER = range(5)
 """What random numbers are for."""
 
 
@@ -106,8 +104,7 @@ def indices(
 class SobolDesign:
     """The points at which `indices` evaluates a model: the same for every model of the variables.
 
-    Where they are few enough to be evaluated together, they are made once, as are the numbers by
-    which the bootstrap counts them.
+    Where they are few enough to be evaluated together, they are made once.
     """
 
     def __init__(self, drawing: Drawing, sets: Sequence[Indices], samples: int, seed: int) -> None:
@@ -149,9 +146,11 @@ class SobolDesign:
                     np.concatenate([part.start[every], part.end[every]]) @ effects,
                 )
                 slopes = effects * fit
-                sums = Sums(self._seed, slopes.shape[1], self._counts)
-            rows = self._rows(part, values, centre, slopes)
-            sums.add(rows if whole else rows[every])
+            moments, rows = self._rows(part, values, centre, slopes)
+            if not whole:
+                moments, rows = moments[every], rows[every]
+            sums = Sums() if sums is None else sums
+            sums.add(rows, moments)
         assert sums is not None
         return self._estimates(sums, slopes, failed, points, confidence, floor)
 
@@ -164,28 +163,29 @@ class SobolDesign:
         confidence: float,
         floor: Floats,
     ) -> SobolIndices:
-        means = sums.means()
         covariance = self._drawing.covariance
         linear_variance = ((covariance @ slopes) * slopes).sum(axis=0)
-        # Weighted means of the rows, with what is exact of the linear function put back.
-        variance = (
-            means[:, 0] - means[:, 1] ** 2 - (means[:, 2] - means[:, 3] ** 2) + linear_variance
-        )
+        # What is exact of the linear function is put back.
+        moments = sums.moments
+        variance = moments[0] - moments[1] ** 2 - (moments[2] - moments[3] ** 2) + linear_variance
+        one = np.ones_like(variance)
+        of_variance = np.stack([one, -2.0 * moments[1], -one, 2.0 * moments[3]])
         count = len(self._swaps)
         exact = np.empty((2, count, slopes.shape[1]))
         exact[:, self._alone] = slopes[self._variable] ** 2
         for at, swap in self._others:
             exact[0, at] = swap.first(slopes, covariance)
             exact[1, at] = swap.total(slopes, covariance)
-        firsts = means[:, 4 : 4 + count] + exact[0]
-        totals = means[:, 4 + count :] + exact[1]
         some = sums.count >= LEAST
-        spread = np.sqrt(np.maximum(variance[0], 0.0))
+        spread = np.sqrt(np.maximum(variance, 0.0))
         defined = (spread > floor) & some
+        both = estimate(
+            sums, exact.reshape(2 * count, -1), variance, of_variance, defined, confidence
+        )
         return SobolIndices(
-            estimate(firsts, variance, defined, confidence).of(self._first_at),
-            estimate(totals, variance, defined, confidence).of(self._total_at),
-            np.where(some, np.where(spread > floor, variance[0], 0.0), np.nan),
+            both.of(self._first_at),
+            both.of([count + at for at in self._total_at]),
+            np.where(some, np.where(spread > floor, variance, 0.0), np.nan),
             slopes,
             failed,
             points,
@@ -202,10 +202,6 @@ class SobolDesign:
         only, *_ = self._evaluated()
         return only
 
-    @cached_property
-    def _counts(self) -> Floats | None:
-        return None if self._only is None else counts(self._seed, self._samples)
-
     def _evaluated(self) -> Iterator[_Part]:
         drawing, swaps = self._drawing, self._swaps
         starts, ends = drawing.points(BASE), drawing.points(OTHER)
@@ -220,135 +216,146 @@ class SobolDesign:
             variables.flags.writeable = False
             yield _Part(variables, start, end)
 
-    def _rows(self, part: _Part, values: Floats, centre: Floats, slopes: Floats) -> Floats:
-        """(n, 4 + 2 k, m): moments of f and the linear g, then first and total of k swaps, f - g.
+    def _rows(
+        self, part: _Part, values: Floats, centre: Floats, slopes: Floats
+    ) -> tuple[Floats, Floats]:
+        """Moments (n, 4, m) of f and the linear g, and first and total (n, m, 2 k) of f less g.
 
         From f (n, 2 + k, m), less `centre` (m,), which does not change what is estimated.
         """
         base, other = values[:, 0] - centre, values[:, 1] - centre
         at_base, at_other = part.start @ slopes, part.end @ slopes
-        between = part.end - part.start
         step, of_linear, product, rows = self._room(len(base), base.shape[1])
-        np.subtract(values[:, 2:], values[:, :1], out=step)
+        np.subtract(values[:, 2:].swapaxes(1, 2), values[:, 0, :, np.newaxis], out=step)
+        between, alone = part.between[:, np.newaxis], slopes.T[:, self._variable]
         if not self._others:
-            np.multiply(between[:, self._variable, np.newaxis], slopes[self._variable], of_linear)
+            np.multiply(between[:, :, self._variable], alone, out=of_linear)
         else:
-            of_linear[:, self._alone] = (
-                between[:, self._variable, np.newaxis] * slopes[self._variable]
-            )
+            of_linear[:, :, self._alone] = between[:, :, self._variable] * alone
         for at, swap in self._others:
-            of_linear[:, at] = between @ swap.moved(slopes)
+            of_linear[:, :, at] = part.between @ swap.moved(slopes)
         count = len(self._swaps)
-        rows[:, 0] = 0.5 * (base**2 + other**2)
-        rows[:, 1] = 0.5 * (base + other)
-        rows[:, 2] = 0.5 * (at_base**2 + at_other**2)
-        rows[:, 3] = 0.5 * (at_base + at_other)
-        first, total = rows[:, 4 : 4 + count], rows[:, 4 + count :]
-        np.multiply(other[:, np.newaxis], step, out=first)
-        np.multiply(at_other[:, np.newaxis], of_linear, out=product)
+        moments = np.stack(
+            [
+                0.5 * (base**2 + other**2),
+                0.5 * (base + other),
+                0.5 * (at_base**2 + at_other**2),
+                0.5 * (at_base + at_other),
+            ],
+            axis=1,
+        )
+        first, total = rows[:, :, :count], rows[:, :, count:]
+        np.multiply(other[:, :, np.newaxis], step, out=first)
+        np.multiply(at_other[:, :, np.newaxis], of_linear, out=product)
         first -= product
         # step^2 - of_linear^2, halved
         np.subtract(step, of_linear, out=product)
         step += of_linear
         step *= 0.5
         np.multiply(product, step, out=total)
-        return rows
+        return moments, rows
 
     def _room(self, count: int, n_output: int) -> tuple[Floats, Floats, Floats, Floats]:
-        """Three arrays (n, k, m) and the rows (n, 4 + 2 k, m), the same from model to model."""
+        """Three arrays (n, m, k) and the rows (n, m, 2 k), the same from model to model."""
         swaps = len(self._swaps)
-        if self._arrays is None or self._arrays[0].shape != (count, swaps, n_output):
-            step, of_linear, product = np.empty((3, count, swaps, n_output))
-            rows = np.empty((count, 4 + 2 * swaps, n_output))
+        if self._arrays is None or self._arrays[0].shape != (count, n_output, swaps):
+            step, of_linear, product = np.empty((3, count, n_output, swaps))
+            rows = np.empty((count, n_output, 2 * swaps))
             self._arrays = step, of_linear, product, rows
         return self._arrays
 
 
-def estimate(parts: Floats, variance: Floats, defined: Flags, confidence: float) -> Estimate:
-    """Shares from `parts` (1 + REPLICATES, k, m) of `variance` (1 + REPLICATES, m).
-
-    The first row is the estimate, the others are those of the bootstrap. NaN where not `defined`
-    (m,).
-    """
-    usable = defined & (variance > 0.0)
-    if usable.all():
-        shares = parts / variance[:, np.newaxis]
-        spread = shares[1:].std(axis=0, ddof=1)
-        return Estimate(shares[0], _width(confidence) * spread)
-    shares = np.divide(
-        parts,
-        variance[:, np.newaxis],
-        out=np.full_like(parts, np.nan),
-        where=usable[:, np.newaxis],
-    )
-    share = np.where(defined, shares[0], np.nan)
-    spread = np.full_like(share, np.nan)
-    if defined.any():
-        known = shares[1:][:, :, defined]
-        # A replicate without variance, from a handful of samples, says nothing.
-        spread[:, defined] = _deviation(known)
-    return Estimate(share, _width(confidence) * spread)
-
-
-def _width(confidence: float) -> float:
-    """Half of an interval that holds the share `confidence`, in standard deviations."""
-    return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
-
-
-def _deviation(values: Floats) -> Floats:
-    """(k, m) standard deviation of `values` (r, k, m) that are not NaN."""
-    good = ~np.isnan(values)
-    count = np.maximum(good.sum(axis=0), 1)
-    filled = np.where(good, values, 0.0)
-    mean = filled.sum(axis=0) / count
-    squares = np.where(good, filled - mean, 0.0) ** 2
-    deviation: Floats = np.sqrt(squares.sum(axis=0) / np.maximum(count - 1, 1))
-    return deviation
-
-
-def counts(seed: int, samples: int, numbers: np.random.Generator | None = None) -> Floats:
-    """(1 + REPLICATES, samples) how often each row counts: once, and in each of the bootstrap's."""
-    drawn = generator(seed, 0, COUNTS) if numbers is None else numbers
-    times = np.empty((1 + REPLICATES, samples))
-    times[0] = 1.0
-    times[1:] = drawn.poisson(1.0, (samples, REPLICATES)).T
-    return times
-
-
 class Sums:
-    """Means over rows, as they are and as the bootstrap counts them.
+    """Means of rows (n, m, k), k statistics of m outputs, and how sure these are.
 
-    Rows are (n, k, m): k statistics of m outputs. `known`: the counts of as many rows as are added
-    at most, all at once, where these are known.
+    Beside them go some moments (n, j, m) of the same samples, on which their whole depends.
     """
 
-    def __init__(self, seed: int, n_output: int, known: Floats | None = None) -> None:
-        self._seed, self._known = seed, known
-        self._counts = generator(seed, 0, COUNTS)
-        self._total: Floats | None = None
-        self._weight = np.zeros(1 + REPLICATES)
-        self._n_output = n_output
+    def __init__(self) -> None:
+        # Of 1 and the moments (m, 1 + j): products with each other, and with the rows; the rows'
+        # squares (m, k).
+        self._sums: tuple[Floats, Floats, Floats] | None = None
 
-    def add(self, rows: Floats) -> None:
-        """More rows (n, k, m)."""
-        if self._known is None:
-            times = counts(self._seed, len(rows), self._counts)
-        else:
-            times = self._known[:, : len(rows)]
-        sums = times @ rows.reshape(len(rows), rows.shape[1] * rows.shape[2])
-        self._total = sums if self._total is None else self._total + sums
-        self._weight += times.sum(axis=1)
+    def add(self, rows: Floats, moments: Floats) -> None:
+        """More rows (n, m, k), and moments (n, j, m) of the same samples."""
+        n, m, k = rows.shape
+        beside = np.ones((m, 1 + moments.shape[1], n))
+        beside[:, 1:] = moments.transpose(2, 1, 0)
+        flat = rows.reshape(n, m * k)
+        sums = (
+            beside @ beside.swapaxes(1, 2),
+            beside @ rows.swapaxes(0, 1),
+            np.einsum("ij,ij->j", flat, flat).reshape(m, k),
+        )
+        if self._sums is not None:
+            own, products, squares = self._sums
+            sums = (own + sums[0], products + sums[1], squares + sums[2])
+        self._sums = sums
 
     @property
     def count(self) -> int:
         """Rows added."""
-        return int(self._weight[0])
+        return int(self._of_all[0][0, 0, 0])
 
+    @property
+    def moments(self) -> Floats:
+        """(j, m) means."""
+        means: Floats = self._of_all[0][:, 0, 1:].T / max(self.count, 1)
+        return means
+
+    @property
     def means(self) -> Floats:
-        """(1 + REPLICATES, k, m): of all rows, then of each counting."""
-        assert self._total is not None
-        mean = self._total / np.maximum(self._weight, 1.0)[:, np.newaxis]
-        return mean.reshape(len(mean), -1, self._n_output)
+        """(k, m) of the rows."""
+        means: Floats = self._of_all[1][:, 0].T / max(self.count, 1)
+        return means
+
+    def deviation(self, share: Floats, slopes: Floats) -> Floats:
+        """(k, m) standard uncertainty of the means less `share` (k, m) of a whole.
+
+        `slopes` (j, m): how the whole changes with the mean of each moment.
+        """
+        own, products, squares = self._of_all
+        count = max(self.count, 2)
+        mean, between = products[:, 0] / count, own[:, 0, 1:] / count
+        among = own[:, 1:, 1:] / count - between[:, :, np.newaxis] * between[:, np.newaxis]
+        with_rows = products[:, 1:] / count - between[:, :, np.newaxis] * mean[:, np.newaxis]
+        along = slopes.T[:, np.newaxis]
+        of_whole = (along @ among @ along.swapaxes(1, 2))[:, :, 0]
+        with_whole = (along @ with_rows)[:, 0]
+        of_each = squares / count - mean**2
+        squared = of_each + share.T * (share.T * of_whole - 2.0 * with_whole)
+        deviation: Floats = np.sqrt(np.maximum(squared, 0.0) / (count - 1)).T
+        return deviation
+
+    @property
+    def _of_all(self) -> tuple[Floats, Floats, Floats]:
+        assert self._sums is not None
+        return self._sums
+
+
+def estimate(
+    sums: Sums,
+    exact: Floats,
+    variance: Floats,
+    of_variance: Floats,
+    defined: Flags,
+    confidence: float,
+) -> Estimate:
+    """Shares of `variance` (m,): the means of the sums and what is `exact` (k, m) beside them.
+
+    `of_variance` (j, m): how it changes with each of the moments. NaN where not `defined` (m,).
+    """
+    whole = np.where(defined, variance, np.nan)
+    share = (sums.means + exact) / whole
+    return Estimate(
+        share, _width(confidence, sums.count) * sums.deviation(share, of_variance) / whole
+    )
+
+
+@cache
+def _width(confidence: float, samples: int) -> float:
+    """Half of an interval that holds the share `confidence`, in deviations known from samples."""
+    return float(student_quantile(0.5 + 0.5 * confidence, max(samples - 1, 1)))
 
 
 @dataclass(frozen=True)
@@ -442,6 +449,11 @@ class _Part:
     variables: Floats
     start: Floats
     end: Floats
+
+    @cached_property
+    def between(self) -> Floats:
+        """(n, n_variable) B less A."""
+        return self.end - self.start
 
 
 def parts(samples: int, points: int) -> Iterable[int]:

@@ -22,6 +22,7 @@ from truepose.runs.dataset import (
     Variable,
     component_units,
     label,
+    labelled_dataset,
     provenance,
     quantity_coords,
     units_of,
@@ -150,7 +151,7 @@ def dataset_of(calibration: Calibration) -> xr.Dataset:
         )
         for name, variable in SCHEMA.items()
     }
-    return xr.Dataset(data, coords, _attrs(calibration))
+    return labelled_dataset(data, coords, _attrs(calibration))
 
 
 def verdict_of(calibration: Calibration) -> str:

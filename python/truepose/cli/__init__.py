@@ -6,6 +6,7 @@ click and the thin command files, never numpy, the kernel or the report.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -36,6 +37,9 @@ COMMANDS: dict[str, str] = {
     "export": "truepose.cli.export",
 }
 """Command name -> module that holds it, in the order of `truepose --help`."""
+
+FEW_COLLECTIONS = 100_000
+"""New containers after which Python looks for cycles among them: imports make many, and none."""
 
 
 def _print_version(context: click.Context, _: click.Parameter, asked: bool) -> None:
@@ -94,6 +98,7 @@ def main() -> None:
         sys.stderr = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115
     if sys.stdout is None:
         sys.exit(refused_output("a standard output that is closed"))
+    gc.set_threshold(FEW_COLLECTIONS)
     for stream in (sys.stdout, sys.stderr):
         # A terminal that has no µ shows a question mark, not a traceback.
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]

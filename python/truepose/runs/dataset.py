@@ -127,8 +127,6 @@ def assemble(
     coords: Mapping[str, xr.Variable] | None = None,
 ) -> xr.Dataset:
     """The Dataset of `schema`: `rows` over poses, `over_all` what has no pose, more `coords`."""
-    import xarray as xr
-
     values, units = {**rows.arrays, **(over_all or {})}, _units(machine)
     data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
@@ -139,15 +137,13 @@ def assemble(
     }
     attrs = provenance(machine, condition)
     attrs |= {"poses_used": rows.count, "poses_left_out": len(poses) - rows.count}
-    return xr.Dataset(data, labels, attrs)
+    return labelled_dataset(data, labels, attrs)
 
 
 def region_dataset(
     machine: Machine, condition: Condition, schema: Schema, values: Mapping[str, Any]
 ) -> xr.Dataset:
     """The Dataset of a result over a continuous region, which has no dim pose."""
-    import xarray as xr
-
     units = _units(machine)
     data = {name: data_variable(variable, values[name], units) for name, variable in schema.items()}
     labels = {
@@ -157,7 +153,32 @@ def region_dataset(
         "commanded_units": label("commanded", commanded_units(machine), "unit of the freedom"),
         **quantity_coords(machine),
     }
-    return xr.Dataset(data, labels, provenance(machine, condition))
+    return labelled_dataset(data, labels, provenance(machine, condition))
+
+
+def labelled_dataset(
+    data: Mapping[str, xr.Variable],
+    labels: Mapping[str, xr.Variable],
+    attrs: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """The Dataset of variables and coordinates.
+
+    The index of each dim is made here: where xarray makes it, it first imports pint and all that
+    pint needs, to see whether labels are quantities.
+    """
+    import pandas as pd
+    import xarray as xr
+    from xarray.indexes import PandasIndex
+
+    indexes = {}
+    variables = dict(labels)
+    for name, variable in labels.items():
+        if variable.dims == (name,):
+            # As xarray does it: objects are kept as they are.
+            values = pd.Index(variable.values, dtype=object if variable.dtype == object else None)
+            indexes[name] = PandasIndex(values, name, coord_dtype=variable.dtype)
+            variables |= indexes[name].create_variables({name: variable})
+    return xr.Dataset(data, xr.Coordinates(variables, indexes), attrs)
 
 
 def label(dim: str, values: Any, long_name: str, units: str = "1") -> xr.Variable:

@@ -46,6 +46,7 @@ from truepose.runs.dataset import (
     data_variable,
     joint_units,
     label,
+    labelled_dataset,
     provenance,
     quantity_coords,
 )
@@ -426,8 +427,6 @@ def _dataset(plan: Plan) -> xr.Dataset:
         "sought": list(unknowns.units),
     }
 
-    import xarray as xr
-
     def variable(dims: tuple[str, ...], values: ArrayLike, unit: str, meaning: str) -> xr.Variable:
         return data_variable(Variable(dims, unit, meaning), values, units)
 
@@ -475,4 +474,4 @@ def _dataset(plan: Plan) -> xr.Dataset:
         "without_place_of_machine": int(plan.relative),
         "seed": str(plan.seed),
     }
-    return xr.Dataset(data, labels, attrs)
+    return labelled_dataset(data, labels, attrs)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from truepose.runs.dataset import Schema, data_variable, label
+from truepose.runs.dataset import Schema, data_variable, label, labelled_dataset
 from truepose.version import version
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ def function_dataset(
 
     A variable of `schema` that has a dim pose has it not here.
     """
-    import xarray as xr
-
     # One text for all outputs: no coordinate has the unit of each.
     of_outputs = [", ".join(dict.fromkeys(model.output_units))]
     units = dict.fromkeys(("component", "covariance"), of_outputs)
@@ -63,4 +61,4 @@ def function_dataset(
         ),
         "seed": "none",
     }
-    return xr.Dataset(data, {**labels, **(coords or {})}, attrs)
+    return labelled_dataset(data, {**labels, **(coords or {})}, attrs)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from truepose.cli._ending import INTERRUPTED
 from truepose.cli._options import (
     OutputFile,
     Request,
@@ -124,7 +125,7 @@ def command(
 
     Takes those poses of the workspace, in reach and away from singularities, that leave the
     calibrated machine's tool known best, and says what each further pose buys. Tolerances count as
-    what is known before.
+    what is known before. Ctrl-C gives the best plan found by then (exit code 130).
     """
     from truepose.calibration.planning.comparison import compare_instruments
     from truepose.calibration.planning.plan import plan
@@ -144,7 +145,7 @@ def command(
     seconds, speed = _seconds(machine, dwell), _speed(machine, feed)
     chosen = _instruments(machine, instruments)
     compared = [_instruments(machine, (other,)) for other in others]
-    with progress("plan", "starts") as report:
+    with progress("plan", "starts", first="a greedy search") as report:
         planned = plan(
             machine,
             chosen,
@@ -155,6 +156,9 @@ def command(
             seed=seed,
             progress=report,
         )
+    if planned.interrupted:
+        click.echo(planning.interrupted(planned), err=True)
+        compared = []
     beside = []
     if program is not None:
         moves = program_text(
@@ -183,7 +187,7 @@ def command(
     for sentence in sentences:
         # Beside data for programs a sentence goes where people look.
         click.echo(sentence, err=request.format != "table")
-    return 0
+    return INTERRUPTED if planned.interrupted else 0
 
 
 def _instruments(machine: Machine, texts: tuple[str, ...]) -> tuple[Instrument, ...]:

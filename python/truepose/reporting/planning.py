@@ -101,6 +101,12 @@ def poses(plan: Plan) -> Table:
     )
 
 
+def interrupted(plan: Plan) -> str:
+    """What Ctrl-C left of the search."""
+    starts = counted(plan.searches, "start")
+    return f"Interrupted after {starts}: the plan is the best of what these came to."
+
+
 def sentences(plan: Plan) -> Iterator[str]:
     """What the plan comes to."""
     name, unit = _quantities(plan)[0]

@@ -197,7 +197,8 @@ def monte_carlo(
     `samples` at each pose; by default as many as JCGM 101:2008, 7.9 takes until so many significant
     `digits` of the standard deviation are stable. Intervals hold the share `probability` of the
     samples. `sampling` "sobol": scrambled Sobol points instead of random ones (`samples` a power of
-    two; needs scipy). `progress` is called with (samples done over all poses, samples in all or 0).
+    two; needs scipy). `progress` is called with (samples done over all poses, samples expected in
+    all or 0 while that is not known).
     Ctrl-C, once there are samples, gives the result so far (attribute `interrupted`). The Dataset,
     SI, is described in docs/results.md.
 
@@ -241,15 +242,25 @@ def _required_sampling(sampling: str, samples: int | None) -> str:
 
 
 class _Account:
-    """Samples done over all poses, for whoever looks on."""
+    """Samples done over all poses, and expected, for whoever looks on."""
 
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self._progress, self._total, self._done = progress, total, 0
+    def __init__(self, progress: Progress | None, n_pose: int) -> None:
+        self._progress, self._done = progress, 0
+        self._left, self._finished, self._each = n_pose, 0, 0
 
-    def add(self, samples: int) -> None:
+    def add(self, samples: int, each: int) -> None:
+        """Samples done; `each`: expected at a pose, 0 where that is not known."""
         self._done += samples
+        # Other poses are expected to need as many as the last.
+        self._each = each or self._each
         if self._progress is not None:
-            self._progress(self._done, self._total)
+            total = self._finished + self._each * self._left if self._each else 0
+            self._progress(self._done, max(total, self._done) if total else 0)
+
+    def finish(self, n_pose: int) -> None:
+        """So many poses have enough."""
+        self._left -= n_pose
+        self._finished = self._done
 
 
 def _of_machine(
@@ -263,7 +274,7 @@ def _of_machine(
     axes = [name for name in machine.components if name in POSITIONS]
     schema = {**SCHEMA, **MACHINE, **(ELLIPSE if axes else {})}
     rows = run.begin(schema, level=LEVELS.size, axis=len(axes), other_axis=len(axes))
-    account = _Account(progress, len(run.poses) * (asked.samples or 0))
+    account = _Account(progress, len(run.poses))
     interrupted = False
     for block, every in run.with_variables():
         draws = asked.draws(every)
@@ -273,6 +284,7 @@ def _of_machine(
         for number in _worst_first(machine, block, every):
             sampler = _MachineSampler(machine, *listed[number])
             drawn = sampler.run(draws, asked.stop, account.add)
+            account.finish(sampler.n_pose)
             interrupted = drawn.interrupted
             if drawn.tallies is not None:
                 values = sampler.values(drawn.tallies, asked.probability)
@@ -500,7 +512,7 @@ def _of_function(model: FunctionModel, asked: _Options, progress: Progress | Non
     sampler = _FunctionSampler(model)
     draws = asked.draws(model)
     sampler.prepare(draws)
-    drawn = sampler.run(draws, asked.stop, _Account(progress, asked.samples or 0).add)
+    drawn = sampler.run(draws, asked.stop, _Account(progress, 1).add)
     if drawn.tallies is None or drawn.tallies.count[0] < 2:
         if drawn.interrupted:
             raise KeyboardInterrupt

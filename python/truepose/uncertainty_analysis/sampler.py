@@ -207,9 +207,13 @@ class Sampler(ABC):
         """Columns whose figures are to be stable."""
 
     def run(
-        self, draws: Draws, enough: StoppingRule, account: Callable[[int], None]
+        self, draws: Draws, enough: StoppingRule, account: Callable[[int, int], None]
     ) -> DrawnSamples:
-        """Draws until there are enough."""
+        """Draws until there are enough.
+
+        `account` is called with the samples done over all poses, and with how many are expected at
+        each pose, 0 where that is not known.
+        """
         whole: Tallies | None = None
         done = 0
         try:
@@ -226,7 +230,7 @@ class Sampler(ABC):
                 else:
                     whole.merge(batch)
                 done += count
-                account(count * self.n_pose)
+                account(count * self.n_pose, enough.expected(done))
         except KeyboardInterrupt:
             return DrawnSamples(whole, True)
         return DrawnSamples(whole, False)

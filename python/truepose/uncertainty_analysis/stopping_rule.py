@@ -33,6 +33,10 @@ class StoppingRule(ABC):
     def next(self, done: int, n_pose: int) -> int:
         """Samples to draw next at every pose; 0: there are enough."""
 
+    @abstractmethod
+    def expected(self, done: int) -> int:
+        """Samples that there will be at every pose, as it looks after those `done`; 0: unknown."""
+
 
 @dataclass(frozen=True)
 class FixedNumber(StoppingRule):
@@ -44,6 +48,10 @@ class FixedNumber(StoppingRule):
         """As many as are looked at together, at most what is left."""
         together = max(1, SLICE // (n_pose * BATCH)) * BATCH
         return min(together, self.samples - done)
+
+    def expected(self, done: int) -> int:
+        """As many as asked for."""
+        return self.samples
 
 
 class Adaptive(StoppingRule):
@@ -66,6 +74,15 @@ class Adaptive(StoppingRule):
         """A batch, or 0."""
         return 0 if done >= MOST or self._stable() else self.batch
 
+    def expected(self, done: int) -> int:
+        """As many as make the least stable figure so, whose mean spreads by 1 / sqrt(batches)."""
+        count = len(self._figures)
+        unstable = self._unstable() if count > 1 else math.nan
+        if not math.isfinite(unstable):
+            return 0
+        batches = max(count, math.ceil(count * unstable**2))
+        return min(batches * self.batch, max(MOST, done))
+
     def update(self, batch: Tallies, columns: slice) -> None:
         """The figures of one batch."""
         m = np.asarray(batch.covariance).shape[1]
@@ -75,9 +92,11 @@ class Adaptive(StoppingRule):
         self._figures.append(np.stack([*figures, ends[..., 0], ends[..., 1]]))
 
     def _stable(self) -> bool:
+        return len(self._figures) >= 2 and self._unstable() < 1.0
+
+    def _unstable(self) -> float:
+        """Twice the deviation of a figure's mean over what is allowed, of that where it is most."""
         count = len(self._figures)
-        if count < 2:
-            return False
         figures = np.stack(self._figures)
         deviation = figures.std(axis=0, ddof=1) / np.sqrt(count)
         spread = figures[:, 1].mean(axis=0)
@@ -87,4 +106,5 @@ class Adaptive(StoppingRule):
         with np.errstate(divide="ignore", invalid="ignore"):
             last = np.floor(np.log10(spread)) - self._digits + 1.0
             tolerance = 0.5 * 10.0**last
-        return bool((2.0 * deviation < tolerance)[:, varying].all())
+        ratios = (2.0 * deviation)[:, varying] / tolerance[varying]
+        return float(ratios.max(initial=0.0))

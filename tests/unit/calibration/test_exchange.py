@@ -171,6 +171,30 @@ def test_the_same_seed_gives_the_same_design_and_progress_is_told() -> None:
     assert one.value == pytest.approx(one.reached.min(), rel=1e-12)
 
 
+def test_ctrl_c_gives_the_best_of_the_starts_done() -> None:
+    candidates = problem(4, count=60)
+    whole = best(candidates, 10, seed=3)
+
+    def stop(done: int, _: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    found = best(candidates, 10, seed=3, progress=stop)
+    assert found.interrupted
+    assert not whole.interrupted
+    assert found.reached.tolist() == whole.reached[:2].tolist()
+    assert found.value == pytest.approx(found.reached.min(), rel=1e-12)
+
+
+def test_ctrl_c_before_there_is_a_plan_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(exchange, "_exchange", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        best(problem(4), 3)
+
+
 @pytest.mark.parametrize(
     ("blocks", "tool", "prior", "said"),
     [

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -55,6 +56,30 @@ def test_the_tables_say_what_every_pose_buys(capsys: pytest.CaptureFixture[str])
     last = f"{found.rms[-1, 0] * 1e6:.3g} µm rms"
     assert last in done.out
     assert "stay known mainly from their tolerances" in done.out
+
+
+def test_ctrl_c_gives_the_best_plan_so_far(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def stop(done: int, total: int) -> None:
+        assert total == 5
+        if done == 2:
+            raise KeyboardInterrupt
+
+    def stopped(*given: Any, **asked: Any) -> Any:
+        return plan(*given, **{**asked, "progress": stop})
+
+    monkeypatch.setattr("truepose.calibration.planning.plan.plan", stopped)
+    output, program = tmp_path / "plan.json", tmp_path / "poses.ngc"
+    outcome = call(capsys, *ASKED, "--compare", "distance=2um", "-o", output, "--program", program)
+    assert outcome.code == 130
+    assert "Interrupted after 2 starts: the plan is the best" in outcome.err
+    assert json.loads(output.read_text("utf-8"))["attributes"]["interrupted"] == 1
+    assert "pose 5 of 5" in program.read_text("utf-8")
+    monkeypatch.undo()
+    done = call(capsys, *ASKED, "--format", "json")
+    assert done.code == 0
+    assert json.loads(done.out)["attributes"]["interrupted"] == 0
 
 
 def test_json_csv_and_netcdf_have_the_plan(

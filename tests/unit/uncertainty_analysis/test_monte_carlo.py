@@ -231,6 +231,21 @@ def test_progress_is_told() -> None:
     tp.monte_carlo(machine, poses, progress=lambda *each: seen.append(each))
     assert seen[0] == (30_000, 0)
     assert [done for done, _ in seen] == [30_000 * (at + 1) for at in range(len(seen))]
+    # How many it takes is estimated from the second batch on, and known at the end.
+    assert all(total >= done for done, total in seen[1:])
+    assert seen[-1][0] == seen[-1][1]
+
+
+def test_what_is_expected_is_about_what_it_takes() -> None:
+    machine = load("hexapod")
+    seen: list[tuple[int, int]] = []
+    poses = machine.poses()[:3]
+    found = tp.monte_carlo(machine, poses, digits=2, progress=lambda *each: seen.append(each))
+    taken = int(found.samples.sum())
+    assert len(seen) > 8
+    assert seen[-1] == (taken, taken)
+    half = next(total for done, total in seen if done >= 0.5 * taken)
+    assert 0.5 * taken < half < 2.0 * taken
 
 
 def test_as_many_as_are_needed() -> None:

@@ -69,12 +69,14 @@ class Design:
 
     `chosen` (count,): their numbers; each in its turn is the one that betters the criterion most
     after those before it. `value`: the criterion, a mean variance for "tool", log det M for
-    "determinant". `reached` (1 + starts,): the value from each start, the greedy one first.
+    "determinant". `reached` (n,): the value from each start, the greedy one first; all 1 + starts,
+    or those that were done when Ctrl-C ended the search (`interrupted`).
     """
 
     chosen: Indices
     value: float
     reached: Floats
+    interrupted: bool
 
 
 class Candidates:
@@ -164,7 +166,8 @@ def best(
     `repeats`: whether a candidate may be taken more than once; default: only where there are fewer
     than `count`. `excursions`: without them a plan takes a fraction of the time, and is a little
     worse. `progress(starts done, starts)`. The search ends in a set in which no single exchange
-    helps; several starts make it likely, not certain, that it is the best of all.
+    helps; several starts make it likely, not certain, that it is the best of all. Ctrl-C, once
+    there is one, gives the best so far.
 
     Raises `ValueError` for a criterion that is none, a count below one, or more than there are
     candidates where none may be repeated.
@@ -178,21 +181,27 @@ def best(
         raise ValueError(f"{count} of {candidates.count} candidates were asked for")
     generator = np.random.default_rng(seed)
     attempts: list[tuple[float, list[int]]] = []
-    for start in range(1 + starts):
-        if start == 0:
-            state = _greedy(candidates, criterion, count, again)
-        else:
-            drawn = generator.choice(candidates.count, count, replace=again)
-            state = ExchangeState(candidates, criterion, drawn.tolist())
-        _exchange(state, criterion, again)
-        if excursions:
-            state = _excursions(state, criterion, again)
-        attempts.append((state.loss(), state.chosen))
-        if progress is not None:
-            progress(start + 1, 1 + starts)
+    interrupted = False
+    try:
+        for start in range(1 + starts):
+            if start == 0:
+                state = _greedy(candidates, criterion, count, again)
+            else:
+                drawn = generator.choice(candidates.count, count, replace=again)
+                state = ExchangeState(candidates, criterion, drawn.tolist())
+            _exchange(state, criterion, again)
+            if excursions:
+                state = _excursions(state, criterion, again)
+            attempts.append((state.loss(), state.chosen))
+            if progress is not None:
+                progress(start + 1, 1 + starts)
+    except KeyboardInterrupt:
+        if not attempts:
+            raise
+        interrupted = True
     chosen = ordered(candidates, min(attempts, key=lambda attempt: attempt[0])[1], criterion)
     reached = np.array([candidates.value(selection, criterion) for _, selection in attempts])
-    return Design(chosen, candidates.value(chosen, criterion), reached)
+    return Design(chosen, candidates.value(chosen, criterion), reached, interrupted)
 
 
 def ordered(candidates: Candidates, chosen: ArrayLike, criterion: Criterion = "tool") -> Indices:

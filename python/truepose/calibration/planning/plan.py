@@ -85,7 +85,8 @@ class Plan(Represented):
     `relative`: but for where the whole machine stands, which an instrument in an unknown frame
     cannot tell. `before`, `after` (n_unknown,): standard uncertainty of each unknown, inf where
     nothing is known. `value`: the criterion. `n_candidate`: poses there were to choose from;
-    `left_out`: poses that cannot be used or lie near a singularity.
+    `left_out`: poses that cannot be used or lie near a singularity. `searches`: from how many
+    starts it is the best; `interrupted`: Ctrl-C ended the search before there were more.
     """
 
     machine: Machine
@@ -106,6 +107,8 @@ class Plan(Represented):
     repeated: bool
     relative: bool
     seed: int
+    searches: int
+    interrupted: bool
 
     def _facts(self) -> Facts:
         yield "machine", self.machine
@@ -159,6 +162,7 @@ def plan(
     from; default those of the workspace. `condition`: in which is measured; default: reference
     temperature, nothing on the tool. `identify`: patterns of parameters and properties to find
     beside those with a tolerance. A pose is taken twice only where there are fewer than `budget`.
+    `progress(starts done, starts)`; Ctrl-C gives the best plan so far, once there is one.
 
     Raises `RequestError`: plan-budget, plan-option, plan-instrument, no-workspace, bad-poses,
     no-pose-left, and what `unknowns_of` raises.
@@ -207,6 +211,8 @@ def plan(
         count > len(field.placed),
         field.relative,
         seed,
+        len(design.reached),
+        design.interrupted,
     )
 
 
@@ -473,5 +479,6 @@ def _dataset(plan: Plan) -> xr.Dataset:
         "candidates_left_out": plan.left_out,
         "without_place_of_machine": int(plan.relative),
         "seed": str(plan.seed),
+        "interrupted": int(plan.interrupted),
     }
     return labelled_dataset(data, labels, attrs)

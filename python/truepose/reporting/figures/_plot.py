@@ -17,7 +17,7 @@ TITLE_SIZE = 16
 
 
 @dataclass(frozen=True)
-class Panel:
+class Subplot:
     """Part of a plot with axes of its own: `across` and `up` are its ends, shares of the whole.
 
     `number` counts from 1; `span` is how many columns of a grid it covers.
@@ -66,7 +66,7 @@ class Plot:
     """
 
     def __init__(
-        self, *traces: Keys, panels: Mapping[tuple[int, int], Panel] | None = None
+        self, *traces: Keys, panels: Mapping[tuple[int, int], Subplot] | None = None
     ) -> None:
         self.data: list[Keys] = list(traces)
         self.layout: Keys = {}
@@ -159,14 +159,14 @@ def grid(
     width = (1.0 - horizontal_spacing * (cols - 1)) / cols
     relative = row_heights or [1.0] * rows
     scale = (1.0 - vertical_spacing * (rows - 1)) / sum(relative)
-    panels: dict[tuple[int, int], Panel] = {}
+    panels: dict[tuple[int, int], Subplot] = {}
     for number, (row, col) in enumerate(sorted(spans), start=1):
         span = spans[row, col]
         left = (col - 1) * (width + horizontal_spacing)
         right = left + span * width + (span - 1) * horizontal_spacing
         low = scale * sum(relative[row:]) + (rows - row) * vertical_spacing
         high = low + scale * relative[row - 1]
-        panels[row, col] = Panel(
+        panels[row, col] = Subplot(
             number, (left, min(right, 1.0)), (low, min(high, 1.0)), span, spatial
         )
     plot = Plot(panels=panels)
@@ -186,7 +186,7 @@ def grid(
     return plot
 
 
-def _share(plot: Plot, axis: str, panels: Iterable[tuple[int, Panel]]) -> None:
+def _share(plot: Plot, axis: str, panels: Iterable[tuple[int, Subplot]]) -> None:
     """Axes go with the first of their group (a number), which alone has labels."""
     first: dict[int, str] = {}
     for group, panel in panels:
@@ -196,7 +196,7 @@ def _share(plot: Plot, axis: str, panels: Iterable[tuple[int, Panel]]) -> None:
             plot.layout[axis + panel.suffix] |= matched
 
 
-def _title(panel: Panel, text: str) -> Keys:
+def _title(panel: Subplot, text: str) -> Keys:
     """A text above the middle of a panel."""
     return {
         "text": text,

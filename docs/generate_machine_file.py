@@ -6,11 +6,10 @@ refuses files that are not what this writes.
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
-from truepose.machine.reference import json_schema, page
+from truepose.machine.reference import page, schema_text
 from truepose.sources import REGISTRY
 
 SOURCES = Path(__file__).parent / "sources"
@@ -32,10 +31,9 @@ def list_of_sources() -> str:
 
 def pages() -> dict[str, str]:
     """File name in docs/ -> its text."""
-    schema = json.dumps(json_schema(REGISTRY), indent=2, ensure_ascii=False) + "\n"
     return {
         "machine_file.md": page(REGISTRY),
-        "machine_file.schema.json": schema,
+        "machine_file.schema.json": schema_text(REGISTRY),
         "sources/README.md": list_of_sources(),
     }
 

@@ -141,6 +141,7 @@ CATALOGUE: dict[str, str] = {
     "output-ending": "the ending of the output file is not one that can be written",
     "output-is-input": "the output would write over a file that is read",
     "output-twice": "two outputs of one command are the same file",
+    "stdin-twice": "standard input is given for two files of one command",
     "output-exists": "a new file is wanted where there is one already",
     "machine-file-changed": "a machine file that is not the one that was read",
     "no-witness": "a witness is wanted where no machine exceeds the accuracy asked",

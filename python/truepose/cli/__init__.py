@@ -16,6 +16,7 @@ from types import FrameType
 
 import click
 
+from truepose.__main__ import COMPLETION
 from truepose.cli._ending import INTERRUPTED, ending, refused_output
 from truepose.cli._guard import GuardedGroup
 
@@ -35,6 +36,9 @@ COMMANDS: dict[str, str] = {
     "report": "truepose.cli.report",
     "gcode": "truepose.cli.gcode",
     "export": "truepose.cli.export",
+    "explain": "truepose.cli.explain",
+    "schema": "truepose.cli.schema",
+    "completion": "truepose.cli.completion",
 }
 """Command name -> module that holds it, in the order of `truepose --help`."""
 
@@ -77,6 +81,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """Run the command line on `arguments` (default: those of the process) -> exit code."""
     try:
         try:
+            if COMPLETION in os.environ:
+                from truepose.cli._shells import answer_shells
+
+                answer_shells()
             result = cli.main(args=arguments, prog_name="truepose", standalone_mode=False)
         except click.ClickException as problem:
             problem.show()

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from truepose.cli import _complete
 from truepose.cli._guard import JSON_ASKED
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -28,11 +33,34 @@ class Request:
     witness: Path | None = None
 
 
-class OutputFile(click.Path):
-    """A file, or a folder, that the command writes: the same as no other, and no input."""
+class FileName(click.Path):
+    """A file by its name. `endings`: what names most often end with, which a shell then offers."""
 
-    def __init__(self) -> None:
+    def __init__(self, *endings: str) -> None:
         super().__init__(path_type=Path)
+        self.endings = endings
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Folders, and files that end as these do."""
+        return _complete.files(incomplete, self.endings)
+
+
+class InputFile(FileName):
+    """A file that the command reads; "-" is standard input, for one file of a command."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """The path; of standard input what it is called. Raises `RequestError` (stdin-twice)."""
+        if value == "-":
+            from truepose.files.one_run import will_read_stdin
+
+            return will_read_stdin()
+        return Path(os.fsdecode(super().convert(value, param, ctx)))
+
+
+class OutputFile(FileName):
+    """A file, or a folder, that the command writes: the same as no other, and no input."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Path:
         """The path, once it is noted what it is asked for with."""
@@ -50,14 +78,13 @@ def _note_format(context: click.Context, _: click.Parameter, value: str) -> str:
     return value
 
 
-machine_argument = click.argument(
-    "machine_file", metavar="MACHINE.toml", type=click.Path(path_type=Path)
-)
+machine_argument = click.argument("machine_file", metavar="MACHINE.toml", type=InputFile(".toml"))
 set_option = click.option(
     "--set",
     "settings",
     metavar="KEY=VALUE",
     multiple=True,
+    shell_complete=_complete.settings,
     help="Try a change without editing the file, for example --set condition.temperature=28. "
     "May be repeated.",
 )
@@ -81,7 +108,7 @@ def output_option_of(endings: str) -> Callable[[Command], Command]:
         "-o",
         "output",
         metavar="FILE",
-        type=OutputFile(),
+        type=OutputFile(*re.findall(r"\.\w+", endings)),
         help=f"Also write the result to FILE; its ending chooses the form: {endings}.",
     )
 
@@ -103,7 +130,7 @@ witness_option = click.option(
     "--witness",
     "witness",
     metavar="FILE.toml",
-    type=OutputFile(),
+    type=OutputFile(".toml"),
     help="Where the accuracy asked is NOT met: write the machine that exceeds it, as a machine "
     "file at its pose.",
 )

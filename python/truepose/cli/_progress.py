@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from truepose.cli._verbose import step
+
 PATIENCE = 2.0
 """Seconds of work before a bar appears."""
 
@@ -25,6 +27,12 @@ def progress(
     A `total` below one is one that is not known yet. Before it comes a line that stays: how long
     all takes, where that is known, and what is done `first`, where that is said.
     """
+    with step(what), _bar(what, unit, first) as report:
+        yield report
+
+
+@contextmanager
+def _bar(what: str, unit: str, first: str) -> Iterator[Callable[[int, int], None] | None]:
     if not sys.stderr.isatty():
         yield None
         return
@@ -59,6 +67,12 @@ def progress(
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
     """Show that work goes on whose length nobody knows, where someone looks and it takes long."""
+    with step(what), _clock_running(what):
+        yield
+
+
+@contextmanager
+def _clock_running(what: str) -> Iterator[None]:
     if not sys.stderr.isatty():
         yield
         return

@@ -17,6 +17,7 @@ import truepose
 from truepose.cli._options import Request
 from truepose.cli._progress import progress, waiting
 from truepose.cli._show import show_answers, show_tables
+from truepose.cli._verbose import say_machine, say_result, step
 from truepose.errors import Problem, RequestError
 from truepose.files.document import MACHINE_FILE
 from truepose.files.text_file import read_text
@@ -57,7 +58,7 @@ def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMAT
         from truepose.verdict import witness_file
 
         require_writable(request.witness, [witness_file.ENDING], [request.machine_file])
-    machine = truepose.load(request.machine_file, settings=request.settings)
+    machine = load_machine(request.machine_file, request.settings)
     if request.require_accuracy and not machine.accuracy.asks:
         raise RequestError(
             Problem(
@@ -72,6 +73,14 @@ def read_machine(request: Request, endings: Sequence[str] = tuple(formats.FORMAT
         )
     if request.witness is not None and not machine.accuracy.asks:
         raise _no_witness("no accuracy that is asked for", ASK)
+    return machine
+
+
+def load_machine(file: Path, settings: Sequence[str] = ()) -> Machine:
+    """The machine of a file, and what it is for who wants to know (`--verbose`)."""
+    with step("machine file"):
+        machine = truepose.load(file, settings=settings)
+        say_machine(machine)
     return machine
 
 
@@ -187,9 +196,11 @@ def deliver(
     `beside`: other files, and their texts. Raises `RequestError` (no-witness) at the end, where
     that is asked for and there is none.
     """
+    say_result(result.dataset)
     with written_together():
         if request.output is not None:
-            formats.write(result, request.output)
+            with step(f"{request.output} written"):
+                formats.write(result, request.output)
         written = write_witness(request, answers, witness_of)
         for path, text in beside:
             with replacing(path) as temporary:

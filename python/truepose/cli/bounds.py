@@ -8,7 +8,9 @@ from typing import Any
 import click
 
 from truepose.cli._ending import INTERRUPTED
+from truepose.cli import _complete
 from truepose.cli._options import (
+    FileName,
     Request,
     accuracy_option,
     format_option,
@@ -18,6 +20,7 @@ from truepose.cli._options import (
     strict_option,
     takes,
 )
+from truepose.cli._verbose import verbose_option
 
 
 @click.command("bounds")
@@ -26,6 +29,7 @@ from truepose.cli._options import (
     click.option(
         "--region",
         metavar="ENDS",
+        shell_complete=_complete.freedoms,
         help="Every pose in this part of the workspace instead of the file's poses: "
         '"x=200:400,y=100:300", in the units of the machine file.',
     ),
@@ -46,7 +50,7 @@ from truepose.cli._options import (
     click.option(
         "--resume",
         metavar="FILE.nc",
-        type=click.Path(path_type=Path),
+        type=FileName(".nc"),
         help="Over a region: go on from the result that an interrupted search, or one that ran "
         "out of boxes, wrote with --output.",
     ),
@@ -55,6 +59,7 @@ from truepose.cli._options import (
     output_option,
     strict_option,
     accuracy_option,
+    verbose_option,
 )
 def command(
     region: str | None,

@@ -17,6 +17,7 @@ from truepose.cli._options import (
     takes,
     witness_option,
 )
+from truepose.cli._verbose import verbose_option
 
 
 @click.command("budget")
@@ -28,6 +29,7 @@ from truepose.cli._options import (
     strict_option,
     accuracy_option,
     witness_option,
+    verbose_option,
 )
 def command(**options: Any) -> int:
     """Predict the error from each source, and compare them.

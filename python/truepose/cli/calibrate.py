@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from truepose.cli import _complete
 from truepose.cli._options import (
+    InputFile,
     OutputFile,
     Request,
     format_option,
@@ -18,14 +20,13 @@ from truepose.cli._options import (
     set_option,
     takes,
 )
+from truepose.cli._verbose import verbose_option
 
 if TYPE_CHECKING:
     from truepose.calibration.calibrate import Calibration
     from truepose.machine import Machine
     from truepose.machine.tables.controller import Holds
     from truepose.reporting.result import Result
-
-_FILE = click.Path(path_type=Path)
 
 
 class _Day(click.ParamType):  # type: ignore[type-arg]
@@ -44,11 +45,12 @@ class _Day(click.ParamType):  # type: ignore[type-arg]
 @click.command("calibrate")
 @takes(
     machine_argument,
-    click.argument("data", metavar="MEASUREMENTS.csv", type=_FILE),
+    click.argument("data", metavar="MEASUREMENTS.csv", type=InputFile(".csv")),
     click.option(
         "--identify",
         metavar="PATTERN[=BAND]",
         multiple=True,
+        shell_complete=_complete.unknowns,
         help="What is to be found: a parameter, a group of tolerances, a pattern such as "
         "'strut.*.length', strut.1.expansion; with a half band of its own as in "
         "'strut.*.length=0.5 mm'. May be repeated. Default: all that has a tolerance.",
@@ -82,7 +84,7 @@ class _Day(click.ParamType):  # type: ignore[type-arg]
     click.option(
         "--machine-output",
         metavar="CALIBRATED.toml",
-        type=OutputFile(),
+        type=OutputFile(".toml"),
         help="Write the calibrated machine file; needs --date.",
     ),
     click.option("--date", type=_Day(), metavar="YYYY-MM-DD", help="The day of the measurements."),
@@ -106,12 +108,13 @@ class _Day(click.ParamType):  # type: ignore[type-arg]
     click.option(
         "--report",
         metavar="PAGE.html",
-        type=OutputFile(),
+        type=OutputFile(".html"),
         help="Write a page with the calibration's figures and tables too.",
     ),
     set_option,
     format_option,
     output_option,
+    verbose_option,
 )
 def command(**options: Any) -> int:
     """Find the machine's parameters from measurements of it.

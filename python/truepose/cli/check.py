@@ -16,6 +16,7 @@ from truepose.cli._options import (
     takes,
     witness_option,
 )
+from truepose.cli._verbose import verbose_option
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
@@ -32,13 +33,33 @@ if TYPE_CHECKING:
     output_option_of(".json or .csv"),
     strict_option,
     witness_option,
+    click.option(
+        "--watch",
+        is_flag=True,
+        help="Check again whenever the file, or a data file that it names, changes, until Ctrl-C; "
+        "the exit code is that of the last check.",
+    ),
+    verbose_option,
 )
-def command(**options: Any) -> int:
+def command(*, watch: bool, **options: Any) -> int:
     """Describe a machine, and say if it is accurate enough.
 
     Exit code 1 unless it is certain that the machine, commanded as it is, keeps the accuracy
     asked; what compensation would leave is shown beside it.
     """
+    request = Request(**options)
+    if not watch:
+        return _check(request)
+    from truepose.cli._watch import watched
+    from truepose.files.one_run import is_stdin
+
+    if is_stdin(request.machine_file):
+        raise click.UsageError("--watch needs a file: standard input does not change.")
+    return watched(lambda: _check(request), request.machine_file, as_json=request.format == "json")
+
+
+def _check(request: Request) -> int:
+    """Describe the machine and answer -> exit code."""
     from truepose.cli import _steps
     from truepose.errors import RequestError
     from truepose.files.writing import replacing, written_together
@@ -47,7 +68,6 @@ def command(**options: Any) -> int:
     from truepose.reporting.workspace_check import check_workspace
     from truepose.verdict.answer import AFTER, BEFORE, met
 
-    request = Request(**options)
     machine = _steps.read_machine(request, [".json", ".csv"])
     check = check_workspace(machine)
     out = ~check.usable

@@ -7,20 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from truepose.cli._options import format_option, output_option_of, takes
+from truepose.cli._options import InputFile, format_option, output_option_of, takes
+from truepose.cli._verbose import verbose_option
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from truepose.reporting.result import Result
 
-_FILE = click.Path(path_type=Path)
+_FILE = InputFile(".toml")
 
 
 @click.command("compare")
 @click.argument("old_file", metavar="OLD.toml", type=_FILE)
 @click.argument("new_file", metavar="NEW.toml", type=_FILE)
-@takes(format_option, output_option_of(".json or .csv"))
+@takes(format_option, output_option_of(".json or .csv"), verbose_option)
 def command(old_file: Path, new_file: Path, **options: Any) -> int:
     """Tell whether a machine changed between two files of it.
 
@@ -30,17 +31,18 @@ def command(old_file: Path, new_file: Path, **options: Any) -> int:
     most 5 % of cases, and in far fewer where both rest on the same tolerances: then small changes
     are missed.
     """
-    import truepose
     from truepose.calibration.result.compare import compare
     from truepose.cli import _steps
+    from truepose.cli._verbose import step
     from truepose.files.writing import replacing, require_writable
     from truepose.reporting.result import Result
 
     form, output = options["format"], options["output"]
     if output is not None:
         require_writable(output, [".json", ".csv"], [old_file, new_file])
-    old, new = truepose.load(old_file), truepose.load(new_file)
-    result = Result("compare", old, compare(old, new))
+    old, new = _steps.load_machine(old_file), _steps.load_machine(new_file)
+    with step("comparison"):
+        result = Result("compare", old, compare(old, new))
     if form == "table":
         from truepose.cli._show import show_tables
         from truepose.reporting import calibrated_files

@@ -6,16 +6,18 @@ from pathlib import Path
 
 import click
 
-from truepose.cli._options import OutputFile, set_option, takes
+from truepose.cli import _complete
+from truepose.cli._options import InputFile, OutputFile, set_option, takes
+from truepose.cli._verbose import verbose_option
 
 
 @click.command("export")
 @takes(
-    click.argument("controller", required=False),
+    click.argument("controller", required=False, shell_complete=_complete.controllers),
     click.argument(
         "machine_file",
         metavar="[MACHINE.toml]",
-        type=click.Path(path_type=Path),
+        type=InputFile(".toml"),
         required=False,
     ),
     set_option,
@@ -37,6 +39,7 @@ from truepose.cli._options import OutputFile, set_option, takes
         "are printed.",
     ),
     click.option("--list", "listed", is_flag=True, help="Describe every controller, and stop."),
+    verbose_option,
 )
 def command(
     controller: str | None,
@@ -57,9 +60,8 @@ def command(
         return 0
     if controller is None or machine_file is None:
         raise click.UsageError("Give a CONTROLLER and a MACHINE.toml, or --list.")
-    import truepose
     from truepose.cli._progress import progress
-    from truepose.cli._steps import note_written
+    from truepose.cli._steps import load_machine, note_written
     from truepose.controllers import controller as adapter_of
     from truepose.controllers import export
     from truepose.files.writing import replacing, require_folder, written_together
@@ -67,7 +69,7 @@ def command(
     adapter_of(controller)
     if folder is not None:
         require_folder(folder)
-    machine = truepose.load(machine_file, settings=settings)
+    machine = load_machine(machine_file, settings)
     with progress(f"export {controller}"):
         result = export(machine, controller, options)
     if folder is None:

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from truepose.cli._options import OutputFile, _note_format, machine_argument, set_option, takes
+from truepose.cli._options import (
+    FileName,
+    InputFile,
+    OutputFile,
+    _note_format,
+    machine_argument,
+    set_option,
+    takes,
+)
+from truepose.cli._verbose import verbose_option
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -23,7 +32,7 @@ if TYPE_CHECKING:
 @click.command("gcode")
 @takes(
     machine_argument,
-    click.argument("program", metavar="PROGRAM", type=click.Path(path_type=Path)),
+    click.argument("program", metavar="PROGRAM", type=InputFile(".ngc")),
     click.option(
         "--output",
         "-o",
@@ -76,7 +85,7 @@ if TYPE_CHECKING:
         "--var",
         "parameter_file",
         metavar="FILE",
-        type=click.Path(path_type=Path),
+        type=FileName(".var"),
         help="LinuxCNC's parameter file (linuxcnc.var), which has all offsets.",
     ),
     click.option(
@@ -120,6 +129,7 @@ if TYPE_CHECKING:
         help="What is printed: a table for people (mm and µm, or in and µin, as the file has it), "
         "or json for programs (full precision, m and rad).",
     ),
+    verbose_option,
 )
 def command(
     machine_file: Path,
@@ -146,10 +156,10 @@ def command(
 
     Bare numbers are in the units of the machine file.
     """
-    import truepose
     from truepose.cli._problems import show_problems
     from truepose.cli._progress import progress
-    from truepose.cli._steps import note_written
+    from truepose.cli._steps import load_machine, note_written
+    from truepose.cli._verbose import say, say_file
     from truepose.controllers.gcode import NoBetter, correct_program
     from truepose.controllers.gcode.exact_stops import ACCELERATION
     from truepose.files.writing import require_writable
@@ -160,7 +170,7 @@ def command(
         raise click.UsageError("--force writes a program, and --dry-run writes none")
     if output is not None:
         require_writable(output, [output.suffix.lower()], [machine_file])
-    machine = truepose.load(machine_file, settings=settings)
+    machine = load_machine(machine_file, settings)
     read = _Reading(machine)
     said = "" if tolerance is None else read.said(tolerance)
     try:
@@ -181,6 +191,8 @@ def command(
                 progress=report,
                 **options,
             )
+            say_file(program)
+            say(f"{proof.moves:,} moves, {proof.blocks:,} blocks, {proof.points:,} points compared")
     except NoBetter as no:
         _show(machine, no.proof, form, said, written=False)
         show_problems(no, as_json=False)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from truepose.cli import _complete
 from truepose.cli._options import OutputFile, format_option, takes
 
 if TYPE_CHECKING:
@@ -17,14 +18,14 @@ if TYPE_CHECKING:
 
 @click.command("init")
 @takes(
-    click.argument("kind", required=False),
+    click.argument("kind", required=False, shell_complete=_complete.kinds),
     click.option("--list", "listed", is_flag=True, help="Describe every kind, and write nothing."),
     click.option(
         "--output",
         "-o",
         "output",
         metavar="FILE.toml",
-        type=OutputFile(),
+        type=OutputFile(".toml"),
         help="Where the file goes; by default beside you, named KIND.toml.",
     ),
     format_option,
@@ -50,7 +51,7 @@ def command(kind: str | None, listed: bool, output: Path | None, format: str) ->
     require_writable(path, [".toml"])
     require_new(path)
     with replacing(path) as temporary:
-        temporary.write_text(machine.text, encoding="utf-8")
+        temporary.write_text(machine.template, encoding="utf-8")
     note_written(path)
     return 0
 

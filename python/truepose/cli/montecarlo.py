@@ -18,6 +18,7 @@ from truepose.cli._options import (
     strict_option,
     takes,
 )
+from truepose.cli._verbose import verbose_option
 
 
 @click.command("montecarlo")
@@ -58,6 +59,7 @@ from truepose.cli._options import (
     format_option,
     output_option,
     strict_option,
+    verbose_option,
 )
 def command(
     samples: int | None, digits: int, probability: float, seed: int, sampling: str, **options: Any

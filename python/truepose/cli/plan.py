@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from truepose.cli import _complete
 from truepose.cli._ending import INTERRUPTED
 from truepose.cli._options import (
     OutputFile,
@@ -19,6 +20,7 @@ from truepose.cli._options import (
     set_option,
     takes,
 )
+from truepose.cli._verbose import verbose_option
 
 if TYPE_CHECKING:
     from truepose.calibration.instruments import Instrument
@@ -71,6 +73,7 @@ _INSTRUMENT = (
         "--identify",
         metavar="PATTERN",
         multiple=True,
+        shell_complete=_complete.unknowns,
         help="Find these parameters only, such as strut.*.length; with a half band of their own: "
         '"strut.*.length=0.5 mm". Without it all that have a tolerance.',
     ),
@@ -89,7 +92,7 @@ _INSTRUMENT = (
     click.option(
         "--template",
         metavar="FILE.csv",
-        type=OutputFile(),
+        type=OutputFile(".csv"),
         help="Also write a file of measurements with all but the readings filled in.",
     ),
     click.option(
@@ -106,6 +109,7 @@ _INSTRUMENT = (
     set_option,
     format_option,
     output_option,
+    verbose_option,
 )
 def command(
     instruments: tuple[str, ...],

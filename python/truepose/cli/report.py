@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from truepose.cli._options import (
+    InputFile,
     OutputFile,
     Request,
     accuracy_option,
@@ -16,6 +17,7 @@ from truepose.cli._options import (
     strict_option,
     takes,
 )
+from truepose.cli._verbose import verbose_option
 
 
 @click.command("report")
@@ -27,18 +29,20 @@ from truepose.cli._options import (
         "-o",
         "output",
         metavar="FILE.html",
-        type=OutputFile(),
-        help="Where the page goes; by default beside you, named after the machine file.",
+        type=OutputFile(".html"),
+        help="Where the page goes; by default beside you, named after the machine file (of "
+        "standard input, report.html).",
     ),
     click.option(
         "--measurements",
         metavar="FILE.csv",
-        type=click.Path(path_type=Path),
+        type=InputFile(".csv"),
         help="Measurements of the machine: the page then begins with a calibration, with the "
         "defaults of `truepose calibrate`.",
     ),
     strict_option,
     accuracy_option,
+    verbose_option,
 )
 def command(**options: Any) -> int:
     """Do all of it, and write one HTML page.
@@ -50,13 +54,16 @@ def command(**options: Any) -> int:
     """
     from truepose.cli import _steps, _uncertainty
     from truepose.cli._show import show_answers, show_tables
+    from truepose.cli._verbose import say_result, step
+    from truepose.files.one_run import is_stdin
     from truepose.files.writing import require_writable
     from truepose.reporting import how_far, tables, uncertainty_tables
     from truepose.reporting.accuracy import gains, told
     from truepose.verdict.answer import AFTER, met
 
     if options["output"] is None:
-        options["output"] = Path(options["machine_file"].stem + ".html")
+        file = options["machine_file"]
+        options["output"] = Path("report.html" if is_stdin(file) else file.stem + ".html")
     measurements: Path | None = options.pop("measurements")
     request = Request(**options)
     assert request.output is not None
@@ -68,7 +75,9 @@ def command(**options: Any) -> int:
     study = _uncertainty.with_how_sure(_steps.with_strain(request, study))
     study = _steps.with_calibration(study, measurements)
     text = _steps.machine_text(request)
-    page.write(study, request.output, text)
+    say_result(study.budget)
+    with step(f"{request.output} written"):
+        page.write(study, request.output, text)
     show_answers(told(machine, study.accuracy), gains(study.accuracy))
     shown = [
         tables.ranking(study),

@@ -18,6 +18,7 @@ from truepose.cli._options import (
     strict_option,
     takes,
 )
+from truepose.cli._verbose import verbose_option
 
 
 @click.command("shares")
@@ -34,6 +35,7 @@ from truepose.cli._options import (
     format_option,
     output_option,
     strict_option,
+    verbose_option,
 )
 def command(samples: int | None, seed: int, **options: Any) -> int:
     """Say which parameters and sources the spread comes from.

@@ -15,10 +15,11 @@ from truepose.cli._options import (
     strict_option,
     takes,
 )
+from truepose.cli._verbose import verbose_option
 
 
 @click.command("strain")
-@takes(machine_argument, set_option, format_option, output_option, strict_option)
+@takes(machine_argument, set_option, format_option, output_option, strict_option, verbose_option)
 def command(**options: Any) -> int:
     """Find the internal forces of an over-constrained machine.
 

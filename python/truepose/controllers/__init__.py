@@ -6,14 +6,12 @@ an adapter may need what only it needs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from truepose.controllers._export import Controller, Export, Option, options_of
-from truepose.errors import Problem, RequestError
-from truepose.files.wording import did_you_mean, one_of
-from truepose.machine import Machine
-from truepose.runs.arguments import checked
+if TYPE_CHECKING:
+    from truepose.controllers._adapters import controller, export
+    from truepose.controllers._export import Controller, Export, Option
 
 REGISTRY: dict[str, str] = {
     "c": "truepose.controllers.c:C",
@@ -27,33 +25,27 @@ REGISTRY: dict[str, str] = {
 }
 """Name on the command line -> module and class of the adapter."""
 
-
-def controller(name: str) -> type[Controller]:
-    """The adapter of a name. Raises `RequestError` (unknown-controller)."""
-    if name not in REGISTRY:
-        raise RequestError(
-            Problem(
-                "unknown-controller",
-                f"there is no adapter for {name!r}",
-                found=repr(name),
-                expected=one_of(REGISTRY),
-                hint=did_you_mean(name, REGISTRY),
-            )
-        )
-    module, _, attribute = REGISTRY[name].partition(":")
-    adapter: type[Controller] = getattr(import_module(module), attribute)
-    return adapter
-
-
-@checked
-def export(machine: Machine, name: str, options: Mapping[str, str] | Sequence[str] = ()) -> Export:
-    """What the controller `name` is to be given for `machine` in the file's condition.
-
-    `options`: texts as on the command line, `{"clamp": "1 mm"}`. Raises `RequestError`:
-    unknown-controller, bad-option, controller-cannot, and what the adapter says itself.
-    """
-    adapter = controller(name)
-    return adapter.export(machine, options_of(adapter, machine, options))
-
+_WHERE = {
+    "Controller": "truepose.controllers._export",
+    "Export": "truepose.controllers._export",
+    "Option": "truepose.controllers._export",
+    "controller": "truepose.controllers._adapters",
+    "export": "truepose.controllers._adapters",
+}
+"""Name -> the module that is imported when it is first used: the names of adapters need none."""
 
 __all__ = ["REGISTRY", "Controller", "Export", "Option", "controller", "export"]
+
+
+if not TYPE_CHECKING:  # type checkers know the names above, and refuse all others
+
+    def __getattr__(name: str) -> Any:
+        if name not in _WHERE:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = getattr(import_module(_WHERE[name]), name)
+        globals()[name] = value
+        return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -7,6 +7,7 @@ of a run, in Python, nothing is noted: who names a file there knows it.
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,17 +18,32 @@ from pathlib import Path
 from truepose.errors import Fault, RequestError
 
 
+STDIN = Path("<stdin>")
+"""What standard input is called, in messages and where a file names what it was made from."""
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a file held when it was read: how many bytes, and their SHA-256."""
+
+    size: int
+    sha256: str
+
+
 @dataclass
 class _Files:
     """Of one run, links followed; `outputs` by what they were asked for with.
 
-    `written`: outputs that have their names; `of_pipes`: what came out of pipes.
+    `written`: outputs that have their names; `of_pipes`: what came out of pipes, and of standard
+    input, if that is an input too; `contents`: what was read, in that order.
     """
 
     inputs: list[Path] = field(default_factory=list)
     outputs: dict[str, Path] = field(default_factory=dict)
     written: list[Path] = field(default_factory=list)
     of_pipes: dict[Path, bytes] = field(default_factory=dict)
+    stdin: bool = False
+    contents: dict[Path, Content] = field(default_factory=dict)
 
 
 _RUN: ContextVar[_Files | None] = ContextVar("files of one run", default=None)
@@ -73,6 +89,62 @@ def reads(path: Path) -> None:
         if _same(path, output):
             raise _over_input(output, f"{path}, of {asked_with}")
     run.inputs.append(real_path(path))
+
+
+def will_read_stdin() -> Path:
+    """State that standard input, given as "-", is an input -> what it is called from here on.
+
+    Raises `RequestError` (stdin-twice): what came out of it for one input is gone for another.
+    """
+    run = _RUN.get()
+    if run is not None:
+        if run.stdin:
+            raise RequestError(
+                Fault(
+                    "stdin-twice",
+                    "standard input cannot be two files of one command",
+                    found="- twice",
+                    expected="- once, and the names of files",
+                ).at()
+            )
+        run.stdin = True
+    return STDIN
+
+
+def is_stdin(path: Path) -> bool:
+    """Whether a path means standard input: that was given, and is not the name of a file."""
+    run = _RUN.get()
+    return run is not None and run.stdin and path == STDIN
+
+
+def inputs() -> tuple[Path, ...]:
+    """What this run has read, or wanted to, links followed."""
+    run = _RUN.get()
+    return () if run is None else tuple(dict.fromkeys(run.inputs))
+
+
+def has_read(path: Path, content: bytes) -> None:
+    """Note what an input held."""
+    run = _RUN.get()
+    if run is not None:
+        run.contents[path] = Content(len(content), hashlib.sha256(content).hexdigest())
+
+
+def contents() -> dict[Path, Content]:
+    """What the inputs of this run held, in the order in which they were read."""
+    run = _RUN.get()
+    return {} if run is None else dict(run.contents)
+
+
+@contextmanager
+def once_more() -> Iterator[None]:
+    """What this run does once more, with the same outputs: what it reads is read anew."""
+    run = _RUN.get()
+    token = _RUN.set(_Files() if run is None else _Files(outputs=dict(run.outputs)))
+    try:
+        yield
+    finally:
+        _RUN.reset(token)
 
 
 def require_not_read(path: Path) -> None:

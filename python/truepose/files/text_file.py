@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from truepose.errors import MachineFileError, Problem, RequestError
 from truepose.files.limits import LARGEST_FILE
-from truepose.files.one_run import once, reads
+from truepose.files.one_run import has_read, is_stdin, once, reads
 from truepose.files.writing import kind_of, standing_for
 
 
@@ -24,13 +28,14 @@ class FileKind:
 def read_text(path: Path, kind: FileKind) -> tuple[bytes, str]:
     """Bytes and UTF-8 text of a file, without a byte order mark.
 
-    Inside of a set of files that is being written, one of these is read as it will be. Raises
+    Inside of a set of files that is being written, one of these is read as it will be; standard
+    input is read once, however often it is asked for. Raises
     `MachineFileError` (file-missing, file-is-directory, file-unreadable, file-too-large, not-utf8),
     `RequestError` (output-is-input) for a file that this run is to write.
     """
     file = str(path)
     stands = standing_for(path)
-    if stands == path:
+    if stands == path and not is_stdin(path):
         reads(path)
     try:
         content = _content(stands)
@@ -50,7 +55,23 @@ def read_text(path: Path, kind: FileKind) -> tuple[bytes, str]:
     except (OSError, ValueError) as error:  # ValueError: a null character in the path
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise MachineFileError(_unreadable(file, reason)) from None
+    has_read(path, content)
     return content, _decoded(content, file)
+
+
+@contextmanager
+def on_disk(path: Path) -> Iterator[Path]:
+    """A file for what opens files itself: the path, or what came out of standard input.
+
+    Raises as `read_text` does of standard input.
+    """
+    if not is_stdin(path):
+        yield path
+        return
+    with TemporaryDirectory(prefix="truepose") as folder:
+        copy = Path(folder) / "stdin"
+        copy.write_bytes(_content(path))
+        yield copy
 
 
 def require_input(path: Path, kind: FileKind) -> None:
@@ -58,6 +79,8 @@ def require_input(path: Path, kind: FileKind) -> None:
 
     Raises `RequestError` (file-missing, file-is-directory, file-unreadable, output-is-input).
     """
+    if is_stdin(path):
+        return
     try:
         found = kind_of(path.stat().st_mode)
     except (FileNotFoundError, NotADirectoryError):
@@ -78,10 +101,13 @@ def _content(path: Path) -> bytes:
     """All of it, up to `LARGEST_FILE`: a pipe may never come to an end."""
 
     def read() -> bytes:
+        if stdin:
+            return sys.stdin.buffer.read(LARGEST_FILE + 1)
         with path.open("rb") as file:
             return file.read(LARGEST_FILE + 1)
 
-    kind = kind_of(path.stat().st_mode)
+    stdin = is_stdin(path)
+    kind = "a pipe" if stdin else kind_of(path.stat().st_mode)
     if kind in ("a device", "a socket"):
         raise MachineFileError(_unreadable(str(path), kind))
     content = once(path, read) if kind == "a pipe" else read()

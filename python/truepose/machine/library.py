@@ -18,6 +18,12 @@ from truepose.files.wording import did_you_mean, one_of
 
 FOLDER = "machine_library"
 
+SCHEMA_FILE = "truepose.schema.json"
+"""What the JSON schema is called beside a machine file, as `truepose schema` writes it."""
+
+SCHEMA_LINE = f"#:schema {SCHEMA_FILE}\n"
+"""First line of a machine file that names it for editors, as the language server taplo reads it."""
+
 
 @dataclass(frozen=True)
 class LibraryMachine:
@@ -34,19 +40,31 @@ class LibraryMachine:
     """The file as it is."""
 
     @property
+    def template(self) -> str:
+        """The file to begin with: it names the schema for editors too."""
+        return SCHEMA_LINE + self.text
+
+    @property
     def parasitic(self) -> tuple[str, ...]:
         """Freedoms of the platform that cannot be commanded."""
         return tuple(freedom for freedom in self.dof if freedom not in self.commanded)
 
 
+def kinds() -> tuple[str, ...]:
+    """The kinds of the library's machines, in order; no file is read."""
+    names = (entry.name for entry in (resources.files("truepose") / FOLDER).iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
+
+
+def text_of(kind: str) -> str:
+    """The file of a kind that there is, as it is."""
+    file = resources.files("truepose") / FOLDER / f"{kind}.toml"
+    return file.read_text(encoding="utf-8")
+
+
 def machines() -> tuple[LibraryMachine, ...]:
     """Every machine of the library, in the order of their kinds."""
-    folder = resources.files("truepose") / FOLDER
-    files = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    return tuple(
-        _machine(file.name.removesuffix(".toml"), file.read_text(encoding="utf-8"))
-        for file in sorted(files, key=lambda file: file.name)
-    )
+    return tuple(_machine(kind, text_of(kind)) for kind in kinds())
 
 
 def machine_of(kind: str) -> LibraryMachine:

@@ -7,6 +7,7 @@ models, of the kernel's table of elements and of the registered sources.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -22,6 +23,11 @@ from truepose.machine.source_builder import SourceType
 from truepose.machine.tables import REQUIRED, SCHEMA, owners, takes_every_key
 
 Json = dict[str, Any]
+
+
+def schema_text(registry: Sequence[SourceType]) -> str:
+    """The JSON schema as a file has it."""
+    return json.dumps(json_schema(registry), indent=2, ensure_ascii=False) + "\n"
 
 
 def json_schema(registry: Sequence[SourceType]) -> Json:

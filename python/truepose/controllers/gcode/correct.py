@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import cast, get_args
@@ -48,7 +48,7 @@ from truepose.controllers.gcode.tolerance import (
 )
 from truepose.controllers.gcode.work_offsets import Positions, WorkOffsets, named, work_offsets
 from truepose.errors import Problem, RequestError
-from truepose.files.text_file import FileKind, require_input
+from truepose.files.text_file import FileKind, on_disk, require_input
 from truepose.files.wording import one_of
 from truepose.files.writing import replacing, require_writable
 from truepose.machine import Condition, Machine
@@ -98,7 +98,8 @@ Progress = Callable[[int, int], None]
 class _Options:
     """What was asked, checked; coordinates by the axes' letters, mm and degrees.
 
-    `tolerance`, m; None: it follows from the error before.
+    `tolerance`, m; None: it follows from the error before. `opened`: the file that the program is
+    read from, which is another one than it is called where it comes from standard input.
     """
 
     tolerance: float | None
@@ -111,16 +112,17 @@ class _Options:
     block_delete: bool | None
     path_mode: str | None
     acceleration: float
+    opened: Path = Path()
 
     def limits(self, tolerance: float) -> Limits:
         """What the division must hold."""
         return Limits(tolerance, min(LEAST_PIECE, tolerance), self.interpolation)
 
-    def corrector(self, program: Path, target: Path, machine: str) -> GcodeCorrector:
+    def corrector(self, target: Path, machine: str) -> GcodeCorrector:
         """What reads a program and writes it anew, for a machine of this name."""
         name = "".join(c for c in machine if c.isascii() and c.isprintable() and c not in "()%")
         return GcodeCorrector(
-            program,
+            self.opened,
             target,
             units=self.units,
             start=self.start,
@@ -213,20 +215,19 @@ def correct_program(
     given = machine.condition if condition is None else condition
     required_sources(machine, given)
     actual = ActualMachine(machine, given)
-    with _problems_of(program):
-        allowed = _tolerance(actual, axes, program, options)
-    division = Division(actual, axes, options.limits(allowed.value))
-    with _written(written) as temporary, _problems_of(program):
-        session = _Session(division, program, temporary, options, allowed)
-        proof = session.run("" if written is None else str(written), progress)
-        if not (proof.improves or force):
-            raise _refusals.NoBetter(machine, proof)
-        return proof
+    with on_disk(program) as opened, _problems_of(program):
+        options = replace(options, opened=opened)
+        allowed = _tolerance(actual, axes, options)
+        division = Division(actual, axes, options.limits(allowed.value))
+        with _written(written) as temporary:
+            session = _Session(division, program, temporary, options, allowed)
+            proof = session.run("" if written is None else str(written), progress)
+            if not (proof.improves or force):
+                raise _refusals.NoBetter(machine, proof)
+            return proof
 
 
-def _tolerance(
-    actual: ActualMachine, axes: Axes, program: Path, options: _Options
-) -> PathTolerance:
+def _tolerance(actual: ActualMachine, axes: Axes, options: _Options) -> PathTolerance:
     """The tolerance that was asked for, or the one that follows from the error before."""
     if options.tolerance is not None:
         division = Division(actual, axes, options.limits(options.tolerance))
@@ -234,7 +235,7 @@ def _tolerance(
         if options.tolerance < least:
             raise _refusals.of_tolerance(actual.machine, options.tolerance, least, options.digits)
         return PathTolerance(options.tolerance, "asked")
-    reader = options.reader(program)
+    reader = options.reader(options.opened)
 
     def batches() -> Iterator[Moves]:
         # What cannot be read is refused in the order of lines where the program is corrected.
@@ -262,8 +263,8 @@ class _Session:
         self._program = program
         self._options = options
         self._allowed = allowed
-        self._reader = options.reader(program)
-        self._writing = _Writing(division, program, temporary, options)
+        self._reader = options.reader(options.opened)
+        self._writing = _Writing(division, temporary, options)
         length = division.actual.machine.characteristic_length
         self._stops = CountedStops(
             options.acceleration,
@@ -373,13 +374,11 @@ def _warnings(machine: Machine, before: Errors, stops: ExactStops) -> tuple[dict
 class _Writing:
     """Writes divided batches, reads the file back behind that, and proves what it finds."""
 
-    def __init__(
-        self, division: Division, program: Path, temporary: Path, options: _Options
-    ) -> None:
+    def __init__(self, division: Division, temporary: Path, options: _Options) -> None:
         self.proving = Proving(division)
         self._temporary = temporary
         machine = division.actual.machine.name
-        self._corrector = options.corrector(program, temporary, machine)
+        self._corrector = options.corrector(temporary, machine)
         self._back = options.reader(temporary)
         self._waiting: list[tuple[Moves, Divided]] = []
 

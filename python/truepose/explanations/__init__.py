@@ -1,0 +1,133 @@
+"""What each code means, what to do about it, and an example that gives it.
+
+Codes of problems have their meaning in `errors.CATALOGUE`; the other codes (warnings, suspicions,
+reasons of a calibration, why a pose is left out) have it here. All the rest is in the tables beside
+this file, one a topic, from which `truepose explain` and docs/errors.md are made; a test runs every
+example. Nothing heavy is imported: a shell completes codes from here.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from importlib import resources
+from typing import Any
+
+from truepose.errors import CATALOGUE
+
+TOPICS: dict[str, str] = {
+    "files": "Files",
+    "values": "Keys and values",
+    "structure": "The machine's structure",
+    "tolerances": "Materials, tolerances and measured tables",
+    "workspace": "The workspace and its poses",
+    "requests": "Requests",
+    "functions": "Calls in Python",
+    "controllers": "Controllers",
+    "measurements": "Measurements",
+    "calibration": "Calibration and plans",
+    "suspicions": "Suspicions about measurements",
+    "reasons": "Reasons of a calibration's answer",
+    "programs": "Programs of G-code",
+}
+"""Name of a table beside this file -> its title, in the order of the page."""
+
+MACHINE = "planar_two_slider"
+"""The kind of machine of an example that names no other."""
+
+MEASURED = "measured.csv"
+"""Readings of a machine like that of the example, from a table beside this file."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """Files in a folder, and what is done there that gives the code.
+
+    `machine`: the kind that `truepose init` writes as machine.toml, `changes` what then stands in
+    it instead of what. `files`: others by their name. `commands`: those of truepose, without its
+    name, the last of which gives the code; or `python`: a script that does.
+    """
+
+    machine: str = MACHINE
+    changes: tuple[tuple[str, str], ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)
+    commands: tuple[str, ...] = ()
+    python: str = ""
+
+    @property
+    def needs_machine(self) -> bool:
+        """Whether machine.toml has a part in it."""
+        said = (*self.commands, self.python)
+        return bool(self.changes) or any("machine.toml" in text for text in said)
+
+    def shown(self) -> Iterator[tuple[str, tuple[str, ...]]]:
+        """It for people, step by step: what each is ("" for a command), and its lines."""
+        if self.needs_machine:
+            yield "", (f"truepose init {self.machine} -o machine.toml",)
+        for old, new in self.changes:
+            was, now = (tuple(text.strip("\n").splitlines()) for text in (old, new))
+            yield "in machine.toml, take out" if not any(now) else "in machine.toml, instead of", was
+            if any(now):
+                yield "write", now
+        for name, text in self.files.items():
+            yield f"in {name}", tuple(text.splitlines())
+        if self.python:
+            yield "in Python", tuple(self.python.strip("\n").splitlines())
+        for command in self.commands:
+            yield "", (f"truepose {command.strip()}",)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A code: what it means, what to do, how it comes about. `topic`: a key of `TOPICS`."""
+
+    code: str
+    topic: str
+    meaning: str
+    advice: str
+    example: Example
+
+
+def explanations() -> dict[str, Explanation]:
+    """Every explanation by its code, topic by topic."""
+    return {explanation.code: explanation for topic in TOPICS for explanation in _of(topic)}
+
+
+def meanings() -> dict[str, str]:
+    """Every code and what it means in a line."""
+    return {code: explanation.meaning for code, explanation in explanations().items()}
+
+
+def _of(topic: str) -> Iterator[Explanation]:
+    for code, entry in tomllib.loads(_beside(f"{topic}.toml")).items():
+        meaning = CATALOGUE[code] if code in CATALOGUE else entry["means"]
+        yield Explanation(code, topic, meaning, entry["do"], _example(entry))
+
+
+def _example(entry: Mapping[str, Any]) -> Example:
+    """The example of an entry; `measured`: what is replaced in the readings of its machine."""
+    run = entry.get("run", ())
+    machine = entry.get("machine", MACHINE)
+    files = dict(entry.get("files", {}))
+    if "measured" in entry:
+        text = _beside(f"{machine}.csv")
+        for old, new in entry["measured"]:
+            if old not in text:
+                raise ValueError(f"{old!r} is not in the readings of {machine}")
+            text = text.replace(old, new)
+        files[MEASURED] = text
+    return Example(
+        machine,
+        tuple((old, new) for old, new in entry.get("change", ())),
+        files,
+        (run,) if isinstance(run, str) else tuple(run),
+        entry.get("python", ""),
+    )
+
+
+def _beside(name: str) -> str:
+    return resources.files(__name__).joinpath(name).read_text(encoding="utf-8")
+
+
+__all__ = ["MACHINE", "TOPICS", "Example", "Explanation", "explanations", "meanings"]

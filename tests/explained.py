@@ -10,17 +10,16 @@ import pytest
 
 from command_line import call
 from truepose.errors import TrueposeError
-from truepose.explanations import Explanation
+from truepose.explanations import Example
 
 _GIVEN = re.compile(r"(?:error|warning)\[([a-z0-9-]+)\]")
-_IN_JSON = re.compile(r'"code": "([a-z0-9_-]+)"')
+_IN_JSON = re.compile(r'"(?:code|status)": "([a-z0-9_-]+)"')
 
 
 def codes_of(
-    explanation: Explanation, folder: Path, capsys: pytest.CaptureFixture[str]
+    example: Example, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> list[str]:
     """Codes that the last step of the example gives; `folder` is the current one."""
-    example = explanation.example
     if example.needs_machine:
         assert call(capsys, "init", example.machine, "-o", "machine.toml").code == 0
         file = folder / "machine.toml"

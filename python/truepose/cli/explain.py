@@ -64,6 +64,8 @@ def _explained(explanation: Explanation) -> Iterator[str]:
 
     yield from (explanation.code, "", text(f"{explanation.meaning}."), "")
     yield from ("What to do:", "", text(explanation.advice), "")
+    if explanation.example is None:
+        return
     yield "An example that gives it:"
     for title, lines in explanation.example.shown():
         yield from ("", *([f"  {title}"] if title else []))

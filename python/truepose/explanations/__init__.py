@@ -39,6 +39,25 @@ MACHINE = "planar_two_slider"
 MEASURED = "measured.csv"
 """Readings of a machine like that of the example, from a table beside this file."""
 
+_CALIBRATED = """
+import truepose as tp
+
+found = tp.calibrate(tp.load("machine.toml"), {asked})
+print(*(suspicion.code for suspicion in found.suspicions))
+print(*(reason.code for reason in (*found.gate.reasons, *found.gate.warnings)))
+"""
+_EDITED = (
+    """
+with open("measured.csv") as file:
+    lines = file.read().splitlines()
+rows = [line.split(",") for line in lines[5:]]
+{rows}
+with open("measured.csv", "w") as file:
+    file.write("\\n".join([*lines[:5], *(",".join(row) for row in rows)]))
+"""
+    + _CALIBRATED
+)
+
 
 @dataclass(frozen=True)
 class Example:
@@ -86,7 +105,8 @@ class Explanation:
     topic: str
     meaning: str
     advice: str
-    example: Example
+    example: Example | None
+    """None for what takes more than a few lines to come about."""
 
 
 def explanations() -> dict[str, Explanation]:
@@ -105,9 +125,18 @@ def _of(topic: str) -> Iterator[Explanation]:
         yield Explanation(code, topic, meaning, entry["do"], _example(entry))
 
 
-def _example(entry: Mapping[str, Any]) -> Example:
-    """The example of an entry; `measured`: what is replaced in the readings of its machine."""
-    run = entry.get("run", ())
+def _example(entry: Mapping[str, Any]) -> Example | None:
+    """The example of an entry, if it has one.
+
+    `measured`: what is replaced in the readings of its machine; `rows`: what a script does to them
+    before it calibrates, with the arguments `calibrate`.
+    """
+    run, python = entry.get("run", ()), entry.get("python", "")
+    if "rows" in entry:
+        asked = ", ".join(filter(None, ('"measured.csv"', entry.get("calibrate", ""))))
+        python = (_EDITED if entry["rows"] else _CALIBRATED).format(rows=entry["rows"], asked=asked)
+    if not (run or python):
+        return None
     machine = entry.get("machine", MACHINE)
     files = dict(entry.get("files", {}))
     if "measured" in entry:
@@ -122,7 +151,7 @@ def _example(entry: Mapping[str, Any]) -> Example:
         tuple((old, new) for old, new in entry.get("change", ())),
         files,
         (run,) if isinstance(run, str) else tuple(run),
-        entry.get("python", ""),
+        python,
     )
 
 

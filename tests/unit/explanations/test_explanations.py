@@ -11,18 +11,36 @@ from truepose.errors import CATALOGUE
 from truepose.explanations import TOPICS, Explanation, explanations
 
 EVERY = explanations()
+EXAMPLES = {code: explanation.example for code, explanation in EVERY.items()}
+WITHOUT = {
+    "other-assembly-mode",
+    "out-of-reach",
+    "gain-unconfirmed",
+    "not-confirmed",
+    "one-sided",
+    "not_converged",
+    "band",
+}
+"""What takes more than a few lines to come about: tests of the calibration reach these."""
 
 
 def test_every_code_of_the_catalogue_is_explained() -> None:
     assert sorted(CATALOGUE.keys() - EVERY.keys()) == []
 
 
-@pytest.mark.parametrize("explanation", EVERY.values(), ids=EVERY)
+def test_every_problem_has_an_example() -> None:
+    assert {code for code, example in EXAMPLES.items() if example is None} == WITHOUT
+    assert not WITHOUT & CATALOGUE.keys()
+
+
+@pytest.mark.parametrize("code", [code for code in EVERY if code not in WITHOUT])
 def test_the_example_gives_the_code(
-    explanation: Explanation,
+    code: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert explanation.code in codes_of(explanation, tmp_path, capsys)
+    example = EXAMPLES[code]
+    assert example is not None
+    assert code in codes_of(example, tmp_path, capsys)

@@ -44,6 +44,20 @@ terminal, when the work takes more than two seconds. What to know before the num
 (`guide-taken-rigid`: [machines.md](machines.md#what-a-description-leaves-out)) is on stderr too,
 once, as `warning[CODE]: ...`, and in `json`.
 
+`-` as the name of a machine file, of measurements or of a program is standard input, for one file
+of a command; problems then name `<stdin>` and its lines, and data files that a machine file names
+are looked for in the current folder.
+
+`--verbose` says on stderr what was read (with its SHA-256), what machine, poses and sources that
+makes, and how long each step took; what is printed on stdout stays the same. `truepose explain
+CODE` says what a code means, what to do, and shows an example: [errors.md](errors.md) has all.
+
+`truepose completion SHELL` makes the Tab key complete commands, options, files by their endings,
+kinds of machine, controllers and codes, and for `--set` the keys of the machine file that stands
+before it on the line. An editor completes the keys inside a machine file by its JSON schema, with
+taplo (Even Better TOML): the first line of a file that `truepose init` writes names
+`truepose.schema.json`, which `truepose schema -o truepose.schema.json` puts beside it.
+
 `montecarlo`, `bounds` and `shares` answer how sure an error is: [how_sure.md](how_sure.md) says
 which of their numbers to quote to whom.
 """

@@ -16,9 +16,7 @@ _GIVEN = re.compile(r"(?:error|warning)\[([a-z0-9-]+)\]")
 _IN_JSON = re.compile(r'"(?:code|status)": "([a-z0-9_-]+)"')
 
 
-def codes_of(
-    example: Example, folder: Path, capsys: pytest.CaptureFixture[str]
-) -> list[str]:
+def codes_of(example: Example, folder: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
     """Codes that the last step of the example gives; `folder` is the current one."""
     if example.needs_machine:
         assert call(capsys, "init", example.machine, "-o", "machine.toml").code == 0
@@ -28,7 +26,7 @@ def codes_of(
             assert old in text, f"{old!r} is not in machine.toml"
             text = text.replace(old, new, 1)
         file.write_text(text, "utf-8")
-    for name, content in example.files.items():
+    for name, content in example.all_files().items():
         (folder / name).write_text(content, "utf-8")
     if example.python:
         return _codes_of_python(example.python, capsys)

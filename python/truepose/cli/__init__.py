@@ -70,7 +70,8 @@ def _print_version(context: click.Context, _: click.Parameter, asked: bool) -> N
 def cli() -> None:
     """Where the tool of a parallel kinematic machine really is, why, and what to command.
 
-    Every command reads one machine file (TOML) and computes everything from it.
+    Every command reads one machine file (TOML) and computes everything from it; as `-` it is
+    standard input.
 
     Exit code 0: done. 1: the command is a question and the answer is no. 2: bad input. 70: a
     defect of this program.

@@ -84,8 +84,9 @@ def unknowns(context: click.Context, _: click.Parameter, incomplete: str) -> Off
 def freedoms(context: click.Context, _: click.Parameter, incomplete: str) -> Offered:
     """Freedoms that are commanded, for "x=200:400,y=100:300"; those before stay."""
     before, comma, start = incomplete.rpartition(",")
-    machine = _document(context).get("machine", {})
-    names = machine.get("commanded", machine.get("dof", [])) if isinstance(machine, dict) else []
+    machine = _document(context).get("machine")
+    given = machine.get("commanded", machine.get("dof")) if isinstance(machine, dict) else None
+    names = given if isinstance(given, list) else []
     return [
         CompletionItem(f"{before}{comma}{name}=", type=OPEN)
         for name in map(str, names)
@@ -101,13 +102,17 @@ def _document(context: click.Context) -> dict[str, Any]:
     """The tables of the machine file on the line so far, none where it cannot be read."""
     import tomllib
 
-    path = context.params.get("machine_file")
+    # Where an option still wants its value, click leaves what stands before it unparsed.
+    loose = [word for word in context.args if word.lower().endswith(".toml")]
+    path = context.params.get("machine_file") or (loose[0] if loose else None)
+    if path is None:
+        return {}
     try:
         file = Path(path).expanduser()
         if not file.is_file() or file.stat().st_size > LARGEST_FILE:
             return {}
         return tomllib.loads(file.read_text(encoding="utf-8-sig"))
-    except (OSError, ValueError, TypeError, RecursionError):
+    except (OSError, ValueError, RecursionError):
         return {}
 
 
@@ -131,13 +136,13 @@ def _keys(document: dict[str, Any]) -> Iterator[tuple[str, ...]]:
 
 
 def _below(words: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]]:
-    """The keys of a value: those of its tables, and of a vector its components too."""
+    """The keys of a value: those of its tables, and of a vector (no range of a grid) its own."""
     if isinstance(value, dict):
         for key, below in value.items():
             yield from _below((*words, key), below)
         return
     yield words
-    if isinstance(value, list) and len(value) == len("xyz"):
+    if isinstance(value, list) and len(value) == len("xyz") and words[0] != "workspace":
         yield from ((*words, axis) for axis in "xyz")
 
 

@@ -9,12 +9,15 @@ import click
 
 from truepose.errors import Problem, TrueposeError
 
+MOST_EXPLAINED = 20
+"""Problems whose codes a person is pointed to the explanations of."""
+
 
 def show_problems(failure: TrueposeError, *, as_json: bool) -> None:
     """Print all problems that `failure` carries.
 
-    They always go to stderr (with colour on a terminal); with `as_json` they are also printed on
-    stdout as `{"problems": [{"code": ..., "message": ..., ...}]}`.
+    They always go to stderr (on a terminal with colour, and how to read more of them); with
+    `as_json` they are also printed on stdout as `{"problems": [{"code": ..., ...}]}`.
     """
     if sys.stderr.isatty():
         _show_on_terminal(failure.problems)
@@ -43,3 +46,5 @@ def _show_on_terminal(problems: tuple[Problem, ...]) -> None:
             value = getattr(problem, label)
             if value not in (None, ""):
                 console.print(Text.assemble((f"  {label + ':':<10}", "cyan"), str(value)))
+    codes = " ".join(dict.fromkeys(problem.code for problem in problems[:MOST_EXPLAINED]))
+    console.print(Text(f"More, with an example: truepose explain {codes}", style="dim"))

@@ -63,7 +63,7 @@ def _done(work: Callable[[], int], *, as_json: bool) -> int:
         return BAD_INPUT
     except BrokenPipeError:
         raise
-    except Exception as failure:  # noqa: BLE001  told like any defect, and the watch goes on
+    except Exception as failure:
         return ending(failure)
 
 

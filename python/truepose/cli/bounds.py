@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from truepose.cli._ending import INTERRUPTED
 from truepose.cli import _complete
+from truepose.cli._ending import INTERRUPTED
 from truepose.cli._options import (
     FileName,
     Request,

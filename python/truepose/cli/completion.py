@@ -21,7 +21,7 @@ def command(context: click.Context, shell: str) -> int:
     fish: truepose completion fish > ~/.config/fish/completions/truepose.fish
 
     Of zsh, compinit must have run before. Then open a new shell.
-    """
+    """  # noqa: D301  click's mark for lines that are not to be joined
     from truepose.cli._shells import script
 
     click.echo(script(shell, context.find_root().command), nl=False)

@@ -62,14 +62,20 @@ def _explained(explanation: Explanation) -> Iterator[str]:
     def text(words: str) -> str:
         return fill(words, WIDTH, initial_indent="  ", subsequent_indent="  ")
 
-    yield from (explanation.code, "", text(f"{explanation.meaning}."), "")
+    yield from (explanation.code, "", text(_sentence(explanation.meaning)), "")
     yield from ("What to do:", "", text(explanation.advice), "")
     if explanation.example is None:
         return
     yield "An example that gives it:"
-    for title, lines in explanation.example.shown():
+    example = explanation.example
+    files = ((f"in {name}", text.splitlines()) for name, text in example.all_files().items())
+    for title, lines in (*example.machine_steps(), *files, *example.last_steps()):
         yield from ("", *([f"  {title}"] if title else []))
         yield from (f"    {line}".rstrip() for line in lines)
+
+
+def _sentence(meaning: str) -> str:
+    return f"{meaning[0].upper()}{meaning[1:]}."
 
 
 def _unknown(codes: list[str], every: dict[str, Explanation]) -> Exception:

@@ -34,7 +34,7 @@ def command(kind: str | None, listed: bool, output: Path | None, format: str) ->
     """Write a commented machine file of a kind to begin with.
 
     It is complete: every command reads it as it stands. A file that is already there is not
-    touched.
+    touched. Its first line is for editors: `truepose schema` says how they complete its keys.
     """
     if listed == (kind is not None):
         raise click.UsageError("Give a KIND, or --list to see which there are.")

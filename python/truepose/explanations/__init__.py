@@ -9,7 +9,7 @@ example. Nothing heavy is imported: a shell completes codes from here.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any
@@ -36,27 +36,30 @@ TOPICS: dict[str, str] = {
 MACHINE = "planar_two_slider"
 """The kind of machine of an example that names no other."""
 
+Step = tuple[str, tuple[str, ...]]
+"""For people: what it is, nothing for a command, and its lines."""
+
 MEASURED = "measured.csv"
 """Readings of a machine like that of the example, from a table beside this file."""
 
 _CALIBRATED = """
 import truepose as tp
-
+{edited}
 found = tp.calibrate(tp.load("machine.toml"), {asked})
 print(*(suspicion.code for suspicion in found.suspicions))
 print(*(reason.code for reason in (*found.gate.reasons, *found.gate.warnings)))
 """
-_EDITED = (
-    """
+
+_EDITED = """
 with open("measured.csv") as file:
     lines = file.read().splitlines()
 rows = [line.split(",") for line in lines[5:]]
+
 {rows}
+
 with open("measured.csv", "w") as file:
     file.write("\\n".join([*lines[:5], *(",".join(row) for row in rows)]))
 """
-    + _CALIBRATED
-)
 
 
 @dataclass(frozen=True)
@@ -64,12 +67,15 @@ class Example:
     """Files in a folder, and what is done there that gives the code.
 
     `machine`: the kind that `truepose init` writes as machine.toml, `changes` what then stands in
-    it instead of what. `files`: others by their name. `commands`: those of truepose, without its
-    name, the last of which gives the code; or `python`: a script that does.
+    it instead of what. `files`: others by their name; `measured`: what stands in measured.csv
+    instead of what in the readings of that machine, None where there is no such file. `commands`:
+    those of truepose, without its name, the last of which gives the code; or `python`: a script
+    that does.
     """
 
     machine: str = MACHINE
     changes: tuple[tuple[str, str], ...] = ()
+    measured: tuple[tuple[str, str], ...] | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     commands: tuple[str, ...] = ()
     python: str = ""
@@ -80,17 +86,29 @@ class Example:
         said = (*self.commands, self.python)
         return bool(self.changes) or any("machine.toml" in text for text in said)
 
-    def shown(self) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """It for people, step by step: what each is ("" for a command), and its lines."""
+    def all_files(self) -> dict[str, str]:
+        """Every file but machine.toml, readings too."""
+        if self.measured is None:
+            return dict(self.files)
+        text = readings(self.machine)
+        for old, new in self.measured:
+            if old not in text:
+                raise ValueError(f"{old!r} is not in the readings of {self.machine}")
+            text = text.replace(old, new)
+        return {MEASURED: text, **self.files}
+
+    def machine_steps(self) -> Iterator[Step]:
+        """How machine.toml comes about, for people."""
         if self.needs_machine:
             yield "", (f"truepose init {self.machine} -o machine.toml",)
         for old, new in self.changes:
             was, now = (tuple(text.strip("\n").splitlines()) for text in (old, new))
-            yield "in machine.toml, take out" if not any(now) else "in machine.toml, instead of", was
+            yield "in machine.toml, " + ("instead of" if any(now) else "take out"), was
             if any(now):
                 yield "write", now
-        for name, text in self.files.items():
-            yield f"in {name}", tuple(text.splitlines())
+
+    def last_steps(self) -> Iterator[Step]:
+        """What is done with the files, for people."""
         if self.python:
             yield "in Python", tuple(self.python.strip("\n").splitlines())
         for command in self.commands:
@@ -134,29 +152,32 @@ def _example(entry: Mapping[str, Any]) -> Example | None:
     run, python = entry.get("run", ()), entry.get("python", "")
     if "rows" in entry:
         asked = ", ".join(filter(None, ('"measured.csv"', entry.get("calibrate", ""))))
-        python = (_EDITED if entry["rows"] else _CALIBRATED).format(rows=entry["rows"], asked=asked)
+        edited = _EDITED.format(rows=entry["rows"].strip()) if entry["rows"] else ""
+        python = _CALIBRATED.format(edited=edited, asked=asked)
     if not (run or python):
         return None
-    machine = entry.get("machine", MACHINE)
-    files = dict(entry.get("files", {}))
-    if "measured" in entry:
-        text = _beside(f"{machine}.csv")
-        for old, new in entry["measured"]:
-            if old not in text:
-                raise ValueError(f"{old!r} is not in the readings of {machine}")
-            text = text.replace(old, new)
-        files[MEASURED] = text
+    measured = entry.get("measured")
     return Example(
-        machine,
-        tuple((old, new) for old, new in entry.get("change", ())),
-        files,
+        entry.get("machine", MACHINE),
+        _pairs(entry.get("change", ())),
+        None if measured is None else _pairs(measured),
+        entry.get("files", {}),
         (run,) if isinstance(run, str) else tuple(run),
         python,
     )
+
+
+def _pairs(rows: Iterable[Sequence[str]]) -> tuple[tuple[str, str], ...]:
+    return tuple((old, new) for old, new in rows)
+
+
+def readings(machine: str) -> str:
+    """A file of measurements of a machine of that kind, which is not as drawn."""
+    return _beside(f"{machine}.csv")
 
 
 def _beside(name: str) -> str:
     return resources.files(__name__).joinpath(name).read_text(encoding="utf-8")
 
 
-__all__ = ["MACHINE", "TOPICS", "Example", "Explanation", "explanations", "meanings"]
+__all__ = ["TOPICS", "Example", "Explanation", "Step", "explanations", "meanings", "readings"]

@@ -17,7 +17,6 @@ from pathlib import Path
 
 from truepose.errors import Fault, RequestError
 
-
 STDIN = Path("<stdin>")
 """What standard input is called, in messages and where a file names what it was made from."""
 

@@ -8,7 +8,7 @@ import pytest
 
 from explained import codes_of
 from truepose.errors import CATALOGUE
-from truepose.explanations import TOPICS, Explanation, explanations
+from truepose.explanations import explanations
 
 EVERY = explanations()
 EXAMPLES = {code: explanation.example for code, explanation in EVERY.items()}

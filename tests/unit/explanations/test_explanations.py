@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import importlib.util
+import re
+import tomllib
 from pathlib import Path
 
 import pytest
 
+import truepose.explanations
 from explained import codes_of
+from truepose._kernel import STATUS
+from truepose.calibration import data_checks, residual_checks
+from truepose.calibration.acceptance.reasons import SENTENCES
 from truepose.errors import CATALOGUE
-from truepose.explanations import explanations
+from truepose.explanations import TOPICS, explanations
+
+DOCS = Path(__file__).parents[3] / "docs"
 
 EVERY = explanations()
 EXAMPLES = {code: explanation.example for code, explanation in EVERY.items()}
@@ -44,3 +53,50 @@ def test_the_example_gives_the_code(
     example = EXAMPLES[code]
     assert example is not None
     assert code in codes_of(example, tmp_path, capsys)
+
+
+def test_codes_of_suspicions_and_reasons_are_explained() -> None:
+    others = {*data_checks.CODES, *residual_checks.CODES, *SENTENCES}
+    others |= {"other-assembly-mode", "exact-stops", "parasitic-remains", "nothing-to-correct"}
+    others |= {*STATUS, "band"} - {"ok"}
+    assert sorted(others - EVERY.keys()) == []
+    assert sorted(EVERY.keys() - others - CATALOGUE.keys()) == []
+
+
+def test_every_topic_has_a_table_and_every_table_a_topic() -> None:
+    folder = Path(truepose.explanations.__file__).parent
+    assert {path.stem for path in folder.glob("*.toml")} == TOPICS.keys()
+    assert {explanation.topic for explanation in EVERY.values()} == TOPICS.keys()
+
+
+def test_a_code_is_explained_once() -> None:
+    folder = Path(truepose.explanations.__file__).parent
+    tables = [tomllib.loads(path.read_text("utf-8")) for path in folder.glob("*.toml")]
+    assert sum(map(len, tables)) == len(EVERY)
+
+
+def test_a_meaning_of_the_catalogue_is_not_written_again() -> None:
+    folder = Path(truepose.explanations.__file__).parent
+    for path in folder.glob("*.toml"):
+        for code, entry in tomllib.loads(path.read_text("utf-8")).items():
+            assert ("means" in entry) == (code not in CATALOGUE), code
+
+
+def test_sentences_are_sentences() -> None:
+    for explanation in EVERY.values():
+        assert explanation.advice.endswith("."), explanation.code
+        assert explanation.advice[0].isupper() or explanation.advice[0].isdigit()
+        assert not explanation.meaning.endswith(".")
+
+
+def test_the_page_is_fresh() -> None:
+    spec = importlib.util.spec_from_file_location("generate", DOCS / "generate_errors.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    written = (DOCS / "errors.md").read_text("utf-8")
+    assert written == module.page(), "run: python docs/generate_errors.py"
+    # Every code has a heading of its own, which is what a link to it leads to.
+    headings = re.findall(r"^### (\S+)$", written, re.MULTILINE)
+    assert headings == list(EVERY)

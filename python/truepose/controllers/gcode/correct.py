@@ -491,7 +491,8 @@ def _require_files(program: Path, written: Path | None, parameters: Path | None)
         return
     inputs = {"the program": program, "the parameter file": parameters}
     for name, file in inputs.items():
-        if file is not None and written.exists() and written.samefile(file):
+        there = file is not None and file.exists() and written.exists()
+        if file is not None and there and written.samefile(file):
             raise _file_problem(
                 "output-is-input",
                 f"the corrected program would write over {name}",

@@ -56,7 +56,7 @@ CODE` says what a code means, what to do, and shows an example: [errors.md](erro
 kinds of machine, controllers and codes, and for `--set` the keys of the machine file that stands
 before it on the line. An editor completes the keys inside a machine file by its JSON schema, with
 taplo (Even Better TOML): the first line of a file that `truepose init` writes names
-`truepose.schema.json`, which `truepose schema -o truepose.schema.json` puts beside it.
+`truepose-schema.json`, which `truepose schema -o truepose-schema.json` puts beside it.
 
 `montecarlo`, `bounds` and `shares` answer how sure an error is: [how_sure.md](how_sure.md) says
 which of their numbers to quote to whom.

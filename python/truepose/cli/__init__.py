@@ -16,7 +16,7 @@ from types import FrameType
 
 import click
 
-from truepose.__main__ import COMPLETION
+from truepose.cli._complete import COMPLETION
 from truepose.cli._ending import INTERRUPTED, ending, refused_output
 from truepose.cli._guard import GuardedGroup
 

@@ -16,6 +16,9 @@ from click.shell_completion import CompletionItem
 
 from truepose.files.limits import LARGEST_FILE
 
+COMPLETION = "_TRUEPOSE_COMPLETE"
+"""Variable of the environment, set by a shell that asks how a line goes on."""
+
 PATH = "path"
 """Type of a completion that is a file or, with a slash at its end, a folder."""
 OPEN = "open"

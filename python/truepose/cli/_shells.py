@@ -15,8 +15,7 @@ from click.shell_completion import (
     add_completion_class,
 )
 
-from truepose.__main__ import COMPLETION
-from truepose.cli._complete import OPEN
+from truepose.cli._complete import COMPLETION, OPEN
 
 _BASH = """\
 %(complete_func)s() {

@@ -17,7 +17,7 @@ from truepose.cli._options import OutputFile, takes
         "output",
         metavar="FILE.json",
         type=OutputFile(".json"),
-        help="Write it to FILE.json instead; `truepose init` names truepose.schema.json beside "
+        help="Write it to FILE.json instead; `truepose init` names truepose-schema.json beside "
         "the machine file.",
     ),
 )
@@ -25,8 +25,8 @@ def command(output: Path | None) -> int:
     """Print the machine file's JSON schema, for editors.
 
     An editor with taplo (Even Better TOML) completes the keys of a machine file whose first line
-    is `#:schema truepose.schema.json`, says what each is, and marks those that are wrong, once
-    `truepose schema -o truepose.schema.json` has written that file beside it.
+    is `#:schema truepose-schema.json`, says what each is, and marks those that are wrong, once
+    `truepose schema -o truepose-schema.json` has written that file beside it.
     """
     from truepose.machine.reference import schema_text
     from truepose.sources import REGISTRY

@@ -9,21 +9,11 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from truepose.controllers._registry import REGISTRY
+
 if TYPE_CHECKING:
     from truepose.controllers._adapters import controller, export
     from truepose.controllers._export import Controller, Export, Option
-
-REGISTRY: dict[str, str] = {
-    "c": "truepose.controllers.c:C",
-    "linuxcnc": "truepose.controllers.linuxcnc:LinuxCNC",
-    "linuxcnc-genhexkins": "truepose.controllers.linuxcnc_genhexkins:LinuxCncGenhexkins",
-    "linuxcnc-lineardelta": "truepose.controllers.linuxcnc_lineardelta:LinuxCncLinearDelta",
-    "klipper": "truepose.controllers.klipper:Klipper",
-    "marlin": "truepose.controllers.marlin:Marlin",
-    "reprap": "truepose.controllers.reprap:RepRap",
-    "pose-map": "truepose.controllers.pose_map:PoseMap",
-}
-"""Name on the command line -> module and class of the adapter."""
 
 _WHERE = {
     "Controller": "truepose.controllers._export",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 
-from truepose.controllers import REGISTRY
 from truepose.controllers._export import Controller, Export, options_of
+from truepose.controllers._registry import REGISTRY
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine

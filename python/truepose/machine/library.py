@@ -18,7 +18,7 @@ from truepose.files.wording import did_you_mean, one_of
 
 FOLDER = "machine_library"
 
-SCHEMA_FILE = "truepose.schema.json"
+SCHEMA_FILE = "truepose-schema.json"
 """What the JSON schema is called beside a machine file, as `truepose schema` writes it."""
 
 SCHEMA_LINE = f"#:schema {SCHEMA_FILE}\n"

@@ -16,8 +16,8 @@ import pytest
 
 from build_machine import MACHINES, machine_files
 from command_line import call
-from truepose.__main__ import COMPLETION
-from truepose.cli import COMMANDS, cli
+from truepose import __main__ as program
+from truepose.cli import COMMANDS, COMPLETION, cli
 from truepose.cli._shells import SHELLS, Bash
 from truepose.controllers import REGISTRY
 from truepose.explanations import explanations
@@ -45,6 +45,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         Path(name).write_text("")
     Path("machines").mkdir()
     return tmp_path
+
+
+def test_the_variable_is_the_one_that_the_program_asks_for() -> None:
+    assert program.COMPLETION == COMPLETION
 
 
 def test_commands_and_options() -> None:

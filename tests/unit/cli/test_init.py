@@ -17,14 +17,14 @@ import pytest
 import truepose
 from build_machine import machine_files
 from command_line import call
-from truepose.machine.library import FOLDER, machine_of, machines
+from truepose.machine.library import FOLDER, SCHEMA_LINE, machine_of, machines
 
 ROOT = Path(__file__).parents[3]
 KINDS = [path.stem for path in machine_files()]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_file_of_a_kind_is_written_as_it_is_shipped(
+def test_the_file_of_a_kind_is_written_as_it_is_shipped_with_a_line_for_editors(
     kind: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -32,7 +32,8 @@ def test_the_file_of_a_kind_is_written_as_it_is_shipped(
     assert (outcome.code, outcome.out) == (0, "")
     assert outcome.err == f"wrote {kind}.toml\n"
     written = tmp_path / f"{kind}.toml"
-    assert written.read_bytes() == (ROOT / "machines" / written.name).read_bytes()
+    shipped = (ROOT / "machines" / written.name).read_bytes()
+    assert written.read_bytes() == SCHEMA_LINE.encode() + shipped
     assert list(tmp_path.iterdir()) == [written]
     assert "#" in written.read_text("utf-8")
     assert truepose.load(written).name == machine_of(kind).name
@@ -41,7 +42,7 @@ def test_the_file_of_a_kind_is_written_as_it_is_shipped(
 def test_the_output_may_be_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     assert call(capsys, "init", "3rrr", "--output", file).code == 0
-    assert file.read_text("utf-8") == machine_of("3rrr").text
+    assert file.read_text("utf-8") == machine_of("3rrr").template
 
 
 def test_a_file_that_is_there_is_not_touched(

@@ -1,0 +1,15 @@
+"""The registry of adapters, which who completes a command line reads too: it imports none."""
+
+from __future__ import annotations
+
+REGISTRY: dict[str, str] = {
+    "c": "truepose.controllers.c:C",
+    "linuxcnc": "truepose.controllers.linuxcnc:LinuxCNC",
+    "linuxcnc-genhexkins": "truepose.controllers.linuxcnc_genhexkins:LinuxCncGenhexkins",
+    "linuxcnc-lineardelta": "truepose.controllers.linuxcnc_lineardelta:LinuxCncLinearDelta",
+    "klipper": "truepose.controllers.klipper:Klipper",
+    "marlin": "truepose.controllers.marlin:Marlin",
+    "reprap": "truepose.controllers.reprap:RepRap",
+    "pose-map": "truepose.controllers.pose_map:PoseMap",
+}
+"""Name on the command line -> module and class of the adapter."""

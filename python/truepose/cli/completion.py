@@ -18,7 +18,7 @@ def command(context: click.Context, shell: str) -> int:
     \b
     bash: echo 'eval "$(truepose completion bash)"' >> ~/.bashrc
     zsh:  echo 'eval "$(truepose completion zsh)"' >> ~/.zshrc
-    fish: truepose completion fish > ~/.config/fish/completions/truepose.fish
+    fish: echo 'truepose completion fish | source' >> ~/.config/fish/config.fish
 
     Of zsh, compinit must have run before. Then open a new shell.
     """  # noqa: D301  click's mark for lines that are not to be joined

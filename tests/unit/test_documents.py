@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from generators import generator
 
 ROOT = Path(__file__).parent.parent.parent
 README = ROOT / "README.md"
@@ -59,14 +60,10 @@ def test_the_architecture_is_short_enough_to_be_read() -> None:
 
 
 def test_the_picture_of_the_layers_is_fresh() -> None:
-    generator = ROOT / "docs" / "generate_architecture_picture.py"
-    spec = importlib.util.spec_from_file_location("generate", generator)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
     written = (ROOT / "docs" / "architecture.svg").read_text("utf-8")
-    assert written == module.picture(), "run: python docs/generate_architecture_picture.py"
+    assert written == generator("architecture_picture").picture(), (
+        "run: python docs/generate_architecture_picture.py"
+    )
 
 
 def test_every_word_of_the_glossary_lives_somewhere() -> None:

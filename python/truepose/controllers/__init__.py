@@ -6,10 +6,10 @@ an adapter may need what only it needs.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from truepose.controllers._registry import REGISTRY
+from truepose.lazy_names import imported_when_used
 
 if TYPE_CHECKING:
     from truepose.controllers._adapters import controller, export
@@ -28,13 +28,7 @@ __all__ = ["REGISTRY", "Controller", "Export", "Option", "controller", "export"]
 
 
 if not TYPE_CHECKING:  # type checkers know the names above, and refuse all others
-
-    def __getattr__(name: str) -> Any:
-        if name not in _WHERE:
-            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-        value = getattr(import_module(_WHERE[name]), name)
-        globals()[name] = value
-        return value
+    __getattr__ = imported_when_used(__name__, _WHERE)
 
 
 def __dir__() -> list[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 import tomllib
 from pathlib import Path
@@ -11,13 +10,12 @@ import pytest
 
 import truepose.explanations
 from explained import codes_of
+from generators import DOCS, generator
 from truepose._kernel import STATUS
 from truepose.calibration import data_checks, residual_checks
 from truepose.calibration.acceptance.reasons import SENTENCES
 from truepose.errors import CATALOGUE
 from truepose.explanations import TOPICS, explanations
-
-DOCS = Path(__file__).parents[3] / "docs"
 
 EVERY = explanations()
 EXAMPLES = {code: explanation.example for code, explanation in EVERY.items()}
@@ -90,13 +88,8 @@ def test_sentences_are_sentences() -> None:
 
 
 def test_the_page_is_fresh() -> None:
-    spec = importlib.util.spec_from_file_location("generate", DOCS / "generate_errors.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
     written = (DOCS / "errors.md").read_text("utf-8")
-    assert written == module.page(), "run: python docs/generate_errors.py"
+    assert written == generator("errors").page(), "run: python docs/generate_errors.py"
     # Every code has a heading of its own, which is what a link to it leads to.
     headings = re.findall(r"^### (\S+)$", written, re.MULTILINE)
     assert headings == list(EVERY)

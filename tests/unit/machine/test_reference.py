@@ -2,35 +2,25 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import tomllib
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
 from build_machine import machine_files
+from generators import DOCS, generator
 from truepose.files.tolerance_standards import designations
 from truepose.machine.reference import json_schema, page
 from truepose.sources import REGISTRY
 
-DOCS = Path(__file__).parents[3] / "docs"
 
-
-def generator() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("generate", DOCS / "generate_machine_file.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.mark.parametrize("name", generator().pages())
+@pytest.mark.parametrize("name", generator("machine_file").pages())
 def test_the_pages_are_fresh(name: str) -> None:
     written = (DOCS / name).read_text(encoding="utf-8")
-    assert written == generator().pages()[name], "run: python docs/generate_machine_file.py"
+    assert written == generator("machine_file").pages()[name], (
+        "run: python docs/generate_machine_file.py"
+    )
 
 
 def test_the_page_names_every_key_of_every_source() -> None:

@@ -108,7 +108,7 @@ def output_option_of(endings: str) -> Callable[[Command], Command]:
         "-o",
         "output",
         metavar="FILE",
-        type=OutputFile(*re.findall(r"\.\w+", endings)),
+        type=OutputFile(*re.findall(r"\.\w++", endings)),
         help=f"Also write the result to FILE; its ending chooses the form: {endings}.",
     )
 

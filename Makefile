@@ -12,6 +12,9 @@ MADE := $(VENV)/.made
 PACKAGE := $(VENV)/.package
 TOOLS := $(VENV)/.tools
 KLIPPER := build/klipper/.made
+CONSTRAINTS := build/constraints.txt
+RELEASE_TOOLS := build/release/tools/.made
+ACTIONLINT := build/release/actionlint-1.7.12/actionlint
 
 RUST_SOURCES := Cargo.toml Cargo.lock rust-toolchain.toml $(shell find crates -name '*.rs' -o -name Cargo.toml)
 KERNEL := $(wildcard python/truepose/_kernel*.so)
@@ -105,18 +108,57 @@ bench-against: package tools ## build COMMIT=sha beside this one and write the r
 	PYO3_PYTHON=$(abspath $(BIN)/python) $(BIN)/python -m benchmarks.against $(COMMIT) $(ONLY)
 
 .PHONY: bench-peers
-bench-peers: package tools ## install what benchmarks/peers.py compares with, Numba and JAX, into .venv
-	$(BIN)/python -m pip install --quiet --constraint requirements.lock --requirement benchmarks/requirements-peers.txt
+bench-peers: package tools $(CONSTRAINTS) ## install what benchmarks/peers.py compares with, Numba and JAX, into .venv
+	$(BIN)/python -m pip install --quiet --constraint $(CONSTRAINTS) --requirement benchmarks/requirements-peers.txt
 
 .PHONY: docs
 docs: package tools ## write the generated pages of docs/ anew; tests refuse stale ones
 	for page in docs/generate_*.py; do $(BIN)/python $$page || exit 1; done
 
 .PHONY: lock
-lock: tools ## resolve requirements.lock anew from pyproject.toml
+lock: tools ## resolve requirements.lock anew from pyproject.toml, and what wheels are built with
 	$(BIN)/python -m pip install --quiet uv
-	$(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --extra report --extra netcdf --extra sobol --extra dev \
-		--custom-compile-command "make lock" --output-file requirements.lock pyproject.toml
+	$(COMPILE) --extra report --extra netcdf --extra sobol --extra dev --output-file requirements.lock pyproject.toml
+	$(COMPILE) --output-file release/requirements.txt release/requirements.in
+
+# ---- what releases are made with: release/README.md ----
+
+# Names of release/targets.py, or `sdist`: `make wheels ONLY=manylinux-x86_64`.
+.PHONY: wheels
+wheels: cargo $(RELEASE_TOOLS) ## build wheels for Linux on x86-64 and ARM, and the sdist, into dist/: minutes each
+	$(dir $(RELEASE_TOOLS))bin/python -m release.build $(ONLY)
+
+# TRY="FILE ... --python PYTHON ...": of dist/ some files, with several Pythons.
+.PHONY: wheels-test
+wheels-test: $(MADE) ## try each file of dist/ in a clean environment on every library machine: minutes each
+	$(BIN)/python -m release.try_wheels $(TRY)
+
+.PHONY: names
+names: tools ## write the names of CITATION.cff where they are wanted besides
+	$(BIN)/python -m release.names
+
+.PHONY: release-check
+release-check: tools ## say what stands against a release; TAG=v1.2.3 that asks for it
+	$(BIN)/python -m release.check $(if $(TAG),--tag $(TAG))
+
+.PHONY: recipe
+recipe: tools ## write dist/recipe.yaml, for conda-forge, from the sdist in dist/
+	$(BIN)/python -m release.conda
+
+.PHONY: change-report
+change-report: package tools ## what this branch does to public names and to speed since COMMIT=sha
+	@test -n "$(COMMIT)" || { echo "say since which commit: make change-report COMMIT=sha" >&2; exit 1; }
+	PYO3_PYTHON=$(abspath $(BIN)/python) $(BIN)/python -m release.change_report $(COMMIT)
+
+# Where Go is; elsewhere the test of the workflows does without it.
+.PHONY: lint-workflows
+lint-workflows: $(ACTIONLINT) ## check .github/workflows with actionlint
+	$(ACTIONLINT)
+
+.PHONY: audit
+audit: $(RELEASE_TOOLS) ## look for known faults of what is depended on, and at licences; needs cargo-deny
+	$(dir $(RELEASE_TOOLS))bin/pip-audit --require-hashes --disable-pip --requirement requirements.lock
+	cargo deny --locked check
 
 .PHONY: tools
 tools: $(TOOLS)
@@ -139,6 +181,10 @@ distclean: clean ## remove the virtual environment too
 PYTEST := TRUEPOSE_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest \
 	--numprocesses=auto --dist=loadfile --no-loadscope-reorder
 
+# Pins of what is locked, and hashes of all files that a pin has.
+COMPILE := $(BIN)/uv pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes \
+	--custom-compile-command "make lock"
+
 # PyO3 looks at the same Python in every build, so that none of them undoes another's.
 CARGO := PYO3_PYTHON=$(abspath $(BIN)/python) cargo
 
@@ -151,12 +197,26 @@ $(MADE):
 	@touch $@
 
 # The kernel is compiled with all optimisation; the Python sources are used where they lie.
-$(PACKAGE): $(MADE) pyproject.toml requirements.lock $(RUST_SOURCES) $(if $(KERNEL),,kernel-missing) | cargo
-	$(BIN)/python -m pip install --quiet --constraint requirements.lock maturin
-	VIRTUAL_ENV=$(abspath $(VENV)) PIP_CONSTRAINT=$(abspath requirements.lock) \
+$(PACKAGE): $(MADE) pyproject.toml $(CONSTRAINTS) $(RUST_SOURCES) $(if $(KERNEL),,kernel-missing) | cargo
+	$(BIN)/python -m pip install --quiet --constraint $(CONSTRAINTS) maturin
+	VIRTUAL_ENV=$(abspath $(VENV)) PIP_CONSTRAINT=$(abspath $(CONSTRAINTS)) \
 		$(BIN)/maturin develop --release --locked --extras report,netcdf
 	$(BIN)/python -m compileall -q python/truepose
 	@touch $@
+
+# Has an environment of its own: zig takes 300 MB.
+$(RELEASE_TOOLS): $(MADE) release/requirements.txt
+	$(BIN)/python -m venv $(dir $@)
+	$(dir $@)bin/python -m pip install --quiet --require-hashes --requirement release/requirements.txt
+	@touch $@
+
+$(ACTIONLINT):
+	GOBIN=$(abspath $(dir $@)) go install github.com/rhysd/actionlint/cmd/actionlint@v1.7.12
+
+# What the lock pins, without its hashes, which pip does not take of constraints.
+$(CONSTRAINTS): requirements.lock
+	@mkdir -p $(dir $@)
+	@sed -e '/^ *--hash=/d' -e 's/ \\$$//' $< > $@
 
 .PHONY: kernel-missing
 kernel-missing:
@@ -167,5 +227,5 @@ $(KLIPPER): $(MADE) tests/klipper/install.py tests/klipper/environment.txt tests
 	@touch $@
 
 $(TOOLS): $(MADE) requirements.lock
-	$(BIN)/python -m pip install --quiet --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
 	@touch $@

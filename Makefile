@@ -146,9 +146,9 @@ recipe: tools ## write dist/recipe.yaml, for conda-forge, from the sdist in dist
 	$(BIN)/python -m release.conda
 
 .PHONY: change-report
-change-report: package tools ## what this branch does to public names and to speed since COMMIT=sha
+change-report: package tools ## say what this branch does to public names and to speed since COMMIT=sha
 	@test -n "$(COMMIT)" || { echo "say since which commit: make change-report COMMIT=sha" >&2; exit 1; }
-	PYO3_PYTHON=$(abspath $(BIN)/python) $(BIN)/python -m release.change_report $(COMMIT)
+	PYO3_PYTHON=$(abspath $(BIN)/python) $(BIN)/python -m release.change_report $(COMMIT) $(if $(OUTPUT),--output $(OUTPUT))
 
 # Where Go is; elsewhere the test of the workflows does without it.
 .PHONY: lint-workflows

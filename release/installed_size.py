@@ -1,7 +1,8 @@
 """What an installation takes of a disk, a line a package: `python -m release.installed_size WHAT`.
 
-WHAT is what pip is asked for, such as dist/truepose-1.0.0-...whl or `truepose[report]`. It goes into
-a folder of its own, which is counted before anything has run: byte code that pip wrote is in it.
+WHAT is what pip is asked for, such as dist/truepose-1.0.0-...whl or `truepose[report]`. It goes
+into a folder of its own, which is counted before anything has run: with the byte code that pip
+wrote.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Tries what is in dist/ as users get it, in clean environments, on every library machine.
 
-`python -m release.try_wheels [FILE ...] [--python PYTHON ...]`. A wheel has nothing but its own
-environment on the PATH, so no cargo; the sdist is built with the cargo there is. An ARM wheel runs
-on another machine under QEMU (release/arm64.py). What the files answer is compared between them.
+`python -m release.try_wheels [FILE ...] [--python PYTHON ...] [--native]`. A wheel has nothing but
+its own environment on the PATH, so no cargo; the sdist is built with the cargo there is. What is
+for ARM runs elsewhere under QEMU (release/arm64.py); `--native` leaves such files out. What
+the files answer is compared between them.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import platform
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import time
 from collections.abc import Callable, Sequence
@@ -28,8 +30,10 @@ Answers = dict[str, object]
 
 AGREEMENT = 1e-9
 """Answers of two processors differ by no more, relative to the larger of both and to 1."""
+EXTRAS = {"report": ("report", "report.html"), "netcdf": ("budget", "budget.nc")}
+"""Extra -> the command that needs it, and what that writes."""
 REPORTED = "planar_two_slider"
-"""The machine of which a report and a netCDF file are made, so that the extras are tried too."""
+"""The machine with which extras are tried."""
 VERDICTS = (0, 1)
 """Exit codes of `truepose check` that are an answer."""
 
@@ -49,15 +53,20 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m release.try_wheels", description=__doc__)
     parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="default: all of dist/")
     parser.add_argument("--python", nargs="+", default=[sys.executable], metavar="PYTHON")
+    parser.add_argument("--extras", nargs="*", choices=EXTRAS, default=list(EXTRAS))
+    parser.add_argument("--native", action="store_true", help="only files for this machine")
     arguments = parser.parse_args()
     files = arguments.files or sorted((*DIST.glob("*.whl"), *DIST.glob("*.tar.gz")))
+    files = sorted(filter(runs_here, files)) + sorted(filter(under_qemu_only, files))
+    if arguments.native:
+        files = list(filter(runs_here, files))
     if not files:
-        parser.error(f"nothing in {DIST}; run: make wheels")
+        parser.error(f"nothing for this machine in {DIST}; run: make wheels")
     first: Answers = {}
     failed = False
     for file in files:
         for python in arguments.python if runs_here(file) else arguments.python[:1]:
-            faults = tried(file.absolute(), python, first)
+            faults = tried(file.absolute(), python, arguments.extras, first)
             failed |= bool(faults)
             for fault in faults:
                 print(f"  {fault}", file=sys.stderr, flush=True)
@@ -67,28 +76,33 @@ def main() -> int:
 def runs_here(file: Path) -> bool:
     """Whether it is for this machine; the sdist always is."""
     tags = file.name.removesuffix(".whl").rpartition("-")[2]
-    systems = {"linux": "manylinux", "darwin": "macosx", "win32": "win"}
+    linux = "musllinux" if "musl" in str(sysconfig.get_config_var("HOST_GNU_TYPE")) else "manylinux"
+    system = {"linux": linux, "darwin": "macosx", "win32": "win"}[sys.platform]
     return file.name.endswith(".tar.gz") or (
-        systems[sys.platform] in tags and platform.machine().lower() in tags.replace("win_", "")
+        system in tags and platform.machine().lower() in tags.lower()
     )
 
 
-def tried(file: Path, python: str, first: Answers) -> list[str]:
+def under_qemu_only(file: Path) -> bool:
+    """Whether it is for Linux on ARM, and this machine is no such one."""
+    return "manylinux" in file.name and "aarch64" in file.name and not runs_here(file)
+
+
+def tried(file: Path, python: str, extras: Sequence[str], first: Answers) -> list[str]:
     """What is wrong with a file; its answers become those of the first, where there are none."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        install = in_environment if runs_here(file) else under_qemu
-        if install is under_qemu and "manylinux" not in file.name:
-            print(f"{file.name}: not for this machine, not tried", flush=True)
-            return []
-        installed = install(file, python, folder)
+        emulated = under_qemu_only(file)
+        installed = (
+            under_qemu(file, folder) if emulated else in_environment(file, python, extras, folder)
+        )
         answers, faults = asked(installed, folder)
-        faults += [] if install is under_qemu else reported(installed, folder)
+        faults += [] if emulated else reported(installed, extras, folder)
     apart = difference(first, answers) if first else 0.0
     if apart > AGREEMENT:
         faults.append(f"answers are {apart:.1e} from those of the first file")
     first.update(answers)
-    how = "under QEMU" if install is under_qemu else f"with {Path(python).name}"
+    how = "under QEMU" if emulated else f"with {Path(python).name}"
     print(
         f"{file.name} {how}: installed in {installed.seconds:.0f} s, {len(answers)} machines, "
         f"{len(faults)} faults, within {apart:.1e} of the first",
@@ -97,8 +111,8 @@ def tried(file: Path, python: str, first: Answers) -> list[str]:
     return faults
 
 
-def in_environment(file: Path, python: str, folder: Path) -> Installed:
-    """Install into an environment of its own, with the extras; a wheel sees no cargo."""
+def in_environment(file: Path, python: str, extras: Sequence[str], folder: Path) -> Installed:
+    """Install into an environment of its own, with extras; a wheel sees no cargo."""
     subprocess.run([python, "-m", "venv", str(folder / "venv")], check=True)
     binaries = folder / "venv" / ("Scripts" if sys.platform == "win32" else "bin")
     environment = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_"))}
@@ -111,7 +125,7 @@ def in_environment(file: Path, python: str, folder: Path) -> Installed:
             raise RuntimeError("there is a cargo in the clean environment")
     start = time.perf_counter()
     pip = [str(binaries / "python"), "-m", "pip", "install", "--quiet"]
-    subprocess.run([*pip, f"{file}[report,netcdf]"], cwd=folder, env=environment, check=True)
+    subprocess.run([*pip, f"{file}[{','.join(extras)}]"], cwd=folder, env=environment, check=True)
     seconds = time.perf_counter() - start
 
     def run(arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:
@@ -120,8 +134,8 @@ def in_environment(file: Path, python: str, folder: Path) -> Installed:
     return Installed(run, seconds)
 
 
-def under_qemu(file: Path, python: str, folder: Path) -> Installed:
-    """Unpack for ARM beside an ARM Python; the host's `python` does nothing."""
+def under_qemu(file: Path, folder: Path) -> Installed:
+    """Unpack for ARM beside an ARM Python."""
     command = arm64.python_command()
     start = time.perf_counter()
     arm64.install(file, folder / "site")
@@ -153,10 +167,10 @@ def asked(installed: Installed, folder: Path) -> tuple[Answers, list[str]]:
     return answers, faults
 
 
-def reported(installed: Installed, folder: Path) -> list[str]:
-    """What fails of a report and of a netCDF file."""
+def reported(installed: Installed, extras: Sequence[str], folder: Path) -> list[str]:
+    """What fails of the commands that need extras."""
     faults = []
-    for command, name in (("report", "report.html"), ("budget", "budget.nc")):
+    for command, name in (EXTRAS[extra] for extra in extras):
         machine, output = folder / f"{REPORTED}.toml", folder / name
         done = installed.run([command, str(machine), "--output", str(output)])
         if done.returncode not in VERDICTS or not output.exists():

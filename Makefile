@@ -157,7 +157,7 @@ lint-workflows: $(ACTIONLINT) ## check .github/workflows with actionlint
 
 .PHONY: audit
 audit: $(RELEASE_TOOLS) ## look for known faults of what is depended on, and at licences; needs cargo-deny
-	$(dir $(RELEASE_TOOLS))bin/pip-audit --require-hashes --disable-pip --requirement requirements.lock
+	$(dir $(RELEASE_TOOLS))bin/pip-audit --strict --require-hashes --disable-pip --requirement requirements.lock
 	cargo deny --locked check
 
 .PHONY: tools

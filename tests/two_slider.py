@@ -44,7 +44,7 @@ def directions(machine: Machine, poses: Floats) -> Floats:
 def tensions(machine: Machine, poses: Floats, force: tuple[float, float]) -> Floats:
     """(n, 2) forces in the struts that hold `force` on the tool, N, tension positive."""
     along = directions(machine, poses)
-    held = np.linalg.solve(np.swapaxes(along, 1, 2), np.array(force)[:, np.newaxis])
+    held = np.linalg.solve(np.swapaxes(along, 1, 2), np.array(force)[np.newaxis, :, np.newaxis])
     found: Floats = held[..., 0]
     return found
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ValidationError
 
-from truepose.arrays import Floats, real_numbers
+from truepose.arrays import Floats, is_masked, real_numbers
 from truepose.errors import ArgumentError, Problem, RequestError
 from truepose.files.units import UnitSystem, default_units, shown_value
 from truepose.files.wording import did_you_mean, one_of
@@ -304,7 +304,7 @@ class Condition:
 
 def _finite(value: object) -> bool:
     """Whether it is a number, and a finite one."""
-    if np.ma.is_masked(value):
+    if is_masked(value):
         return False
     try:
         return math.isfinite(value)  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from truepose.arrays import Floats, Indices
+from truepose.arrays import Floats, Indices, sorted_union
 from truepose.machine import Machine
 from truepose.runs.displacement import ParameterDeviation, displacement
 from truepose.runs.poses import OK
@@ -65,8 +65,8 @@ class ExactError:
     def __init__(self, machine: Machine, block: PoseBlock, variables: Variables) -> None:
         self._machine, self._block, self._variables = machine, block, variables
         parameters, shift = variables.shift
-        every = np.union1d(parameters, variables.columns)
-        self._parameters: Indices = np.asarray(every, np.intp)
+        every = sorted_union(parameters, variables.columns)
+        self._parameters = every
         self._shift = np.zeros((len(shift), every.size))
         self._shift[:, np.searchsorted(every, parameters)] = shift
         self._place = np.searchsorted(every, variables.columns)
@@ -95,7 +95,7 @@ class ExactError:
         moved = t[:, self._variables.variable_of]
         moved *= half
         values = shift + np.zeros((len(t), 1))
-        if np.unique(self._place).size == self._place.size:
+        if np.bincount(self._place).max(initial=0) <= 1:
             values[:, self._place] += moved
         else:
             for column, place in enumerate(self._place):

@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from truepose.arrays import Flags, Floats, Indices
+from truepose.arrays import Flags, Floats, Indices, sorted_union
 from truepose.machine import Machine
 from truepose.probability.domain import Domain
 from truepose.representation import Represented
@@ -111,7 +111,7 @@ class Variables(Represented):
         parameters, shift = self.shift
         if len(shift) != 1 or len(self.half_width) != 1:
             raise ValueError("variables over several poses; take one of them with at()")
-        every = np.union1d(parameters, self.columns).astype(np.intp)
+        every = sorted_union(parameters, self.columns)
         moves = np.zeros((len(self.names), every.size))
         np.add.at(
             moves, (self.variable_of, np.searchsorted(every, self.columns)), self.half_width[0]

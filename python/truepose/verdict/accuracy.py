@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose._kernel import STATUS
-from truepose.arrays import Floats, Indices
+from truepose.arrays import Floats, Indices, sorted_union
 from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs.arguments import checked
@@ -194,7 +194,7 @@ def _witnessed(
         _largest(surveyed.witness[:, at], 1),
         _largest(surveyed.bound[:, at], 1),
     ]
-    numbers = surveyed.numbers[np.unique(np.concatenate(chosen))]
+    numbers = surveyed.numbers[sorted_union(*chosen)]
     best = _farthest(population, name, numbers, at, columns)
     assert best is not None
     return best

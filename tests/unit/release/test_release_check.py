@@ -34,7 +34,9 @@ def checkout(tmp_path: Path) -> Path:
     for name in (CITATION, "pyproject.toml", "Cargo.toml", "CHANGELOG.md"):
         shutil.copy(ROOT / name, tmp_path / name)
     (tmp_path / "tests" / "archive" / "0.1").mkdir(parents=True)
-    edit(tmp_path / "CHANGELOG.md", {"## [Unreleased]": "## [Unreleased]\n\n## [0.1.0] - 2027-01-31"})
+    edit(
+        tmp_path / "CHANGELOG.md", {"## [Unreleased]": "## [Unreleased]\n\n## [0.1.0] - 2027-01-31"}
+    )
     for name, pattern in (("pyproject.toml", "version = "), (CITATION, "version: ")):
         text = (tmp_path / name).read_text("utf-8")
         text = re.sub(rf'^({pattern}"?)[\d.]+', r"\g<1>0.1.0", text, count=1, flags=re.MULTILINE)

@@ -1,4 +1,4 @@
-"""Workflows are sound, ask for targets and modules that there are, and trust no tag of an action."""
+"""Workflows are sound, run what there is, and trust no tag of an action."""
 
 from __future__ import annotations
 

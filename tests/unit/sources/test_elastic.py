@@ -26,7 +26,7 @@ def test_a_strut_stretches_by_its_tension_over_its_stiffness(tmp_path: Path) -> 
     rails = np.array([0.0, 0.6])
     carriages = np.stack([np.broadcast_to(rails, (len(poses), 2)), machine.inverse(poses)], axis=2)
     along = (poses[:, np.newaxis, :] - carriages) / 0.5
-    tension = np.linalg.solve(np.swapaxes(along, 1, 2), np.array([[1200.0], [-1500.0]]))[..., 0]
+    tension = np.linalg.solve(np.swapaxes(along, 1, 2), np.array([[[1200.0], [-1500.0]]]))[..., 0]
     assert np.abs(found.force.values - tension).max() < 1e-8
     stiffness = 28e-6 * np.array([210e9, machine.struts[1].modulus]) / 0.5
     moved = np.linalg.solve(along, (tension / stiffness)[..., np.newaxis])[..., 0]
@@ -140,7 +140,7 @@ def test_a_drive_gives_way_along_its_rail(tmp_path: Path) -> None:
     found = tp.budget(machine)
     poses, carriages = machine.poses(), machine.inverse(machine.poses())
     along = (poses[:, np.newaxis] - np.stack([[[0.0, 0.6]] * 15, carriages], axis=2)) / 0.5
-    tension = np.linalg.solve(np.swapaxes(along, 1, 2), np.array([[1200.0], [-1500.0]]))[..., 0]
+    tension = np.linalg.solve(np.swapaxes(along, 1, 2), np.array([[[1200.0], [-1500.0]]]))[..., 0]
     # A strut in tension pulls the carriage towards the tool.
     sagged = tension * along[..., 1] / 40e6
     moved = np.linalg.solve(along, (along[..., 1] * sagged)[..., np.newaxis])[..., 0]
@@ -171,7 +171,7 @@ def test_a_crank_twists_by_its_moment_over_its_torsional_stiffness(tmp_path: Pat
     elbow = 0.3 * np.stack([np.cos(joints), np.sin(joints)], axis=2)
     elbow[:, 1, 0] += 0.6
     along = (machine.poses()[found.pose.values][:, np.newaxis] - elbow) / 0.5
-    tension = np.linalg.solve(np.swapaxes(along, 1, 2), np.array([[1200.0], [-1500.0]]))[..., 0]
+    tension = np.linalg.solve(np.swapaxes(along, 1, 2), np.array([[[1200.0], [-1500.0]]]))[..., 0]
     across = 0.3 * np.stack([-np.sin(joints), np.cos(joints)], axis=2)
     lever = (across * along).sum(axis=2)
     moved = np.linalg.solve(along, (lever * tension * lever / 9e3)[..., np.newaxis])[..., 0]
@@ -189,7 +189,7 @@ def test_what_the_base_joint_stands_on_gives_way_along_its_axes(tmp_path: Path) 
     found = tp.budget(machine, condition=machine.condition.replace(force=force))
     poses, carriages = machine.poses(), machine.inverse(machine.poses())
     along = (poses[:, np.newaxis] - np.stack([[[0.0, 0.6]] * 15, carriages], axis=2)) / 0.5
-    tension = np.linalg.solve(np.swapaxes(along, 1, 2), np.array([[12.0], [-15.0]]))[..., 0]
+    tension = np.linalg.solve(np.swapaxes(along, 1, 2), np.array([[[12.0], [-15.0]]]))[..., 0]
     given = tension[..., np.newaxis] * along / [20e6, 30e6]
     moved = np.linalg.solve(along, (along * given).sum(axis=2)[..., np.newaxis])[..., 0]
     gap = np.abs(found.error.sel(source="elastic") - moved).max()

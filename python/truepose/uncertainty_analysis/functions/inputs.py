@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose.arrays import Floats
+from truepose.arrays import Floats, is_masked
 from truepose.errors import Problem, RequestError
 from truepose.files.wording import did_you_mean, one_of
 from truepose.probability import distributions
@@ -156,7 +156,7 @@ def _refused(code: str, message: str, *, found: str, expected: str) -> RequestEr
 
 def _finite(name: str, value: float) -> float:
     try:
-        number = float(value if not np.ma.is_masked(value) else "masked")
+        number = float(value if not is_masked(value) else "masked")
     except (TypeError, ValueError, OverflowError):
         raise _refused(
             "wrong-type", f"{name} is not a number", found=repr(value), expected="a number"

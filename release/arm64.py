@@ -17,6 +17,8 @@ from release import BUILD
 FOLDER = BUILD / "arm64"
 PYTHON = "3.11"
 """Debian 12's."""
+PACKAGES = (f"python{PYTHON}", "libstdc++6")
+"""Of the second numpy takes what every system has."""
 CONFIGURATION = """\
 APT::Architecture "arm64";
 APT::Architectures { "arm64"; };
@@ -51,7 +53,7 @@ def install(wheel: Path, folder: Path) -> None:
 
 
 def _arm_packages() -> list[Path]:
-    """Python and all that it needs, as files."""
+    """Python and all that it and numpy need, as files."""
     apt = FOLDER / "apt"
     for below in ("state/lists/partial", "cache/archives/partial", "log"):
         (apt / below).mkdir(parents=True, exist_ok=True)
@@ -60,7 +62,7 @@ def _arm_packages() -> list[Path]:
     configuration.write_text(CONFIGURATION % {"apt": apt}, encoding="utf-8")
     environment = os.environ | {"APT_CONFIG": str(configuration)}
     install = ["install", "--yes", "--no-install-recommends", "--download-only"]
-    for command in (["update"], [*install, f"python{PYTHON}"]):
+    for command in (["update"], [*install, *PACKAGES]):
         subprocess.run(
             ["apt-get", "--quiet=2", *command], env=environment, stdout=sys.stderr, check=True
         )

@@ -34,6 +34,8 @@ EXTRAS = {"report": ("report", "report.html"), "netcdf": ("budget", "budget.nc")
 """Extra -> the command that needs it, and what that writes."""
 REPORTED = "planar_two_slider"
 """The machine with which extras are tried."""
+SHOWN = 300
+"""Characters of what a failing command says."""
 VERDICTS = (0, 1)
 """Exit codes of `truepose check` that are an answer."""
 
@@ -125,7 +127,8 @@ def in_environment(file: Path, python: str, extras: Sequence[str], folder: Path)
             raise RuntimeError("there is a cargo in the clean environment")
     start = time.perf_counter()
     pip = [str(binaries / "python"), "-m", "pip", "install", "--quiet"]
-    subprocess.run([*pip, f"{file}[{','.join(extras)}]"], cwd=folder, env=environment, check=True)
+    asked_for = f"{file}[{','.join(extras)}]" if extras else str(file)
+    subprocess.run([*pip, asked_for], cwd=folder, env=environment, check=True)
     seconds = time.perf_counter() - start
 
     def run(arguments: Sequence[str]) -> subprocess.CompletedProcess[str]:
@@ -161,7 +164,8 @@ def asked(installed: Installed, folder: Path) -> tuple[Answers, list[str]]:
         made = installed.run(["init", kind, "--output", str(file)])
         done = installed.run(["check", str(file), "--format", "json"])
         if made.returncode or done.returncode not in VERDICTS:
-            faults.append(f"{kind}: exit {done.returncode}: {made.stderr} {done.stderr}".strip())
+            said = (made.stderr or done.stderr).strip()[:SHOWN]
+            faults.append(f"{kind}: exit {done.returncode}: {said}")
         else:
             answers[kind] = json.loads(done.stdout)
     return answers, faults

@@ -61,6 +61,6 @@ def test_a_machine_that_fails_is_told(tmp_path: Path) -> None:
 
     answers, faults = asked(Installed(run, 0.0), tmp_path)
     assert answers == {"good": {}}
-    assert faults == ["bad: exit 3: ! !"]
+    assert faults == ["bad: exit 3: !"]
     # Both commands are done, and neither wrote a file.
     assert len(reported(Installed(run, 0.0), ("report", "netcdf"), tmp_path)) == 2

@@ -118,7 +118,7 @@ docs: package tools ## write the generated pages of docs/ anew; tests refuse sta
 .PHONY: lock
 lock: tools ## resolve requirements.lock anew from pyproject.toml, and what wheels are built with
 	$(BIN)/python -m pip install --quiet uv
-	$(COMPILE) --extra report --extra netcdf --extra sobol --extra dev --output-file requirements.lock pyproject.toml
+	$(COMPILE) --all-extras --output-file requirements.lock pyproject.toml
 	$(COMPILE) --output-file release/requirements.txt release/requirements.in
 
 # ---- what releases are made with: release/README.md ----

@@ -67,7 +67,10 @@ def wheel(target: Target) -> Path:
 
 def look_at(built: Path, target: Target) -> None:
     """Refuse a wheel that is not abi3, lacks its SBOM, or runs on fewer systems than it says."""
-    if f"-cp311-abi3-{target.tag}" not in built.name:
+    python, _, platforms = built.stem.partition("-abi3-")
+    # Several, where older installers know the same systems by another name.
+    tags = platforms.split(".")
+    if not python.endswith("-cp311") or not any(tag.startswith(target.tag) for tag in tags):
         raise RuntimeError(f"{built.name} is not cp311-abi3-{target.tag}")
     with zipfile.ZipFile(built) as archive:
         if not any(SBOMS in name for name in archive.namelist()):

@@ -17,7 +17,7 @@ from release.targets import DEFAULT, SDIST, TARGETS
 from system_package import missing
 
 LINUX = TARGETS["manylinux-x86_64"]
-NAME = "truepose-0.1.0-cp311-abi3-manylinux_2_17_x86_64.whl"
+NAME = "truepose-0.1.0-cp311-abi3-manylinux2014_x86_64.manylinux_2_17_x86_64.whl"
 SBOM = "truepose-0.1.0.dist-info/sboms/truepose-python.cyclonedx.json"
 
 

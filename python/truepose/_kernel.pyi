@@ -186,6 +186,23 @@ class Machine:
         `variables` (k,) is 1; `sigmas`: standard deviations in each variable's half band.
         """
 
+    def budget_at(
+        self,
+        joints: ArrayLike,
+        placements: ArrayLike,
+        causes: Sequence[object],
+        quantities: Sequence[Sequence[int]],
+        all_plain: bool,
+        smallest: float,
+        tables: Mapping[str, Any],
+    ) -> tuple[_Codes, _Codes, _Codes, dict[str, _Floats]]:
+        """(status of shifts (n,), of bands (n,), of edges (n,), highest magnitudes by name).
+
+        Fills the arrays of `tables` with the budget of `causes`: see `error_budget.in_kernel`.
+        `quantities`: components of each length; `all_plain`: whether all variables lie in [-1, 1];
+        `smallest`: of which coordinate, m, there is still a percent.
+        """
+
     @property
     def can_be_enclosed(self) -> bool:
         """Whether bounds over a region can be proven: see `bounds_over`."""

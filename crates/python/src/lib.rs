@@ -2,6 +2,7 @@
 
 mod arrays;
 mod blocks;
+mod budget;
 mod code;
 mod description;
 mod elements;

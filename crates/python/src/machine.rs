@@ -360,7 +360,7 @@ impl Machine {
         })
     }
 
-    /// (loads (n, k), status) on parameters under wrenches (n or 1, 6).
+    /// (loads (n, k), status) on parameters under wrenches (n or 1, 6); (n, 2 k) under two at once, (n or 1, 12).
     fn loads_at<'py>(
         &self,
         py: Python<'py>,
@@ -370,8 +370,8 @@ impl Machine {
         columns: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let columns = self.columns(columns)?;
-        let wrenches = Input::new(wrenches, &[6], "wrenches")?;
-        let (machine, further) = (&self.inner, [columns.len()]);
+        let wrenches = Input::new(wrenches, &[6, 6 * batch::WRENCHES], "wrenches")?;
+        let (machine, further) = (&self.inner, [wrenches.width / 6 * columns.len()]);
         self.at_placements(py, joints, placements, Some(&wrenches), &further, |rows| {
             Quantity::Loads(batch::Loads::new(machine, &columns, rows))
         })

@@ -30,8 +30,11 @@ class Highest:
 
     def add(self, values: Floats) -> None:
         """`values` (n, *shape) of more poses."""
-        absolute = np.abs(values)
-        np.fmax(self.value, np.fmax.reduce(absolute, axis=0), out=self.value)
+        self.raise_to(np.fmax.reduce(np.abs(values), axis=0))
+
+    def raise_to(self, highest: Floats) -> None:
+        """`highest`, as many numbers, over more poses."""
+        np.fmax(self.value, highest.reshape(self.value.shape), out=self.value)
 
 
 class LengthStatistics:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from truepose.error_budget import bands, comparison, worst
+from truepose.error_budget import bands, comparison, in_kernel
 from truepose.error_budget.guide_loads import GuideLoads
 from truepose.machine import Condition, Machine
-from truepose.runs import displacement, percent
+from truepose.runs import percent
 from truepose.runs.arguments import checked
 from truepose.runs.dataset import Schema, Variable, label, quantity_coords
 from truepose.runs.poses import Progress, of_band
@@ -186,13 +186,17 @@ def evaluate(
         deviations = [source.deviation(machine, run.condition, block) for source in sources]
         for names, deviation in zip(distributions, deviations, strict=True):
             names.update((str(deviation.distribution[k]), None) for k in deviation.banded)
-        room = rows.room(block.indices.size)
-        values, shifted, edges = _evaluate(machine, block, sources, deviations, room)
-        usable = run.fill(block, values, *shifted, *map(of_band, edges))
+        values = rows.room(block.indices.size)
+        filled, statuses = _evaluate(machine, block, sources, deviations, values)
+        usable = run.fill(block, values, *statuses)
         if usable.any():
+            every = bool(usable.all())
             for name, running in highest.items():
-                running.add(values[_HIGHEST[name]][usable])
-            statistics.add(values["largest"][usable])
+                if every:
+                    running.raise_to(filled.highest[_HIGHEST[name]])
+                else:
+                    running.add(values[_HIGHEST[name]][usable])
+            statistics.add(values["largest"] if every else values["largest"][usable])
             guides.add(block, usable)
     if rows.count == 0:
         raise run.no_pose_left()
@@ -216,59 +220,33 @@ def _evaluate(
     block: PoseBlock,
     sources: Sequence[Source],
     deviations: Sequence[Deviation],
-    room: dict[str, np.ndarray],
-) -> tuple[dict[str, np.ndarray], list[np.ndarray], list[np.ndarray]]:
-    """Every variable over poses for one block, and all statuses (n,) met on the way.
+    values: dict[str, np.ndarray],
+) -> tuple[in_kernel.Filled, list[np.ndarray]]:
+    """Fill `values`, every variable over poses, for one block.
 
-    First those at shifts, in the order of `displacement.at_shifts`, then those at edges of the
-    bands. Variables of each source are written into `room`.
+    Returns what the kernel says of it, and all statuses (n,) met on the way, in the order of
+    `displacement.at_shifts`: at shifts, of the bands about them, at edges of the bands.
     """
-    coordinate, defined = percent.coordinates(machine, block.placements)
-    per_error = percent.per_error(coordinate, defined)
-    of_source = ("pose", "source")
-    values = {
-        name: room[name] for name, variable in SCHEMA.items() if variable.dims[:2] == of_source
-    }
-    shifted: list[np.ndarray] = []
-    at_edges: list[np.ndarray] = []
-    nominal: list[np.ndarray] = []
     kinds = list(quantities(machine.components).values())
+    filled = in_kernel.fill(machine, block, sources, deviations, kinds, values)
+    statuses = [filled.shifts, filled.bands]
     for at, deviation in enumerate(deviations):
-        edges = displacement.source_edges(machine, block, deviation)
-        band = bands.of_source(machine, block, deviation, edges.error, kinds)
-        values["error"][:, at] = edges.error
-        values["error_lower"][:, at] = edges.lower
-        values["error_upper"][:, at] = edges.upper
-        values["worst"][:, at] = worst.worst(edges.error, band.reach)
-        values["reach"][:, at] = np.maximum(*band.reach)
-        values["uncertainty"][:, at] = band.uncertainty
-        values["largest"][:, at] = band.largest
-        percent.percent(edges.lower, per_error, out=values["percent_lower"][:, at])
-        percent.percent(edges.upper, per_error, out=values["percent_upper"][:, at])
-        shifted.append(edges.status[0])
-        at_edges += edges.status[1:]
-        nominal.append(band.status)
-    overall = displacement.overall_edges(
-        machine,
-        block,
-        [(d, source.sets_overall_edges) for d, source in zip(deviations, sources, strict=True)],
-    )
-    variables = variables_of(machine, sources, deviations)
-    together, regular = bands.of_all(machine, block, variables, overall.error, kinds)
-    shifted += [overall.status[0], *nominal, regular]
-    at_edges += overall.status[1:]
-    values |= {
-        "overall_error": overall.error,
-        "overall_error_lower": overall.lower,
-        "overall_error_upper": overall.upper,
-        "overall_percent_lower": percent.percent(overall.lower, per_error),
-        "overall_percent_upper": percent.percent(overall.upper, per_error),
-        "percent_defined": defined,
-        "linear_maximum": together,
-        "joint_nominal": block.joints,
-        "force": block.forces,
-    }
-    return values, shifted, at_edges
+        if deviation.banded.size and not in_kernel.is_plain(deviation):
+            error = np.ascontiguousarray(values["error"][:, at])
+            effects, status = bands.of_source(machine, block, deviation, error, kinds)
+            for name, effect in effects.items():
+                values[name][:, at] = effect
+            statuses.append(status)
+    if not in_kernel.in_boxes(deviations):
+        variables = variables_of(machine, sources, deviations)
+        values["linear_maximum"][:], status = bands.of_all(
+            machine, block, variables, values["overall_error"], kinds
+        )
+        statuses.append(status)
+    values["percent_defined"][:] = percent.defined(machine, block.placements)
+    values["joint_nominal"][:] = block.joints
+    values["force"][:] = block.forces
+    return filled, [*statuses, of_band(filled.edges)]
 
 
 __all__ = ["SCHEMA", "Evaluation", "budget", "evaluate"]

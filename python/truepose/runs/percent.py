@@ -19,26 +19,16 @@ SMALLEST = 1e-6
 """Coordinate, in characteristic lengths of the machine, below which a percentage says nothing."""
 
 
-def coordinates(machine: Machine, placements: Floats) -> tuple[Floats, Flags]:
-    """The tool point's coordinates, base frame, m, and where a percent of them is defined.
+def smallest(machine: Machine) -> float:
+    """The smallest coordinate of the tool point, m, that an error is a percent of."""
+    return SMALLEST * machine.characteristic_length
 
-    Both (n, n_component); a rotation has no coordinate (NaN).
-    """
-    values = np.full((len(placements), len(machine.components)), np.nan)
+
+def defined(machine: Machine, placements: Floats) -> Flags:
+    """(n, n_component) where there is a percent of the tool point's coordinate, base frame."""
+    flags = np.zeros((len(placements), len(machine.components)), np.bool_)
     for index, component in enumerate(machine.components):
         if component in POSITIONS:
-            values[:, index] = placements[:, POSITIONS.index(component)]
-    return values, np.abs(values) >= SMALLEST * machine.characteristic_length
-
-
-def per_error(coordinate: Floats, defined: Flags) -> Floats:
-    """(n, n_component) percent of `coordinate` per m of error; NaN where it is not `defined`."""
-    result = np.full(coordinate.shape, np.nan)
-    np.divide(100.0, np.abs(coordinate), out=result, where=defined)
-    return result
-
-
-def percent(error: Floats, per_error: Floats, out: Floats | None = None) -> Floats:
-    """(n, n_component) the size of `error` in percent, from what one metre of it is."""
-    result: Floats = np.multiply(np.abs(error), per_error, out=out)
-    return result
+            size = np.abs(placements[:, POSITIONS.index(component)])
+            flags[:, index] = size >= smallest(machine)
+    return flags

@@ -32,7 +32,7 @@ def all_that_acts(block: PoseBlock) -> Floats:
     """(n or 1, 1) N: the size of all that acts, moments by the machine's size."""
     wrench = np.abs(block.tool_wrench) + np.abs(block.own_wrench)
     size = block.machine.characteristic_length
-    acting = wrench[:, :3].sum(axis=1) + wrench[:, 3:].sum(axis=1) / size
+    acting = wrench @ np.repeat([1.0, 1.0 / size], 3)
     if block.base_forces is not None:
         acting = acting + np.abs(block.base_forces).sum(axis=(1, 2))
     if block.condition.envelope is not None:

@@ -97,9 +97,11 @@ class Clearance:
     def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """What each joint adds to the distance of its strut's joint centres, m, (n, k)."""
         struts = [joint.strut for joint in self.joints]
-        reach = np.ones((block.indices.size, len(struts)))
-        for column, joint in enumerate(self.joints):
-            reach[:, column] = _reach(machine, block, joint)
+        reaches = [_reach(machine, block, joint) for joint in self.joints]
+        alike = all(isinstance(one, float) for one in reaches)
+        reach = np.empty((1 if alike else block.indices.size, len(struts)))
+        for column, one in enumerate(reaches):
+            reach[:, column] = one
         columns = machine.kernel.length_parameters[struts]
         forces = block.end_forces[:, struts, [joint.end for joint in self.joints]]
         side, _ = pressed(block, columns, forces, self.threshold)

@@ -117,14 +117,15 @@ class Deviation(Represented):
         for name, table in tables.items():
             if table.ndim != 2 or table.shape[1] != count:
                 raise ValueError(f"{name} has shape {table.shape}, expected (n or 1, {count})")
-            if not np.isfinite(table).all():
+            # A sum is finite only of finite numbers, and found in half the time.
+            if not (np.isfinite(table.sum()) or np.isfinite(table).all()):
                 raise ValueError(f"{name} has a value that is not finite")
         for name, size in (("groups", self.groups.size), ("edge", self.edge.size)):
             if size != count:
                 raise ValueError(f"{name} has {size} entries, expected {count}")
         if len(self.distribution) != count:
             raise ValueError(f"{len(self.distribution)} distributions, expected {count}")
-        if (self.half < 0.0).any():
+        if self.half.min(initial=0.0) < 0.0:
             raise ValueError("a half band is negative")
         if not (np.abs(self.sign) == 1.0).all():
             raise ValueError("a sign is neither +1 nor -1")
@@ -179,7 +180,7 @@ class Deviation(Represented):
     @cached_property
     def banded(self) -> Indices:
         """Columns whose band is not empty at some pose; of a direction all, or none."""
-        wide: Flags = np.asarray((self.half > 0.0).any(axis=0))
+        wide: Flags = self.half.max(axis=0, initial=0.0) > 0.0
         for groups in self.directions:
             members = np.isin(self.groups, groups)
             wide[members] = wide[members].any()
@@ -215,6 +216,12 @@ class Deviation(Represented):
         return np.minimum(one, other), np.maximum(one, other)
 
     @cached_property
+    def edge_variables(self) -> Floats:
+        """(2, k) variable of each column at its lower and upper edge; 0 of one that stays."""
+        t = np.array([variable.ends for variable in self.distribution], np.float64).reshape(-1, 2)
+        return np.where(self.edge, t.T, 0.0)
+
+    @cached_property
     def banded_correlation(self) -> Floats | None:
         """The correlation of the variables that have a band, ascending; None: all independent."""
         if self.correlation is None:
@@ -231,10 +238,8 @@ class Deviation(Represented):
         their shift. Members of a group go to the ends of their common variable, so that one with a
         negative sign moves the other way: other corners of the band cannot happen.
         """
-        t = abs(side) * np.array(
-            [variable.ends[side > 0.0] for variable in self.distribution], np.float64
-        )
-        return self.shift + np.where(self.edge, self.signed_half * t, 0.0)
+        t = abs(side) * self.edge_variables[int(side > 0.0)]
+        return self.shift + self.signed_half * t
 
 
 def _table(values: ArrayLike, count: int) -> Floats:

@@ -96,8 +96,8 @@ class PoseBlock(Represented):
     def directions(self) -> Floats:
         """(n, n_strut, 3) unit vectors from base-side to platform-side joint centre."""
         along = self.centres[:, :, 1] - self.centres[:, :, 0]
-        unit: Floats = along / np.linalg.norm(along, axis=2, keepdims=True)
-        return unit
+        along /= np.sqrt(np.einsum("nsk,nsk->ns", along, along))[:, :, np.newaxis]
+        return along
 
     @cached_property
     def rotations(self) -> Floats:
@@ -130,13 +130,15 @@ class PoseBlock(Represented):
             return np.zeros((1, 6)) if tubes is None else tubes
         names = self.machine.parameters
         tool = self.machine.nominal[[names.index(f"tool.{axis}") for axis in "xyz"]]
-        arm = self.rotations @ (np.array(platform.centre_of_mass) - tool)
+        arm = np.array(platform.centre_of_mass) - tool
         wrench = np.empty((self.indices.size, 6))
         wrench[:, :3] = on_platform + on_struts.sum(axis=0)
-        wrench[:, 3:] = np.cross(arm, on_platform)
+        wrench[:, 3:] = _moments((self.rotations.reshape(-1, 3) @ arm).reshape(-1, 3), on_platform)
         if on_struts.any():
-            arms = self.centres[:, :, 1] - self.placements[:, np.newaxis, :3]
-            wrench[:, 3:] += np.cross(arms, on_struts).sum(axis=1)
+            # Weights are parallel: together they act at the mean of their arms.
+            arms = np.einsum("s,nsk->nk", shares, self.centres[:, :, 1])
+            arms -= shares.sum() * self.placements[:, :3]
+            wrench[:, 3:] += _moments(arms, self.weight)
         return wrench if tubes is None else wrench + tubes
 
     @cached_property
@@ -216,8 +218,11 @@ class PoseBlock(Represented):
         """
         masses = np.array([strut.mass for strut in self.machine.struts])
         centres = np.array([strut.centre_of_mass for strut in self.machine.struts])
-        along = masses * (self.directions @ self.weight)
-        return np.stack([(1.0 - centres) * along, -centres * along], axis=2)
+        along = masses * (self.directions.reshape(-1, 3) @ self.weight).reshape(-1, masses.size)
+        over = np.empty((*along.shape, 2))
+        np.multiply(1.0 - centres, along, out=over[:, :, 0])
+        np.multiply(-centres, along, out=over[:, :, 1])
+        return over
 
     @property
     def end_forces(self) -> Floats:
@@ -237,7 +242,9 @@ class PoseBlock(Represented):
         ends = self.machine.end_compliances
         if not (ends.any() and any(strut.mass > 0.0 for strut in self.machine.struts)):
             return None
-        return np.asarray((self.over_tension * ends).sum(axis=2))
+        over = self.over_tension
+        stretch: Floats = over[:, :, 0] * ends[:, 0] + over[:, :, 1] * ends[:, 1]
+        return stretch
 
     def drive_loads(self, drives: Sequence[int]) -> Floats:
         """(n, k) what these drives carry under everything that acts, N, of a crank N m.
@@ -268,18 +275,44 @@ class PoseBlock(Represented):
 
     def loads(self, columns: Indices, cause: Cause) -> Floats:
         """(n, k) load on parameters by virtual work: N, of an angle N m; it drives them up."""
-        kernel = self.machine.kernel
+        if "compliances" in vars(self):
+            place = {column: at for at, column in enumerate(self.compliances.columns.tolist())}
+            if all(column in place for column in columns.tolist()):
+                at = [place[column] for column in columns.tolist()]
+                tool, own = self._yielding_loads
+                if cause == "all":
+                    return tool[:, at] + own[:, at]
+                every = at == list(range(len(place)))
+                loads = tool if cause == "tool" else own
+                return loads if every else loads[:, at]
         wrench = {"tool": self.tool_wrench, "own": self.own_wrench}.get(cause)
         if wrench is None:
             wrench = self.tool_wrench + self.own_wrench
         loads = self.loads_of(wrench, columns)
         if cause != "tool" and self.base_forces is not None:
-            flat = self.base_forces.reshape(len(self.base_forces), -1)
-            loads = loads + kernel.base_loads_at(self.joints, self.placements, flat, columns)
+            loads = loads + self._base_loads(columns)
         return loads
 
+    @cached_property
+    def _yielding_loads(self) -> tuple[Floats, Floats]:
+        """Loads (n, k) on the columns of `compliances`, of the tool and own: found together."""
+        columns = self.compliances.columns
+        wrenches = np.broadcast_arrays(self.tool_wrench, self.own_wrench)
+        both = self.loads_of(np.concatenate(wrenches, axis=1), columns)
+        tool, own = both[:, : columns.size], both[:, columns.size :]
+        if self.base_forces is not None:
+            own = own + self._base_loads(columns)
+        return tool, own
+
+    def _base_loads(self, columns: Indices) -> Floats:
+        """(n, k) loads on parameters from what weighs on the base-side joint centres."""
+        assert self.base_forces is not None
+        flat = self.base_forces.reshape(len(self.base_forces), -1)
+        kernel = self.machine.kernel
+        return kernel.base_loads_at(self.joints, self.placements, flat, columns)
+
     def loads_of(self, wrenches: Floats, columns: Indices) -> Floats:
-        """(n, k) the same under any wrenches (n or 1, 6) on the tool."""
+        """(n, k) the same under any wrenches (n or 1, 6) on the tool, (n, 2 k) under two (.., 12)."""
         kernel = self.machine.kernel
         return kernel.loads_at(self.joints, self.placements, wrenches, columns)[0]
 
@@ -294,6 +327,12 @@ class PoseBlock(Represented):
             return self.condition.temperature_rise(part)
         rise = self.condition.temperature_rise(part, self.times)
         return rise if isinstance(rise, float) else rise[:, np.newaxis]
+
+
+def _moments(arms: Floats, force: Floats) -> Floats:
+    """(n, 3) moments of one force (3,) at arms (n, 3)."""
+    x, y, z = force.tolist()
+    return arms @ np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 _OF_COMMAND = ("corrected", "drive_joints")

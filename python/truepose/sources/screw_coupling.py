@@ -168,13 +168,19 @@ class ScrewCoupling:
         (n, 3, 3) of the platform. And the sines (n, k, 2) of the angles between each strut and the
         axes of its joints at base and platform.
         """
-        along = directions[:, [screw.strut for screw in self.screws]]
-        base = np.cross(np.array([screw.base_axis for screw in self.screws]), along)
+        along = directions[:, [screw.strut for screw in self.screws]].transpose(2, 0, 1)
+        base = np.array([screw.base_axis for screw in self.screws]).T[:, np.newaxis]
         axes = np.array([screw.platform_axis for screw in self.screws])
-        platform = np.cross(axes @ np.swapaxes(rotations, 1, 2), along)
-        ahead = (np.cross(base, platform) * along).sum(axis=-1)
-        sines = np.stack([np.linalg.norm(turned, axis=-1) for turned in (base, platform)], axis=-1)
-        return np.arctan2(ahead, (base * platform).sum(axis=-1)), sines
+        platform = (rotations.reshape(-1, 3) @ axes.T).reshape(-1, 3, len(axes)).swapaxes(0, 1)
+        # The crosses of both unit axes b and w with the unit strut u have the product
+        # b w - (b u)(w u), and (b x w) u is that of their cross product with u.
+        of_base, of_platform = _product(base, along), _product(platform, along)
+        ahead = _product(np.cross(base, platform, axis=0), along)
+        beside = _product(base, platform) - of_base * of_platform
+        sines = np.empty((*ahead.shape, 2))
+        for end, product in enumerate((of_base, of_platform)):
+            sines[..., end] = np.sqrt(np.maximum(1.0 - np.square(product), 0.0))
+        return np.arctan2(ahead, beside), sines
 
     def _parallel(
         self, machine: Machine, block: PoseBlock, pose: int, number: int, end: int
@@ -194,6 +200,12 @@ class ScrewCoupling:
             found=f"an axis parallel to the strut at {at}",
             expected="poses at which the strut is across or oblique to the axis",
         )
+
+
+def _product(one: Floats, other: Floats) -> Floats:
+    """Scalar products of vectors (3, ...)."""
+    product: Floats = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+    return product
 
 
 def _driven(kernel: KernelMachine, strut: int) -> bool:

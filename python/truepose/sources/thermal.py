@@ -111,8 +111,13 @@ class _Moved:
     def deviation(self) -> Deviation:
         """All columns together."""
         rows = max((len(values) for values in self.columns.values()), default=1)
-        shift = [np.broadcast_to(values, (rows, 1)) for values in self.columns.values()]
-        return Deviation.of(list(self.columns), np.hstack(shift) if shift else np.empty((1, 0)))
+        shift = np.empty((rows, len(self.columns)))
+        # What is alike at every pose, row by row; then the columns that are not.
+        shift[:] = [values[0, 0] for values in self.columns.values()]
+        for place, values in enumerate(self.columns.values()):
+            if len(values) > 1:
+                shift[:, [place]] = values
+        return Deviation.of(list(self.columns), shift)
 
     def struts(self) -> None:
         """Every strut, were it at the reference, so that a condition's rows are always the same."""

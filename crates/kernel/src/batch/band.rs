@@ -13,9 +13,14 @@ use crate::largest::{Search, Set};
 use crate::linear::{CLOSURES, SIX};
 use crate::machine::{Machine, indices_of};
 use crate::scalar::Real;
+use crate::spatial::dot;
 
 /// Up to so many segments all their ends are tried; beyond, cones of directions.
 const FEW: usize = 9;
+/// Ends of half of that many segments.
+const ENDS: usize = 16;
+/// Columns whose half widths need no memory of their own.
+const COLUMNS: usize = 64;
 
 /// The columns of a band: which parameters, and of which variable in [-1, 1] each.
 #[derive(Clone, Copy, Debug)]
@@ -32,13 +37,79 @@ pub struct BandColumns<'a> {
 
 /// Reach (component), standard uncertainty (component) and largest length (quantity) of each sample.
 pub struct Band<'a> {
-    components: Vec<usize>,
-    quantities: &'a [Vec<usize>],
-    variables: Vec<Variable<'a>>,
+    effect: BandEffect<'a>,
     half: Rows<'a>,
     columns: usize,
     /// Errors where all variables are 0, in the components that the machine can move in.
     centre: Rows<'a>,
+}
+
+impl<'a> Band<'a> {
+    /// Of a machine about errors `centre`; `quantities`: components, at most three, of each length.
+    pub fn new(
+        machine: &'a Machine,
+        columns: BandColumns<'a>,
+        centre: Rows<'a>,
+        quantities: &'a [Vec<usize>],
+    ) -> Self {
+        let numbered = columns.parameters.iter().copied().zip(columns.variables.iter().copied());
+        Band {
+            effect: BandEffect::new(machine, numbered.enumerate(), columns.sigmas, quantities),
+            half: columns.half,
+            columns: columns.parameters.len(),
+            centre,
+        }
+    }
+}
+
+impl FirstOrder for Band<'_> {
+    fn width(&self) -> usize {
+        2 * self.effect.components.len() + self.effect.quantities.len()
+    }
+    #[inline(always)]
+    fn write<S: Real>(
+        &self,
+        linear: &Linearisation<S>,
+        place: Place,
+        _part: usize,
+        columns: &mut [S],
+    ) {
+        let count = self.effect.components.len();
+        let mut here = [S::default(); COLUMNS];
+        let mut elsewhere = Vec::new();
+        let half = if self.columns <= COLUMNS {
+            &mut here[..self.columns]
+        } else {
+            elsewhere.resize(self.columns, S::default());
+            &mut elsewhere[..]
+        };
+        self.half.load(place.first, place.size, half);
+        let mut centre = [S::default(); SIX];
+        self.centre.load(place.first, place.size, &mut centre[..count]);
+        let (reach, rest) = columns.split_at_mut(count);
+        let (uncertainty, lengths) = rest.split_at_mut(count);
+        let mut answer = Answer { reach, uncertainty, lengths };
+        self.effect.write(linear, half, &centre, place.size, &mut answer);
+    }
+}
+
+/// What some variables do, worked out from the linearised closures: which of them lie in one closure.
+pub(super) struct BandEffect<'a> {
+    components: Vec<usize>,
+    quantities: &'a [Vec<usize>],
+    /// Of each closure the variables of one column that only it reads, once.
+    singles: [Vec<Single>; CLOSURES],
+    /// All others.
+    others: Vec<Variable<'a>>,
+    /// Closures that a variable lies in, and variables that lie in none.
+    segments: usize,
+}
+
+/// A variable of one column that one closure reads once.
+struct Single {
+    place: usize,
+    slot: usize,
+    weight: f64,
 }
 
 struct Variable<'a> {
@@ -50,74 +121,88 @@ struct Variable<'a> {
     weight: f64,
 }
 
-impl<'a> Band<'a> {
-    /// Of a machine about errors `centre`; `quantities`: components, at most three, of each length.
-    pub fn new(
+/// Where the numbers of one band go.
+pub(super) struct Answer<'a, S> {
+    pub(super) reach: &'a mut [S],
+    pub(super) uncertainty: &'a mut [S],
+    pub(super) lengths: &'a mut [S],
+}
+
+impl<'a> BandEffect<'a> {
+    /// Of `columns`: place among the half widths, parameter, and number of its variable in `sigmas`.
+    pub(super) fn new(
         machine: &'a Machine,
-        columns: BandColumns<'a>,
-        centre: Rows<'a>,
+        columns: impl Iterator<Item = (usize, (usize, usize))>,
+        sigmas: &[f64],
         quantities: &'a [Vec<usize>],
     ) -> Self {
-        let mut variables: Vec<Variable<'a>> = columns
-            .sigmas
+        let mut variables: Vec<Variable<'a>> = sigmas
             .iter()
             .map(|sigma| Variable { columns: Vec::new(), closure: None, weight: sigma.powi(-2) })
             .collect();
-        let numbered = columns.parameters.iter().zip(columns.variables).enumerate();
-        for (place, (&parameter, &variable)) in numbered {
+        for (place, (parameter, variable)) in columns {
             variables[variable].columns.push((place, &machine.dependents[parameter]));
         }
-        for variable in &mut variables {
+        let mut effect = BandEffect {
+            components: indices_of(&machine.dof),
+            quantities,
+            singles: Default::default(),
+            others: Vec::new(),
+            segments: 0,
+        };
+        let mut opened = [false; CLOSURES];
+        for mut variable in variables {
             let mut closures = variable.columns.iter().flat_map(|column| column.1).map(|one| one.0);
             let first = closures.next();
             variable.closure = first.filter(|first| closures.all(|closure| closure == *first));
+            match variable.closure {
+                Some(closure) => opened[closure] = true,
+                None => effect.segments += 1,
+            }
+            let weight = variable.weight;
+            match variable.columns[..] {
+                [(place, &[(closure, slot)])] => {
+                    effect.singles[closure].push(Single { place, slot, weight });
+                }
+                _ => effect.others.push(variable),
+            }
         }
-        Band {
-            components: indices_of(&machine.dof),
-            quantities,
-            variables,
-            half: columns.half,
-            columns: columns.parameters.len(),
-            centre,
-        }
+        effect.segments += opened.iter().filter(|opened| **opened).count();
+        effect
     }
-}
 
-impl FirstOrder for Band<'_> {
-    fn width(&self) -> usize {
-        2 * self.components.len() + self.quantities.len()
-    }
+    /// The numbers for half widths `half` (column) about an error `centre` (component).
     #[inline(always)]
-    fn write<S: Real>(
+    pub(super) fn write<S: Real>(
         &self,
         linear: &Linearisation<S>,
-        place: Place,
-        _part: usize,
-        columns: &mut [S],
+        half: &[S],
+        centre: &[S; SIX],
+        size: usize,
+        answer: &mut Answer<'_, S>,
     ) {
         let count = self.components.len();
-        let mut half = vec![S::default(); self.columns];
-        self.half.load(place.first, place.size, &mut half);
-        let mut centre = [S::default(); SIX];
-        self.centre.load(place.first, place.size, &mut centre[..count]);
         // Of variables of one closure: how far it opens, and the sum of squares.
         let mut opened = [S::default(); CLOSURES];
         let mut squares = [S::default(); CLOSURES];
-        let mut segments: Vec<[S; SIX]> = Vec::with_capacity(CLOSURES + self.variables.len());
-        let (reach, rest) = columns.split_at_mut(count);
-        let (uncertainty, lengths) = rest.split_at_mut(count);
-        for k in 0..count {
-            reach[k] = S::default();
-            uncertainty[k] = S::default();
+        for closure in 0..CLOSURES {
+            for single in &self.singles[closure] {
+                let size = half[single.place] * linear.to_parameters[closure][single.slot];
+                opened[closure] = opened[closure] + size.abs();
+                squares[closure] =
+                    (size * size).mul_add(S::splat(single.weight), squares[closure]);
+            }
         }
-        for variable in &self.variables {
+        let mut reach = [S::default(); SIX];
+        let mut variance = [S::default(); SIX];
+        let mut segments = Segments::new(self.segments);
+        for variable in &self.others {
             let weight = S::splat(variable.weight);
             if let Some(closure) = variable.closure {
                 let mut sum = S::default();
                 for &(column, dependents) in &variable.columns {
                     for &(_, slot) in dependents {
-                        let gradient = linear.to_parameters[closure][slot];
-                        sum = half[column].mul_add(gradient, sum);
+                        sum = half[column].mul_add(linear.to_parameters[closure][slot], sum);
                     }
                 }
                 opened[closure] = opened[closure] + sum.abs();
@@ -136,7 +221,7 @@ impl FirstOrder for Band<'_> {
             }
             for k in 0..count {
                 reach[k] = reach[k] + segment[k].abs();
-                uncertainty[k] = (segment[k] * segment[k]).mul_add(weight, uncertainty[k]);
+                variance[k] = (segment[k] * segment[k]).mul_add(weight, variance[k]);
             }
             segments.push(segment);
         }
@@ -149,19 +234,48 @@ impl FirstOrder for Band<'_> {
                 let inverse = linear.inverse[self.components[k]][closure];
                 segment[k] = inverse * opened[closure];
                 reach[k] = reach[k] + segment[k].abs();
-                uncertainty[k] = (inverse * inverse).mul_add(squares[closure], uncertainty[k]);
+                variance[k] = (inverse * inverse).mul_add(squares[closure], variance[k]);
             }
             segments.push(segment);
         }
+        answer.reach.copy_from_slice(&reach[..count]);
         for k in 0..count {
-            uncertainty[k] = uncertainty[k].sqrt();
+            answer.uncertainty[k] = variance[k].sqrt();
         }
-        for (length, quantity) in lengths.iter_mut().zip(self.quantities) {
-            *length = if segments.len() <= FEW {
-                longest_end(&segments, &centre, quantity)
-            } else {
-                longest_by_cones(&segments, &centre, quantity, place.size)
+        for (length, quantity) in answer.lengths.iter_mut().zip(self.quantities) {
+            *length = match &segments {
+                Segments::Few(few, count) => longest_end(&few[..*count], centre, quantity),
+                Segments::Many(many) if many.len() <= FEW => longest_end(many, centre, quantity),
+                Segments::Many(many) => longest_by_cones(many, centre, quantity, size),
             };
+        }
+    }
+}
+
+/// How far an error can be moved, either way: a segment for each closure, and for each variable of several.
+enum Segments<S> {
+    Few([[S; SIX]; FEW], usize),
+    Many(Vec<[S; SIX]>),
+}
+
+impl<S: Real> Segments<S> {
+    #[inline(always)]
+    fn new(most: usize) -> Self {
+        if most <= FEW {
+            Segments::Few([[S::default(); SIX]; FEW], 0)
+        } else {
+            Segments::Many(Vec::with_capacity(most))
+        }
+    }
+
+    #[inline(always)]
+    fn push(&mut self, segment: [S; SIX]) {
+        match self {
+            Segments::Few(few, count) => {
+                few[*count] = segment;
+                *count += 1;
+            }
+            Segments::Many(many) => many.push(segment),
         }
     }
 }
@@ -176,39 +290,64 @@ fn of_quantity<S: Real>(numbers: &[S; SIX], quantity: &[usize]) -> [S; 3] {
     vector
 }
 
-/// All sums of some segments with either sign, added to `sums`, which holds one number to begin with.
-#[inline(always)]
-fn add_ends<S: Real>(segments: &[[S; SIX]], quantity: &[usize], sums: &mut Vec<[S; 3]>) {
-    for segment in segments {
-        let segment = of_quantity(segment, quantity);
-        for number in 0..sums.len() {
-            let sum = sums[number];
-            let other = [sum[0] - segment[0], sum[1] - segment[1], sum[2] - segment[2]];
-            sums.push(other);
-            for k in 0..3 {
-                sums[number][k] = sum[k] + segment[k];
+/// Sums of some segments with either sign.
+struct Ends<S> {
+    at: [[S; 3]; ENDS],
+    count: usize,
+}
+
+impl<S: Real> Ends<S> {
+    /// From one sum on, by all `segments`.
+    #[inline(always)]
+    fn new(first: [S; 3], segments: &[[S; SIX]], quantity: &[usize]) -> Self {
+        let mut ends = Ends { at: [[S::default(); 3]; ENDS], count: 1 };
+        ends.at[0] = first;
+        for segment in segments {
+            let segment = of_quantity(segment, quantity);
+            for number in 0..ends.count {
+                let sum = ends.at[number];
+                for k in 0..3 {
+                    ends.at[number][k] = sum[k] + segment[k];
+                    ends.at[ends.count + number][k] = sum[k] - segment[k];
+                }
             }
+            ends.count *= 2;
         }
+        ends
     }
 }
 
-/// The largest length of a centre plus segments, of which every end is tried.
+/// The largest length of a centre c plus segments, of which every end is tried.
+///
+/// Of an end s and its opposite the longer one has the square c^2 + s^2 + 2 |c s|; so the first segment keeps
+/// its sign.
 #[inline(always)]
 fn longest_end<S: Real>(segments: &[[S; SIX]], centre: &[S; SIX], quantity: &[usize]) -> S {
-    let (some, others) = segments.split_at(segments.len() / 2);
-    let mut ends = vec![of_quantity(centre, quantity)];
-    add_ends(some, quantity, &mut ends);
-    let mut more = vec![[S::default(); 3]];
-    add_ends(others, quantity, &mut more);
-    let mut least = S::default();
-    for end in &ends {
-        for other in &more {
-            let (x, y, z) = (end[0] + other[0], end[1] + other[1], end[2] + other[2]);
-            let square = z.mul_add(z, y.mul_add(y, x * x));
-            least = least.min(-square);
+    let centre = of_quantity(centre, quantity);
+    let square = dot(centre, centre);
+    let Some((first, rest)) = segments.split_first() else { return square.sqrt() };
+    let (some, others) = rest.split_at(rest.len() / 2);
+    let some = Ends::new(of_quantity(first, quantity), some, quantity);
+    let others = Ends::new([S::default(); 3], others, quantity);
+    let mut products = [[S::default(); 2]; ENDS];
+    for number in 0..some.count {
+        let end = some.at[number];
+        products[number] = [dot(end, end), dot(end, centre)];
+    }
+    // NaN where the centre is, and stays so.
+    let mut most = square - square;
+    for other in &others.at[..others.count] {
+        let (own, along) = (dot(*other, *other), dot(*other, centre));
+        let double = [other[0] + other[0], other[1] + other[1], other[2] + other[2]];
+        for number in 0..some.count {
+            let (end, [end_own, end_along]) = (some.at[number], products[number]);
+            let sum = double[0].mul_add(end[0], own + end_own);
+            let sum = double[2].mul_add(end[2], double[1].mul_add(end[1], sum));
+            let across = (along + end_along).abs();
+            most = (across + across + sum).larger(most);
         }
     }
-    (-least).sqrt()
+    (square + most).sqrt()
 }
 
 /// The same by cones of directions, sample by sample.

@@ -325,14 +325,17 @@ impl FirstOrder for Forces<'_> {
     }
 }
 
-/// Loads on some parameters under a wrench on the tool.
+/// Wrenches at once, at most, for [`Loads`].
+pub const WRENCHES: usize = 2;
+
+/// Loads on some parameters under wrenches on the tool, wrench after wrench.
 pub struct Loads<'a> {
     dependents: Vec<&'a [(usize, usize)]>,
     wrenches: Rows<'a>,
 }
 
 impl<'a> Loads<'a> {
-    /// For the parameters of the given indices.
+    /// For the parameters of the given indices, under the wrenches that stand side by side in a row.
     pub fn new(machine: &'a Machine, columns: &[usize], wrenches: Rows<'a>) -> Self {
         Loads { dependents: dependents(machine, columns), wrenches }
     }
@@ -340,7 +343,7 @@ impl<'a> Loads<'a> {
 
 impl FirstOrder for Loads<'_> {
     fn width(&self) -> usize {
-        self.dependents.len()
+        self.wrenches.width() / SIX * self.dependents.len()
     }
     #[inline(always)]
     fn write<S: Real>(
@@ -350,9 +353,17 @@ impl FirstOrder for Loads<'_> {
         _part: usize,
         columns: &mut [S],
     ) {
-        let forces = multipliers(linear, &self.wrenches, place);
-        for (column, dependents) in columns.iter_mut().zip(&self.dependents) {
-            *column = parameter_load(&forces, &linear.to_parameters, dependents);
+        let mut wrenches = [S::default(); SIX * WRENCHES];
+        let wrenches = &mut wrenches[..self.wrenches.width()];
+        self.wrenches.load(place.first, place.size, wrenches);
+        let mut cells = columns.iter_mut();
+        for wrench in wrenches.chunks_exact(SIX) {
+            let mut own = [S::default(); SIX];
+            own.copy_from_slice(wrench);
+            let forces = closure_forces(&linear.inverse, &own);
+            for (dependents, cell) in self.dependents.iter().zip(&mut cells) {
+                *cell = parameter_load(&forces, &linear.to_parameters, dependents);
+            }
         }
     }
 }

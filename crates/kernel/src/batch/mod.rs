@@ -5,6 +5,8 @@
 
 mod band;
 mod base_loads;
+mod budget;
+mod budget_roads;
 mod first_order;
 mod forward;
 mod inverse;
@@ -15,9 +17,10 @@ mod threads;
 pub use crate::dispatch::{InstructionSet, instruction_set, use_instruction_set};
 pub use band::{Band, BandColumns};
 pub use base_loads::base_loads;
+pub use budget::{Budget, Cause, Outcome, TABLES, Table, UNBANDED};
 pub use first_order::{
     Compliance, FirstOrder, Forces, InternalForces, JointJacobian, Loads, Sensitivity, Stiffness,
-    Yielding, first_order,
+    WRENCHES, Yielding, first_order,
 };
 pub use forward::{displacement, displacements, forward_poses};
 pub use inverse::inverses;

@@ -36,15 +36,15 @@ pub fn moved_first_order(
 }
 
 /// In which order the rows are eliminated: that of one pose, so that no sample depends on its neighbours.
-struct Orders {
-    forward: Order,
-    rows: Order,
+pub(super) struct Orders {
+    pub(super) forward: Order,
+    pub(super) rows: Order,
 }
 
 impl Orders {
     /// Of the nominal machine at home. Where its order does not serve, a sample has its own, as every
     /// sample of a machine that is not plain.
-    fn at_home(machine: &Machine) -> Self {
+    pub(super) fn at_home(machine: &Machine) -> Self {
         if !machine.plain {
             return Orders { forward: IN_ORDER, rows: IN_ORDER };
         }
@@ -89,14 +89,11 @@ impl<Q: FirstOrder> Work for Chunk<'_, Q> {
                 let (p, q) = (&group.p, &group.q);
                 linear.fill(machine, p, q, &at, &descent.pose, &orders.rows);
                 let error = displacement(&group.pose, &descent.pose);
-                let turned = [error[3], error[4], error[5]];
-                let square = dot(turned, turned);
-                turn_rows(&mut linear.inverse, turned, series(square));
+                let small = turn_lanes(&mut linear, &error);
                 for part in 0..quantity.parts() {
                     quantity.write(&linear, place, part, &mut columns);
                     S::store_rows(&columns, &mut out[part * columns.len()..], width, place.size);
                 }
-                let small = S::splat(SMALL * SMALL) - square;
                 proven = descent.proof.min(linear.regular).min(small);
             }
             for lane in 0..place.size {
@@ -137,7 +134,26 @@ fn alone(
     }
     let mut linear = Linearisation::default();
     linear.fill_scalar(&sample, q, &pose);
-    let error = displacement(&start, &pose);
+    turn_alone(&mut linear, &displacement(&start, &pose));
+    let width = out.len() / quantity.parts();
+    let place = Place { first: number, size: 1 };
+    for (part, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
+        quantity.write(&linear, place, part, out);
+    }
+    Status::Ok
+}
+
+/// Makes of rates of the pose, at the end of `error`, those of that error; positive where it is small enough for it.
+#[inline(always)]
+pub(super) fn turn_lanes<S: Real>(linear: &mut Linearisation<S>, error: &[S; SIX]) -> S {
+    let turned = [error[3], error[4], error[5]];
+    let square = dot(turned, turned);
+    turn_rows(&mut linear.inverse, turned, series(square));
+    S::splat(SMALL * SMALL) - square
+}
+
+/// The same of one sample, of any error.
+pub(super) fn turn_alone(linear: &mut Linearisation<f64>, error: &[f64; SIX]) {
     let turned = [error[3], error[4], error[5]];
     let square = dot(turned, turned);
     let factor = if square < SMALL * SMALL {
@@ -147,12 +163,6 @@ fn alone(
         (1.0 - half / half.tan()) / square
     };
     turn_rows(&mut linear.inverse, turned, factor);
-    let width = out.len() / quantity.parts();
-    let place = Place { first: number, size: 1 };
-    for (part, out) in out.chunks_exact_mut(width.max(1)).enumerate() {
-        quantity.write(&linear, place, part, out);
-    }
-    Status::Ok
 }
 
 /// `(1 - angle / 2 / tan(angle / 2)) / angle^2` of a small angle, from its square.

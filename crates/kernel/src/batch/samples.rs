@@ -29,6 +29,11 @@ impl<'a> Rows<'a> {
         if self.shared { *self } else { Rows::each(&self.data[first * self.width..], self.width) }
     }
 
+    /// Numbers in a row.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
     /// Whether one row serves all samples.
     pub fn is_shared(&self) -> bool {
         self.shared

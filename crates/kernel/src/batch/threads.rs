@@ -71,24 +71,41 @@ pub fn for_chunks<C: Send>(
     c: &mut [C],
     work: impl Fn(usize, &mut [f64], &mut [f64], &mut [C]) + Sync,
 ) {
-    let chunks = count.div_ceil(CHUNK);
-    let mut pieces = Vec::with_capacity(chunks);
-    let (mut a, mut b, mut c) = (a, b, c);
-    for chunk in 0..chunks {
-        let size = CHUNK.min(count - chunk * CHUNK);
-        let (head_a, tail_a) = a.split_at_mut(size * width_a);
-        let (head_b, tail_b) = b.split_at_mut(size * width_b);
-        let (head_c, tail_c) = c.split_at_mut(size);
-        pieces.push((chunk * CHUNK, head_a, head_b, head_c));
-        (a, b, c) = (tail_a, tail_b, tail_c);
+    for_tables(count, vec![(a, width_a), (b, width_b)], c, |first, tables, c| {
+        let [a, b] = tables else { unreachable!("two tables are given") };
+        work(first, a, b, c);
+    });
+}
+
+/// Calls `work(first sample, its part of each of the tables, its part of c)` for every chunk of `count` samples;
+/// each table has a width per sample.
+pub fn for_tables<C: Send>(
+    count: usize,
+    tables: Vec<(&mut [f64], usize)>,
+    c: &mut [C],
+    work: impl Fn(usize, &mut [&mut [f64]], &mut [C]) + Sync,
+) {
+    let mut pieces = Vec::with_capacity(count.div_ceil(CHUNK));
+    let (mut tables, mut c) = (tables, c);
+    for first in (0..count).step_by(CHUNK) {
+        let size = CHUNK.min(count - first);
+        let mut parts = Vec::with_capacity(tables.len());
+        for (table, width) in &mut tables {
+            let (head, tail) = std::mem::take(table).split_at_mut(size * *width);
+            parts.push(head);
+            *table = tail;
+        }
+        let (head, tail) = c.split_at_mut(size);
+        c = tail;
+        pieces.push((first, parts, head));
     }
-    if chunks <= 1 || threads() == 1 {
-        for (first, a, b, c) in pieces {
-            work(first, a, b, c);
+    if pieces.len() <= 1 || threads() == 1 {
+        for (first, mut parts, c) in pieces {
+            work(first, &mut parts, c);
         }
     } else {
         pool().install(|| {
-            pieces.into_par_iter().for_each(|(first, a, b, c)| work(first, a, b, c));
+            pieces.into_par_iter().for_each(|(first, mut parts, c)| work(first, &mut parts, c));
         });
     }
 }

@@ -110,6 +110,29 @@ pub fn chord_inverse(sample: &Sample<'_>, pose: &Pose<f64>) -> Matrix6<f64> {
     inverse_of(&sample.squared(pose).0)
 }
 
+/// The inverse of the squared rows at a nearby pose, for [`chord`].
+pub trait NearbyInverse<S> {
+    /// What a residual of closure `closure` turns component `component` of the twist by.
+    fn at(&self, component: usize, closure: usize) -> S;
+}
+
+impl<S: Real> NearbyInverse<S> for Matrix6<f64> {
+    #[inline(always)]
+    fn at(&self, component: usize, closure: usize) -> S {
+        S::splat(self[component][closure])
+    }
+}
+
+/// Every lane's own inverse.
+pub struct OwnInverse<S>(pub Matrix6<S>);
+
+impl<S: Real> NearbyInverse<S> for OwnInverse<S> {
+    #[inline(always)]
+    fn at(&self, component: usize, closure: usize) -> S {
+        self.0[component][closure]
+    }
+}
+
 /// Newton's iteration on all lanes of a plain machine with the inverse of a nearby pose all the way: no elimination, and
 /// more steps, each shorter than the one before by the relative change of the rows.
 ///
@@ -120,7 +143,7 @@ pub fn chord<S: Real>(
     machine: &Machine,
     limbs: &Limbs<S>,
     start: &Pose<S>,
-    inverse: &Matrix6<f64>,
+    inverse: &impl NearbyInverse<S>,
 ) -> Descent<S> {
     let mut pose = *start;
     let mut proof = S::splat(1.0);
@@ -131,9 +154,9 @@ pub fn chord<S: Real>(
     for _ in 0..CHORD_LIMIT {
         squared_residuals(machine, limbs, &pose, &IN_ORDER, &mut residuals);
         for k in 0..SIX {
-            twist[k] = S::splat(inverse[k][0]) * residuals[0];
+            twist[k] = inverse.at(k, 0) * residuals[0];
             for i in 1..count {
-                twist[k] = S::splat(inverse[k][i]).mul_add(residuals[i], twist[k]);
+                twist[k] = inverse.at(k, i).mul_add(residuals[i], twist[k]);
             }
         }
         pose.step_back(&twist);

@@ -15,7 +15,9 @@ pub use closures::{
     Limb, Limbs, Sample, guide_limb, guide_wrench, limbs, place_limbs, ring_arm, tool_point,
 };
 pub use condition::{condition, free_motions};
-pub use forward::{Descent, chord, chord_inverse, descend, forward, start_order};
+pub use forward::{
+    Descent, NearbyInverse, OwnInverse, chord, chord_inverse, descend, forward, start_order,
+};
 pub(crate) use gradients::{Gradients, gradients, residuals};
 pub use inverse::{Inverse, Obstacle, commanded_pose, inverse, lane_inverse, obstacles, permitted};
 pub(crate) use inverse::{closed_form, leanings};

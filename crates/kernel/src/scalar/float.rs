@@ -70,6 +70,10 @@ impl Real for f64 {
         if self <= other || self.is_nan() { self } else { other }
     }
     #[inline(always)]
+    fn larger(self, other: f64) -> f64 {
+        if self > other { self } else { other }
+    }
+    #[inline(always)]
     fn all_below(self, limit: f64) -> bool {
         self < limit
     }

@@ -129,6 +129,10 @@ impl<const LEVEL: u8> Real for Lanes<LEVEL> {
         Lanes(result)
     }
     #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        lanes!(k => if self.0[k] > other.0[k] { self.0[k] } else { other.0[k] })
+    }
+    #[inline(always)]
     fn all_below(self, limit: f64) -> bool {
         let mut below = true;
         for k in 0..LANES {
@@ -331,6 +335,16 @@ mod tests {
         assert!(nan.min(one).0[3].is_nan() && one.min(nan).0[3].is_nan());
         assert!(Real::min(f64::NAN, 1.0).is_nan() && Real::min(1.0, f64::NAN).is_nan());
         assert_eq!(Real::min(2.0, 1.0), 1.0);
+    }
+
+    #[test]
+    fn the_larger_keeps_the_other_beside_a_nan() {
+        let nan = Lanes::<PORTABLE>::splat(f64::NAN);
+        let (one, two) = (Lanes::splat(1.0), Lanes::splat(2.0));
+        assert!(one.larger(nan).0[5].is_nan() && Real::larger(1.0, f64::NAN).is_nan());
+        assert_eq!((nan.larger(one), two.larger(one), one.larger(two)), (one, two, two));
+        assert_eq!(Real::larger(f64::NAN, 1.0), 1.0);
+        assert_eq!((Real::larger(2.0, 1.0), Real::larger(1.0, 2.0)), (2.0, 2.0));
     }
 
     #[test]

@@ -75,6 +75,8 @@ pub trait Real: Scalar + Default + PartialEq {
     fn abs(self) -> Self;
     /// The smaller of two, lane by lane; NaN where either is NaN.
     fn min(self, other: Self) -> Self;
+    /// The larger of two, lane by lane; `other` where either is NaN.
+    fn larger(self, other: Self) -> Self;
     /// Whether every lane is below the limit; a NaN is not.
     fn all_below(self, limit: f64) -> bool;
     /// Reads `rows[k * columns.len() + j]` into lane `k` of `columns[j]` for the first `count` lanes;

@@ -219,7 +219,8 @@ class Deviation(Represented):
     def edge_variables(self) -> Floats:
         """(2, k) variable of each column at its lower and upper edge; 0 of one that stays."""
         t = np.array([variable.ends for variable in self.distribution], np.float64).reshape(-1, 2)
-        return np.where(self.edge, t.T, 0.0)
+        at_edges: Floats = np.where(self.edge, t.T, 0.0)
+        return at_edges
 
     @cached_property
     def banded_correlation(self) -> Floats | None:

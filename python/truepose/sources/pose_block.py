@@ -312,7 +312,7 @@ class PoseBlock(Represented):
         return kernel.base_loads_at(self.joints, self.placements, flat, columns)
 
     def loads_of(self, wrenches: Floats, columns: Indices) -> Floats:
-        """(n, k) the same under any wrenches (n or 1, 6) on the tool, (n, 2 k) under two (.., 12)."""
+        """(n, k) the same under any wrenches (n or 1, 6) on the tool; (n, 2 k) under two."""
         kernel = self.machine.kernel
         return kernel.loads_at(self.joints, self.placements, wrenches, columns)[0]
 
@@ -332,7 +332,8 @@ class PoseBlock(Represented):
 def _moments(arms: Floats, force: Floats) -> Floats:
     """(n, 3) moments of one force (3,) at arms (n, 3)."""
     x, y, z = force.tolist()
-    return arms @ np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    moments: Floats = arms @ np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return moments
 
 
 _OF_COMMAND = ("corrected", "drive_joints")

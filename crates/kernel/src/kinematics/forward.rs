@@ -102,8 +102,6 @@ const CHORD_LIMIT: usize = 10;
 const CONTRACTION: f64 = 0.1;
 /// Relative step that may be rounding alone.
 const ROUNDING: f64 = 1e-13;
-/// [`chord`] has converged where the remaining relative step is below this.
-const CHORD_SETTLED: f64 = 1e-15;
 
 /// The inverse of the squared rows of a plain machine at a pose, for [`chord`].
 pub fn chord_inverse(sample: &Sample<'_>, pose: &Pose<f64>) -> Matrix6<f64> {
@@ -112,21 +110,25 @@ pub fn chord_inverse(sample: &Sample<'_>, pose: &Pose<f64>) -> Matrix6<f64> {
 
 /// The inverse of the squared rows at a nearby pose, for [`chord`].
 pub trait NearbyInverse<S> {
+    /// [`chord`] has converged where the remaining relative step is below this.
+    const SETTLED: f64;
     /// What a residual of closure `closure` turns component `component` of the twist by.
     fn at(&self, component: usize, closure: usize) -> S;
 }
 
 impl<S: Real> NearbyInverse<S> for Matrix6<f64> {
+    const SETTLED: f64 = 1e-15;
     #[inline(always)]
     fn at(&self, component: usize, closure: usize) -> S {
         S::splat(self[component][closure])
     }
 }
 
-/// Every lane's own inverse.
+/// Every lane's own inverse, for poses to the last digit.
 pub struct OwnInverse<S>(pub Matrix6<S>);
 
 impl<S: Real> NearbyInverse<S> for OwnInverse<S> {
+    const SETTLED: f64 = 1e-17;
     #[inline(always)]
     fn at(&self, component: usize, closure: usize) -> S {
         self.0[component][closure]
@@ -139,11 +141,11 @@ impl<S: Real> NearbyInverse<S> for OwnInverse<S> {
 /// While steps shrink tenfold each, the rows of every pose on the way differ from those of the start by
 /// less than a singular one would, so the pose found is on the branch of the start.
 #[inline(always)]
-pub fn chord<S: Real>(
+pub fn chord<S: Real, I: NearbyInverse<S>>(
     machine: &Machine,
     limbs: &Limbs<S>,
     start: &Pose<S>,
-    inverse: &impl NearbyInverse<S>,
+    inverse: &I,
 ) -> Descent<S> {
     let mut pose = *start;
     let mut proof = S::splat(1.0);
@@ -163,7 +165,7 @@ pub fn chord<S: Real>(
         let size = relative_size(machine, &twist);
         proof = proof.min(last.mul_add(S::splat(CONTRACTION), S::splat(ROUNDING)) - size);
         // What is left is size * (size / last), and a little more.
-        let left = size.mul_add(size, -(last * S::splat(CHORD_SETTLED)));
+        let left = size.mul_add(size, -(last * S::splat(I::SETTLED)));
         if left.all_below(0.0) {
             return Descent { pose, proof };
         }

@@ -88,7 +88,8 @@ impl Machine {
         all_plain: bool,
         smallest: f64,
         tables: &Bound<'py, PyDict>,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyDict>)> {
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyDict>)>
+    {
         let posed = self.posed(joints, placements)?;
         let samples = posed.of_placements()?;
         let count = samples.count;
@@ -105,8 +106,7 @@ impl Machine {
             .collect::<PyResult<_>>()?;
         let causes: Vec<Cause<'_>> =
             columns.iter().map(|columns| columns.cause(count)).collect::<PyResult<_>>()?;
-        let budget =
-            Budget::new(&self.inner, &causes, &quantities, all_plain, smallest, count);
+        let budget = Budget::new(&self.inner, &causes, &quantities, all_plain, smallest, count);
         let mut arrays: Vec<PyReadwriteArrayDyn<'py, f64>> = Vec::with_capacity(TABLES.len());
         for (name, ..) in TABLES {
             let Some(array) = tables.get_item(name)? else { return Err(unfit()) };

@@ -189,8 +189,7 @@ impl<'a> BandEffect<'a> {
             for single in &self.singles[closure] {
                 let size = half[single.place] * linear.to_parameters[closure][single.slot];
                 opened[closure] = opened[closure] + size.abs();
-                squares[closure] =
-                    (size * size).mul_add(S::splat(single.weight), squares[closure]);
+                squares[closure] = (size * size).mul_add(S::splat(single.weight), squares[closure]);
             }
         }
         let mut reach = [S::default(); SIX];

@@ -105,8 +105,7 @@ impl Default for Outcome {
 
 impl Outcome {
     /// Nothing is wrong.
-    pub const OK: Outcome =
-        Outcome { shifts: Status::Ok, bands: Status::Ok, edges: Status::Ok };
+    pub const OK: Outcome = Outcome { shifts: Status::Ok, bands: Status::Ok, edges: Status::Ok };
 }
 
 /// Whether a machine is moved at its shift and at both edges.
@@ -245,7 +244,11 @@ impl<'a> Budget<'a> {
                 highest: &mut here,
                 scratch: None,
             };
-            if self.machine.plain { dispatch(chunk) } else { chunk.run::<f64>() }
+            if self.machine.plain {
+                dispatch(chunk)
+            } else {
+                chunk.run::<f64>()
+            }
             let mut highest = highest.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
             for (all, here) in highest.iter_mut().flatten().zip(here.into_iter().flatten()) {
                 *all = f64::max(*all, here);
@@ -272,8 +275,7 @@ impl<'a> Budget<'a> {
             if self.components[k] < 3 {
                 let size = start.position[self.components[k]].abs();
                 let percent = S::splat(100.0) / size;
-                percents[k] =
-                    (size - S::splat(self.smallest)).select(percent, S::splat(f64::NAN));
+                percents[k] = (size - S::splat(self.smallest)).select(percent, S::splat(f64::NAN));
             }
         }
         let all = self.causes.len();
@@ -340,7 +342,8 @@ impl<'a> Budget<'a> {
                 }
             }
             let sheets = &mut work.sheets;
-            let (error, percent) = if number < all { (ERROR, PERCENT) } else { (OVERALL, OVERALL_PERCENT) };
+            let (error, percent) =
+                if number < all { (ERROR, PERCENT) } else { (OVERALL, OVERALL_PERCENT) };
             let at = if number < all { number * count } else { 0 };
             for k in 0..count {
                 for state in 0..3 {
@@ -408,9 +411,9 @@ fn numbered<'b>(
     variables: usize,
 ) -> impl Iterator<Item = (usize, (usize, usize))> + use<'b> {
     let columns = cause.parameters.iter().zip(cause.variables).enumerate();
-    columns
-        .filter(|(_, (_, variable))| **variable != UNBANDED)
-        .map(move |(place, (&parameter, &variable))| (first + place, (parameter, variables + variable)))
+    columns.filter(|(_, (_, variable))| **variable != UNBANDED).map(
+        move |(place, (&parameter, &variable))| (first + place, (parameter, variables + variable)),
+    )
 }
 
 fn distinct(parameters: &[usize]) -> Vec<usize> {

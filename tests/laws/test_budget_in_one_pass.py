@@ -23,7 +23,10 @@ from truepose.sources import Deviation, PoseBlock
 Array = NDArray[np.float64]
 
 AGREES = 1e-11
-"""Of the machine's size, in units of the largest number of a table."""
+"""Relative to the largest number of a table,"""
+ROUNDING = 1e-14
+"""and what poses are off by, m and rad: some roundings of one of half a metre, which a delta whose
+rods stand close to each other makes tens of."""
 INSTRUCTION_SETS = ("scalar", "portable", "avx2", "avx512")
 EACH = ("error", "error_lower", "error_upper", "worst", "reach", "uncertainty")
 ALL = ("overall_error", "overall_error_lower", "overall_error_upper")
@@ -34,6 +37,11 @@ def restored() -> Iterator[None]:
     """Whatever a test chose, the best instruction set comes back."""
     yield
     _kernel.use_instruction_set("best")
+
+
+def allowed(largest: Array, table: str) -> Array:
+    """By how much numbers of a table may differ of which the largest is so large."""
+    return AGREES * largest + (0.0 if "percent" in table else ROUNDING)
 
 
 def of_poses(machine: Machine, seed: int, count: int) -> Deviation:
@@ -197,7 +205,7 @@ class Pass:
         for name, numbers in expected.items():
             largest = np.abs(numbers[fine]).max(axis=tuple(range(numbers.ndim - 1)))
             off = np.abs(found[name] - numbers)[fine]
-            assert (off <= AGREES * largest).all(), (name, (off / largest).max())
+            assert (off <= allowed(largest, name)).all(), (name, (off / largest).max())
         self.check_percents(found, fine)
         for name, highest in filled.highest.items():
             sizes = np.abs(found[name][fine])
@@ -249,7 +257,7 @@ def test_instruction_sets_agree(shipped: MachineUnderTest, name: str) -> None:
         missing = np.isnan(best[table])
         assert (np.isnan(found[table]) == missing).all()
         largest = np.nanmax(np.abs(best[table]), initial=0.0)
-        assert np.nanmax(np.abs(found[table] - best[table]), initial=0.0) <= AGREES * largest
+        assert np.nanmax(np.abs(found[table] - best[table]), initial=0.0) <= allowed(largest, table)
 
 
 def test_what_is_no_number_leaves_its_neighbours_alone(shipped: MachineUnderTest) -> None:
@@ -271,7 +279,7 @@ def test_what_is_no_number_leaves_its_neighbours_alone(shipped: MachineUnderTest
     for table in in_kernel.TABLES:
         good, other = expected[table][1::2], found[table][1::2]
         largest = np.nanmax(np.abs(good), initial=0.0)
-        assert np.nanmax(np.abs(other - good), initial=0.0) <= AGREES * largest, table
+        assert np.nanmax(np.abs(other - good), initial=0.0) <= allowed(largest, table), table
     for name, highest in filled.highest.items():
         sizes = np.fmax.reduce(np.abs(found[name][1::2]), axis=0).ravel()
         assert np.array_equal(highest, sizes, equal_nan=True)
@@ -311,4 +319,4 @@ def test_a_budget_is_that_of_its_poses_one_by_one(shipped: MachineUnderTest) -> 
                 continue
             rows, row = together[name].values, values.values[0]
             largest = np.nanmax(np.abs(rows), initial=0.0)
-            assert np.nanmax(np.abs(rows[pose] - row), initial=0.0) <= AGREES * largest, name
+            assert np.nanmax(np.abs(rows[pose] - row), initial=0.0) <= allowed(largest, name), name

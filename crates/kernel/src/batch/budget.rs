@@ -6,7 +6,7 @@
 //! it takes the machine. Every number is written once, where it stays.
 
 use super::band::{Answer, BandEffect};
-use super::budget_roads::{Alone, InLanes, Road};
+use super::budget_roads::{Alone, InLanes, Outcome, Road};
 use super::first_order::Place;
 use super::forward::displacement;
 use super::moved::Orders;
@@ -16,7 +16,6 @@ use crate::dispatch::{Work, dispatch};
 use crate::linear::SIX;
 use crate::machine::{Machine, indices_of};
 use crate::scalar::Real;
-use crate::status::Status;
 use std::sync::Mutex;
 
 /// The number of the variable of a column that has no band.
@@ -84,29 +83,6 @@ pub const TABLES: [(&str, Table, bool); 15] = [
     ("overall_percent_upper", Table::All, true),
     ("linear_maximum", Table::AllLength, false),
 ];
-
-/// What became of one sample: the first status that is not ok of the machines at their shifts, of what bands do
-/// about them, and of the machines at edges.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outcome {
-    /// Of each source at its shift, and of all of them.
-    pub shifts: Status,
-    /// Of the linearised closures.
-    pub bands: Status,
-    /// Of each source at the edges of its band, and of all of them.
-    pub edges: Status,
-}
-
-impl Default for Outcome {
-    fn default() -> Self {
-        Outcome::OK
-    }
-}
-
-impl Outcome {
-    /// Nothing is wrong.
-    pub const OK: Outcome = Outcome { shifts: Status::Ok, bands: Status::Ok, edges: Status::Ok };
-}
 
 /// Whether a machine is moved at its shift and at both edges.
 #[derive(Clone, Copy, Default)]

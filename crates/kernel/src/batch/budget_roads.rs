@@ -1,7 +1,6 @@
 //! The two roads of a budget: lanes with the chord of the pose itself, and one sample alone, which pivots,
 //! follows the residual and has a status.
 
-use super::budget::Outcome;
 use super::moved::{Orders, turn_alone, turn_lanes};
 use crate::kinematics::{
     Limbs, Linearisation, OwnInverse, SINGULAR, Sample, chord, condition, descend, forward, limbs,
@@ -12,6 +11,29 @@ use crate::machine::Machine;
 use crate::scalar::Real;
 use crate::spatial::Pose;
 use crate::status::Status;
+
+/// What became of one sample: the first status that is not ok of the machines at their shifts, of what bands do
+/// about them, and of the machines at edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outcome {
+    /// Of each source at its shift, and of all of them.
+    pub shifts: Status,
+    /// Of the linearised closures.
+    pub bands: Status,
+    /// Of each source at the edges of its band, and of all of them.
+    pub edges: Status,
+}
+
+impl Default for Outcome {
+    fn default() -> Self {
+        Outcome::OK
+    }
+}
+
+impl Outcome {
+    /// Nothing is wrong.
+    pub const OK: Outcome = Outcome { shifts: Status::Ok, bands: Status::Ok, edges: Status::Ok };
+}
 
 /// How the machines of a budget are brought to their poses and linearised there.
 pub(super) trait Road<S: Real> {

@@ -17,7 +17,8 @@ mod threads;
 pub use crate::dispatch::{InstructionSet, instruction_set, use_instruction_set};
 pub use band::{Band, BandColumns};
 pub use base_loads::base_loads;
-pub use budget::{Budget, Cause, Outcome, TABLES, Table, UNBANDED};
+pub use budget::{Budget, Cause, TABLES, Table, UNBANDED};
+pub use budget_roads::Outcome;
 pub use first_order::{
     Compliance, FirstOrder, Forces, InternalForces, JointJacobian, Loads, Sensitivity, Stiffness,
     WRENCHES, Yielding, first_order,

@@ -240,7 +240,8 @@ class Deviation(Represented):
         negative sign moves the other way: other corners of the band cannot happen.
         """
         t = abs(side) * self.edge_variables[int(side > 0.0)]
-        return self.shift + self.signed_half * t
+        moved: Floats = self.shift + self.signed_half * t
+        return moved
 
 
 def _table(values: ArrayLike, count: int) -> Floats:

@@ -14,21 +14,6 @@ README = ROOT / "README.md"
 DOCUMENTS = [README, *(ROOT / name for name in ("ARCHITECTURE.md", "CONTRIBUTING.md"))]
 
 
-def blocks(language: str) -> list[str]:
-    """The README's code blocks of one language."""
-    return re.findall(rf"```{language}\n(.*?)```", README.read_text("utf-8"), re.DOTALL)
-
-
-def test_the_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
-    (example,) = blocks("python")
-    names: dict[str, object] = {}
-    exec(example, names)  # noqa: S102 the README is ours
-    machine, budget, corrected = names["m"], names["budget"], names["corrected"]
-    assert machine.forward(names["q"]) == pytest.approx([0.3, 0.2], abs=1e-12)
-    assert budget.sizes["pose"] == corrected.sizes["pose"] == len(machine.poses())
-
-
 def test_the_example_of_how_sure_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     text = (ROOT / "docs" / "how_sure.md").read_text("utf-8")
@@ -58,15 +43,31 @@ def test_the_architecture_is_short_enough_to_be_read() -> None:
     assert len((ROOT / "ARCHITECTURE.md").read_text("utf-8").split()) <= 900
 
 
-def test_the_picture_of_the_layers_is_fresh() -> None:
-    generator = ROOT / "docs" / "generate_architecture_picture.py"
-    spec = importlib.util.spec_from_file_location("generate", generator)
+def picture_of(generator: str) -> str:
+    """What a script of docs/ draws."""
+    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / generator)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    drawn: str = module.picture()
+    return drawn
+
+
+def test_the_picture_of_the_layers_is_fresh() -> None:
     written = (ROOT / "docs" / "architecture.svg").read_text("utf-8")
-    assert written == module.picture(), "run: python docs/generate_architecture_picture.py"
+    drawn = picture_of("generate_architecture_picture.py")
+    assert written == drawn, "run: python docs/generate_architecture_picture.py"
+
+
+def test_the_picture_of_the_readme_is_fresh() -> None:
+    written = (ROOT / "docs" / "picture.svg").read_text("utf-8")
+    drawn = picture_of("generate_picture.py")
+    number = re.compile(r"\d+(?:\.\d+)?")
+    assert number.sub("#", written) == number.sub("#", drawn), "run: make docs"
+    # In px and µm; rounding may differ from processor to processor.
+    shown = [[float(one) for one in number.findall(text)] for text in (written, drawn)]
+    assert shown[0] == pytest.approx(shown[1], abs=0.11), "run: make docs"
 
 
 def test_every_word_of_the_glossary_lives_somewhere() -> None:

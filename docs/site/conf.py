@@ -18,7 +18,7 @@ author = "truepose's authors"
 release = os.environ["TRUEPOSE_SITE_VERSION"]
 extensions = ["myst_nb", "mathml"]
 root_doc = "index"
-exclude_patterns = ["**/machines", "**/examples", "crates", "machines", "python", "tests"]
+exclude_patterns = ["crates", "examples", "machines", "python", "tests"]
 nitpicky = True
 
 myst_enable_extensions = ["dollarmath", "attrs_inline", "deflist"]
@@ -50,7 +50,20 @@ def _scripts_of_figures(
         app.add_js_file("plotly.min.js")
 
 
+def _for_all_readers(
+    app: Sphinx, page: str, template: str, context: dict[str, Any], document: Any
+) -> None:
+    """What scrolls is reached by the keyboard, and captions of the contents have a level."""
+    if "body" in context:
+        context["body"] = context["body"].replace("<pre>", '<pre tabindex="0">')
+    tree = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = tree.replace(
+        'role="heading"', 'role="heading" aria-level="2"'
+    )
+
+
 def setup(app: Sphinx) -> None:
     """Connect what is ours."""
     app.add_lexer("csv", TextLexer)
     app.connect("html-page-context", _scripts_of_figures)
+    app.connect("html-page-context", _for_all_readers, priority=900)  # after the theme's

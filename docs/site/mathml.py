@@ -16,7 +16,7 @@ def _inline(writer: Any, node: nodes.math) -> None:
 
 def _display(writer: Any, node: nodes.math_block) -> None:
     formula = latex2mathml.converter.convert(node.astext(), display="block")
-    writer.body.append(f'<div class="math-block">{formula}</div>\n')
+    writer.body.append(f'<div class="math-block" tabindex="0">{formula}</div>\n')
     raise nodes.SkipNode
 
 

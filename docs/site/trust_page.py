@@ -26,7 +26,8 @@ programs that know nothing of it, and against laws that every machine must obey.
 written from what the tests found when they last ran, never by hand.
 """
 NUMBERS = """A published number is compared entry by entry. The table has the entry that is
-farthest off for what is allowed: half of the last digit published, or what the source's own rounding makes of it.
+farthest off for what is allowed: half of the last digit published, or what the source's
+own rounding makes of it.
 *Reference* is a number that nobody published: it was computed independently.
 """
 LAWS = """A law is written once and runs on every machine file of the library and of the tests, many
@@ -63,8 +64,8 @@ def _state(results: Results) -> str:
     """Of which commit the numbers are, or why there are none."""
     if results.refusal:
         return (
-            f":::{{warning}}\nNot run for this commit: {results.refusal}. Numbers below are missing"
-            f" or not complete. `make test-all` writes `{PLACE}`, from which they come.\n:::\n"
+            f"```{{warning}}\nNot run for this commit: {results.refusal}. Numbers below are missing"
+            f" or not complete. `make test-all` writes `{PLACE}`, from which they come.\n```\n"
         )
     counts = ", ".join(f"{number} {name}" for name, number in results.counts.items())
     return (

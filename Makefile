@@ -57,8 +57,8 @@ test-python: package tools ## run the package's tests, of each sweep a member or
 	$(PYTEST) -m "not sweep"
 
 .PHONY: test-python-all
-test-python-all: package tools ## run all of the package's tests
-	$(PYTEST)
+test-python-all: package tools ## run all of the package's tests, and write what they found for the site
+	$(PYTEST) --results build/test-results.json
 
 .PHONY: klipper
 klipper: $(KLIPPER) ## fetch and build Klipper's kinematics, with which tests compare, into build/klipper
@@ -114,6 +114,14 @@ bench-peers: package tools $(CONSTRAINTS) ## install what benchmarks/peers.py co
 .PHONY: docs
 docs: package tools ## write the generated pages of docs/ anew; tests refuse stale ones
 	for page in docs/generate_*.py; do $(BIN)/python $$page || exit 1; done
+
+.PHONY: site
+site: package tools ## build the site into build/site; it opens from disk
+	$(BIN)/python docs/site/build.py
+
+.PHONY: site-release
+site-release: package tools ## the same, and refuse results of tests that are not this commit's
+	$(BIN)/python docs/site/build.py --release
 
 .PHONY: lock
 lock: tools ## resolve requirements.lock anew from pyproject.toml, and what wheels are built with

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import results_file
 from sweeps import COLLECTED, member_of
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -19,6 +20,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="write the golden files of tests/golden anew; read the difference before you commit",
     )
+    parser.addoption("--results", metavar="FILE", help="write what the tests found to FILE (JSON)")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    results_file.start(config)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from reference_kinematics import angles_of, rotation_in_order
+
+Published = Callable[..., None]
+"""The fixture `published` of oracles/conftest.py."""
 
 CASES = Path(__file__).parent / "oracles" / "cases"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from build_machine import hexapod
-from oracle_cases import case
+from oracle_cases import Published, case
 from truepose import _kernel
 
 CASE = case("d03_hexapod_ik")
@@ -15,9 +15,9 @@ HALF_DIGIT = 5e-5
 
 
 @pytest.mark.parametrize("one", CASE["cases"], ids=lambda one: str(one["rpy"]))
-def test_lengths(one: dict[str, list[float]]) -> None:
+def test_lengths(one: dict[str, list[float]], published: Published) -> None:
     # R = Rz(yaw) Ry(pitch) Rx(roll): the kernel's own order; another one is 0.02 off.
     pose = np.array(one["position"] + one["rpy"], float)
     joints = MACHINE.inverse(pose)
-    assert np.abs(joints - one["lengths"]).max() < HALF_DIGIT
+    published("strut lengths at a pose", one["lengths"], joints, within=HALF_DIGIT)
     assert np.abs(MACHINE.forward(joints, pose + 0.01) - pose).max() < 1e-9

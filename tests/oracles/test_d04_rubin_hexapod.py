@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from build_machine import MACHINES, description_of, hexapod
-from oracle_cases import case, pose_in_order
+from oracle_cases import Published, case, pose_in_order
 from reference_kinematics import rotation_of
 from truepose import _kernel
 
@@ -26,7 +26,7 @@ def machine_about(
     return machine, np.r_[pivot, 0.0, 0.0, 0.0]
 
 
-def test_strokes_about_the_pivot() -> None:
+def test_strokes_about_the_pivot(published: Published) -> None:
     data = CASE["case_a"]
     machine, zero = machine_about(
         data["pivot"], np.array(data["base_points"]), np.array(data["mirror_points"])
@@ -34,7 +34,7 @@ def test_strokes_about_the_pivot() -> None:
     pose = zero + pose_in_order("xyz", data["pose"][:3], data["pose"][3:])
 
     strokes = machine.inverse(pose)
-    assert np.abs(strokes - data["delta_lengths"]).max() < 6e-6  # five decimals
+    published("strokes about a pivot", data["delta_lengths"], strokes, within=6e-6, unit="m")
 
     # From the five published decimals back to the pose, to four.
     found = machine.forward(data["delta_lengths"])
@@ -47,13 +47,13 @@ def ring(radius: float, degrees: list[float], z: float) -> np.ndarray:
     return np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(6, z)])
 
 
-def test_strokes_of_a_zigzag_hexapod() -> None:
+def test_strokes_of_a_zigzag_hexapod(published: Published) -> None:
     data = CASE["case_b"]
     moving = ring(1.2, [10, 130, 130, 250, 250, 10], 0.0)
     fixed = ring(2.3, [70, 70, 190, 190, 310, 310], 0.81)
     machine, zero = machine_about([0.0, 0.0, 0.0], moving, fixed)
     strokes = machine.inverse(zero + np.r_[data["translation_um"], 0, 0, 0] * UM)
-    assert np.abs(strokes / UM - data["delta_um"]).max() < 0.006
+    published("strokes of a zigzag", data["delta_um"], strokes / UM, within=0.006, unit="um")
 
 
 def test_load_paths_of_the_m2_hexapod_are_separate() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from build_machine import hexapod
-from oracle_cases import case, pose_in_order
+from oracle_cases import Published, case, pose_in_order
 from truepose import _kernel
 
 CASE = case("d05_cdsl_stewart")
@@ -23,9 +23,9 @@ POSE = pose_in_order(
 )
 
 
-def test_lengths() -> None:
+def test_lengths(published: Published) -> None:
     # The source's lengths have three decimals and are not symmetric to the third.
-    assert np.abs(MACHINE.inverse(POSE) - CASE["lengths"]).max() < 5e-4
+    published("strut lengths", CASE["lengths"], MACHINE.inverse(POSE), within=5e-4)
 
 
 def test_forward() -> None:

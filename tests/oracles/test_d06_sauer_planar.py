@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from build_machine import hexapod
-from oracle_cases import case
+from oracle_cases import Published, case
 from reference_kinematics import Vector
 from truepose import _kernel
 
@@ -55,13 +55,14 @@ def test_set_a() -> None:
 
 
 @pytest.mark.parametrize(("name", "middle"), [("set_b", 5.0), ("set_c", 7.0)])
-def test_all_poses(name: str, middle: float) -> None:
+def test_all_poses(name: str, middle: float, published: Published) -> None:
     machine, lengths = machine_of(CASE["set_b"]), [5.0, middle, 3.0]
     expected = np.array(CASE[name]["computed_theta_x_y"])[:, [1, 2, 0]]
     assert len(expected) == CASE[name]["published_root_count"]
     for pose in expected:
         assert np.abs(machine.inverse(pose) - lengths).max() < 1e-9
     found = all_roots(machine, lengths)
+    published("number of poses", len(expected), len(found), within=0.5)
     assert found.shape == expected.shape
     assert max(apart(one, other) for one, other in zip(found, expected, strict=True)) < 1e-8
 

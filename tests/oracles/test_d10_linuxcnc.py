@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from build_machine import MACHINES, description_of, hexapod
-from oracle_cases import case
+from oracle_cases import Published, case
 from truepose import _kernel
 
 CASE = case("d10_linuxcnc_genhex")
@@ -20,9 +20,12 @@ MACHINES_OF_CASE = [
 
 @pytest.mark.parametrize("machine", MACHINES_OF_CASE)
 @pytest.mark.parametrize("one", CASE["computed_reference"]["cases"])
-def test_lengths(machine: _kernel.Machine, one: dict[str, list[float]]) -> None:
+def test_lengths(
+    machine: _kernel.Machine, one: dict[str, list[float]], published: Published
+) -> None:
     # R = Rz(c) Ry(b) Rx(a): the kernel's own order.
     pose = np.r_[np.array(one["position"]) * INCH, one["rpy_rad"]]
     joints = machine.inverse(pose)
-    assert np.abs(joints / INCH - one["lengths"]).max() < 1e-12
+    lengths = joints / INCH
+    published("strut lengths", one["lengths"], lengths, within=1e-12, unit="in", by="reference")
     assert np.abs(machine.forward(joints, pose + 0.01) - pose).max() < 1e-12

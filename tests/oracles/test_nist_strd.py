@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from oracle_cases import Published
 from truepose.calibration import Solution, covariance, least_squares
 
 FOLDER = Path(__file__).parent / "cases" / "nist_strd"
@@ -134,10 +135,12 @@ def solve(name: str, start: int) -> tuple[Certificate, Solution]:
 @pytest.mark.filterwarnings("ignore:(overflow|invalid|divide):RuntimeWarning")
 @pytest.mark.parametrize("start", [0, 1], ids=["far", "near"])
 @pytest.mark.parametrize("name", MODELS)
-def test_certified_values(name: str, start: int) -> None:
+def test_certified_values(name: str, start: int, published: Published) -> None:
     # Start 1 (far) is the harder one.
     data, found = solve(name, start)
     assert found.converged
+    within = 1e-8 * np.abs(data.values)
+    published(f"{name}: certified parameters", data.values, found.values, within=within)
     assert digits(found.values, data.values) >= 8.0
     if name != "Lanczos1":  # its certified sum, 1e-25, is rounding of its data
         assert digits(np.array([found.cost]), np.array([data.cost])) >= 9.0

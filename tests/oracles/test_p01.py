@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 import truepose as tp
 from build_machine import MACHINES
-from oracle_cases import case
+from oracle_cases import Published, case
 from truepose.machine import Machine
 
 LENGTH = 1e-9 * 1e-3
@@ -53,16 +53,18 @@ def test_the_poses_are_the_case_s_in_its_order() -> None:
     assert np.array_equal(found, machine().poses())
 
 
-def test_joints() -> None:
+def test_joints(published: Published) -> None:
     expected = metres(OUTPUTS["joints_nominal_mm"])
-    assert np.abs(machine().inverse(machine().poses()) - expected).max() < LENGTH
+    joints, mm = machine().inverse(machine().poses()), {"unit": "mm", "by": "reference"}
+    published("joints", expected * 1e3, joints * 1e3, within=LENGTH * 1e3, **mm)
     assert np.abs(budget().joint_nominal - expected).max() < LENGTH
     assert np.abs(compensation().joint_nominal - expected).max() < LENGTH
 
 
-def test_strut_forces() -> None:
+def test_strut_forces(published: Published) -> None:
     expected = np.asarray(OUTPUTS["strut_force_N"])
-    assert np.abs(budget().force.values - expected).max() < FORCE
+    found = budget().force.values
+    published("strut forces", expected, found, within=FORCE, unit="N", by="reference")
     wrench = np.array([1200.0, -1500.0, 0, 0, 0, 0])
     assert np.abs(machine().forces(machine().poses(), wrench) - expected).max() < FORCE
 
@@ -87,10 +89,11 @@ def test_error_of_a_source_alone(key: str, source: str, variable: str) -> None:
 
 
 @pytest.mark.parametrize("edge", ["upper", "lower"])
-def test_overall_error(edge: str) -> None:
+def test_overall_error(edge: str, published: Published) -> None:
     key = {"upper": "overall_max", "lower": "overall_min"}[edge]
     expected = metres(OUTPUTS["errors_mm"][key])
-    assert np.abs(budget()[f"overall_error_{edge}"].values - expected).max() < LENGTH
+    found, mm = budget()[f"overall_error_{edge}"].values, {"unit": "mm", "by": "reference"}
+    published(f"overall error, {edge}", expected * 1e3, found * 1e3, within=LENGTH * 1e3, **mm)
 
 
 @pytest.mark.parametrize("row", sorted(OUTPUTS["tables"]))
@@ -115,10 +118,12 @@ def test_compensated_joints() -> None:
 
 
 @pytest.mark.parametrize("edge", ["upper", "lower"])
-def test_residual_after_compensation(edge: str) -> None:
+def test_residual_after_compensation(edge: str, published: Published) -> None:
     key = {"upper": "at_max", "lower": "at_min"}[edge]
     expected = metres(OUTPUTS["residual_after_compensation_mm"][key])
-    assert np.abs(compensation()[f"residual_{edge}"].values - expected).max() < LENGTH
+    found, mm = compensation()[f"residual_{edge}"].values, {"unit": "mm", "by": "reference"}
+    what = f"residual after compensation, {edge}"
+    published(what, expected * 1e3, found * 1e3, within=LENGTH * 1e3, **mm)
 
 
 def test_nothing_remains_in_the_middle() -> None:

@@ -7,9 +7,8 @@ figure is photographed and the colours that carry its meaning are looked for.
 from __future__ import annotations
 
 import base64
-import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +16,10 @@ import numpy as np
 import pytest
 
 import truepose
+from browser import Heard, opened_browser
 from command_line import MACHINES
 from made_measurements import made_measurements, poses_within
 from sweeps import sweep, thinned
-from system_package import missing
 from truepose.calibration import write_measurements
 from truepose.cli import run
 from truepose.reporting.figures import (
@@ -34,13 +33,6 @@ from truepose.reporting.figures import (
     tornado,
 )
 
-CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
-# The browser looks for no updates and asks no service; WebGL is drawn by the processor.
-FLAGS = [
-    "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-]  # fmt: skip
 FIGURE_NAMES = [module.__name__.rpartition(".")[2] for module in FIGURES]
 # What must be seen in each figure; a figure that is not named here must only not be blank.
 COLOURS = {
@@ -98,8 +90,8 @@ COUNT = """async ([data, colours]) => {
 }"""
 
 
-@dataclass
-class Visit:
+@dataclass(kw_only=True)
+class Visit(Heard):
     """A page opened in the browser, and all that it asked for and complained of.
 
     `absent` are the figures that have no place on it.
@@ -107,8 +99,6 @@ class Visit:
 
     page: Any
     absent: frozenset[str] = frozenset()
-    requests: list[str] = field(default_factory=list)
-    complaints: list[str] = field(default_factory=list)
 
     def look(self, selector: str, colours: list[str]) -> dict[str, Any]:
         """Photograph one element: share of marked pixels, number of colours, pixels near each."""
@@ -124,33 +114,14 @@ class Visit:
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        missing("playwright is not installed: pip install 'truepose[dev]'")
-    if not Path(CHROMIUM).exists():
-        missing("chromium is not installed: apt-get install chromium")
-    with sync_playwright() as playwright:
-        context = playwright.chromium.launch_persistent_context(
-            tmp_path_factory.mktemp("profile"),
-            executable_path=CHROMIUM,
-            headless=True,
-            viewport={"width": 1200, "height": 900},
-            args=FLAGS,
-        )
+    with opened_browser(tmp_path_factory.mktemp("profile")) as context:
         yield context
-        context.close()
 
 
 def visit(browser: Any, file: Path, figures: int) -> Visit:
     page = browser.new_page()
-    seen = Visit(page)
-    page.on("request", lambda request: seen.requests.append(request.url))
-    page.on("pageerror", lambda error: seen.complaints.append(str(error)))
-    page.on(
-        "console",
-        lambda message: seen.complaints.append(message.text) if message.type == "error" else None,
-    )
+    seen = Visit(page=page)
+    seen.listen(page)
     page.goto(file.as_uri(), wait_until="load")
     # Plotly draws in steps; a finished plot has its axes or its canvas.
     page.wait_for_function(
@@ -239,8 +210,7 @@ def test_the_maps_differ_from_place_to_place(report: Visit) -> None:
 
 
 def test_nothing_was_asked_from_the_network_and_nothing_went_wrong(report: Visit) -> None:
-    outside = [url for url in report.requests if not url.startswith(("file:", "data:", "blob:"))]
-    assert outside == []
+    assert report.outside == []
     assert len([url for url in report.requests if url.startswith("file:")]) == 1
     assert report.complaints == []
 
@@ -260,9 +230,8 @@ def test_a_blank_figure_would_be_seen(browser: Any, tmp_path: Path) -> None:
         "<script src='https://example.invalid/a.js'></script><script>nothing()</script>"
     )
     page = browser.new_page()
-    seen = Visit(page)
-    page.on("request", lambda request: seen.requests.append(request.url))
-    page.on("pageerror", lambda error: seen.complaints.append(str(error)))
+    seen = Visit(page=page)
+    seen.listen(page)
     page.goto(file.as_uri())
     assert seen.look("#blank", ["#0072B2"]) == {"marked": 0, "colours": 1, "near": [0]}
     plain = seen.look("#plain", [])

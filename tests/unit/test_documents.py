@@ -15,21 +15,6 @@ README = ROOT / "README.md"
 DOCUMENTS = [README, *(ROOT / name for name in ("ARCHITECTURE.md", "CONTRIBUTING.md"))]
 
 
-def blocks(language: str) -> list[str]:
-    """The README's code blocks of one language."""
-    return re.findall(rf"```{language}\n(.*?)```", README.read_text("utf-8"), re.DOTALL)
-
-
-def test_the_python_example_runs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
-    (example,) = blocks("python")
-    names: dict[str, object] = {}
-    exec(example, names)  # noqa: S102 the README is ours
-    machine, budget, corrected = names["m"], names["budget"], names["corrected"]
-    assert machine.forward(names["q"]) == pytest.approx([0.3, 0.2], abs=1e-12)
-    assert budget.sizes["pose"] == corrected.sizes["pose"] == len(machine.poses())
-
-
 def test_the_example_of_how_sure_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     text = (ROOT / "docs" / "how_sure.md").read_text("utf-8")
@@ -64,6 +49,16 @@ def test_the_picture_of_the_layers_is_fresh() -> None:
     assert written == generator("architecture_picture").picture(), (
         "run: python docs/generate_architecture_picture.py"
     )
+
+
+def test_the_picture_of_the_readme_is_fresh() -> None:
+    written = (ROOT / "docs" / "picture.svg").read_text("utf-8")
+    drawn = generator("picture").picture()
+    number = re.compile(r"\d+(?:\.\d+)?")
+    assert number.sub("#", written) == number.sub("#", drawn), "run: make docs"
+    # In px and µm; rounding may differ from processor to processor.
+    shown = [[float(one) for one in number.findall(text)] for text in (written, drawn)]
+    assert shown[0] == pytest.approx(shown[1], abs=0.11), "run: make docs"
 
 
 def test_every_word_of_the_glossary_lives_somewhere() -> None:

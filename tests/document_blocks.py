@@ -51,10 +51,15 @@ class Block:
         return f"{self.page.relative_to(ROOT)}:{self.line}"
 
 
+RUN_ELSEWHERE = (ROOT / "docs" / "errors.md",)
+"""Its examples are made of what `tests/unit/explanations` runs."""
+
+
 def pages() -> list[Path]:
-    """README, the documents beside it, and all of docs/ that the site does not run itself."""
+    """README, documents beside it, and all of docs/ that is not run elsewhere or by the site."""
     top = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md")]
-    return [*top, *sorted(page for page in (ROOT / "docs").rglob("*.md") if not is_notebook(page))]
+    docs = sorted(set((ROOT / "docs").rglob("*.md")) - set(RUN_ELSEWHERE))
+    return [*top, *(page for page in docs if not is_notebook(page))]
 
 
 def is_notebook(page: Path) -> bool:
@@ -68,6 +73,8 @@ def blocks_of(page: Path) -> list[Block]:
     found = []
     end = 0
     for fence in FENCE.finditer(text):
+        if fence["language"].startswith("{"):  # what Sphinx is told
+            continue
         first: list[str] = []
         files: dict[str, str] = {}
         reason = None

@@ -28,7 +28,15 @@ from test_results import Results, read_results  # noqa: E402
 
 import truepose  # noqa: E402
 
-BESIDE = ("ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE")
+BESIDE = (
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "SECURITY.md",
+    "CODE_OF_CONDUCT.md",
+    "CITATION.cff",
+    "LICENSE",
+)
 FOLDERS = ("machines", "examples", "python", "crates", "tests")
 """Linked to by pages: what a link leads to is copied into the site."""
 INDEXED = ("tutorials", "decisions", "controllers", "sources")
@@ -40,9 +48,10 @@ def lay_out(source: Path, results: Results) -> None:
     shutil.rmtree(source, ignore_errors=True)
     unwanted = shutil.ignore_patterns("site", "*.py", "__pycache__")
     shutil.copytree(DOCS, source / "docs", ignore=unwanted)
-    (source / "benchmarks").mkdir()
-    for page in sorted((ROOT / "benchmarks").glob("*.md")):
-        shutil.copy(page, source / "benchmarks")
+    for folder in ("benchmarks", "release"):
+        (source / folder).mkdir()
+        for page in sorted((ROOT / folder).glob("*.md")):
+            shutil.copy(page, source / folder)
     for name in BESIDE:
         shutil.copy(ROOT / name, source)
     shutil.copy(HERE / "index.md", source)

@@ -63,6 +63,9 @@ impl<'py> Columns<'py> {
     }
 }
 
+/// Codes of the shifts, of the bands and of the edges, and highest magnitudes by name.
+type Found<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyDict>);
+
 fn unfit() -> PyErr {
     PyValueError::new_err("the arguments do not fit each other")
 }
@@ -88,8 +91,7 @@ impl Machine {
         all_plain: bool,
         smallest: f64,
         tables: &Bound<'py, PyDict>,
-    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyDict>)>
-    {
+    ) -> PyResult<Found<'py>> {
         let posed = self.posed(joints, placements)?;
         let samples = posed.of_placements()?;
         let count = samples.count;

@@ -335,8 +335,7 @@ fn longest_end<S: Real>(segments: &[[S; SIX]], centre: &[S; SIX], quantity: &[us
     }
     // NaN where the centre or a segment is, and stays so.
     let another = dot(others.at[0], others.at[0]);
-    let all = square + products[0][0] + another;
-    let mut most = all - all;
+    let mut most = (square + products[0][0] + another) * S::splat(0.0);
     for other in &others.at[..others.count] {
         let (own, along) = (dot(*other, *other), dot(*other, centre));
         let double = [other[0] + other[0], other[1] + other[1], other[2] + other[2]];

@@ -86,7 +86,8 @@ def make(source: Path, output: Path) -> int:
         "IPYTHONDIR": str(kernel),  # a copy: IPython writes into it
     }
     command = [sys.executable, "-m", "sphinx", "--quiet", "--fail-on-warning", "--keep-going"]
-    command += ["--jobs", "auto"]
+    # Afresh: a page whose text is the same may print other numbers.
+    command += ["--jobs", "auto", "--fresh-env"]
     command += ["-c", str(HERE), "-d", str(source.parent / "doctrees"), str(source), str(output)]
     code = subprocess.run(command, env=environment, check=False).returncode  # noqa: S603 ours
     if code == 0:

@@ -122,7 +122,9 @@ def test_a_wheel_has_them_in_the_package(tmp_path: Path) -> None:
     # As maturin lays a wheel out: files matching `include`, at their place below `python-source`.
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["maturin"]
     source = ROOT / settings["python-source"]
-    shipped = [path for pattern in settings["include"] for path in ROOT.glob(pattern)]
+    # What has a form is of the sdist alone.
+    patterns = [pattern for pattern in settings["include"] if isinstance(pattern, str)]
+    shipped = [path for pattern in patterns for path in ROOT.glob(pattern)]
     assert sorted(path.stem for path in shipped) == KINDS
     # What maturin takes by itself, without the link's content.
     skipped = shutil.ignore_patterns(FOLDER, "__pycache__")

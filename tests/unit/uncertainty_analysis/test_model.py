@@ -112,8 +112,9 @@ def test_poses_that_cannot_be_used_are_set_aside_and_counted() -> None:
     found = each.dataset({})
     assert found.pose.values.tolist() == [0, 2]
     assert found.left_out_index.values.tolist() == [1]
+    # two roads: the model's own linearisation, and the budget's pass in the kernel
     budget = tp.budget(machine, poses)
-    assert np.allclose(found["value"], budget.overall_error, rtol=0, atol=0)
+    assert np.allclose(found["value"], budget.overall_error, rtol=0, atol=1e-15)
 
 
 def test_a_pose_that_is_left_out_later(tmp_path: Path) -> None:

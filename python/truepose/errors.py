@@ -49,6 +49,7 @@ CATALOGUE: dict[str, str] = {
     "zero-direction": "a direction of no length",
     # the machine's structure
     "bad-name": "a name that cannot be used",
+    "family-contradiction": "a joint centre, or other geometry, that is not what [family] gives",
     "duplicate-name": "two drives, two struts or two freedoms with one name",
     "unknown-drive": "a strut names a drive that is not there",
     "unused-drive": "a drive that carries no strut",

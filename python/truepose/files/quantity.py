@@ -236,6 +236,41 @@ class _PerWay(_Quantity):
 
 
 @dataclass(frozen=True)
+class _PerLimb(_Quantity):
+    """A quantity of each limb: one for all, unless they differ by nature, or a list of them."""
+
+    limbs: int = 3
+    alike: bool = True
+
+    def read(self, value: Any, units: UnitSystem) -> Any:
+        phrase = DIMENSIONS[self.dimension].phrase
+        if not isinstance(value, list) and self.alike:
+            return (super().read(value, units),) * self.limbs
+        if not isinstance(value, list) or len(value) != self.limbs:
+            found = f"a list of {len(value)}" if isinstance(value, list) else type_phrase(value)
+            wanted = f"a list of {self.limbs}, one for each limb"
+            expected = f"{phrase}, or {wanted}" if self.alike else wanted
+            raise QuantityError(
+                "wrong-type",
+                f"expected {expected}, found {found}",
+                found=shown_value(value),
+                expected=expected,
+            )
+        return tuple(super(_PerLimb, self).read(component, units) for component in value)
+
+    def json_schema(self) -> JsonSchemaValue:
+        one = super().json_schema()
+        several = {
+            "type": "array",
+            "items": {"anyOf": one["anyOf"]},
+            "minItems": self.limbs,
+            "maxItems": self.limbs,
+        }
+        choices = [*one["anyOf"], several] if self.alike else [several]
+        return one | {"anyOf": choices, "x-per-limb": self.limbs, "x-alike": self.alike}
+
+
+@dataclass(frozen=True)
 class _Gradient(_Quantity):
     """A gradient along a part, kept as the first of three components, or a list of all three."""
 
@@ -368,6 +403,7 @@ AllowedLength = Annotated[float, _Quantity("length", "positive", _NO_ERROR)]
 NonNegativeLength = Annotated[float, _Quantity("length", "not negative")]
 Angle = Annotated[float, _Quantity("angle")]
 PositiveAngle = Annotated[float, _Quantity("angle", "positive")]
+NonNegativeAngle = Annotated[float, _Quantity("angle", "not negative")]
 AllowedAngle = Annotated[float, _Quantity("angle", "positive", _NO_ERROR)]
 Force = Annotated[float, _Quantity("force")]
 Moment = Annotated[float, _Quantity("moment")]
@@ -399,6 +435,8 @@ Ratio = Annotated[float, _Quantity("ratio")]
 Scale = Annotated[float, _Quantity("ratio", "positive")]
 Fraction = Annotated[float, _Fraction("ratio")]
 ProperFraction = Annotated[float, _Fraction("ratio", proper=True)]
+ThreePositiveLengths = Annotated[tuple[float, float, float], _PerLimb("length", "positive")]
+ThreeAngles = Annotated[tuple[float, float, float], _PerLimb("angle", alike=False)]
 Point = Annotated[tuple[Length, Length, Length], list_of(3)]
 Direction = Annotated[tuple[float, float, float], _Unitise("ratio")]
 LengthTolerance = Annotated[Tolerance, _Tolerance("length")]

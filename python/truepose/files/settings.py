@@ -60,6 +60,19 @@ def apply(
         raise RequestError(*problems)
 
 
+def of_table(
+    settings: Mapping[str, str] | Sequence[str], table: str
+) -> Mapping[str, str] | Sequence[str]:
+    """Those of the settings that change something in `table`."""
+
+    def inside(path: str) -> bool:
+        return path.strip().startswith(f"{table}.")
+
+    if isinstance(settings, Mapping):
+        return {path: text for path, text in settings.items() if inside(path)}
+    return [setting for setting in settings if inside(setting)]
+
+
 class _LeadsNowhereError(Exception):
     def __init__(self, message: str, found: str, expected: str, hint: str | None = None) -> None:
         super().__init__(message)

@@ -1,4 +1,4 @@
-"""The kernel's table of elements as models of the machine file.
+"""The kernel's table of elements, and the families, as kinds of tables of the machine file.
 
 Nothing here knows an element: names, dimensions, defaults and docs come from `_kernel.elements()`.
 """
@@ -28,6 +28,7 @@ from truepose.files.quantity import (
     refuse,
 )
 from truepose.files.units import shown_value
+from truepose.machine.families import REGISTRY, MachineFamily
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,13 @@ class DriveKind(ElementKind):
     def has_carriage(self) -> bool:
         """Whether it moves a carriage: neither the strut itself, nor an arm."""
         return self.coordinate == "length" and not self.sets_length
+
+
+@dataclass(frozen=True)
+class FamilyKind(ElementKind):
+    """One family of machines: its drawing is one of characters."""
+
+    model: type[MachineFamily]
 
 
 @dataclass(frozen=True)
@@ -164,11 +172,21 @@ def guide_kinds() -> dict[str, GuideKind]:
     return kinds
 
 
+@cache
+def family_kinds() -> dict[str, FamilyKind]:
+    """Every family of machines, by the word that a file writes for it."""
+    return {
+        family.kind: FamilyKind(family.kind, family.doc, family.drawing, family)
+        for family in REGISTRY
+    }
+
+
 def kinds_of(table: str) -> Mapping[str, ElementKind]:
-    """The kinds of the rows of a table, by their word; none where they are all of one kind."""
+    """The kinds of a table or of its rows, by their word; none where there is but one."""
     of_table: dict[str, Callable[[], Mapping[str, ElementKind]]] = {
         "drive": drive_kinds,
         "guide": guide_kinds,
+        "family": family_kinds,
     }
     return of_table[table]() if table in of_table else {}
 

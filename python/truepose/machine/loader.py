@@ -15,6 +15,8 @@ from truepose.files.settings import apply, require_settings
 from truepose.files.units import shown_value
 from truepose.machine import build_kernel, build_parts, build_workspace, checks, validation
 from truepose.machine.condition import Condition
+from truepose.machine.families.expansion import TABLE as FAMILY
+from truepose.machine.families.expansion import expand
 from truepose.machine.model import Machine
 from truepose.machine.parts import BODIES, Drive, Strut
 from truepose.machine.shared_keys import share_each
@@ -49,11 +51,14 @@ def load(
     require_settings(settings)
     document = read(path)
     owned = owners(source.tables for source in registry)
+    expansion = expand(document, settings, owned)
     share_each(document, settings, owned.free_tables)
     apply(document, settings, owned.free_tables)
     _require_schema(document)
     validated, problems = validation.validate(document, owned)
-    problems += checks.check(document, validated)
+    if validated.family is None and FAMILY in document.data:
+        _raise(problem for problem in problems if not expansion.explains(document, problem))
+    problems += [*expansion.problems, *checks.check(document, validated)]
     _raise(problems)
     return _built(document, validated, registry)
 

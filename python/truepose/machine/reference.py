@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from inspect import cleandoc
 from typing import Any
 
 from pydantic import BaseModel
@@ -16,7 +17,7 @@ from pydantic import BaseModel
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.document import ARRAY_TABLES, SEVERAL
 from truepose.files.tolerance_standards import STANDARDS, designations_of
-from truepose.machine.elements import kinds_of
+from truepose.machine.elements import FamilyKind, kinds_of
 from truepose.machine.materials import MATERIALS
 from truepose.machine.shared_keys import EACH
 from truepose.machine.source_builder import SourceType
@@ -38,7 +39,7 @@ def json_schema(registry: Sequence[SourceType]) -> Json:
         properties[table] = (
             {"type": "array", "minItems": 1, "items": _row_schema(table, models)}
             if table in SEVERAL
-            else _merged(models)
+            else _one_of(_choices(table, models))
         )
     properties[EACH] = {
         "type": "object",
@@ -51,9 +52,29 @@ def json_schema(registry: Sequence[SourceType]) -> Json:
         "title": "truepose machine file",
         "type": "object",
         "properties": properties,
-        "required": ["schema", *REQUIRED],
+        **_complete(properties),
         "additionalProperties": False,
     }
+
+
+def _complete(properties: Json) -> Json:
+    """What a file must have: rows and freedoms, or a `[family]` that gives them."""
+    machine = properties["machine"]
+    machine["required"].remove("dof")
+    rows = [table for table in REQUIRED if table in SEVERAL]
+    by_hand = {
+        "type": "object",
+        "required": rows,
+        "properties": {"machine": {"type": "object", "required": ["dof"]}},
+    }
+    return {
+        "required": ["schema", *(table for table in REQUIRED if table not in SEVERAL)],
+        "anyOf": [{"type": "object", "required": ["family"]}, by_hand],
+    }
+
+
+def _one_of(choices: list[Json]) -> Json:
+    return choices[0] if len(choices) == 1 else {"anyOf": choices}
 
 
 def _row_schema(table: str, models: tuple[type[BaseModel], ...]) -> Json:
@@ -62,7 +83,7 @@ def _row_schema(table: str, models: tuple[type[BaseModel], ...]) -> Json:
     if table in ARRAY_TABLES:
         for choice in choices:
             choice["required"] = ["name"]
-    return choices[0] if len(choices) == 1 else {"anyOf": choices}
+    return _one_of(choices)
 
 
 def _shared_schema(table: str, models: tuple[type[BaseModel], ...]) -> Json:
@@ -71,11 +92,11 @@ def _shared_schema(table: str, models: tuple[type[BaseModel], ...]) -> Json:
     for choice in choices:
         choice.pop("required", None)
         del choice["properties"]["name"]
-    return choices[0] if len(choices) == 1 else {"anyOf": choices}
+    return _one_of(choices)
 
 
 def _choices(table: str, models: tuple[type[BaseModel], ...]) -> list[Json]:
-    """The keys of a row, one object schema for each kind that there is of it."""
+    """The keys of a table or row, one object schema for each kind that there is of it."""
     kinds = kinds_of(table)
     if not kinds:
         return [_merged(models)]
@@ -168,6 +189,8 @@ def _section(
     lines += _tables_below(table, schema)
     for kind in kinds_of(table).values():
         lines += [f'### `kind = "{kind.kind}"`', "", kind.doc, ""]
+        if isinstance(kind, FamilyKind):
+            lines += ["```text", *kind.drawing.rstrip().split("\n"), "```", ""]
         lines += _rows(_merged((kind.model,)), {})
     return "\n".join(lines)
 
@@ -185,7 +208,7 @@ def _tables_below(path: str, schema: Json) -> list[str]:
 
 
 def _first_line(model: type[BaseModel]) -> str:
-    return (model.__doc__ or "").strip()
+    return cleandoc(model.__doc__ or "")
 
 
 def _rows(schema: Json, reader: Mapping[str, str]) -> list[str]:
@@ -263,6 +286,11 @@ def _takes_quantity(schema: Json, name: str) -> str:
         return f"{dimension.name.replace('_', ' ')}, or a table of those in series"
     if schema.get("x-per-axis"):
         return f"{dimension.name}, or `[x, y, z]` of them; `inf` is rigid"
+    if "x-per-limb" in schema:
+        several = f"list of {schema['x-per-limb']}, one for each limb"
+        if schema["x-alike"]:
+            return f"{dimension.name}, or a {several}"
+        return f"{several} ({dimension.plural})"
     if schema.get("x-by-part"):
         return f"table of {dimension.plural} per part"
     if schema.get("x-per-part"):
@@ -349,6 +377,9 @@ key that nothing reads is one.
 
 **Names.** Drives and struts are told apart by `name`. Parameters are named after them:
 `strut.1.length`, `strut.1.base.x`, `drive.d1.offset`, `tool.z`.
+
+**Families.** A machine of a common kind is said by its few parameters in [`[family]`](#family),
+from which the joint centres follow.
 
 **Trying a change.** `--set key=value` on the command line changes a value before the file is
 checked: `--set accuracy.target="0.2 mm"`, `--set strut.1.length=501`,

@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 from truepose.errors import Fault, Problem
 from truepose.files.document import ARRAY_TABLES, Document, Key
-from truepose.files.settings import apply
+from truepose.files.settings import apply, of_table
 from truepose.files.units import shown_value, type_phrase
 from truepose.files.wording import did_you_mean, one_of
 
@@ -28,7 +28,7 @@ def share_each(
 
     A key is shared as a whole: a row that writes one keeps all of its own value.
     """
-    apply(document, _of_each(settings), free_tables)
+    apply(document, of_table(settings, EACH), free_tables)
     tables = document.data.get(EACH)
     if not isinstance(tables, dict):
         return
@@ -41,16 +41,6 @@ def share_each(
                 if isinstance(row, dict) and key not in row and key != "name":
                     row[key] = copy.deepcopy(value)
                     document.shared[table, index, key] = (EACH, table, key)
-
-
-def _of_each(settings: Mapping[str, str] | Sequence[str]) -> Mapping[str, str] | Sequence[str]:
-    if isinstance(settings, Mapping):
-        return {path: text for path, text in settings.items() if _is_each(path)}
-    return [setting for setting in settings if _is_each(setting)]
-
-
-def _is_each(path: str) -> bool:
-    return path.strip().startswith(f"{EACH}.")
 
 
 def problems(document: Document) -> list[Problem]:

@@ -14,7 +14,8 @@ from truepose.files.file_table import FileTable
 from truepose.files.units import FileUnit, UnitSystem, shown_value, type_phrase
 from truepose.files.wording import did_you_mean, nearest, one_of
 from truepose.machine import shared_keys
-from truepose.machine.elements import DriveKind, kinds_of
+from truepose.machine.elements import DriveKind, ElementKind, kinds_of
+from truepose.machine.families import MachineFamily
 from truepose.machine.tables import REQUIRED, Owners, takes_every_key
 from truepose.machine.tables.units import UnitsTable
 
@@ -50,6 +51,11 @@ class Validated:
         """The one instance of `model`, or None."""
         return cast("Model | None", self.tables.get(model))
 
+    @property
+    def family(self) -> MachineFamily | None:
+        """What `[family]` says; None where the file has none, or it is no good."""
+        return next((one for one in self.tables.values() if isinstance(one, MachineFamily)), None)
+
     def rows(self, model: type[Model]) -> tuple[Model, ...]:
         """The instances of `model`, one per row; only for a document without problems."""
         return cast("tuple[Model, ...]", tuple(self.every_row.get(model, ())))
@@ -74,6 +80,14 @@ def validate(document: Document, owners: Owners) -> tuple[Validated, list[Proble
             else:
                 _single(document, table, models, validated, problems)
     return validated, _one_per_unit(problems)
+
+
+def validate_alone(document: Document, owners: Owners, table: str) -> Validated:
+    """Fill the models of one table that the file has; what is wrong with it `validate` says."""
+    unsaid: list[Problem] = []
+    validated = Validated(_units(document, unsaid))
+    _single(document, table, owners.by_table[table], validated, unsaid)
+    return validated
 
 
 def _one_per_unit(problems: list[Problem]) -> list[Problem]:
@@ -137,6 +151,7 @@ def _single(
     if not isinstance(value, dict):
         problems.append(_not_a_table(document, (table,), value))
         return
+    models, value, _ = _of_its_kind(document, (table,), models, value, problems)
     filled, faults = _share_out(document, (table,), models, value, validated)
     problems += faults
     validated.tables |= {model: one for model, one in filled.items() if one is not None}
@@ -156,25 +171,35 @@ def _array(
     kinds = kinds_of(table)
     for index, row in enumerate(rows):
         key: Key = (table, index)
-        of_row = models
-        coordinate = None
-        if kinds:
-            kind = kinds.get(row["kind"]) if isinstance(row.get("kind"), str) else None
-            if kind is not None:
-                of_row = (*models, kind.model)
-                coordinate = kind.coordinate if isinstance(kind, DriveKind) else None
-            else:
-                problems += _unknown_kind(document, key, row, kinds)
-                # Which keys it may have is not known without its kind: check only the common ones.
-                common = {name for model in models for name in model.model_fields}
-                row = {name: value for name, value in row.items() if name in common}
+        of_row, row, kind = _of_its_kind(document, key, models, row, problems)
+        coordinate = kind.coordinate if isinstance(kind, DriveKind) else None
         filled, faults = _share_out(document, key, of_row, row, validated, coordinate)
         problems += faults
         for model in models:
             validated.every_row.setdefault(model, []).append(filled[model])
         if kinds:
-            one = filled[of_row[-1]] if of_row is not models else None
+            one = filled[of_row[-1]] if kind is not None else None
             validated.geometry.setdefault(table, []).append(cast("FileTable | None", one))
+
+
+def _of_its_kind(
+    document: Document,
+    key: Key,
+    models: tuple[type[BaseModel], ...],
+    value: dict[str, Any],
+    problems: list[Problem],
+) -> tuple[tuple[type[BaseModel], ...], dict[str, Any], ElementKind | None]:
+    """The models of one table or row with that of its kind, the keys to check, and the kind."""
+    kinds = kinds_of(str(key[0]))
+    if not kinds:
+        return models, value, None
+    kind = kinds.get(value["kind"]) if isinstance(value.get("kind"), str) else None
+    if kind is not None:
+        return (*models, kind.model), value, kind
+    problems += _unknown_kind(document, key, value, kinds)
+    # Which keys it may have is not known without its kind: check only the common ones.
+    common = {name for model in models for name in model.model_fields}
+    return models, {name: entry for name, entry in value.items() if name in common}, None
 
 
 def _unknown_kind(

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from build_machine import machine_files
+from family_machines import KINDS, family_file
 from generators import DOCS, generator
 from truepose.files.tolerance_standards import designations
 from truepose.machine.reference import json_schema, page
@@ -37,8 +38,8 @@ def test_the_page_names_every_key_of_every_source() -> None:
 def fits(value: object, schema: dict) -> bool:
     """The parts of JSON schema that ours uses, checked plainly."""
     for choice in ("anyOf", "oneOf"):
-        if choice in schema:
-            return any(fits(value, each) for each in schema[choice])
+        if choice in schema and not any(fits(value, each) for each in schema[choice]):
+            return False
     if "const" in schema:
         return value == schema["const"]
     if "enum" in schema and value not in schema["enum"]:
@@ -79,5 +80,19 @@ def test_the_schema_takes_the_machines_shipped(path: Path) -> None:
         document | {"drive": [{**document["drive"][0], "kind": "slyder"}]},
         document | {"strut": [{**document["strut"][0], "lenght": 1}]},
         {key: value for key, value in document.items() if key != "machine"},
+        {key: value for key, value in document.items() if key != "strut"},
+        document | {"machine": {"name": "no freedoms"}},
     ):
         assert not fits(wrong, schema)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_schema_takes_families(kind: str) -> None:
+    schema = json.loads(json.dumps(json_schema(REGISTRY)))
+    file = family_file(kind)
+    assert fits(file, schema)
+    assert fits(
+        {key: value for key, value in file.items() if key not in ("drive", "strut")}, schema
+    )
+    for wrong in ({"kind": "delta"}, {"spacing": -1}, {"rods": 3}, {"base_radius": "x", "rod": {}}):
+        assert not fits(file | {"family": file["family"] | wrong}, schema)

@@ -18,6 +18,7 @@ from truepose.machine.tables.calibration import CalibrationTable
 from truepose.machine.tables.condition import ConditionTable
 from truepose.machine.tables.controller import ControllerTable
 from truepose.machine.tables.drive import DriveTable
+from truepose.machine.tables.family import FamilyTable
 from truepose.machine.tables.guide import GuideTable
 from truepose.machine.tables.limb import LimbTable
 from truepose.machine.tables.machine import MachineTable
@@ -62,6 +63,7 @@ def owners(added: Iterable[Mapping[str, type[BaseModel]]]) -> Owners:
     every: dict[str, list[type[BaseModel]]] = {
         "machine": [MachineTable],
         "units": [UnitsTable],
+        "family": [FamilyTable],
         "drive": [DriveTable],
         "strut": [StrutTable, strut_geometry()],
         "guide": [GuideTable],

@@ -15,12 +15,13 @@ class MachineTable(FileTable):
     description: str = Field("", description="What the machine is, in a sentence or two.")
     origin: str = Field("", description="Where its numbers come from, in one paragraph.")
     dof: Freedoms = Field(
-        description="The platform's freedoms among `x y z a b c`; the frame holds the others."
+        description="The platform's freedoms among `x y z a b c`; the frame holds the others. "
+        "A `[family]` gives them."
     )
     commanded: Freedoms | None = Field(
         None,
         description="The freedoms that a pose commands, as many as there are drives. "
-        "Default: all of `dof`.",
+        "Default: those of `[family]`, else all of `dof`.",
     )
     tool: Point = Field((0.0, 0.0, 0.0), description="The tool point, platform frame.")
     characteristic_length: PositiveLength | None = Field(

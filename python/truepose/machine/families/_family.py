@@ -1,0 +1,75 @@
+"""What a family is: a machine's shape as a function of a few parameters.
+
+A family is a file with one class, its parameters as pydantic fields, and a line in `REGISTRY`. All
+is in SI. `rows` is plain NumPy on real or complex numbers without a branch on a value, so that its
+derivatives are exact by a complex step (J. N. Lyness, C. B. Moler, Numerical differentiation of
+analytic functions, SIAM J. Numer. Anal. 4 (1967) 202-210).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from truepose.files.file_table import FileTable
+
+Numbers: TypeAlias = NDArray[Any]
+"""Real or complex."""
+
+Values: TypeAlias = Mapping[str, Numbers]
+"""Parameter -> its value () or, of one that each limb has its own of, (n_limb,); m, rad."""
+
+X, Y, Z = np.eye(3)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One drive, strut or guide of a machine of a family.
+
+    `words`, such as the kind of a drive, and `numbers`, () or (3,), m, rad or a unit vector, are
+    its geometry. `defaults` are what a file may say otherwise.
+    """
+
+    table: str
+    name: str
+    words: Mapping[str, str]
+    numbers: Mapping[str, Numbers]
+    defaults: Mapping[str, str] = field(default_factory=dict)
+
+
+class MachineFamily(FileTable):
+    """A family of machines; an instance is one of them, in SI."""
+
+    kind: ClassVar[str]
+    """The word of `[family] kind`, and of the library's machine of the family."""
+    doc: ClassVar[str]
+    drawing: ClassVar[str]
+    """What the parameters measure, as characters."""
+    limbs: ClassVar[tuple[str, ...]]
+    """Names of the limbs, for parameters that each may have its own of."""
+    dof: ClassVar[tuple[str, ...]]
+    commanded: ClassVar[tuple[str, ...]]
+
+    @classmethod
+    def rows(cls, values: Values) -> Iterator[Row]:
+        """The machine's rows, in their order."""
+        raise NotImplementedError
+
+    def home(self) -> Mapping[str, float]:
+        """Home by freedom, m and rad, where it follows from a parameter."""
+        return {}
+
+    def values(self) -> dict[str, Numbers]:
+        """The value of every parameter that has one, () or (n_limb,)."""
+        given = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: np.asarray(value) for name, value in given.items() if value is not None}
+
+
+def outward(angle: Numbers) -> tuple[Numbers, Numbers]:
+    """Unit vectors (3,) in the base plane at an angle, rad, from x: outward, and across to it."""
+    cosine, sine, zero = np.cos(angle), np.sin(angle), 0.0 * angle
+    return np.array([cosine, sine, zero]), np.array([-sine, cosine, zero])

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from truepose.calibration.calibrate import calibrate
     from truepose.calibration.planning.plan import plan
     from truepose.compensation.compensate import compensate
-    from truepose.controllers import export
+    from truepose.controllers import export, import_machine
     from truepose.controllers.gcode import correct_program
     from truepose.error_budget.evaluate import budget
     from truepose.error_budget.over_time import over_time
@@ -50,6 +50,7 @@ _WHERE = {
     "compensate": "truepose.compensation.compensate",
     "correct_program": "truepose.controllers.gcode",
     "export": "truepose.controllers",
+    "import_machine": "truepose.controllers",
     "monte_carlo": "truepose.uncertainty_analysis.monte_carlo",
     "over_time": "truepose.error_budget.over_time",
     "plan": "truepose.calibration.planning.plan",
@@ -73,6 +74,7 @@ __all__ = [
     "correct_program",
     "errors",
     "export",
+    "import_machine",
     "load",
     "monte_carlo",
     "over_time",

@@ -153,6 +153,12 @@ CATALOGUE: dict[str, str] = {
     "unknown-controller": "a controller that there is no adapter for",
     "bad-option": "an option of a controller's adapter that it does not have or cannot read",
     "controller-cannot": "a machine that the controller has no way to take",
+    "import-unrecognised": "a file that no reader of a controller's format knows",
+    "import-declined": "a controller's file of a machine that is not imported",
+    "import-include": "a file that another includes, and that is not read",
+    "import-syntax": "a line that the controller's format does not have",
+    "import-value": "a value that the controller itself does not take",
+    "import-no-measurements": "measurements are wanted of a controller's file that keeps none",
     # calibration
     "controller-unsaid": "a calibrated file that does not say which geometry its controller has",
     "controller-contradicted": "a controller said to hold the drawing, of a file without it",

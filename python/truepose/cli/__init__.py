@@ -22,6 +22,7 @@ from truepose.cli._guard import GuardedGroup
 
 COMMANDS: dict[str, str] = {
     "init": "truepose.cli.init",
+    "import": "truepose.cli.import_",
     "check": "truepose.cli.check",
     "plan": "truepose.cli.plan",
     "calibrate": "truepose.cli.calibrate",

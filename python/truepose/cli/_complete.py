@@ -63,6 +63,13 @@ def controllers(_: click.Context, __: click.Parameter, incomplete: str) -> Offer
     return _plain(REGISTRY, incomplete)
 
 
+def readers(_: click.Context, __: click.Parameter, incomplete: str) -> Offered:
+    """Controllers whose files are read."""
+    from truepose.controllers import READERS
+
+    return _plain(READERS, incomplete)
+
+
 def codes(_: click.Context, __: click.Parameter, incomplete: str) -> Offered:
     """Codes that can be explained, each with its meaning."""
     from truepose.explanations import meanings

@@ -1,30 +1,64 @@
 """What controllers take: programs, parameters and kinematics, each adapter one folder.
 
-`REGISTRY` has every adapter, in the order of `truepose export --help`; it is read lazily, since
-an adapter may need what only it needs.
+`REGISTRY` has every adapter, in the order of `truepose export --help`, and `READERS` every reader
+of a controller's own files; both are read lazily, since an adapter may need what only it needs.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from truepose.controllers._registry import REGISTRY
+from truepose.controllers._registry import READERS, REGISTRY
 from truepose.lazy_names import imported_when_used
 
 if TYPE_CHECKING:
     from truepose.controllers._adapters import controller, export
     from truepose.controllers._export import Controller, Export, Option
+    from truepose.controllers._import import (
+        Assumption,
+        ControllerFile,
+        Import,
+        Reader,
+        Reading,
+        Setting,
+        import_machine,
+        reader,
+    )
 
 _WHERE = {
+    "Assumption": "truepose.controllers._import",
     "Controller": "truepose.controllers._export",
+    "ControllerFile": "truepose.controllers._import",
     "Export": "truepose.controllers._export",
+    "Import": "truepose.controllers._import",
     "Option": "truepose.controllers._export",
+    "Reader": "truepose.controllers._import",
+    "Reading": "truepose.controllers._import",
+    "Setting": "truepose.controllers._import",
     "controller": "truepose.controllers._adapters",
     "export": "truepose.controllers._adapters",
+    "import_machine": "truepose.controllers._import",
+    "reader": "truepose.controllers._import",
 }
 """Name -> the module that is imported when it is first used: the names of adapters need none."""
 
-__all__ = ["REGISTRY", "Controller", "Export", "Option", "controller", "export"]
+__all__ = [
+    "READERS",
+    "REGISTRY",
+    "Assumption",
+    "Controller",
+    "ControllerFile",
+    "Export",
+    "Import",
+    "Option",
+    "Reader",
+    "Reading",
+    "Setting",
+    "controller",
+    "export",
+    "import_machine",
+    "reader",
+]
 
 
 if not TYPE_CHECKING:  # type checkers know the names above, and refuse all others

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from importlib import import_module
+from typing import Any
 
 from truepose.controllers._export import Controller, Export, options_of
 from truepose.controllers._registry import REGISTRY
@@ -15,19 +16,24 @@ from truepose.runs.arguments import checked
 
 def controller(name: str) -> type[Controller]:
     """The adapter of a name. Raises `RequestError` (unknown-controller)."""
-    if name not in REGISTRY:
+    adapter: type[Controller] = by_name(name, REGISTRY, "adapter")
+    return adapter
+
+
+def by_name(name: str, registry: Mapping[str, str], what: str) -> Any:
+    """What a registry has under a name. Raises `RequestError` (unknown-controller)."""
+    if name not in registry:
         raise RequestError(
             Problem(
                 "unknown-controller",
-                f"there is no adapter for {name!r}",
+                f"there is no {what} for {name!r}",
                 found=repr(name),
-                expected=one_of(REGISTRY),
-                hint=did_you_mean(name, REGISTRY),
+                expected=one_of(registry),
+                hint=did_you_mean(name, registry),
             )
         )
-    module, _, attribute = REGISTRY[name].partition(":")
-    adapter: type[Controller] = getattr(import_module(module), attribute)
-    return adapter
+    module, _, attribute = registry[name].partition(":")
+    return getattr(import_module(module), attribute)
 
 
 @checked

@@ -99,18 +99,22 @@ def options_of(
         try:
             values[key] = _read(option, units, text)
         except ReadingError as failure:
-            problems.append(
-                Problem(
-                    "bad-option",
-                    f"option {key} of {controller.name}: {failure.message}",
-                    found=failure.found or repr(text),
-                    expected=failure.expected or option.doc,
-                    hint=failure.hint,
-                )
-            )
+            subject = f"option {key} of {controller.name}"
+            problems.append(unread("bad-option", subject, failure, text, option.doc))
     if problems:
         raise RequestError(*problems)
     return values
+
+
+def unread(code: str, subject: str, failure: ReadingError, text: str, doc: str) -> Problem:
+    """The problem of a value that could not be read: of `subject`, given as `text`."""
+    return Problem(
+        code,
+        f"{subject}: {failure.message}",
+        found=failure.found or repr(text),
+        expected=failure.expected or doc,
+        hint=failure.hint,
+    )
 
 
 def _pair(text: str) -> tuple[str, str]:
@@ -189,5 +193,6 @@ __all__ = [
     "geometry_compensated",
     "geometry_loaded",
     "options_of",
+    "unread",
     "unsupported_machine",
 ]

@@ -1,4 +1,4 @@
-"""The registry of adapters, which who completes a command line reads too: it imports none."""
+"""The registries of adapters and of readers: who completes a line reads them; they import none."""
 
 from __future__ import annotations
 
@@ -13,3 +13,8 @@ REGISTRY: dict[str, str] = {
     "pose-map": "truepose.controllers.pose_map:PoseMap",
 }
 """Name on the command line -> module and class of the adapter."""
+
+READERS: dict[str, str] = {
+    "klipper": "truepose.controllers.klipper.read:KlipperReader",
+}
+"""Name on the command line -> module and class of the reader of that controller's files."""

@@ -25,6 +25,7 @@ TOPICS: dict[str, str] = {
     "requests": "Requests",
     "functions": "Calls in Python",
     "controllers": "Controllers",
+    "imports": "Files of controllers",
     "measurements": "Measurements",
     "calibration": "Calibration and plans",
     "suspicions": "Suspicions about measurements",

@@ -152,8 +152,16 @@ MACHINE_FILE = FileKind("a machine file (TOML)", ".toml")
 
 def read(path: str | Path) -> Document:
     """Read a machine file. Raises `MachineFileError` for what is no readable TOML text."""
-    file = str(path)
     content, text = read_text(Path(path), MACHINE_FILE)
+    return document_of(path, content, text)
+
+
+def document_of(path: str | Path, content: bytes, text: str) -> Document:
+    """The document that a file at `path` is, or would be, with such bytes and the text of them.
+
+    Raises `MachineFileError` (not-toml).
+    """
+    file = str(path)
     try:
         data = parse_toml(text)
     except TomlError as error:

@@ -49,3 +49,6 @@ LONGEST_NAME = 200
 
 MOST_COLUMNS = 2000
 """Columns of a data file or of a file of measurements."""
+
+MOST_INCLUDED = 200
+"""Files that a controller's file includes, with those that these include."""

@@ -10,7 +10,7 @@ from pydantic import BaseModel
 
 from truepose.errors import ArgumentError, Fault, MachineFileError, Problem
 from truepose.files.data_file import DataFiles
-from truepose.files.document import Document, read
+from truepose.files.document import Document, document_of, read
 from truepose.files.settings import apply, require_settings
 from truepose.files.units import shown_value
 from truepose.machine import build_kernel, build_parts, build_workspace, checks, validation
@@ -49,7 +49,20 @@ def load(
     if not isinstance(path, str | PathLike):
         raise ArgumentError.of("path", path, "the name of a machine file")
     require_settings(settings)
-    document = read(path)
+    return _loaded(read(path), settings, registry)
+
+
+def load_text(path: str | Path, text: str, *, registry: Sequence[SourceType]) -> Machine:
+    """The machine of a text as a machine file at `path` would have it, whether one is there or not.
+
+    Raises `MachineFileError` with every problem of the text.
+    """
+    return _loaded(document_of(path, text.encode(), text), (), registry)
+
+
+def _loaded(
+    document: Document, settings: Mapping[str, str] | Sequence[str], registry: Sequence[SourceType]
+) -> Machine:
     owned = owners(source.tables for source in registry)
     expansion = expand(document, settings, owned)
     share_each(document, settings, owned.free_tables)

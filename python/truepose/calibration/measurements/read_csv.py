@@ -71,11 +71,21 @@ def read_measurements(path: str | Path, machine: Machine) -> Measurements:
     Raises `RequestError` with every problem of the file, each with its line: what is no table, what
     is not declared, a reading that the machine or the instrument cannot have.
     """
-    file = str(path)
     try:
         content, text = read_text(Path(path), _KIND)
     except MachineFileError as error:
         raise RequestError(*error.problems) from None
+    return measurements_of_text(path, content, text, machine)
+
+
+def measurements_of_text(
+    path: str | Path, content: bytes, text: str, machine: Machine
+) -> Measurements:
+    """The measurements that a file at `path` has, or would have, with such bytes and their text.
+
+    Raises `RequestError` with every problem of them.
+    """
+    file = str(path)
     head, csv_text = separated(text)
     header = read_header(head, file, Path(path).name, reserved_names(machine))
     read = read_table(file, Path(path).name, csv_text, _columns(machine))

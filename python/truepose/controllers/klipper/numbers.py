@@ -1,0 +1,127 @@
+"""The numbers of a printer.cfg, each with its place: what is wrong is told at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from truepose.controllers.klipper.config import Config, Option
+from truepose.errors import Fault, MachineFileError, Problem
+from truepose.files.wording import did_you_mean, one_of
+
+
+class Numbers:
+    """Reads options; what cannot be read is NaN, and among the `problems`.
+
+    `read`: what was read, "section.option" -> as it is written.
+    """
+
+    def __init__(self, config: Config) -> None:
+        self.config = config
+        self.problems: list[Problem] = []
+        self.read: dict[str, str] = {}
+
+    def has(self, section: str, name: str) -> bool:
+        """Whether an option is there."""
+        return self.config.get(section, name) is not None
+
+    def number(
+        self,
+        section: str,
+        name: str,
+        default: float | None = None,
+        *,
+        above: float = -math.inf,
+        expected: str = "a number",
+    ) -> float:
+        """A number, greater than `above`; without a default it must be there."""
+        option = self.config.get(section, name)
+        if option is None:
+            if default is not None:
+                return default
+            self._missing(section, name, expected)
+            return math.nan
+        value = _float(option.text)
+        if value is None:
+            self.refuse(option, section, name, "not-a-number", "this is no number", expected)
+            return math.nan
+        if not value > above:
+            if above == 0.0:
+                self.refuse(
+                    option, section, name, "not-positive", "this is not above zero", expected
+                )
+            else:
+                message = f"Klipper wants more than {above:.10g} here"
+                self.refuse(option, section, name, "import-value", message, expected)
+            return math.nan
+        self.read[f"{section}.{name}"] = option.text
+        return value
+
+    def word(self, section: str, name: str, words: Iterable[str], *, of: str) -> str | None:
+        """One of some words; None where it is none."""
+        known = list(words)
+        option = self.config.get(section, name)
+        if option is None:
+            self._missing(section, name, one_of(known))
+            return None
+        if option.text not in known:
+            hint = did_you_mean(option.text, known)
+            message = f"truepose imports {of} of Klipper's, and no other machine"
+            self.refuse(option, section, name, "import-declined", message, one_of(known), hint)
+            return None
+        self.read[f"{section}.{name}"] = option.text
+        return option.text
+
+    def refuse(
+        self,
+        option: Option,
+        section: str,
+        name: str,
+        code: str,
+        message: str,
+        expected: str,
+        hint: str | None = None,
+    ) -> None:
+        """Note what is wrong with an option."""
+        path = f"{section}.{name}"
+        fault = Fault(code, f"{path}: {message}", option.text[:80], expected, hint)
+        self.problems.append(option.file.problem(fault, option.line, path))
+
+    def done(self) -> None:
+        """Raise `MachineFileError` with all problems, if any, in the order of the lines."""
+        if self.problems:
+            files = list(dict.fromkeys(problem.file for problem in self.problems))
+            self.problems.sort(key=lambda problem: (files.index(problem.file), problem.line or 0))
+            raise MachineFileError(*dict.fromkeys(self.problems))
+
+    def _missing(self, section: str, name: str, expected: str) -> None:
+        place = self.config.sections.get(section)
+        hidden = self.config.unread_line
+        hint = None
+        if hidden is not None:
+            hint = (
+                f"what SAVE_CONFIG wrote is not read, by Klipper neither: line {hidden} is no line "
+                "of its block"
+            )
+        fault = Fault(
+            "missing-key",
+            f"{section}.{name}: missing",
+            "nothing" if place is not None else f"no section [{section}]",
+            f"{name}: {expected}, in [{section}]",
+            hint,
+        )
+        file = self.config.file if place is None else place.file
+        line = None if place is None else place.line
+        self.problems.append(file.problem(fault, line, f"{section}.{name}"))
+
+
+def _float(text: str) -> float | None:
+    """A finite number as Klipper reads it."""
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+__all__ = ["Numbers"]

@@ -102,6 +102,11 @@ def export() -> None:
     assert tp.export(small(), "c").files
 
 
+@use("import_machine")
+def import_machine() -> None:
+    expect(tp.Machine, tp.import_machine(DATA / "printer.cfg").machine)
+
+
 @use("load")
 def load() -> None:
     expect(tp.Machine, small())

@@ -31,11 +31,17 @@ DATA = ROOT / "examples" / "data"
 
 CHANGED = ("--set", 'machine.name="another"')
 """What makes every output of the new run differ from that of the old one."""
-OTHERS = {"init": (), "calibrate": ("--set", 'accuracy.target="0.37 mm"', "--date", "2026-01-02")}
+NEW = ("init", "import")
+"""Commands that write new files only."""
+OTHERS = {
+    **dict.fromkeys(NEW, ()),
+    "calibrate": ("--set", 'accuracy.target="0.37 mm"', "--date", "2026-01-02"),
+}
 """The same where that is no change: a new file is new, and measurements name their machine."""
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "init": ("init", "tripod", "-o", "new.toml"),
+    "import": ("import", str(DATA / "printer.cfg"), "-o", "new.toml"),
     "check": ("check", str(PLANAR), "-o", "out.json"),
     "budget": ("budget", str(PLANAR), "-o", "out.json", "--witness", "witness.toml"),
     "compensate": ("compensate", str(PLANAR), "-o", "out.nc"),
@@ -140,7 +146,7 @@ class Kills:
         folder = self._place / "folder"
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(self._old, folder)
-        if self.name == "init":  # it writes over nothing
+        if self.name in NEW:  # it writes over nothing
             (folder / "new.toml").unlink()
         ears, mouth = os.pipe()
         process = self._started(folder, self._changes(), mouth)
@@ -167,13 +173,13 @@ class Kills:
         """Which run a file is of, byte by byte."""
         file = self._place / "folder" / name
         if not file.exists():
-            return "old" if self.name == "init" else "none"
+            return "old" if self.name in NEW else "none"
         content = file.read_bytes()
-        runs = ("new",) if self.name == "init" else ("old", "new")
+        runs = ("new",) if self.name in NEW else ("old", "new")
         return next((run for run in runs if content == self._content(run, name)), "half")
 
     def _differs(self, name: str) -> bool:
-        if self.name == "init":
+        if self.name in NEW:
             return name != PART
         return self._content("old", name) != self._content("new", name)
 

@@ -62,7 +62,7 @@ def command(
     """Write a machine file from the FILE that its controller has.
 
     Such as Klipper's printer.cfg, with the measurements of its last calibration. What the file does
-    not say is assumed, and stands in lines that say so.
+    not say is assumed, and stands in lines that say so. Files that are already there are not touched.
     """
     if listed:
         _show_readers()
@@ -73,11 +73,12 @@ def command(
     from truepose.cli._verbose import say_machine, step
     from truepose.controllers import import_machine
     from truepose.errors import Fault, RequestError
-    from truepose.files.writing import replacing, require_writable, written_together
+    from truepose.files.writing import replacing, require_new, require_writable, written_together
 
     for path, ending in ((output, ".toml"), (measurements, ".csv")):
         if path is not None:
             require_writable(path, [ending])
+            require_new(path)
     with step("controller's file"):
         found = import_machine(controller_file, kind, settings)
         say_machine(found.machine)

@@ -14,27 +14,25 @@ from truepose.lazy_names import imported_when_used
 if TYPE_CHECKING:
     from truepose.controllers._adapters import controller, export
     from truepose.controllers._export import Controller, Export, Option
-    from truepose.controllers._import import (
+    from truepose.controllers._import import Import, import_machine, reader
+    from truepose.controllers._reader import (
         Assumption,
         ControllerFile,
-        Import,
+        ControllerReading,
         Reader,
-        Reading,
         Setting,
-        import_machine,
-        reader,
     )
 
 _WHERE = {
-    "Assumption": "truepose.controllers._import",
+    "Assumption": "truepose.controllers._reader",
     "Controller": "truepose.controllers._export",
-    "ControllerFile": "truepose.controllers._import",
+    "ControllerFile": "truepose.controllers._reader",
+    "ControllerReading": "truepose.controllers._reader",
     "Export": "truepose.controllers._export",
     "Import": "truepose.controllers._import",
     "Option": "truepose.controllers._export",
-    "Reader": "truepose.controllers._import",
-    "Reading": "truepose.controllers._import",
-    "Setting": "truepose.controllers._import",
+    "Reader": "truepose.controllers._reader",
+    "Setting": "truepose.controllers._reader",
     "controller": "truepose.controllers._adapters",
     "export": "truepose.controllers._adapters",
     "import_machine": "truepose.controllers._import",
@@ -48,11 +46,11 @@ __all__ = [
     "Assumption",
     "Controller",
     "ControllerFile",
+    "ControllerReading",
     "Export",
     "Import",
     "Option",
     "Reader",
-    "Reading",
     "Setting",
     "controller",
     "export",

@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from truepose.controllers._import import ASSUMED, Assumption
+from truepose.controllers._reader import ASSUMED, Assumption
 
 TOWERS = ("a", "b", "c")
 

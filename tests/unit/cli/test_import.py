@@ -72,8 +72,19 @@ def test_the_controllers_file_is_never_written_over(
     (tmp_path / "more.toml").write_text(text.partition("#*#")[0], "utf-8")
     done = call(capsys, "import", str(tmp_path / "printer.cfg"), "-o", str(tmp_path / "more.toml"))
     assert done.code == 2
-    assert "output-is-input" in done.err
+    assert "output-exists" in done.err
     assert (tmp_path / "more.toml").read_text("utf-8").startswith("# A printer")
+
+
+def test_a_file_that_is_there_is_not_touched(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    for name, flag in (("mine.toml", "-o"), ("mine.csv", "--measurements")):
+        (tmp_path / name).write_text("mine", "utf-8")
+        done = call(capsys, "import", PRINTER, flag, str(tmp_path / name))
+        assert done.code == 2
+        assert "output-exists" in done.err
+        assert (tmp_path / name).read_text("utf-8") == "mine"
 
 
 def test_a_problem_has_the_files_own_line(

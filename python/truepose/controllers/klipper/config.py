@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from truepose.controllers._import import ControllerFile
+from truepose.controllers._reader import ControllerFile
 from truepose.errors import Fault, MachineFileError, Problem, ReadingError
 
 _SAVED = (
@@ -30,7 +30,7 @@ _BEHIND = re.compile(r"\s;.*$")
 
 
 @dataclass(frozen=True)
-class Option:
+class Entry:
     """A value as it is written, and where: `saved`, in the block of SAVE_CONFIG."""
 
     text: str
@@ -48,13 +48,13 @@ class Config:
     """
 
     file: ControllerFile
-    options: dict[tuple[str, str], Option] = field(default_factory=dict)
-    sections: dict[str, Option] = field(default_factory=dict)
+    options: dict[tuple[str, str], Entry] = field(default_factory=dict)
+    sections: dict[str, Entry] = field(default_factory=dict)
     """Where each section begins; its text is the line."""
-    hidden: dict[tuple[str, str], Option] = field(default_factory=dict)
+    hidden: dict[tuple[str, str], Entry] = field(default_factory=dict)
     unread_line: int | None = None
 
-    def get(self, section: str, name: str) -> Option | None:
+    def get(self, section: str, name: str) -> Entry | None:
         """An option, or None where there is none."""
         return self.options.get((section, name))
 
@@ -110,15 +110,15 @@ class _Lines:
 
     def of(
         self, file: ControllerFile, lines: Sequence[str], first: int
-    ) -> Iterator[tuple[str, str, Option]]:
+    ) -> Iterator[tuple[str, str, Entry]]:
         """Section, name and value of every option; `first`: the number of the first line."""
         section: str | None = None
         name, value, at, indent = "", [""], 0, 0
 
-        def whole() -> Iterator[tuple[str, str, Option]]:
+        def whole() -> Iterator[tuple[str, str, Entry]]:
             if name and section is not None:
                 text = "\n".join(value).strip()
-                yield section, name, Option(text, file, at, self._saved)
+                yield section, name, Entry(text, file, at, self._saved)
 
         for number, line in enumerate(lines, first):
             text = line.partition("#")[0].rstrip()
@@ -140,7 +140,7 @@ class _Lines:
                 section = None  # Klipper begins anew below it
             elif header is not None:
                 section = header["name"]
-                self._config.sections.setdefault(section, Option(text, file, number, self._saved))
+                self._config.sections.setdefault(section, Entry(text, file, number, self._saved))
             elif section is None:
                 self._refuse(file, number, text, "a line above the first section")
             else:
@@ -153,7 +153,7 @@ class _Lines:
 
     def _included(
         self, file: ControllerFile, pattern: str, line: int
-    ) -> Iterator[tuple[str, str, Option]]:
+    ) -> Iterator[tuple[str, str, Entry]]:
         if self._saved:
             self._refuse(file, line, f"[include {pattern}]", "an include in the saved block")
             return
@@ -182,4 +182,4 @@ class _Lines:
         )
 
 
-__all__ = ["Config", "Option", "read_config"]
+__all__ = ["Config", "Entry", "read_config"]

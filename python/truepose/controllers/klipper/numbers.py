@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from truepose.controllers.klipper.config import Config, Option
+from truepose.controllers.klipper.config import Config, Entry
 from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.wording import did_you_mean, one_of
 
@@ -74,7 +74,7 @@ class Numbers:
 
     def refuse(
         self,
-        option: Option,
+        option: Entry,
         section: str,
         name: str,
         code: str,

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from typing import ClassVar
 
-from truepose.controllers._import import ControllerFile, Reading, Setting
+from truepose.controllers._reader import ControllerFile, ControllerReading, Setting
 from truepose.controllers.klipper.config import read_config
 from truepose.controllers.klipper.numbers import Numbers
 from truepose.controllers.klipper.read_linear import read_linear
@@ -31,7 +31,7 @@ class KlipperReader:
         return _SECTIONS.search(text) is not None
 
     @classmethod
-    def read(cls, file: ControllerFile, settings: Mapping[str, float | str]) -> Reading:
+    def read(cls, file: ControllerFile, settings: Mapping[str, float | str]) -> ControllerReading:
         """Raises `MachineFileError` with everything that is wrong, each with its own line."""
         config = read_config(file)
         numbers = Numbers(config)

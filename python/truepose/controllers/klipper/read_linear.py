@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from truepose.controllers._import import Reading
 from truepose.controllers._linear_delta_file import LinearDeltaFile
+from truepose.controllers._reader import ControllerReading
 from truepose.controllers.klipper.numbers import Numbers
 
 STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
@@ -23,7 +23,7 @@ NARROWEST = math.cos(math.atan(1.0 / 12.0))
 """Of an arm's length, how far from a tower Klipper still moves: carriages then go 12 for 1."""
 
 
-def read_linear(numbers: Numbers, settings: Mapping[str, float | str]) -> Reading:
+def read_linear(numbers: Numbers, settings: Mapping[str, float | str]) -> ControllerReading:
     """Raises `MachineFileError` with every number that is missing or wrong."""
     radius = numbers.number("printer", "delta_radius", above=0.0, expected="mm, above zero")
     above = 0.0 if math.isnan(radius) else radius
@@ -61,7 +61,7 @@ def read_linear(numbers: Numbers, settings: Mapping[str, float | str]) -> Readin
         switches=switches,
         workspace=(reach, low, high),
     )
-    return Reading(delta.text(), None, numbers.read, delta.assumptions())
+    return ControllerReading(delta.text(), None, numbers.read, delta.assumptions())
 
 
 __all__ = ["read_linear"]

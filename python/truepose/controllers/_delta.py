@@ -33,6 +33,9 @@ TOWERS = np.radians([210.0, 330.0, 90.0])
 
 AROUND = "controllers have the z axis of the base frame in the middle of the drives"
 
+ROUNDING = 1e-6
+"""Of the last digit that is written: what a number may be beyond it and still be that number."""
+
 SWITCHES = switch_option("the end of each drive's travel that raises the tool")
 
 
@@ -134,9 +137,12 @@ def surrounded(angles: Floats) -> bool:
 
 
 def print_radius(machine: Machine) -> str:
-    """The radius of the workspace about the z axis, mm, rounded up and above zero."""
+    """The radius of the workspace about the z axis, mm, rounded up and above zero.
+
+    A radius that has one decimal stays as it is: its rounding counts for nothing.
+    """
     radius = float(np.hypot(*machine.poses()[:, :2].T).max()) / MM
-    return f"{max(math.ceil(radius * 10.0), 1) / 10.0:.1f}"
+    return f"{max(math.ceil(radius * 10.0 - ROUNDING), 1) / 10.0:.1f}"
 
 
 def lowest_z(machine: Machine) -> str:
@@ -147,6 +153,7 @@ def lowest_z(machine: Machine) -> str:
 __all__ = [
     "AROUND",
     "LEAN",
+    "ROUNDING",
     "SWITCHES",
     "TOWERS",
     "DeltaLimb",

@@ -35,6 +35,9 @@ DIGITS = {"mm": 6, "inch": 8}
 SMALL = 0.01
 """m, of the characteristic length."""
 
+SLACK = 1e-3
+"""Of the last digit: what a limit that has no more digits may be off by its own rounding."""
+
 SCALE = {"mm": MM, "inch": INCH}
 
 
@@ -100,12 +103,13 @@ def ini_joint(
     scale, digits = SCALE[unit], digits_of(machine, unit)
     ends = sorted((gain * end + offset) / scale for end in machine.drives[drive].travel)
     last = 10.0**-digits  # inwards, so that rounding does not widen the travel
+    low, high = (math.ceil(ends[0] / last - SLACK), math.floor(ends[1] / last + SLACK))
     return [
         "",
         f"[JOINT_{joint}]",
         f"# drive {ascii_only(machine.drives[drive].name)}",
-        f"MIN_LIMIT = {fixed(math.ceil(ends[0] / last) * last, digits)}",
-        f"MAX_LIMIT = {fixed(math.floor(ends[1] / last) * last, digits)}",
+        f"MIN_LIMIT = {fixed(low * last, digits)}",
+        f"MAX_LIMIT = {fixed(high * last, digits)}",
         f"HOME_OFFSET = {home_offset}",
         f"HOME = {fixed(home / scale, digits)}",
     ]

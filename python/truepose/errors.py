@@ -155,6 +155,7 @@ CATALOGUE: dict[str, str] = {
     "controller-cannot": "a machine that the controller has no way to take",
     "import-unrecognised": "a file that no reader of a controller's format knows",
     "import-declined": "a controller's file of a machine that is not imported",
+    "import-incomplete": "a controller's file that does not say what a machine needs",
     "import-include": "a file that another includes, and that is not read",
     "import-syntax": "a line that the controller's format does not have",
     "import-value": "a value that the controller itself does not take",

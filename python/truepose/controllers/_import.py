@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 
 from truepose import sources
 from truepose.controllers._adapters import by_name
+from truepose.controllers._declined import declined
 from truepose.controllers._export import unread
 from truepose.controllers._reader import Assumption, ControllerFile, Reader
 from truepose.controllers._registry import READERS
 from truepose.errors import Fault, MachineFileError, ReadingError, RequestError
-from truepose.files.units import FileUnit, UnitSystem
+from truepose.files.dimensions import DIMENSIONS
+from truepose.files.units import UnitSystem, unit_of
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine
 from truepose.machine.loader import load_text
@@ -22,6 +24,9 @@ from truepose.runs.arguments import checked
 
 if TYPE_CHECKING:
     from truepose.calibration import Measurements
+
+BARE = {"length": "mm", "angle": "deg"}
+"""The units of a setting's bare numbers."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -58,10 +63,15 @@ def reader(name: str) -> type[Reader]:
 
 
 def reader_of(file: ControllerFile) -> type[Reader]:
-    """The reader that recognises a file. Raises `MachineFileError` (import-unrecognised)."""
+    """The reader that recognises a file.
+
+    Raises `MachineFileError`: import-unrecognised, import-declined.
+    """
     found = [each for each in map(reader, READERS) if each.recognises(file.text)]
     if len(found) == 1:
         return found[0]
+    if not found and (fault := declined(file.text)) is not None:
+        raise MachineFileError(file.problem(fault))
     names = [each.name for each in found]
     raise MachineFileError(
         file.problem(
@@ -119,7 +129,8 @@ def settings_of(
     reader: type[Reader], given: Mapping[str, str] | Sequence[str]
 ) -> dict[str, float | str]:
     """The settings that are given, read: SI, or text. Raises `RequestError` (bad-setting)."""
-    units = UnitSystem({"length": FileUnit("mm"), "angle": FileUnit("deg")})
+    bare = {dimension: unit_of(unit, DIMENSIONS[dimension]) for dimension, unit in BARE.items()}
+    units = UnitSystem(bare)
     pairs = given.items() if isinstance(given, Mapping) else (s.partition("=")[::2] for s in given)
     values: dict[str, float | str] = {}
     problems = []

@@ -31,7 +31,8 @@ class LinearDeltaFile:
     `radius` (3,): from the tool's axis to each carriage's joints, less the effector's; `angles`,
     `rods` (3,); `switches` (3,): heights of the carriages' joints over z = 0 where the endstops
     trip, which are the ends of the travels. `workspace`: radius, lowest and highest z. `origin`:
-    where the numbers come from.
+    where the numbers come from. `lowest` (3,): the other ends of the travels, and `home`: z of the
+    tool there, None where the controller does not say.
     """
 
     name: str
@@ -41,6 +42,8 @@ class LinearDeltaFile:
     rods: Sequence[float]
     switches: Sequence[float]
     workspace: tuple[float, float, float]
+    lowest: Sequence[float] | None = None
+    home: float | None = None
 
     def assumptions(self) -> tuple[Assumption, ...]:
         """What the file says and no firmware does."""
@@ -51,7 +54,11 @@ class LinearDeltaFile:
                 "tolerance",
             ),
             Assumption(f"an accuracy of {ACCURACY} is asked for", "accuracy.target"),
-            Assumption("carriages go down as far as the workspace needs", "drive.*.travel"),
+            *(
+                (Assumption("carriages go down as far as the workspace needs", "drive.*.travel"),)
+                if self.lowest is None
+                else ()
+            ),
             Assumption(
                 "one rod a tower, and so no tilt: how the tool tilts is unknown until the spacing "
                 "of the rods and the effector's radius are known",
@@ -86,16 +93,18 @@ class LinearDeltaFile:
         yield "platform = [0, 0, 0]"
 
     def _rows(self) -> Iterator[str]:
-        low = min(0.0, self.workspace[1])
-        rows = zip(TOWERS, self.radius, self.angles, self.rods, self.switches, strict=True)
-        for name, radius, angle, rod, switch in rows:
+        down, note = self.lowest, ""
+        if down is None:
+            down, note = [min(0.0, self.workspace[1])] * 3, f"; the lower end is {ASSUMED}"
+        rows = zip(TOWERS, self.radius, self.angles, self.rods, down, self.switches, strict=True)
+        for name, radius, angle, rod, low, switch in rows:
             out = math.radians(angle)
             place = f"{radius * math.cos(out)!r}, {radius * math.sin(out)!r}"
             yield ""
             yield "[[drive]]"
             yield f'name = "{name}" # at {angle:.10g} degrees, {radius:.10g} mm'
             yield f"origin = [{place}, 0]"
-            yield f"travel = [{low!r}, {switch!r}] # the endstop above; the lower end is {ASSUMED}"
+            yield f"travel = [{low!r}, {switch!r}] # the endstop above{note}"
             yield ""
             yield "[[strut]]"
             yield f'name = "{name}"'
@@ -117,6 +126,8 @@ class LinearDeltaFile:
         yield ""
         yield "[workspace]"
         step = max(radius, high - low) / 5.0
+        if self.home is not None:
+            yield f"home = {{ z = {self.home!r} }}"
         yield f"cylinder = {{ radius = {radius!r}, z = [{low!r}, {high!r}], step = {step:.6g} }}"
         yield ""
         yield "[accuracy]"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
@@ -84,6 +84,13 @@ class Reader(Protocol):
         Raises `MachineFileError` with everything that is wrong, each with the file's own line.
         """
         ...
+
+
+def refuse(problems: Iterable[Problem]) -> None:
+    """Raise `MachineFileError` with all problems, each once, where there are any."""
+    every = list(dict.fromkeys(problems))
+    if every:
+        raise MachineFileError(*every)
 
 
 @dataclass
@@ -190,4 +197,5 @@ __all__ = [
     "ControllerReading",
     "Reader",
     "Setting",
+    "refuse",
 ]

@@ -16,5 +16,10 @@ REGISTRY: dict[str, str] = {
 
 READERS: dict[str, str] = {
     "klipper": "truepose.controllers.klipper.read:KlipperReader",
+    "marlin": "truepose.controllers.marlin.read:MarlinReader",
+    "reprap": "truepose.controllers.reprap.read:RepRapReader",
+    "linuxcnc-genhexkins": "truepose.controllers.linuxcnc_genhexkins.read:GenhexkinsReader",
+    "linuxcnc-lineardelta": "truepose.controllers.linuxcnc_lineardelta.read:LinearDeltaKinsReader",
+    "joint-centres": "truepose.controllers.joint_centres.read:JointCentresReader",
 }
 """Name on the command line -> module and class of the reader of that controller's files."""

@@ -6,7 +6,6 @@ the workspace; these, counted from HOME_OFFSET, drive the actual machine.
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ import firmware
 import truepose as tp
 from benchmarks.kinematics_host import NEEDED, PACKAGED, Host, available, the_host
 from build_machine import MACHINES
+from kinematics_module import kinematics_of
 from system_package import missing
 from truepose.compensation.commands import actual_of_joints
 from truepose.controllers._export import options_of
@@ -36,14 +36,7 @@ def host() -> Host:
 
 def joints_of(host: Host, folder: Path, module: str, count: int, hal: str, poses: Array) -> Array:
     """(n, count) the module's inverse for poses (n, 6), in the block's units and degrees."""
-    # A copy is another library to the loader: with pins of its own.
-    copy = folder / f"{module}.so"
-    shutil.copy(PACKAGED / copy.name, copy)
-    kinematics = host.load(copy, count)
-    for line in hal.splitlines():
-        if line.startswith("setp "):
-            _, name, value = line.split()
-            host.set(name, float(value))
+    kinematics = kinematics_of(host, folder, module, count, hal)
     joints = [kinematics.inverse(pose.tolist()) for pose in poses]
     assert all(row is not None for row in joints)
     return np.array(joints)

@@ -1,0 +1,282 @@
+"""Marlin's M503, M665 and M666, or Configuration.h, as a linear delta; its logs as measurements.
+
+Towers X, Y and Z stand at 210, 330 and 90 degrees and their trims; each carriage is at its endstop
+where the tool, at x = y = 0, is at H less the bed probe's z offset and less the tower's M666. A and
+C of M665 are rod trims, and with them B; B alone is the radius on which G33 of Marlin 1.1 probes.
+Sources: https://marlinfw.org/docs/gcode/M665.html, M666.html, M851.html, and pull request 18423.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from decimal import Decimal
+from typing import ClassVar
+
+from truepose.controllers._commands import commands, only_reprap
+from truepose.controllers._decimals import numbers_of
+from truepose.controllers._probed import (
+    ASSUMED_PROBE,
+    Probed,
+    ProbedPoints,
+    logs_beside,
+    measurements_text,
+)
+from truepose.controllers._reader import (
+    Assumption,
+    ControllerFile,
+    ControllerReading,
+    Setting,
+    refuse,
+)
+from truepose.controllers._towers import Held, Three, Towers, bridged, require
+from truepose.controllers.marlin._definitions import Definitions, definitions
+from truepose.controllers.marlin._logs import Bounds, logged, mesh
+from truepose.controllers.marlin._numbers import INCH, of_commands, of_definitions
+from truepose.errors import Fault, MachineFileError, Problem
+
+ANGLES = (210, 330, 90)
+NEEDED = {"M665 L": "length of the diagonal rods", "M665 R": "delta radius"}
+
+OTHERS = (
+    *("COREXY", "COREXZ", "COREYX", "COREYZ", "COREZX", "COREZY", "MARKFORGED_XY", "MARKFORGED_YX"),
+    *(
+        "MORGAN_SCARA",
+        "MP_SCARA",
+        "AXEL_TPARA",
+        "POLARGRAPH",
+        "POLAR",
+        "FIVE_BAR",
+        "FOAMCUTTER_XYUV",
+    ),
+)
+"""Kinematics of Configuration.h that are no delta."""
+
+_DEFINES = re.compile(
+    r"^\s*#\s*define\s+(?:DELTA\w*|CONFIGURATION_H\w*|MOTHERBOARD|[XYZ]_BED_SIZE)\b", re.M
+)
+_PRINTED = re.compile(
+    r"echo:\s*(?:;|M92|M203|M665|G21|G20)|Bed X:|Leveling Grid|G33 Auto Cal", re.I
+)
+
+
+class MarlinReader:
+    """A dump of M503, M665 and M666 as they are sent, or Configuration.h."""
+
+    name: ClassVar[str] = "marlin"
+    doc: ClassVar[str] = "M503's output, M665 and M666, or Configuration.h of a linear delta"
+    settings: ClassVar[Mapping[str, Setting]] = {
+        "logs": Setting("files beside it with what G29, G30 or G33 printed, commas between", None),
+        "g29.bounds": Setting("where G29's grid lies: left, right, front, back, mm", None),
+        "g33.radius": Setting("radius on which G33 probed"),
+        "workspace.radius": Setting("radius of the bed, where the file does not say it"),
+    }
+
+    @classmethod
+    def recognises(cls, text: str) -> bool:
+        """Whether it has definitions of Marlin's, what Marlin prints, or an M665 of no other's."""
+        if _DEFINES.search(text):
+            return True
+        if only_reprap(text):
+            return False
+        return bool(_PRINTED.search(text)) or any(
+            command.code == "M665" for command in commands(text)
+        )
+
+    @classmethod
+    def read(cls, file: ControllerFile, settings: Mapping[str, float | str]) -> ControllerReading:
+        """The delta. Raises `MachineFileError` with everything that is wrong."""
+        known: Definitions | None = None
+        scale = Decimal(1)
+        if _DEFINES.search(file.text):
+            known = definitions(file.text)
+            _require_delta(file, known)
+            held, problems = of_definitions(known, str(file.path))
+        else:
+            held, problems, scale = of_commands(file.text, str(file.path))
+        missing = list(require(held, NEEDED))
+        if missing and not problems:
+            problems += [file.problem(fault) for fault in _of_missing(missing, known)]
+        refuse(problems)
+        refuse(_impossible(held))
+        towers = _towers(held, settings)
+        points, unused = _points(file, settings, held, scale)
+        delta = towers.file("Linear delta", f"Marlin's {file.path.name}.")
+        return ControllerReading(
+            delta.text(),
+            measurements_text(points, delta.name, offset=_offset(held)),
+            {name: number.text for name, number in held.items()},
+            (
+                *delta.assumptions(),
+                *towers.assumptions(),
+                *_assumptions(held, known, scale),
+                *((ASSUMED_PROBE,) if points else ()),
+            ),
+            unused,
+        )
+
+
+def _require_delta(file: ControllerFile, known: Definitions) -> None:
+    """Decline a Configuration.h of another machine by its name."""
+    if "DELTA" in known.of:
+        return
+    others = [name for name in OTHERS if name in known.of]
+    line = known.of[others[0]].line if others else None
+    raise MachineFileError(
+        file.problem(
+            Fault(
+                "import-declined",
+                "truepose imports a linear delta of Marlin's, and no other machine",
+                f"#define {others[0]}" if others else "no #define DELTA: a Cartesian machine",
+                "#define DELTA",
+            ),
+            line,
+        )
+    )
+
+
+def _of_missing(missing: Sequence[Fault], known: Definitions | None) -> Iterator[Fault]:
+    for fault in missing:
+        hint = "send M503 to the printer: what it prints has M665" if known is None else None
+        yield Fault(fault.code, fault.message, fault.found, fault.expected, hint)
+
+
+def _impossible(held: Mapping[str, Held]) -> Iterator[Problem]:
+    """What no delta has, and what Marlin refuses."""
+    rods = {"M665 L": _rods(held)}
+    if min(_radius(held)) <= 0:
+        yield held["M665 R"].problem("not-positive", "this is not above zero", "mm, above zero")
+    else:
+        yield from bridged(held, "M665 R", rods)
+    for letter in "XYZ":
+        adjusted = held.get(f"M666 {letter}")
+        if adjusted is not None and adjusted.value > 0:
+            yield adjusted.problem(
+                "import-value",
+                "Marlin takes no endstop adjustment above zero",
+                "zero, or how far below its endstop the carriage begins, negative",
+            )
+
+
+def _three(held: Mapping[str, Held], names: Sequence[str]) -> Three:
+    """Three values, 0 for what is not there."""
+    a, b, c = (held[name].value if name in held else Decimal(0) for name in names)
+    return a, b, c
+
+
+def has_rod_trims(held: Mapping[str, Held]) -> bool:
+    """Whether B of M665 is a rod's trim, as it is beside A and C."""
+    return "M665 A" in held and "M665 C" in held
+
+
+def _rods(held: Mapping[str, Held]) -> Three:
+    trims = _three(held, ["M665 A", "M665 B", "M665 C"]) if has_rod_trims(held) else None
+    rod = held["M665 L"].value
+    return (rod, rod, rod) if trims is None else (rod + trims[0], rod + trims[1], rod + trims[2])
+
+
+def _radius(held: Mapping[str, Held]) -> Three:
+    a, b, c = _three(held, [f"DELTA_RADIUS_TRIM_TOWER {tower}" for tower in "ABC"])
+    out = held["M665 R"].value
+    return out + a, out + b, out + c
+
+
+def _offset(held: Mapping[str, Held]) -> tuple[Decimal, Decimal]:
+    return _three(held, ["M851 X", "M851 Y", "M851 Z"])[:2]
+
+
+def _towers(held: Mapping[str, Held], settings: Mapping[str, float | str]) -> Towers:
+    turned = _three(held, ["M665 X", "M665 Y", "M665 Z"])
+    lowered = _three(held, ["M666 X", "M666 Y", "M666 Z"])
+    probe = _three(held, ["M851 X", "M851 Y", "M851 Z"])[2]
+    height = held["M665 H"].value if "M665 H" in held else 2 * held["M665 L"].value
+    reach = held.get("DELTA_PRINTABLE_RADIUS")
+    given = settings.get("workspace.radius")
+    return Towers(
+        _radius(held),
+        (ANGLES[0] + turned[0], ANGLES[1] + turned[1], ANGLES[2] + turned[2]),
+        _rods(held),
+        (
+            height - probe - lowered[0],
+            height - probe - lowered[1],
+            height - probe - lowered[2],
+        ),
+        _mm(given) if given is not None else None if reach is None else reach.value,
+    )
+
+
+def _mm(value: float | str) -> Decimal:
+    """A setting's length, m, in mm."""
+    return Decimal(f"{float(value) * 1000.0:.12g}")
+
+
+def _points(
+    file: ControllerFile,
+    settings: Mapping[str, float | str],
+    held: Mapping[str, Held],
+    scale: Decimal,
+) -> tuple[tuple[Probed, ...], tuple[str, ...]]:
+    """The heights in the file and in its logs, and in sentences what of them cannot be used."""
+    radius = None
+    if "g33.radius" in settings:
+        radius = _mm(settings["g33.radius"])
+    elif "M665 B" in held and not has_rod_trims(held):
+        radius = held["M665 B"].value
+    bounds: Bounds | None = None
+    if "g29.bounds" in settings:
+        values = numbers_of(str(settings["g29.bounds"]))
+        if len(values) != 4 or values[0] >= values[1] or values[2] >= values[3]:
+            raise MachineFileError(
+                file.problem(
+                    Fault(
+                        "bad-setting",
+                        "--set g29.bounds cannot be read",
+                        repr(settings["g29.bounds"]),
+                        "left, right, front and back of the grid, mm",
+                        "--set g29.bounds=-70,70,-70,70",
+                    )
+                )
+            )
+        bounds = (values[0], values[1], values[2], values[3])
+    found = ProbedPoints()
+    if not _DEFINES.search(file.text):
+        found += logged(file.text, str(file.path), scale, radius, bounds)
+    for other in logs_beside(file, str(settings.get("logs", ""))):
+        found += logged(other.text, str(other.path), scale, radius, bounds)
+    if not found.points:
+        found += mesh(file.text, str(file.path), scale, bounds)
+    return found.points, found.unused
+
+
+def _assumptions(
+    held: Mapping[str, Held], known: Definitions | None, scale: Decimal
+) -> Iterator[Assumption]:
+    if "M665 H" not in held:
+        yield Assumption(
+            "M665 H is not said: carriages are taken to go up to twice the rods' length",
+            "drive.*.travel",
+        )
+    if "M851 Z" in held and held["M851 Z"].value != 0:
+        yield Assumption(
+            f"Marlin homes to H less the bed probe's z offset, M851 Z{held['M851 Z'].text}",
+            "drive.*.travel",
+        )
+    if known is None and not has_rod_trims(held):
+        yield Assumption(
+            "the firmware is older than 2.0.6: M665 has no A and C, so B is no rod's trim; 1.1.9 "
+            "and early 2.0 stop 0.1 mm farther from an endstop than M666 says",
+            "drive.*.travel",
+        )
+    if known is None:
+        yield Assumption(
+            "DELTA_RADIUS_TRIM_TOWER is 0: it stands in Configuration.h and is not printed",
+            "drive.*.origin",
+        )
+    elif known.doubtful:
+        lines = ", ".join(str(line) for line in known.doubtful[:5])
+        yield Assumption(f"both ways of conditions that are not understood: line {lines}", "drive")
+    if scale == INCH:
+        yield Assumption("M503 in inches divides the towers' angles by 25.4 too", "drive.*.origin")
+
+
+__all__ = ["MarlinReader"]

@@ -57,6 +57,8 @@ class Kind:
     arguments: tuple[str, ...]
     companion: str | None = None
     """Text of the machine file beside it, where it is not one itself."""
+    most_read: float = 0.6
+    """The share of spoilt texts that may be read; of a log nearly all, whose other lines pass."""
 
 
 @cache
@@ -85,6 +87,35 @@ def _measured(folder: Path) -> object:
     return read_measurements(folder / "measured.csv", planar())
 
 
+def _imported(folder: Path, file: str, **settings: str) -> object:
+    return truepose.import_machine(folder / file, settings=settings)
+
+
+def _hexapod_of_hal(folder: Path) -> object:
+    (folder / "hexapod.ini").write_text(_controller_file("linuxcnc/hexapod.ini"), "utf-8")
+    return _imported(folder, "hexapod.hal")
+
+
+def _height_map(folder: Path) -> object:
+    (folder / "config.g").write_text(REPRAP, "utf-8")
+    return _imported(folder, "config.g", logs="heightmap.csv")
+
+
+def _reprap_log(folder: Path) -> object:
+    (folder / "config.g").write_text(REPRAP, "utf-8")
+    return _imported(folder, "config.g", logs="session.log")
+
+
+def _controller_file(name: str) -> str:
+    return (ROOT / "tests" / "controller_files" / name).read_text("utf-8")
+
+
+def _lines_with(text: str, *words: str) -> str:
+    """The lines of a text that have one of the words."""
+    kept = [line for line in text.splitlines() if any(word in line for word in words)]
+    return "\n".join([*kept, ""])
+
+
 def _planar_with(old: str, new: str) -> str:
     text = PLANAR.read_text("utf-8")
     assert text.count(old) == 1
@@ -96,6 +127,19 @@ def _planar_line(start: str) -> str:
     (line,) = (one for one in PLANAR.read_text("utf-8").splitlines() if one.startswith(start))
     return line
 
+
+MARLIN = _lines_with(_controller_file("marlin/m503.txt"), "G21", "M665 L", "M666 X", "M851 X")
+G29 = "Send: G29 L-70 R70 F-70 B70\n" + _controller_file("marlin/g29_bilinear.log")
+REPRAP = _lines_with(_controller_file("reprap/config.g"), "M665", "M666", "M584", "G31")
+PLACES = _controller_file("reprap/bed.g") + _controller_file("reprap/g32.log")
+CENTRES = "name, x (mm), y (mm), z (mm), role\n" + "".join(
+    f"{strut}, {x}, {y}, {z}, {role}\n"
+    for strut, out in enumerate(((1, 0), (2, 3), (-2, 3), (-3, 0), (-1, -3), (1, -3)))
+    for role, (x, y, z) in (
+        ("base", (100 * out[0], 100 * out[1], 0)),
+        ("platform", (40 * out[1], 40 * out[0], 510)),
+    )
+) + "t, 0, 0, 500, tool\n"  # fmt: skip
 
 KINDS = {
     "machine": Kind(
@@ -130,5 +174,59 @@ KINDS = {
         _load,
         ("check", "{folder}/machine.toml"),
         _planar_with(_planar_line("grid = "), 'poses = "poses.csv"'),
+    ),
+    "marlin": Kind(
+        (MARLIN, "G20\n" + MARLIN.replace("Recv: echo:  G21 ; (mm)\n", "")),
+        "m503.txt",
+        lambda folder: _imported(folder, "m503.txt"),
+        ("import", "{folder}/m503.txt"),
+    ),
+    "marlin-log": Kind(
+        (
+            MARLIN + G29 + _controller_file("marlin/g30.log"),
+            _controller_file("marlin/m503_old_dialect.txt")
+            + _controller_file("marlin/g33_dry_run.log").replace("V0", "V0 P3"),
+        ),
+        "session.log",
+        lambda folder: _imported(folder, "session.log"),
+        ("import", "{folder}/session.log"),
+        most_read=0.95,
+    ),
+    "marlin-configuration": Kind(
+        (_controller_file("marlin/Configuration.h"),),
+        "Configuration.h",
+        lambda folder: _imported(folder, "Configuration.h"),
+        ("import", "{folder}/Configuration.h"),
+    ),
+    "reprap": Kind(
+        (REPRAP,),
+        "config.g",
+        lambda folder: _imported(folder, "config.g"),
+        ("import", "{folder}/config.g"),
+    ),
+    "reprap-log": Kind(
+        (PLACES, _controller_file("reprap/g30_s-1.log")),
+        "session.log",
+        _reprap_log,
+        ("import", "{folder}/session.log"),
+        most_read=1.0,
+    ),
+    "reprap-height-map": Kind(
+        (_controller_file("reprap/heightmap.csv"),),
+        "heightmap.csv",
+        _height_map,
+        ("import", "{folder}/heightmap.csv"),
+    ),
+    "linuxcnc-hal": Kind(
+        (_lines_with(_controller_file("linuxcnc/hexapod.hal"), "setp genhexkins", "net tool"),),
+        "hexapod.hal",
+        _hexapod_of_hal,
+        ("import", "{folder}/hexapod.hal", "--set", "units.length=mm"),
+    ),
+    "joint-centres": Kind(
+        (CENTRES,),
+        "centres.csv",
+        lambda folder: _imported(folder, "centres.csv"),
+        ("import", "{folder}/centres.csv"),
     ),
 }

@@ -19,7 +19,7 @@ def test_in_this_process(kind: str, count: int) -> None:
     assert [answer for answer in answers if answer not in ("read", "refused")] == []
     assert len(answers) == count
     # Neither is all of it refused at the first token, nor does nothing come of the mutations.
-    assert 0 < answers.count("read") < 0.6 * count
+    assert 0 < answers.count("read") <= KINDS[kind].most_read * count
 
 
 @sweep

@@ -159,6 +159,7 @@ CATALOGUE: dict[str, str] = {
     "import-include": "a file that another includes, and that is not read",
     "import-syntax": "a line that the controller's format does not have",
     "import-value": "a value that the controller itself does not take",
+    "import-steps": "positions that were counted in other steps than the file has now",
     "import-no-measurements": "measurements are wanted of a controller's file that keeps none",
     # calibration
     "controller-unsaid": "a calibrated file that does not say which geometry its controller has",

@@ -5,10 +5,12 @@ argument, and knows nothing of truepose. Klipper reads the configuration, homes,
 calibrates by its own code. Only what stands between it and a microcontroller is replaced, as small
 as it goes: a rail keeps its endstop and its C stepper, and a printer is a box of objects.
 
-In:  "config", text; "positions", n rows x y z, mm; "probed", m rows of stepper positions, or none.
+In:  "config", text; "positions", n rows x y z, mm; "probed", m rows of stepper positions, or none;
+     "extended", whether to calibrate from what the config's [delta_calibrate] has measured.
 Out: "home", where the tool stands once homed, mm; "home_joints", the steppers there, mm or rad;
      "joints", n rows; "back", the positions that Klipper finds from them; "refused", numbers of the
-     positions to which it would not move; "calibrated", what DELTA_CALIBRATE would save.
+     positions to which it would not move; "calibrated", what DELTA_CALIBRATE would save, or
+     DELTA_ANALYZE CALIBRATE=extended; "steps", how far the steppers go for a step, mm or rad.
 """
 
 import configparser
@@ -29,8 +31,12 @@ STEP = 0.000005
 class Rail:
     """What a rail is to kinematics: an endstop, and a stepper whose position C works out."""
 
-    def __init__(self, config, *, default_position_endstop=None, **_):
+    def __init__(self, config, *, default_position_endstop=None, units_in_radians=False, **_):
         self.name = config.get_name()
+        self.step = STEP
+        if config.fileconfig.has_option(self.name, "microsteps"):
+            turn, steps = stepper.parse_step_distance(config, units_in_radians, True)
+            self.step = turn / steps
         self.position_endstop = config.getfloat("position_endstop", default_position_endstop)
 
     def get_homing_info(self):
@@ -43,7 +49,7 @@ class Rail:
         return [self]
 
     def get_step_dist(self):
-        return STEP
+        return self.step
 
     def setup_itersolve(self, allocate, *arguments):
         ffi, self.library = chelper.get_ffi()
@@ -136,13 +142,20 @@ def allowed(kinematics, position):
 
 
 def calibrate(printer, config, positions):
-    """What DELTA_CALIBRATE saves of numbers once the bed was touched at `positions`."""
+    """What DELTA_CALIBRATE saves of numbers once the bed was touched at `positions`.
+
+    Without any: what DELTA_ANALYZE does from what the configuration has.
+    """
     # In Klipper the search runs in a process beside the reactor; here there is neither.
     mathutil.background_coordinate_descent = lambda _, *search: mathutil.coordinate_descent(*search)
-    config.fileconfig.add_section("delta_calibrate")
-    config.fileconfig.set("delta_calibrate", "radius", "50")
+    if positions:
+        config.fileconfig.add_section("delta_calibrate")
+        config.fileconfig.set("delta_calibrate", "radius", "50")
     calibration = delta_calibrate.DeltaCalibrate(config.getsection("delta_calibrate"))
-    calibration.probe_finalize((0.0, 0.0, 0.0), positions)
+    if positions:
+        calibration.probe_finalize((0.0, 0.0, 0.0), positions)
+    else:
+        calibration.do_extended_calibration()
     printer.saved.pop("delta_calibrate")
     return printer.saved
 
@@ -166,6 +179,8 @@ def main(asked):
             {r.get_name(): q for r, q in zip(rails, steppers, strict=True)}
         )
 
+    probed = [position_of(q) for q in asked["probed"] or []]
+    calibrated = calibrate(printer, config, probed) if probed or asked["extended"] else {}
     unread = [
         f"{section}.{key}"
         for section in parsed.sections()
@@ -173,14 +188,14 @@ def main(asked):
         if (section, key) not in config.access_tracking
     ]
     assert not unread, f"Klipper does not read {unread}"
-    probed = [position_of(q) for q in asked["probed"] or []]
     return {
         "home": kinematics.home_position,
         "home_joints": [r.calc_position_from_coord(kinematics.home_position) for r in rails],
         "joints": joints,
         "back": [position_of(q) for q in joints],
         "refused": [n for n, p in enumerate(asked["positions"]) if not allowed(kinematics, p)],
-        "calibrated": calibrate(printer, config, probed) if probed else {},
+        "calibrated": calibrated,
+        "steps": [r.get_step_dist() for r in rails],
     }
 
 

@@ -25,7 +25,7 @@ class Klipper:
 
     `home` (3,) mm and `home_joints` (3,) once homed; `joints` (n, 3); `back` (n, 3), mm, what it
     finds from them; `refused`: positions to which it would not move; `calibrated`: what
-    DELTA_CALIBRATE would save, by section and key.
+    DELTA_CALIBRATE would save, by section and key; `steps` (3,): mm or rad a step.
     """
 
     home: Array
@@ -34,16 +34,27 @@ class Klipper:
     back: Array
     refused: Sequence[int]
     calibrated: dict[str, dict[str, str]]
+    steps: Array
 
 
-def klipper(config: str, positions: ArrayLike, probed: ArrayLike | None = None) -> Klipper:
-    """Ask Klipper. `probed` (m, 3): steppers' positions where a probe touched the bed."""
+def klipper(
+    config: str,
+    positions: ArrayLike,
+    probed: ArrayLike | None = None,
+    *,
+    extended: bool = False,
+) -> Klipper:
+    """Ask Klipper. `probed` (m, 3): steppers' positions where a probe touched the bed.
+
+    `extended`: calibrate from what was measured, as the config's [delta_calibrate] has it.
+    """
     if not HELPER.exists():
         missing("Klipper's kinematics are not built: make klipper (it asks the package index)")
     asked = {
         "config": config,
         "positions": np.asarray(positions, float).tolist(),
         "probed": None if probed is None else np.asarray(probed, float).tolist(),
+        "extended": extended,
     }
     done = subprocess.run(
         [BUILT / "env" / "bin" / "python", DRIVER, BUILT / "source"],
@@ -55,4 +66,5 @@ def klipper(config: str, positions: ArrayLike, probed: ArrayLike | None = None) 
     assert done.returncode == 0, done.stderr
     answer = json.loads(done.stdout)
     numbers = [np.array(answer[key]) for key in ("home", "home_joints", "joints", "back")]
-    return Klipper(*numbers, answer["refused"], answer["calibrated"])
+    steps = np.array(answer["steps"])
+    return Klipper(*numbers, answer["refused"], answer["calibrated"], steps)

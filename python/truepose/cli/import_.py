@@ -62,7 +62,7 @@ def command(
     """Write a machine file from the FILE that its controller has.
 
     Such as Klipper's printer.cfg, with the measurements of its last calibration. What the file does
-    not say is assumed, and stands in lines that say so. Files that are already there are not touched.
+    not say is assumed, in lines that say so. Files that are already there are not touched.
     """
     if listed:
         _show_readers()

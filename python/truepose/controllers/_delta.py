@@ -147,7 +147,8 @@ def print_radius(machine: Machine) -> str:
 
 def lowest_z(machine: Machine) -> str:
     """Klipper's minimum_z_position of the workspace, mm: rounded down, not above zero."""
-    return f"{min(0.0, math.floor(float(machine.poses()[:, 2].min()) / MM)):.0f}"
+    lowest = float(machine.poses()[:, 2].min()) / MM
+    return f"{min(0.0, math.floor(lowest + ROUNDING)):.0f}"
 
 
 __all__ = [

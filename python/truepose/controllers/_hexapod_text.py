@@ -14,7 +14,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.controllers._decimals import plain
-from truepose.controllers._linear_delta_file import quoted
+from truepose.controllers._delta_file import quoted
 from truepose.controllers._reader import ASSUMED, Assumption
 from truepose.spatial import euler_to_matrix
 

@@ -11,8 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 
-from truepose.controllers._linear_delta_file import LinearDeltaFile
-from truepose.controllers._reader import Assumption
+from truepose.controllers._delta_file import LinearDeltaFile, Rods
 from truepose.errors import Fault, Problem
 
 Three = tuple[Decimal, Decimal, Decimal]
@@ -22,6 +21,11 @@ NARROW = 0.75
 
 STEEPEST = 0.95
 """Of a rod's length, how far it bridges at most in such a workspace."""
+
+NARROWED = (
+    "nothing says how far the bed reaches: the workspace's radius is three quarters of the delta "
+    "radius, or less where the rods are short"
+)
 
 
 @dataclass(frozen=True)
@@ -60,39 +64,32 @@ class Towers:
     reach: Decimal | None
     low: Decimal = Decimal(0)
 
-    def file(self, name: str, origin: str) -> LinearDeltaFile:
+    def file(self, name: str, origin: str, rods: Rods | None) -> LinearDeltaFile:
         """The machine file of it."""
-        radius, rods = [float(r) for r in self.radius], [float(r) for r in self.rod]
+        radius, arms = [float(r) for r in self.radius], [float(r) for r in self.rod]
         switches = [
-            float(trip) + math.sqrt(rod * rod - out * out)
-            for trip, rod, out in zip(self.trips, rods, radius, strict=True)
+            float(trip) + math.sqrt(arm * arm - out * out)
+            for trip, arm, out in zip(self.trips, arms, radius, strict=True)
         ]
-        most = STEEPEST * min(rods) - max(radius)
+        most = STEEPEST * min(arms) - max(radius)
         reach = min(NARROW * min(radius), most) if self.reach is None else float(self.reach)
         if self.reach is None:
             reach = float(f"{max(reach, 0.05 * min(radius)):.3g}")
         low = float(self.low)
         # Above the cone carriages would leave their rails at the rim of the workspace.
-        cone = min(switch - rod for switch, rod in zip(switches, rods, strict=True))
+        cone = min(switch - arm for switch, arm in zip(switches, arms, strict=True))
         high = cone if cone > low else min(float(trip) for trip in self.trips)
         return LinearDeltaFile(
             name=name,
             origin=origin,
             radius=radius,
             angles=[float(angle) for angle in self.angle],
-            rods=rods,
-            switches=switches,
+            arms=arms,
+            ends=switches,
             workspace=(reach, low, high),
+            rods=rods,
+            reach_assumed=NARROWED if self.reach is None else None,
         )
-
-    def assumptions(self) -> Iterator[Assumption]:
-        """What `file` assumes besides what every such file does."""
-        if self.reach is None:
-            yield Assumption(
-                "nothing says how far the bed reaches: the workspace's radius is three quarters of "
-                "the delta radius, or less where the rods are short",
-                "workspace.cylinder",
-            )
 
 
 def require(held: Mapping[str, Held], names: Mapping[str, str]) -> Iterator[Fault]:

@@ -27,6 +27,18 @@ arm_length: 333.0
 """
 
 
+ROTARY = """\
+[printer]
+kinematics: rotary_delta
+shoulder_radius: 60
+shoulder_height: 400
+[stepper_a]
+position_endstop: 180
+upper_arm_length: 150
+lower_arm_length: 320
+"""
+
+
 def options(folder: Path, text: str) -> dict[str, str]:
     """Every option of a file with that text."""
     path = folder / "printer.cfg"
@@ -103,6 +115,10 @@ def test_a_block_that_was_changed_is_not_read(text: str, line: int, tmp_path: Pa
         (DELTA.replace("333.0", "100"), "import-value", 6),
         (DELTA.replace("174.75", "-174.75"), "not-positive", 3),
         (DELTA.replace("297.05", "nan"), "not-a-number", 5),
+        (DELTA.replace("297.05", "-1"), "negative", 5),
+        (DELTA.replace("[stepper_a]", "minimum_z_position: 300\n[stepper_a]"), "import-value", 4),
+        (ROTARY.replace("60", "0"), "not-positive", 3),
+        (ROTARY.replace("180", "1000"), "import-value", 6),
         (DELTA.replace("297.05", "1 2"), "not-a-number", 5),
         (DELTA.partition("[stepper_a]")[0], "missing-key", None),
         (DELTA + "[include none.cfg]\n", "import-include", 7),

@@ -9,6 +9,9 @@ from truepose.controllers.klipper.config import Config, Entry
 from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.wording import did_you_mean, one_of
 
+STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
+"""The sections of the three drives."""
+
 
 class Numbers:
     """Reads options; what cannot be read is NaN, and among the `problems`.
@@ -32,6 +35,7 @@ class Numbers:
         default: float | None = None,
         *,
         above: float = -math.inf,
+        at_least: float = -math.inf,
         expected: str = "a number",
     ) -> float:
         """A number, greater than `above`; without a default it must be there."""
@@ -39,30 +43,49 @@ class Numbers:
         if option is None:
             if default is not None:
                 return default
-            self._missing(section, name, expected)
+            self.missing(section, name, expected)
             return math.nan
-        value = _float(option.text)
+        value = finite(option.text)
         if value is None:
             self.refuse(option, section, name, "not-a-number", "this is no number", expected)
             return math.nan
-        if not value > above:
-            if above == 0.0:
-                self.refuse(
-                    option, section, name, "not-positive", "this is not above zero", expected
-                )
-            else:
-                message = f"Klipper wants more than {above:.10g} here"
-                self.refuse(option, section, name, "import-value", message, expected)
+        if not value > above or value < at_least:
+            code, message = "import-value", f"Klipper wants more than {above:.10g} here"
+            if value < at_least:
+                code, message = "negative", "this is below zero"
+            elif above == 0.0:
+                code, message = "not-positive", "this is not above zero"
+            self.refuse(option, section, name, code, message, expected)
             return math.nan
         self.read[f"{section}.{name}"] = option.text
         return value
+
+    def number_if(self, section: str, name: str) -> float | None:
+        """A number above zero, in mm, or None where there is none."""
+        if not self.has(section, name):
+            return None
+        return self.number(section, name, above=0.0, expected="mm, above zero")
+
+    def inherited(
+        self, name: str, *, above: float = -math.inf, at_least: float = -math.inf, expected: str
+    ) -> list[float]:
+        """A number of each stepper a, b, c; the last two have that of the first by default."""
+        numbers: list[float] = []
+        for section in STEPPERS:
+            default = numbers[0] if numbers else None
+            numbers.append(
+                self.number(
+                    section, name, default, above=above, at_least=at_least, expected=expected
+                )
+            )
+        return numbers
 
     def word(self, section: str, name: str, words: Iterable[str], *, of: str) -> str | None:
         """One of some words; None where it is none."""
         known = list(words)
         option = self.config.get(section, name)
         if option is None:
-            self._missing(section, name, one_of(known))
+            self.missing(section, name, one_of(known))
             return None
         if option.text not in known:
             hint = did_you_mean(option.text, known)
@@ -81,10 +104,12 @@ class Numbers:
         message: str,
         expected: str,
         hint: str | None = None,
+        found: str | None = None,
     ) -> None:
-        """Note what is wrong with an option."""
+        """Note what is wrong with an option; what is found is by default its text."""
         path = f"{section}.{name}"
-        fault = Fault(code, f"{path}: {message}", option.text[:80], expected, hint)
+        shown = option.text[:80] or "nothing" if found is None else found
+        fault = Fault(code, f"{path}: {message}", shown, expected, hint)
         self.problems.append(option.file.problem(fault, option.line, path))
 
     def done(self) -> None:
@@ -94,7 +119,8 @@ class Numbers:
             self.problems.sort(key=lambda problem: (files.index(problem.file), problem.line or 0))
             raise MachineFileError(*dict.fromkeys(self.problems))
 
-    def _missing(self, section: str, name: str, expected: str) -> None:
+    def missing(self, section: str, name: str, expected: str) -> None:
+        """Note that an option is not there."""
         place = self.config.sections.get(section)
         hidden = self.config.unread_line
         hint = None
@@ -115,7 +141,7 @@ class Numbers:
         self.problems.append(file.problem(fault, line, f"{section}.{name}"))
 
 
-def _float(text: str) -> float | None:
+def finite(text: str) -> float | None:
     """A finite number as Klipper reads it."""
     try:
         value = float(text)
@@ -124,4 +150,4 @@ def _float(text: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-__all__ = ["Numbers"]
+__all__ = ["STEPPERS", "Numbers", "finite"]

@@ -9,13 +9,14 @@ they give none. Facts from Klipper's configuration reference
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
-from truepose.controllers._linear_delta_file import LinearDeltaFile
-from truepose.controllers._reader import ControllerReading
-from truepose.controllers.klipper.numbers import Numbers
+import numpy as np
 
-STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
+from truepose.arrays import Floats
+from truepose.controllers._delta_file import LinearDeltaFile, Rods
+from truepose.controllers.klipper.geometry import Geometry, bed_radius, lowest
+from truepose.controllers.klipper.numbers import STEPPERS, Numbers
+
 ANGLES = (210.0, 330.0, 90.0)
 """Degrees, where an angle is not given."""
 
@@ -23,45 +24,47 @@ NARROWEST = math.cos(math.atan(1.0 / 12.0))
 """Of an arm's length, how far from a tower Klipper still moves: carriages then go 12 for 1."""
 
 
-def read_linear(numbers: Numbers, settings: Mapping[str, float | str]) -> ControllerReading:
-    """Raises `MachineFileError` with every number that is missing or wrong."""
+def read_linear(numbers: Numbers, rods: Rods | None) -> Geometry | None:
+    """The machine, mm; None where a number is missing or wrong, which `numbers` then knows."""
     radius = numbers.number("printer", "delta_radius", above=0.0, expected="mm, above zero")
-    above = 0.0 if math.isnan(radius) else radius
-    longer = f"mm, longer than the delta_radius of {above:.10g} mm"
-    arm, end = math.nan, math.nan
-    arms, ends = [], []
-    for number, section in enumerate(STEPPERS):
-        of_first = (None, None) if number == 0 else (arm, end)
-        arms.append(
-            numbers.number(section, "arm_length", of_first[0], above=above, expected=longer)
-        )
-        ends.append(numbers.number(section, "position_endstop", of_first[1], expected="mm"))
-        if number == 0:
-            arm, end = arms[0], ends[0]
+    longer = 0.0 if math.isnan(radius) else radius
+    arms = numbers.inherited(
+        "arm_length", above=longer, expected=f"mm, above the delta_radius of {longer:.10g}"
+    )
+    ends = numbers.inherited("position_endstop", at_least=0.0, expected="mm, zero or above")
     angles = [
         numbers.number(section, "angle", angle, expected="degrees")
         for section, angle in zip(STEPPERS, ANGLES, strict=True)
     ]
-    low = numbers.number("printer", "minimum_z_position", 0.0, expected="mm")
-    wanted = numbers.number("printer", "print_radius", radius, above=0.0, expected="mm")
-    numbers.done()
+    low = lowest(numbers, ends)
+    if numbers.problems:
+        return None
     switches = [
-        end + math.sqrt(arm * arm - radius * radius) for arm, end in zip(arms, ends, strict=True)
+        e + math.sqrt(arm * arm - radius * radius) for arm, e in zip(arms, ends, strict=True)
     ]
-    reach = min(wanted, min(arms) - radius, NARROWEST * min(arms) - radius)
+    reach = min(min(arms) - radius, NARROWEST * min(arms) - radius)
+    wanted, assumed = bed_radius(numbers, reach, numbers.number_if("printer", "print_radius"))
     # Above this height Klipper's workspace narrows to a cone.
     cone = min(switch - arm for switch, arm in zip(switches, arms, strict=True))
     high = cone if cone > low else min(ends)
-    delta = LinearDeltaFile(
+    file = LinearDeltaFile(
         name="Linear delta",
         origin=f"Klipper's {numbers.config.file.path.name}.",
-        radius=[radius] * 3,
         angles=angles,
-        rods=arms,
-        switches=switches,
-        workspace=(reach, low, high),
+        ends=switches,
+        workspace=(wanted, low, high),
+        rods=rods,
+        reach_assumed=assumed,
+        radius=[radius] * 3,
+        arms=arms,
     )
-    return ControllerReading(delta.text(), None, numbers.read, delta.assumptions())
+    out = np.radians(angles)
+    towers = radius * np.column_stack([np.cos(out), np.sin(out)])
+
+    def spheres(joints: Floats) -> tuple[Floats, Floats]:
+        return np.column_stack([towers, joints]), np.array(arms)
+
+    return Geometry(file, np.array(switches), "mm", 1.0, spheres)
 
 
 __all__ = ["read_linear"]

@@ -150,7 +150,7 @@ class Rotary:
 
     def joints(self, values: Floats, poses: Floats) -> Floats:
         """(n, 3) joint coordinates, rad, for poses (n, 3)."""
-        arms = _arm_angles(values, poses)
+        arms = arm_angles(values, poses)
         # As Klipper counts: both angles between -pi and pi, their difference not brought there.
         joints: Floats = self.switches + (arms - wrapped(values[ENDS])) / self._gain
         return joints
@@ -190,7 +190,7 @@ class Rotary:
         values[LOWER] = of("lower_arm_length") * MM
         on_axis = np.zeros((3, 3))
         on_axis[:, 2] = of("position_endstop") * MM
-        values[ENDS] = np.diagonal(_arm_angles(values, on_axis))
+        values[ENDS] = np.diagonal(arm_angles(values, on_axis))
         return values
 
     def block(self, printed: Printed) -> list[str]:
@@ -226,7 +226,7 @@ def _sense(limb: DeltaLimb) -> float:
     return math.copysign(1.0, np.cross(limb.axis, _outwards(limb))[2])
 
 
-def _arm_angles(values: Floats, poses: Floats) -> Floats:
+def arm_angles(values: Floats, poses: Floats) -> Floats:
     """(n, 3) angles of the upper arms over the horizontal, rad, elbows outwards.
 
     From A cos t + B sin t = C with A = 2 U d, B = 2 U h, C = d^2 + h^2 + U^2 - V^2 + w^2: t is
@@ -257,4 +257,4 @@ def _endstop(values: Floats) -> Floats:
     return height
 
 
-__all__ = ["Rotary"]
+__all__ = ["Rotary", "arm_angles"]

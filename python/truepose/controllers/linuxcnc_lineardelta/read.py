@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from typing import ClassVar
 
+from truepose.controllers._delta_file import SETTINGS, LinearDeltaFile, Rods, rods_of
 from truepose.controllers._hal_text import value_of
-from truepose.controllers._linear_delta_file import LinearDeltaFile
 from truepose.controllers._linuxcnc_files import Configuration
 from truepose.controllers._linuxcnc_read import (
     UNIT,
@@ -44,7 +44,7 @@ class LinearDeltaKinsReader:
 
     name: ClassVar[str] = "linuxcnc-lineardelta"
     doc: ClassVar[str] = "LinuxCNC's INI or HAL file of a linear delta with lineardeltakins"
-    settings: ClassVar[Mapping[str, Setting]] = {"units.length": UNIT}
+    settings: ClassVar[Mapping[str, Setting]] = {**SETTINGS, "units.length": UNIT}
 
     @classmethod
     def recognises(cls, text: str) -> bool:
@@ -66,7 +66,9 @@ class LinearDeltaKinsReader:
         axes = [limits(config, f"AXIS_{axis}", size, problems) for axis in "XYZ"]
         homes = [config.number(f"JOINT_{joint}", "HOME", problems) for joint in range(3)]
         refuse(problems)
-        delta, assumptions = _delta(file, config, scale, radius, rod, joints, axes, homes)
+        delta, assumptions = _delta(
+            file, config, scale, radius, rod, joints, axes, homes, rods_of(settings)
+        )
         return ControllerReading(
             delta.text(),
             None,
@@ -106,21 +108,20 @@ def _delta(
     joints: list[Range | None],
     axes: list[Range | None],
     homes: list[Decimal | None],
+    rods: Rods | None,
 ) -> tuple[LinearDeltaFile, list[Assumption]]:
     """The machine file, in mm, and what besides the usual is assumed in it."""
-    assumptions = []
+    assumptions: list[Assumption] = []
+    narrowed = None
     out, length = float(radius * scale), float(rod * scale)
     x, y, z = axes
     if x is not None and y is not None:
         reach = float(min(-x[0], x[1], -y[0], y[1]) * scale)
     if x is None or y is None or reach <= 0.0:
         reach = float(f"{max(min(NARROW * out, STEEPEST * length - out), 0.05 * out):.3g}")
-        assumptions.append(
-            Assumption(
-                "nothing says how far the tool may go sideways: the workspace's radius is three "
-                "quarters of R, or less where the rods are short",
-                "workspace.cylinder",
-            )
+        narrowed = (
+            "nothing says how far the tool may go sideways: the workspace's radius is three "
+            "quarters of R, or less where the rods are short"
         )
     ends = [pair for pair in joints if pair is not None]
     if len(ends) == len(joints):
@@ -146,10 +147,12 @@ def _delta(
             origin=f"LinuxCNC's {file.path.name}.",
             radius=[out] * 3,
             angles=list(ANGLES),
-            rods=[length] * 3,
-            switches=tops,
+            arms=[length] * 3,
+            ends=tops,
             workspace=(reach, low, high),
-            lowest=lows if len(ends) == len(joints) else None,
+            rods=rods,
+            reach_assumed=narrowed,
+            lows=lows if len(ends) == len(joints) else None,
             home=known[0] - rise if level else None,
         ),
         assumptions,

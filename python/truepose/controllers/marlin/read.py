@@ -15,6 +15,7 @@ from typing import ClassVar
 
 from truepose.controllers._commands import commands, only_reprap
 from truepose.controllers._decimals import numbers_of
+from truepose.controllers._delta_file import SETTINGS, rods_of
 from truepose.controllers._probed import (
     ASSUMED_PROBE,
     Probed,
@@ -66,6 +67,7 @@ class MarlinReader:
     name: ClassVar[str] = "marlin"
     doc: ClassVar[str] = "M503's output, M665 and M666, or Configuration.h of a linear delta"
     settings: ClassVar[Mapping[str, Setting]] = {
+        **SETTINGS,
         "logs": Setting("files beside it with what G29, G30 or G33 printed, commas between", None),
         "g29.bounds": Setting("where G29's grid lies: left, right, front, back, mm", None),
         "g33.radius": Setting("radius on which G33 probed"),
@@ -99,16 +101,16 @@ class MarlinReader:
             problems += [file.problem(fault) for fault in _of_missing(missing, known)]
         refuse(problems)
         refuse(_impossible(held))
+        rods = rods_of(settings)
         towers = _towers(held, settings)
         points, unused = _points(file, settings, held, scale)
-        delta = towers.file("Linear delta", f"Marlin's {file.path.name}.")
+        delta = towers.file("Linear delta", f"Marlin's {file.path.name}.", rods)
         return ControllerReading(
             delta.text(),
             measurements_text(points, delta.name, offset=_offset(held)),
             {name: number.text for name, number in held.items()},
             (
                 *delta.assumptions(),
-                *towers.assumptions(),
                 *_assumptions(held, known, scale),
                 *((ASSUMED_PROBE,) if points else ()),
             ),

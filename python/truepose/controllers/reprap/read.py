@@ -15,6 +15,7 @@ from decimal import Decimal
 from typing import ClassVar
 
 from truepose.controllers._commands import commands, only_reprap
+from truepose.controllers._delta_file import SETTINGS, rods_of
 from truepose.controllers._probed import (
     ASSUMED_PROBE,
     Place,
@@ -49,6 +50,7 @@ class RepRapReader:
     name: ClassVar[str] = "reprap"
     doc: ClassVar[str] = "RepRapFirmware's config.g of a linear delta, and config-override.g"
     settings: ClassVar[Mapping[str, Setting]] = {
+        **SETTINGS,
         "logs": Setting("files beside it: logs, bed.g, height maps, commas between", None),
         "workspace.radius": Setting("radius of the bed, where the file does not say it"),
     }
@@ -77,9 +79,10 @@ class RepRapReader:
             problems += [file.problem(fault) for fault in require(held, NEEDED)]
         refuse(problems)
         refuse(list(bridged(held, "M665 R", {n: v.value for n, v in held.items() if " L" in n})))
+        rods = rods_of(settings)
         towers = _towers(held, settings)
         points = _points(file, settings, held)
-        delta = towers.file("Linear delta", f"RepRapFirmware's {file.path.name}.")
+        delta = towers.file("Linear delta", f"RepRapFirmware's {file.path.name}.", rods)
         measured = measurements_text(
             points.points,
             delta.name,
@@ -92,7 +95,6 @@ class RepRapReader:
             {name: number.text for name, number in held.items()},
             (
                 *delta.assumptions(),
-                *towers.assumptions(),
                 *_assumptions(held),
                 *((ASSUMED_PROBE,) if points.points else ()),
             ),

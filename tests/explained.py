@@ -12,7 +12,7 @@ from command_line import call
 from truepose.errors import TrueposeError
 from truepose.explanations import Example
 
-_GIVEN = re.compile(r"(?:error|warning)\[([a-z0-9-]+)\]")
+_GIVEN = re.compile(r"(?:error|warning|looks odd)\[([a-z0-9-]+)\]")
 _IN_JSON = re.compile(r'"(?:code|status)": "([a-z0-9_-]+)"')
 
 
@@ -34,7 +34,7 @@ def codes_of(example: Example, folder: Path, capsys: pytest.CaptureFixture[str])
     for command in example.commands:
         outcome = call(capsys, *shlex.split(command))
     assert outcome is not None
-    return [*_GIVEN.findall(outcome.err), *_IN_JSON.findall(outcome.out + outcome.err)]
+    return [*_GIVEN.findall(outcome.out + outcome.err), *_IN_JSON.findall(outcome.out + outcome.err)]
 
 
 def _codes_of_python(script: str, capsys: pytest.CaptureFixture[str]) -> list[str]:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from truepose.error_budget.over_time import over_time
     from truepose.error_budget.strain import strain
     from truepose.machine import Condition, Machine
+    from truepose.plausibility import oddities
     from truepose.uncertainty_analysis.bounds import bounds
     from truepose.uncertainty_analysis.functions.inputs import Input
     from truepose.uncertainty_analysis.monte_carlo import monte_carlo
@@ -52,6 +53,7 @@ _WHERE = {
     "export": "truepose.controllers",
     "import_machine": "truepose.controllers",
     "monte_carlo": "truepose.uncertainty_analysis.monte_carlo",
+    "oddities": "truepose.plausibility",
     "over_time": "truepose.error_budget.over_time",
     "plan": "truepose.calibration.planning.plan",
     "shares": "truepose.uncertainty_analysis.shares",
@@ -77,6 +79,7 @@ __all__ = [
     "import_machine",
     "load",
     "monte_carlo",
+    "oddities",
     "over_time",
     "plan",
     "shares",

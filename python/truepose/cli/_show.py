@@ -7,9 +7,12 @@ import sys
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+import click
+
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
+    from truepose.plausibility import Oddity
     from truepose.reporting.accuracy import Told
     from truepose.reporting.table import Table
 
@@ -45,6 +48,24 @@ def _print(shown: Iterable[Any]) -> None:
         console.print(table)
     sys.stdout.writelines(f"{line.rstrip(' ')}\n" for line in text.getvalue().splitlines())
 
+
+def show_oddities(oddities: Iterable[Oddity], *, err: bool = False) -> None:
+    """Print what looks odd, a paragraph each: above the answers, or with a failure on stderr."""
+    if err:
+        for oddity in oddities:
+            click.echo(f"{_LOOKS_ODD}[{oddity.code}]: {oddity.sentence}", err=True)
+        return
+    from rich.text import Text
+
+    lines = [
+        Text.assemble((_LOOKS_ODD, "bold yellow"), f"[{oddity.code}]: {oddity.sentence}")
+        for oddity in oddities
+    ]
+    if lines:
+        _print([*lines, Text()])
+
+
+_LOOKS_ODD = "looks odd"
 
 COLOURS = {"met": "green", "missed": "red", "open": "yellow", "none": "default"}
 """Of an answer's word."""

@@ -20,6 +20,7 @@ from truepose.cli._verbose import verbose_option
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
+    from truepose.plausibility import Oddity
     from truepose.reporting.table import Table
     from truepose.reporting.workspace_check import WorkspaceCheck
     from truepose.verdict.answer import Answer
@@ -45,7 +46,8 @@ def command(*, watch: bool, **options: Any) -> int:
     """Describe a machine, and say if it is accurate enough.
 
     Exit code 1 unless it is certain that the machine, commanded as it is, keeps the accuracy
-    asked; what compensation would leave is shown beside it.
+    asked; what compensation would leave is shown beside it. What looks odd about the file stands
+    above the answer, and changes neither it nor the exit code.
     """
     request = Request(**options)
     if not watch:
@@ -61,48 +63,68 @@ def command(*, watch: bool, **options: Any) -> int:
 def _check(request: Request) -> int:
     """Describe the machine and answer -> exit code."""
     from truepose.cli import _steps
-    from truepose.errors import RequestError
+    from truepose.cli._show import show_answers, show_oddities, show_tables
+    from truepose.errors import TrueposeError
     from truepose.files.writing import replacing, written_together
-    from truepose.reporting import inputs
+    from truepose.plausibility import oddities
     from truepose.reporting.accuracy import gains, told
     from truepose.reporting.workspace_check import check_workspace
     from truepose.verdict.answer import AFTER, BEFORE, met
 
     machine = _steps.read_machine(request, [".json", ".csv"])
     check = check_workspace(machine)
-    out = ~check.usable
-    _steps.refuse_left_out(request, machine, out.nonzero()[0], check.poses[out], check.status[out])
-    answers: tuple[Answer, ...] = ()
-    warnings: list[dict[str, str]] = []
-    # Without a source the file may still be asked about its workspace, unless it asks for more.
-    asked = machine.accuracy.target is not None or machine.accuracy.angle_target is not None
-    if asked or any(inputs.acting(machine)):
-        answers = _steps.answers_of(machine)
-        try:
-            warnings = _steps.evaluation(request, machine).warnings
-        except RequestError as error:
-            # There are poses, as there are answers; only no budget of what bands leave of them.
-            if [problem.code for problem in error.problems] != ["no-pose-left"]:
-                raise
+    odd = oddities(machine, check.codes)
+    try:
+        answers, warnings = _answers(request, machine, check)
+    except TrueposeError:
+        # It may be why there is no answer.
+        show_oddities(odd, err=True)
+        raise
     kept = met(answers, BEFORE) is not False
     with written_together():
         written = _steps.write_witness(request, answers, AFTER if kept else BEFORE)
         if request.output is not None:
             form = request.output.suffix.lower().removeprefix(".")
             with replacing(request.output) as temporary:
-                text = _text(form, machine, check, answers, warnings)
+                text = _text(form, machine, check, odd, answers, warnings)
                 temporary.write_text(text + "\n", encoding="utf-8")
     if request.format == "table":
-        from truepose.cli._show import show_answers, show_tables
-
+        show_oddities(odd)
         show_answers(told(machine, answers), gains(answers))
         show_tables(_tables(machine, check, answers))
     else:
-        click.echo(_text(request.format, machine, check, answers, warnings))
+        click.echo(_text(request.format, machine, check, odd, answers, warnings))
     _steps.note_written(request.output, request.witness if written else None)
     if not written:
         raise _steps.no_witness(answers, AFTER if kept else BEFORE)
     return int(not kept)
+
+
+def _answers(
+    request: Request, machine: Machine, check: WorkspaceCheck
+) -> tuple[tuple[Answer, ...], list[dict[str, str]]]:
+    """The answers, and what the budget warns of.
+
+    Raises `RequestError` (unusable-pose, no-pose-left), and `TrueposeError` of an error source.
+    """
+    from truepose.cli import _steps
+    from truepose.errors import RequestError
+    from truepose.reporting import inputs
+
+    out = ~check.usable
+    _steps.refuse_left_out(request, machine, out.nonzero()[0], check.poses[out], check.status[out])
+    # Without a source the file may still be asked about its workspace, unless it asks for more.
+    asked = machine.accuracy.target is not None or machine.accuracy.angle_target is not None
+    if not (asked or any(inputs.acting(machine))):
+        return (), []
+    answers = _steps.answers_of(machine)
+    try:
+        return answers, _steps.evaluation(request, machine).warnings
+    except RequestError as error:
+        # There are poses, as there are answers; only no budget of what bands leave of them.
+        if [problem.code for problem in error.problems] != ["no-pose-left"]:
+            raise
+        return answers, []
 
 
 def _tables(machine: Machine, check: WorkspaceCheck, answers: tuple[Answer, ...]) -> list[Table]:
@@ -127,6 +149,7 @@ def _text(
     form: str,
     machine: Machine,
     check: WorkspaceCheck,
+    odd: tuple[Oddity, ...],
     answers: tuple[Answer, ...],
     warnings: list[dict[str, str]],
 ) -> str:
@@ -167,6 +190,10 @@ def _text(
             "not_included": [
                 {"part": part, "why": NO_MATERIAL}
                 for part in not_included(machine, machine.condition)
+            ],
+            "oddities": [
+                {"code": oddity.code, "sentence": oddity.sentence, "parts": list(oddity.parts)}
+                for oddity in odd
             ],
             "workspace": workspace_check.as_data(machine, check),
             "answers": rows,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from truepose.arrays import Flags, Floats
+from truepose.arrays import Codes, Flags, Floats
 from truepose.reporting.display import number, pose_text, where_highest
 from truepose.reporting.result import in_file_units, pose_in_file_units
 from truepose.reporting.table import Table
@@ -58,12 +58,13 @@ class SkipReason:
 class WorkspaceCheck:
     """What became of the poses of a workspace.
 
-    `status` (n_pose,): kernel status by name. `worst_conditioning` of the usable poses (smallest
+    `codes` (n_pose,): kernel status, `status` (n_pose,) the same by name. `worst_conditioning` of the usable poses (smallest
     over largest scaled singular value: 1 best, 0 singular) and the pose where it is, SI; NaN
     where no pose is usable.
     """
 
     poses: Floats
+    codes: Codes
     status: NDArray[np.str_]
     reasons: tuple[SkipReason, ...]
     worst_conditioning: float
@@ -87,6 +88,7 @@ def check_workspace(machine: Machine) -> WorkspaceCheck:
     worst = where_highest(-np.where(usable, conditioning, np.inf)) if usable.any() else 0
     return WorkspaceCheck(
         poses,
+        codes,
         np.array(STATUS)[codes],
         _reasons(machine, poses[~usable]),
         float(conditioning[worst]) if usable.any() else float("nan"),

@@ -1,0 +1,209 @@
+"""The form of an oddity and of a rule that finds it, and the machine at home as rules see it.
+
+A rule looks at one machine in the base frame at its home pose, and says in a sentence what is odd,
+the numbers, what is usual, and what to do if it is meant. It judges by physics or by ratios of the
+machine's own sizes, never by numbers of the library's machines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from truepose._kernel import STATUS
+from truepose.arrays import Codes, Floats
+from truepose.errors import TrueposeError
+from truepose.sources import Deviation, PoseBlock, acting
+
+if TYPE_CHECKING:
+    from truepose.machine import Machine
+
+OK = STATUS.index("ok")
+
+MEANT = "If it is meant, leave it: no answer depends on this."
+"""How a sentence ends that has no better advice."""
+
+
+@dataclass(frozen=True)
+class Oddity:
+    """What looks odd about a machine. It changes no answer.
+
+    `code`: of the rule; `sentence`: for people; `parts`: paths of what is meant, as in the machine
+    file or among the machine's parameters.
+    """
+
+    code: str
+    sentence: str
+    parts: tuple[str, ...] = ()
+
+
+Remark = tuple[str, tuple[str, ...]]
+"""A sentence, and the paths of what it is about."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One kind of oddity: `code`, `doc` (what is odd), `basis` (the threshold, and its source)."""
+
+    code: str
+    doc: str
+    basis: str
+    inspect: Callable[[MachineAtHome], Iterable[Remark]]
+
+    def oddities(self, view: MachineAtHome) -> Iterator[Oddity]:
+        """What the rule finds."""
+        for sentence, parts in self.inspect(view):
+            yield Oddity(self.code, sentence, parts)
+
+
+@dataclass(frozen=True, eq=False)
+class MachineAtHome:
+    """A machine at its home pose, nominal, base frame, SI; what costs anything is made when asked.
+
+    `given_status` (n_pose,): kernel status codes of the poses of its workspace, if they are known.
+    """
+
+    machine: Machine
+    given_status: Codes | None = None
+
+    @cached_property
+    def poses(self) -> Floats:
+        """(n_pose, n_commanded) the workspace's; none where the file has none."""
+        machine = self.machine
+        return np.empty((0, len(machine.commanded))) if machine.workspace is None else machine.poses()
+
+    @cached_property
+    def status(self) -> Codes:
+        """(n_pose,) status codes of `poses`."""
+        if self.given_status is not None:
+            return self.given_status
+        if len(self.poses) == 0:
+            return np.empty(0, np.uint8)
+        status = self.machine.inverse(self.poses, status=True)[1]
+        solved = self.machine.conditioning(self.poses, status=True)[1]
+        return np.where(status == OK, solved, status)
+
+    @cached_property
+    def pose(self) -> Floats:
+        """(1, n_commanded) home, as it is commanded."""
+        machine = self.machine
+        at = [machine.dof.index(freedom) for freedom in machine.commanded]
+        return np.asarray(machine.home)[at][np.newaxis, :]
+
+    @cached_property
+    def placed(self) -> tuple[Floats, Floats, int]:
+        """Joint coordinates (1, n_joint), placement (1, 7) and status code at home."""
+        joints, placements, status = self.machine.kernel.place(self.pose)
+        return joints, placements, int(status[0])
+
+    @property
+    def is_reached(self) -> bool:
+        """Whether the machine can be at home."""
+        return self.placed[2] == OK
+
+    @cached_property
+    def centres(self) -> Floats:
+        """(n_strut, 2, 3) base-side and platform-side joint centres, m; NaN of what is unknown."""
+        joints, placements, _ = self.placed
+        return self.machine.kernel.joint_centres(joints, placements)[0]
+
+    @cached_property
+    def nominal(self) -> dict[str, float]:
+        """Every parameter's nominal value by its name, SI."""
+        machine = self.machine
+        return dict(zip(machine.parameters, machine.nominal.tolist(), strict=True))
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """(n_strut,) of the struts at home, m; of the file where it has them."""
+        reached = np.linalg.norm(self.centres[:, 1] - self.centres[:, 0], axis=1)
+        own = [self.nominal.get(f"{strut.part}.length") for strut in self.machine.struts]
+        return np.array(
+            [length if fixed is None else fixed for length, fixed in zip(reached, own, strict=True)]
+        )
+
+    @cached_property
+    def size(self) -> float:
+        """Diagonal, m, of the box about all joint centres at home, or the longest strut."""
+        points = self.centres.reshape(-1, 3)
+        points = points[np.isfinite(points).all(axis=1)]
+        diagonal = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+        return max(diagonal, float(np.nanmax(self.lengths, initial=0.0)))
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether the platform moves in a plane, where struts lie in layers above each other."""
+        return "z" not in self.machine.dof
+
+    def vector(self, path: str) -> Floats | None:
+        """(3,) of the parameters `path.x`, `path.y`, `path.z`; None where there are none."""
+        values = [self.nominal.get(f"{path}.{axis}") for axis in "xyz"]
+        known = [value for value in values if value is not None]
+        return np.array(known) if len(known) == 3 else None
+
+    @cached_property
+    def _lever(self) -> dict[str, float]:
+        """Part -> the length, m, that its lengths are compared with: the strut's own, or size."""
+        levers: dict[str, float] = {}
+        for strut, length in zip(self.machine.struts, self.lengths.tolist(), strict=True):
+            if np.isfinite(length):
+                levers[strut.part] = length
+                if strut.drive is not None:
+                    path = f"drive.{strut.drive}"
+                    levers[path] = min(length, levers.get(path, length))
+        return levers
+
+    def lever(self, column: int) -> float:
+        """What a deviation of a parameter is a share of: m, or 1 for angles and ratios."""
+        machine = self.machine
+        if machine.units[column] != "m":
+            return 1.0
+        part = ".".join(machine.parameters[column].split(".")[:2])
+        return self._lever.get(part, self.size)
+
+    @cached_property
+    def deviations(self) -> tuple[tuple[str, Deviation], ...]:
+        """What each acting source does to the parameters at home, by its name; none out of reach.
+
+        A source that lacks something is left out: it is an error wherever it is asked.
+        """
+        if not self.is_reached:
+            return ()
+        machine, condition = self.machine, self.machine.condition
+        joints, placements, _ = self.placed
+        block = PoseBlock(machine, condition, self.pose, np.array([0]), joints, placements)
+        done = []
+        for source in acting(machine):
+            try:
+                done.append((source.name, source.deviation(machine, condition, block)))
+            except TrueposeError:
+                continue
+        return tuple(done)
+
+    def length(self, metres: float) -> str:
+        """A length for people, in the unit of the file."""
+        return self.machine.shown.length.text(metres)
+
+    def quantity(self, value: float, column: int) -> str:
+        """A deviation of a parameter for people."""
+        shown = self.machine.shown
+        unit = self.machine.units[column]
+        coarse = unit == "m" and abs(value) >= shown.least_dimension
+        return (shown.of(unit) if coarse else shown.small(unit)).text(value)
+
+    def degrees(self, kelvin: float) -> str:
+        """A temperature for people, on the scale of the file."""
+        shown = self.machine.shown
+        return f"{float(shown.temperature(kelvin)):.4g} {shown.degree}"
+
+
+def listed(paths: Iterable[str], most: int = 3) -> str:
+    """Paths in words: all of a few, the first of many and how many more."""
+    every = list(paths)
+    if len(every) <= most:
+        return ", ".join(every)
+    return f"{', '.join(every[:most])} and {len(every) - most} more"

@@ -1,0 +1,37 @@
+"""An axis with the wrong sign: with it turned, home would be inside the travel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
+from truepose.plausibility._roots import roots, sided, within
+
+
+def inspect(view: MachineAtHome) -> Iterator[Remark]:
+    """Sliders and cranks whose coordinate at home is out of travel, but not of the opposite axis."""
+    if view.is_reached:
+        return
+    wrong = []
+    for drive in filter(sided, view.machine.drives):
+        mode = 1.0 if drive.working_mode == "+" else -1.0
+        if within(drive, roots(view, drive, mode=mode, turn=1.0)):
+            continue
+        # A carriage turned with its axis stays on the side of the platform that it was on.
+        if within(drive, roots(view, drive, mode=mode, turn=-1.0)):
+            wrong.append(drive.part)
+    if wrong:
+        yield (
+            f"{listed(wrong)}: home is out of travel, and inside it were the axis to point the other "
+            "way; usual is a home that all drives reach. Look at the sign of axis, and at the "
+            "travel. If it is meant, give [workspace] another home",
+            tuple(f"{part}.axis" for part in wrong),
+        )
+
+
+RULE = Rule(
+    "axis-reversed",
+    "home is out of a drive's travel, and would be inside with its axis the other way",
+    "No threshold: both joint coordinates are solved in closed form.",
+    inspect,
+)

@@ -1,0 +1,37 @@
+"""Base and platform exchanged: the platform is wider than the base."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from truepose.plausibility._base import MachineAtHome, Remark, Rule
+
+WIDEST = 1.25
+"""Radius of the platform's joint centres in that of the base's (root mean square)."""
+
+
+def inspect(view: MachineAtHome) -> Iterator[Remark]:
+    """Radii about the centroids, at home."""
+    if len(view.machine.struts) < 3 or not np.isfinite(view.centres).all():
+        return
+    about = view.centres - view.centres.mean(axis=0)
+    base, platform = np.sqrt((about**2).sum(axis=2).mean(axis=0)).tolist()
+    if platform > WIDEST * base:
+        yield (
+            f"the joint centres of the platform lie {view.length(platform)} from their middle, "
+            f"those of the base {view.length(base)}; usual is a platform smaller than the base. "
+            "Look whether base and platform of the struts are exchanged. If it is meant, leave it",
+            ("strut.*.base", "strut.*.platform"),
+        )
+
+
+RULE = Rule(
+    "exchanged-ends",
+    "the platform's joint centres are spread 1.25 times as wide as the base's",
+    "The platform is what moves: machines are built with it smaller than the base, or as large "
+    "(Merlet, Parallel Robots, 2nd ed., ch. 2 and 11). Exchanged, a ratio of less than 0.8 is more "
+    "than 1.25.",
+    inspect,
+)

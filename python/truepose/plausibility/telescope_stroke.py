@@ -1,0 +1,43 @@
+"""A telescope that becomes more than three times as long as it was: a forgotten offset."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
+
+MOST = 3.0
+"""Longest over shortest length."""
+
+
+def inspect(view: MachineAtHome) -> Iterator[Remark]:
+    """Lengths at both ends of the travel of struts whose drive is their length."""
+    odd = {}
+    drives = {drive.name: drive for drive in view.machine.drives if drive.kind == "telescopic"}
+    for strut in view.machine.struts:
+        drive = drives.get(strut.drive or "")
+        if drive is None or f"{strut.part}.length" in view.nominal:
+            continue
+        scale = view.nominal.get(f"{drive.part}.scale", 1.0)
+        offset = view.nominal.get(f"{strut.part}.offset", view.nominal.get(f"{drive.part}.offset"))
+        ends = sorted(scale * end + (offset or 0.0) for end in drive.travel)
+        if ends[1] > MOST * ends[0]:
+            odd[drive.part] = ends
+    if odd:
+        short, long = next(iter(odd.values()))
+        yield (
+            f"{listed(odd)}: the strut goes from {view.length(short)} to {view.length(long)}; usual "
+            "is less than twice as long as at its shortest, and less than three times with two "
+            "stages. Look whether the travel is a stroke: offset is the length at zero. If it is "
+            "meant, as of screws that pass through their joint, leave it",
+            tuple(f"{part}.travel" for part in odd),
+        )
+
+
+RULE = Rule(
+    "telescope-stroke",
+    "a telescopic strut's longest length is more than three times its shortest",
+    "A rod that slides out of a tube as long as itself makes it at most twice as long, each further "
+    "stage once more; two stages are the most in use. A stroke without its offset begins at zero.",
+    inspect,
+)

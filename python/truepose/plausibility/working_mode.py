@@ -1,0 +1,36 @@
+"""The other working mode is meant: with it, home would be inside the travel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
+from truepose.plausibility._roots import roots, sided, within
+
+
+def inspect(view: MachineAtHome) -> Iterator[Remark]:
+    """Sliders and cranks whose coordinate at home is out of travel, but not in the other mode."""
+    if view.is_reached:
+        return
+    wrong = []
+    for drive in filter(sided, view.machine.drives):
+        mode = 1.0 if drive.working_mode == "+" else -1.0
+        if within(drive, roots(view, drive, mode=mode, turn=1.0)):
+            continue
+        if within(drive, roots(view, drive, mode=-mode, turn=1.0)):
+            wrong.append(drive.part)
+    if wrong:
+        yield (
+            f"{listed(wrong)}: home is out of travel, and inside it in the other working mode; usual "
+            "is a home that all drives reach. Look at working_mode, on which side of the platform "
+            "joint the carriage or the elbow stands. If it is meant, give [workspace] another home",
+            tuple(f"{part}.working_mode" for part in wrong),
+        )
+
+
+RULE = Rule(
+    "other-working-mode",
+    "home is out of a drive's travel, and would be inside in the other working mode",
+    "No threshold: both joint coordinates are solved in closed form.",
+    inspect,
+)

@@ -1,7 +1,7 @@
 """What each code means, what to do about it, and an example that gives it.
 
-Codes of problems have their meaning in `errors.CATALOGUE`; the other codes (warnings, suspicions,
-reasons of a calibration, why a pose is left out) have it here. All the rest is in the tables beside
+Codes of problems have their meaning in `errors.CATALOGUE`; the other codes (oddities, warnings,
+suspicions, reasons of a calibration, why a pose is left out) have it here. All the rest is in the tables beside
 this file, one a topic, from which `truepose explain` and docs/errors.md are made; a test runs every
 example. Nothing heavy is imported: a shell completes codes from here.
 """
@@ -22,6 +22,7 @@ TOPICS: dict[str, str] = {
     "structure": "The machine's structure",
     "tolerances": "Materials, tolerances and measured tables",
     "workspace": "The workspace and its poses",
+    "oddities": "What looks odd",
     "requests": "Requests",
     "functions": "Calls in Python",
     "controllers": "Controllers",

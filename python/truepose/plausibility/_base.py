@@ -20,7 +20,7 @@ from truepose.errors import TrueposeError
 from truepose.sources import Deviation, PoseBlock, acting
 
 if TYPE_CHECKING:
-    from truepose.machine import Machine
+    from truepose.machine import Machine, Strut
 
 OK = STATUS.index("ok")
 
@@ -106,6 +106,14 @@ class MachineAtHome:
         return self.placed[2] == OK
 
     @cached_property
+    def conditioning(self) -> float:
+        """At home: 1 is best, 0 is singular; NaN out of reach."""
+        if not self.is_reached:
+            return float("nan")
+        value, status = self.machine.conditioning(self.pose, status=True)
+        return float(value[0]) if status[0] == OK else 0.0
+
+    @cached_property
     def centres(self) -> Floats:
         """(n_strut, 2, 3) base-side and platform-side joint centres, m; NaN of what is unknown."""
         joints, placements, _ = self.placed
@@ -119,20 +127,47 @@ class MachineAtHome:
 
     @cached_property
     def lengths(self) -> Floats:
-        """(n_strut,) of the struts at home, m; of the file where it has them."""
-        reached = np.linalg.norm(self.centres[:, 1] - self.centres[:, 0], axis=1)
-        own = [self.nominal.get(f"{strut.part}.length") for strut in self.machine.struts]
-        return np.array(
-            [length if fixed is None else fixed for length, fixed in zip(reached, own, strict=True)]
+        """(n_strut,) m: those of the file, and of telescopic struts at home.
+
+        Out of reach, a telescopic strut has its longest.
+        """
+        reached = np.linalg.norm(self.centres[:, 1] - self.centres[:, 0], axis=1).tolist()
+        lengths = []
+        for strut, length in zip(self.machine.struts, reached, strict=True):
+            ends = self.telescope(strut)
+            at_home = length if ends is None or self.is_reached else ends[1]
+            lengths.append(self.nominal.get(f"{strut.part}.length", at_home))
+        return np.array(lengths)
+
+    def telescope(self, strut: Strut) -> tuple[float, float] | None:
+        """Shortest and longest length, m, of a strut whose drive is its length; None of others."""
+        drive = next((d for d in self.machine.drives if d.name == strut.drive), None)
+        if drive is None or drive.kind != "telescopic":
+            return None
+        scale, offset = (
+            self.nominal.get(f"{drive.part}.{name}", usual)
+            for name, usual in (("scale", 1.0), ("offset", 0.0))
         )
+        short, long = sorted(scale * end + offset for end in drive.travel)
+        return short, long
 
     @cached_property
     def size(self) -> float:
-        """Diagonal, m, of the box about all joint centres at home, or the longest strut."""
-        points = self.centres.reshape(-1, 3)
-        points = points[np.isfinite(points).all(axis=1)]
-        diagonal = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
-        return max(diagonal, float(np.nanmax(self.lengths, initial=0.0)))
+        """Diagonal, m, of the box about all joint centres at home, or the longest strut.
+
+        Out of reach, of the boxes about those of the base and of the platform the larger.
+        """
+        bodies = (
+            [self.centres.reshape(-1, 3)]
+            if self.is_reached
+            else [self.centres[:, 0], self.centres[:, 1]]
+        )
+        spans = [float(np.nanmax(self.lengths, initial=0.0))]
+        for points in bodies:
+            known = points[np.isfinite(points).all(axis=1)]
+            if len(known):
+                spans.append(float(np.linalg.norm(np.ptp(known, axis=0))))
+        return max(spans)
 
     @property
     def is_planar(self) -> bool:
@@ -167,11 +202,11 @@ class MachineAtHome:
 
     @cached_property
     def deviations(self) -> tuple[tuple[str, Deviation], ...]:
-        """What each acting source does to the parameters at home, by its name; none out of reach.
+        """What each acting source does to the parameters at home, by its name.
 
-        A source that lacks something is left out: it is an error wherever it is asked.
+        None where the machine is out of reach or nothing holds it. A source that lacks something is left out: it is an error wherever it is asked.
         """
-        if not self.is_reached:
+        if not self.conditioning > 0.0:
             return ()
         machine, condition = self.machine, self.machine.condition
         joints, placements, _ = self.placed

@@ -13,10 +13,20 @@ WIDEST = 1.25
 
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
-    """Radii about the centroids, at home."""
-    if len(view.machine.struts) < 3 or not np.isfinite(view.centres).all():
+    """Radii about the centroids, of the struts whose base joints stand on the frame."""
+    struts = view.machine.struts
+    frame = [
+        strut.drive is None or view.telescope(strut) is not None for strut in struts
+    ]
+    points = [
+        [view.vector(f"{strut.part}.{end}") for end in ("base", "platform")]
+        for strut, kept in zip(struts, frame, strict=True)
+        if kept
+    ]
+    if len(points) < 3:
         return
-    about = view.centres - view.centres.mean(axis=0)
+    about = np.array(points)
+    about -= about.mean(axis=0)
     base, platform = np.sqrt((about**2).sum(axis=2).mean(axis=0)).tolist()
     if platform > WIDEST * base:
         yield (

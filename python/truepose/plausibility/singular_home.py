@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from truepose.plausibility._base import OK, MachineAtHome, Remark, Rule
+from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 LEAST = 0.002
 """Smallest over largest scaled singular value."""
@@ -12,10 +12,7 @@ LEAST = 0.002
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
     """Conditioning at home."""
-    if not view.is_reached:
-        return
-    conditioning, status = view.machine.conditioning(view.pose, status=True)
-    value = float(conditioning[0]) if status[0] == OK else 0.0
+    value = view.conditioning
     if value < LEAST:
         yield (
             f"home is all but singular: conditioning {value:.2g}, so that an error of a strut may "

@@ -12,30 +12,53 @@ from truepose.sources.tolerance import bands_of
 FACTOR = 5.0
 """From the nearest of the others."""
 
+FAR = 0.2
+"""Of the machine's size: a joint centre that is less far from the others is not looked at."""
+
 ALIKE = 2.0
 """Largest over smallest of the others."""
 
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
-    """What struts and drives have in common."""
-    for values in _compared(view):
-        if len(values) < 3 or min(values.values()) <= 0.0:
-            continue
-        ranked = sorted(values, key=lambda path: values[path])
-        for path, rest in ((ranked[-1], ranked[:-1]), (ranked[0], ranked[1:])):
-            least, most = values[rest[0]], values[rest[-1]]
-            factor = max(values[path] / most, least / values[path])
-            if most <= ALIKE * least and factor > FACTOR:
-                size = "times as large as" if values[path] > most else "times smaller than"
-                yield (
-                    f"{path} is {factor:.3g} {size} that of any other, and those are alike; usual "
-                    "is that all are. Look for a slipped decimal point. If it is meant, leave it",
-                    (path,),
-                )
+    """What struts and drives have in common: sizes, and how far apart their points are."""
+    for values in _sizes(view):
+        yield from _largest(values)
+        yield from _smallest(values)
+    for values in _distances(view):
+        # One joint may well stand in the middle of the others.
+        yield from _largest(values)
 
 
-def _compared(view: MachineAtHome) -> Iterator[dict[str, float]]:
-    """Values by path, of one kind each."""
+def _largest(values: dict[str, float]) -> Iterator[Remark]:
+    path, *rest = sorted(values, key=lambda path: -values[path])
+    if len(rest) > 1 and 0.0 < values[rest[0]] <= ALIKE * values[rest[-1]]:
+        factor = values[path] / values[rest[0]]
+        if factor > FACTOR:
+            yield _remark(path, f"{factor:.3g} times as large as")
+
+
+def _smallest(values: dict[str, float]) -> Iterator[Remark]:
+    path, *rest = sorted(values, key=lambda path: values[path])
+    if len(rest) > 1 and values[rest[-1]] <= ALIKE * values[rest[0]]:
+        factor = values[rest[0]] / values[path]
+        if factor > FACTOR:
+            yield _remark(path, f"{factor:.3g} times smaller than")
+
+
+def _remark(path: str, how: str) -> Remark:
+    return (
+        f"{path} is {how} that of any other, and those are alike; usual is that all are. Look for "
+        "a slipped decimal point. If it is meant, leave it",
+        (path,),
+    )
+
+
+def _sizes(view: MachineAtHome) -> Iterator[dict[str, float]]:
+    """Values above zero by path, of one kind each; at least one."""
+    yield from filter(None, _every_size(view))
+
+
+def _every_size(view: MachineAtHome) -> Iterator[dict[str, float]]:
     machine, struts, drives = view.machine, view.machine.struts, view.machine.drives
     nominal = view.nominal
     yield {
@@ -51,13 +74,6 @@ def _compared(view: MachineAtHome) -> Iterator[dict[str, float]]:
             for drive in drives
             if drive.kind == kind
         }
-    for parts, name in ((struts, "base"), (struts, "platform"), (drives, "origin")):
-        points = {f"{part.part}.{name}": view.vector(f"{part.part}.{name}") for part in parts}
-        yield {
-            path: float(np.linalg.norm(point))
-            for path, point in points.items()
-            if point is not None and point.any()
-        }
     bands = bands_of(machine)
     if bands is not None:
         of_lengths = set(machine.kernel.length_parameters.tolist())
@@ -66,6 +82,19 @@ def _compared(view: MachineAtHome) -> Iterator[dict[str, float]]:
             for column, half in zip(bands.parameters.tolist(), bands.half[0], strict=True)
             if column in of_lengths and half > 0.0
         }
+
+
+def _distances(view: MachineAtHome) -> Iterator[dict[str, float]]:
+    """Of joint centres and origins from the median of their kind, where that is far."""
+    struts, drives = view.machine.struts, view.machine.drives
+    for parts, name in ((struts, "base"), (struts, "platform"), (drives, "origin")):
+        paths = [f"{part.part}.{name}" for part in parts]
+        points = np.array([point for path in paths if (point := view.vector(path)) is not None])
+        if len(points) == len(paths):
+            # From the median, so that no rule asks where the frame's origin stands.
+            away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+            if away.max(initial=0.0) > FAR * view.size:
+                yield dict(zip(paths, away.tolist(), strict=True))
 
 
 RULE = Rule(

@@ -12,17 +12,11 @@ MOST = 3.0
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
     """Lengths at both ends of the travel of struts whose drive is their length."""
-    odd = {}
-    drives = {drive.name: drive for drive in view.machine.drives if drive.kind == "telescopic"}
-    for strut in view.machine.struts:
-        drive = drives.get(strut.drive or "")
-        if drive is None or f"{strut.part}.length" in view.nominal:
-            continue
-        scale = view.nominal.get(f"{drive.part}.scale", 1.0)
-        offset = view.nominal.get(f"{strut.part}.offset", view.nominal.get(f"{drive.part}.offset"))
-        ends = sorted(scale * end + (offset or 0.0) for end in drive.travel)
-        if ends[1] > MOST * ends[0]:
-            odd[drive.part] = ends
+    odd = {
+        f"drive.{strut.drive}": ends
+        for strut in view.machine.struts
+        if (ends := view.telescope(strut)) is not None and ends[1] > MOST * ends[0]
+    }
     if odd:
         short, long = next(iter(odd.values()))
         yield (

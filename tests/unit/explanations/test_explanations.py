@@ -18,6 +18,7 @@ from truepose.calibration import data_checks, residual_checks
 from truepose.calibration.acceptance.reasons import SENTENCES
 from truepose.errors import CATALOGUE
 from truepose.explanations import TOPICS, explanations
+from truepose.plausibility import RULES
 
 EVERY = explanations()
 EXAMPLES = {code: explanation.example for code, explanation in EVERY.items()}
@@ -58,7 +59,8 @@ def test_the_example_gives_the_code(
 
 
 def test_codes_of_suspicions_and_reasons_are_explained() -> None:
-    others = {*data_checks.CODES, *residual_checks.CODES, *SENTENCES}
+    others = {rule.code for rule in RULES}
+    others |= {*data_checks.CODES, *residual_checks.CODES, *SENTENCES}
     others |= {"other-assembly-mode", "exact-stops", "parasitic-remains", "nothing-to-correct"}
     others |= {*STATUS, "band"} - {"ok"}
     assert sorted(others - EVERY.keys()) == []

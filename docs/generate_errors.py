@@ -15,9 +15,9 @@ HEAD = """# Every code, and what to do
 
 <!-- Written by `python docs/generate_errors.py`. Do not edit. -->
 
-A code stands in brackets behind `error`, `warning` and `looks odd`, in results where a pose is left out, and in
-the answer of a calibration. `truepose explain CODE` shows what stands here at the prompt. Every
-example has been run and gives its code; try it in an empty folder.
+A code stands in brackets behind `error`, `warning` and `looks odd`, in results where a pose is
+left out, and in the answer of a calibration. `truepose explain CODE` shows what stands here at the
+prompt. Every example has been run and gives its code; try it in an empty folder.
 """
 
 

@@ -34,7 +34,10 @@ def codes_of(example: Example, folder: Path, capsys: pytest.CaptureFixture[str])
     for command in example.commands:
         outcome = call(capsys, *shlex.split(command))
     assert outcome is not None
-    return [*_GIVEN.findall(outcome.out + outcome.err), *_IN_JSON.findall(outcome.out + outcome.err)]
+    return [
+        *_GIVEN.findall(outcome.out + outcome.err),
+        *_IN_JSON.findall(outcome.out + outcome.err),
+    ]
 
 
 def _codes_of_python(script: str, capsys: pytest.CaptureFixture[str]) -> list[str]:

@@ -16,7 +16,7 @@ from machine_file import File, file_at
 
 @dataclass(frozen=True)
 class Blunder:
-    """What somebody typed: a change of the file of a library machine, and the code that it gives."""
+    """What somebody typed: a change of a library machine's file, and the code that it gives."""
 
     name: str
     machine: str

@@ -4,18 +4,18 @@
 
     machine = sound_machine(17).loaded
 
-A machine is drawn by its number alone (`SEED`): its family, its size from 50 mm to 5 m, proportions,
-how its rails point, where the frame's origin stands and how it is turned about z, the units of its
-file, joint centres off by up to 0.3 % as in a calibrated file, materials, sections or stiffnesses,
-temperatures from -20 to 60 degC, tolerances from 1e-6 to 3e-3 of the struts or of a class, forces
-that its struts bear, and an accuracy that is asked.
+A machine is drawn by its number alone (`SEED`): its family, its size from 50 mm to 5 m,
+proportions, how its rails point, where the frame's origin stands and how it is turned about z, the
+units of its file, joint centres off by up to 0.3 % as in a calibrated file, materials, sections or
+stiffnesses, temperatures from -20 to 60 degC, tolerances from 1e-6 to 3e-3 of the struts or of a
+class, forces that its struts bear, and an accuracy that is asked.
 
 Sound means what an engineer would ask of a design, and nothing that a rule of oddities asks: every
 pose of the workspace and home are reached within travel, errors grow at most thirty times
-(`REGULAR`), a telescopic strut is at most `STAGES` times as long as at its shortest, no
-carriage passes the middle of the machine (struts would run through each other), and the force on the
-tool strains a strut that bears it alone by 1e-4. A draw that is not sound is drawn again;
-travels are then those that the workspace needs, with room.
+(`REGULAR`), a telescopic strut is at most `STAGES` times as long as at its shortest, no carriage
+passes the middle of the machine (struts would run through each other), and the force on the tool
+strains a strut that bears it alone by 1e-4. A draw that is not sound is drawn again; travels are
+then those that the workspace needs, with room.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ STRAIN = 1e-4
 class Layout:
     """A machine in m and rad, its frame as its family has it: z up, about the origin.
 
-    `drives`: rows without travel, points and lengths in m; `struts` likewise; `workspace`: freedom ->
-    (from, to); `home` (x, y, z) of the tool.
+    `drives`: rows without travel, points and lengths in m; `struts` likewise, with the index of
+    their drive; `workspace`: freedom -> (from, to).
     """
 
     dof: tuple[str, ...]
@@ -80,7 +80,9 @@ def _pairs(half: float, turn: float = 0.0) -> Points:
     return np.asarray(thirds + np.tile([-half, half], 3))
 
 
-def _box(random: Random, size: float, *freedoms: str, middle: float) -> dict[str, tuple[float, float]]:
+def _box(
+    random: Random, size: float, *freedoms: str, middle: float
+) -> dict[str, tuple[float, float]]:
     sides = {}
     for freedom in freedoms:
         if freedom in "abc":
@@ -141,9 +143,13 @@ def _hexaglide(random: Random, size: float) -> Layout:
         outward = base[at] / np.linalg.norm(base[at])
         axis, mode, _ = _rail(random, outward)
         drives.append({"kind": "slider", "origin": base[at], "axis": axis, "working_mode": mode})
-        struts.append({"drive": at, "base": np.zeros(3), "platform": platform[at], "length": length})
+        struts.append(
+            {"drive": at, "base": np.zeros(3), "platform": platform[at], "length": length}
+        )
     middle = size * random.uniform(-0.5, 0.5)
-    return Layout(tuple("xyzabc"), drives, struts, _box(random, 0.5 * size, *"xyzabc", middle=middle))
+    return Layout(
+        tuple("xyzabc"), drives, struts, _box(random, 0.5 * size, *"xyzabc", middle=middle)
+    )
 
 
 def _level_hexaglide(random: Random, size: float) -> Layout:
@@ -162,15 +168,24 @@ def _level_hexaglide(random: Random, size: float) -> Layout:
                 "working_mode": "+" if sign > 0 else "-",
             }
         )
-        struts.append({"drive": at, "base": np.zeros(3), "platform": platform[at], "length": length})
+        struts.append(
+            {"drive": at, "base": np.zeros(3), "platform": platform[at], "length": length}
+        )
     middle = height * random.choice([-1.0, 1.0])
-    return Layout(tuple("xyzabc"), drives, struts, _box(random, 0.4 * size, *"xyzabc", middle=middle))
+    return Layout(
+        tuple("xyzabc"), drives, struts, _box(random, 0.4 * size, *"xyzabc", middle=middle)
+    )
 
 
 def _pair_struts(at: int, angle: float, base: Points, platform: Points, half: float, length: float):
     across = half * np.array([-math.sin(angle), math.cos(angle), 0.0])
     return [
-        {"drive": at, "base": base + side * across, "platform": platform + side * across, "length": length}
+        {
+            "drive": at,
+            "base": base + side * across,
+            "platform": platform + side * across,
+            "length": length,
+        }
         for side in (-1.0, 1.0)
     ]
 
@@ -291,7 +306,12 @@ def _two_sliders(random: Random, size: float) -> Layout:
         for x in (-0.5 * size, 0.5 * size):
             axis = np.array([0.0, side, 0.0])
             drives.append(
-                {"kind": "slider", "origin": np.array([x, 0.0, 0.0]), "axis": axis, "working_mode": "+"}
+                {
+                    "kind": "slider",
+                    "origin": np.array([x, 0.0, 0.0]),
+                    "axis": axis,
+                    "working_mode": "+",
+                }
             )
         middle = (0.0, 0.3 * size * random.uniform(-1.0, 1.0))
     else:
@@ -496,12 +516,16 @@ def _grid(layout: Layout, shift: Points, per_metre: float, random: Random) -> Ro
     return grid
 
 
-def _add_properties(file: File, layout: Layout, size: float, per_metre: float, random: Random) -> None:
+def _add_properties(
+    file: File, layout: Layout, size: float, per_metre: float, random: Random
+) -> None:
     """Materials, sections, tolerances, temperatures, forces, masses and an accuracy."""
     planar = "z" not in layout.dof
     material = str(random.choice(list(MODULI)))
     length = min(
-        float(np.linalg.norm(row["platform"] - row["base"])) if "length" not in row else row["length"]
+        float(np.linalg.norm(row["platform"] - row["base"]))
+        if "length" not in row
+        else row["length"]
         for row in layout.struts
     )
     length = max(length, 0.2 * size)
@@ -534,7 +558,9 @@ def _add_properties(file: File, layout: Layout, size: float, per_metre: float, r
     }
     if random.uniform() < 0.3:
         file["condition"]["gradient"] = {"strut.1": _said(random.normal() * 2.0, "K/m")}
-    force = STRAIN * MODULI[material] * area * (soft if outright else 1.0) * random.uniform(0.0, 1.0)
+    force = (
+        STRAIN * MODULI[material] * area * (soft if outright else 1.0) * random.uniform(0.0, 1.0)
+    )
     names = "xy" if planar else "xyz"
     direction = random.normal(size=len(names))
     direction *= force / np.linalg.norm(direction)
@@ -552,7 +578,7 @@ def _add_properties(file: File, layout: Layout, size: float, per_metre: float, r
 
 def _tolerance(length: float, random: Random) -> Any:
     """Of a strut's length: a part of it, one- or two-sided, or a class."""
-    if random.uniform() < 0.3 and 0.04 < length < 1.0:
+    if random.uniform() < 0.3 and 0.04 < length < 0.25:
         return str(random.choice(["IT5", "IT7", "IT9", "ISO 2768-f", "ISO 2768-m"]))
     half = length * _log(random, 1e-6, 3e-3)
     if random.uniform() < 0.3:

@@ -1,9 +1,9 @@
 """What each code means, what to do about it, and an example that gives it.
 
 Codes of problems have their meaning in `errors.CATALOGUE`; the other codes (oddities, warnings,
-suspicions, reasons of a calibration, why a pose is left out) have it here. All the rest is in the tables beside
-this file, one a topic, from which `truepose explain` and docs/errors.md are made; a test runs every
-example. Nothing heavy is imported: a shell completes codes from here.
+suspicions, reasons of a calibration, why a pose is left out) have it here. All the rest is in the
+tables beside this file, one a topic, from which `truepose explain` and docs/errors.md are made; a
+test runs every example. Nothing heavy is imported: a shell completes codes from here.
 """
 
 from __future__ import annotations

@@ -74,7 +74,9 @@ class MachineAtHome:
     def poses(self) -> Floats:
         """(n_pose, n_commanded) the workspace's; none where the file has none."""
         machine = self.machine
-        return np.empty((0, len(machine.commanded))) if machine.workspace is None else machine.poses()
+        return (
+            np.empty((0, len(machine.commanded))) if machine.workspace is None else machine.poses()
+        )
 
     @cached_property
     def status(self) -> Codes:
@@ -117,7 +119,8 @@ class MachineAtHome:
     def centres(self) -> Floats:
         """(n_strut, 2, 3) base-side and platform-side joint centres, m; NaN of what is unknown."""
         joints, placements, _ = self.placed
-        return self.machine.kernel.joint_centres(joints, placements)[0]
+        centres: Floats = self.machine.kernel.joint_centres(joints, placements)[0]
+        return centres
 
     @cached_property
     def nominal(self) -> dict[str, float]:
@@ -204,7 +207,8 @@ class MachineAtHome:
     def deviations(self) -> tuple[tuple[str, Deviation], ...]:
         """What each acting source does to the parameters at home, by its name.
 
-        None where the machine is out of reach or nothing holds it. A source that lacks something is left out: it is an error wherever it is asked.
+        None where the machine is out of reach or nothing holds it. A source that lacks something
+        is left out: it is an error wherever it is asked.
         """
         if not self.conditioning > 0.0:
             return ()

@@ -37,7 +37,7 @@ def roots(view: MachineAtHome, drive: Drive, *, mode: float, turn: float) -> Flo
 
 
 def within(drive: Drive, coordinates: Floats) -> bool:
-    """Whether all coordinates are inside the drive's travel; those of cranks but for whole turns."""
+    """Whether all coordinates are inside the drive's travel, of cranks but for whole turns."""
     first, last = drive.travel
     if drive.coordinate == "angle":
         middle = 0.5 * (first + last)

@@ -9,7 +9,7 @@ from truepose.plausibility._roots import roots, sided, within
 
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
-    """Sliders and cranks whose coordinate at home is out of travel, but not of the opposite axis."""
+    """Drives whose coordinate at home is out of travel, but not with the opposite axis."""
     if view.is_reached:
         return
     wrong = []
@@ -22,9 +22,9 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
             wrong.append(drive.part)
     if wrong:
         yield (
-            f"{listed(wrong)}: home is out of travel, and inside it were the axis to point the other "
-            "way; usual is a home that all drives reach. Look at the sign of axis, and at the "
-            "travel. If it is meant, give [workspace] another home",
+            f"{listed(wrong)}: home is out of travel, and inside it were the axis to point the "
+            "other way; usual is a home that all drives reach. Look at the sign of axis, and at "
+            "the travel. If it is meant, give [workspace] another home",
             tuple(f"{part}.axis" for part in wrong),
         )
 

@@ -11,13 +11,11 @@ import numpy as np
 from truepose.arrays import Floats
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
-ALIKE = 0.01
+ALIKE = 0.002
 APART = 0.05
 """Of the joint circle's radius: what still fits the pattern, and what does not at all."""
 
-_TURN = np.array(
-    [[-0.5, -math.sqrt(0.75), 0.0], [math.sqrt(0.75), -0.5, 0.0], [0.0, 0.0, 1.0]]
-)
+_TURN = np.array([[-0.5, -math.sqrt(0.75), 0.0], [math.sqrt(0.75), -0.5, 0.0], [0.0, 0.0, 1.0]])
 
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
@@ -77,8 +75,9 @@ def _point(view: MachineAtHome, point: Floats) -> str:
 
 RULE = Rule(
     "broken-symmetry",
-    "one joint centre differs by a sign or the order of its coordinates from where the others put it",
-    "All others of three or six turn into each other by 120° about z to 1 % of their radius, and "
+    "one joint centre differs by a sign or the order of its coordinates from where the others "
+    "put it",
+    "All others of three or six turn into each other by 120° about z to 0.2 % of their radius, and "
     "both neighbours ask for one place, more than 5 % away, which another sign or order of the "
     "same coordinates would give. Layouts with no such symmetry are not looked at, and a "
     "calibrated file is off by far less.",

@@ -20,9 +20,9 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         if apart < SAME * view.size:  # not where one is unknown
             names = view.machine.struts[one].part, view.machine.struts[other].part
             yield (
-                f"{names[0]} and {names[1]} have both joint centres in common; usual is that no two "
-                "struts do, as the second holds nothing that the first does not. Look whether one "
-                "was copied and its points not changed. If it is meant, leave it",
+                f"{names[0]} and {names[1]} have both joint centres in common; usual is that no "
+                "two struts do, as the second holds nothing that the first does not. Look "
+                "whether one was copied and its points not changed. If it is meant, leave it",
                 names,
             )
 

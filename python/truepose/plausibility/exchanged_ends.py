@@ -15,9 +15,7 @@ WIDEST = 1.25
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
     """Radii about the centroids, of the struts whose base joints stand on the frame."""
     struts = view.machine.struts
-    frame = [
-        strut.drive is None or view.telescope(strut) is not None for strut in struts
-    ]
+    frame = [strut.drive is None or view.telescope(strut) is not None for strut in struts]
     points = [
         [view.vector(f"{strut.part}.{end}") for end in ("base", "platform")]
         for strut, kept in zip(struts, frame, strict=True)

@@ -15,11 +15,15 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     """Expansion of struts, drives' scales and bodies."""
     machine = view.machine
     given = {
-        part.part: part.expansion
-        for part in (*machine.struts, *machine.drives, *machine.bodies)
-        if part.expansion is not None
+        **{strut.part: strut.expansion for strut in machine.struts},
+        **{drive.part: drive.expansion for drive in machine.drives},
+        **{body.part: body.expansion for body in machine.bodies},
     }
-    odd = {part: value for part, value in given.items() if not LEAST <= value <= MOST}
+    odd = {
+        part: value
+        for part, value in given.items()
+        if value is not None and not LEAST <= value <= MOST
+    }
     if odd:
         value = max(odd.values(), key=abs)
         yield (

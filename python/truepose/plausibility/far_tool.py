@@ -34,7 +34,8 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
 RULE = Rule(
     "far-tool",
     "the tool point is more than five times the machine's own size away from the platform",
-    "A far pivot multiplies errors of orientation. The camera hexapod of the Rubin Observatory has "
-    "its pivot at 1.3 times its size (machines/hexapod_telescope.toml); m for mm is a factor of 1000.",
+    "A far pivot multiplies errors of orientation. The camera hexapod of the Rubin Observatory "
+    "has its pivot at 1.3 times its size (machines/hexapod_telescope.toml); m for mm is a factor "
+    "of 1000.",
     inspect,
 )

@@ -28,9 +28,9 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         names = [view.machine.parameters[columns[at]] for at in fine]
         yield (
             f"{listed(names)}: a tolerance of ±{half[first] * 1e9:.3g} nm on "
-            f"{view.length(levers[first])}; usual is more than a ten-millionth, finer than which no "
-            "length is measured in air. Look at its unit: a bare number is in the file's length. If "
-            "it is meant, leave it",
+            f"{view.length(levers[first])}; usual is more than a ten-millionth, finer than which "
+            "no length is measured in air. Look at its unit: a bare number is in the file's "
+            "length. If it is meant, leave it",
             tuple(names),
         )
 

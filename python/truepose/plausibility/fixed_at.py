@@ -20,9 +20,10 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         at, away = next(iter(odd.values()))
         yield (
-            f"{listed(odd)}: fixed_at is {view.length(at)}, {view.length(away)} from the nearer end "
-            "of the travel; usual is a bearing within or near the travel. Look at its unit and for "
-            "a slipped decimal point. If it is meant, leave it: the screw grows from there",
+            f"{listed(odd)}: fixed_at is {view.length(at)}, {view.length(away)} from the nearer "
+            "end of the travel; usual is a bearing within or near the travel. Look at its unit "
+            "and for a slipped decimal point. If it is meant, leave it: the screw grows from "
+            "there",
             tuple(f"{part}.fixed_at" for part in odd),
         )
 

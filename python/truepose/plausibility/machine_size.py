@@ -1,4 +1,4 @@
-"""Metres for millimetres, or the reverse: the machine is larger or smaller than any that was built."""
+"""Metres for millimetres, or the reverse: a machine as large or small as none was built."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ THICKEST = 0.5
 
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
-    """Masses of struts, against the thickest bar; of bodies, against a cube of the machine's size."""
+    """Struts against the thickest bar, bodies against a cube of the machine's size."""
     machine = view.machine
     blocks = {
         strut.part: (strut.mass, STEEL * math.pi / 4.0 * THICKEST**2 * length**3)
@@ -37,7 +37,7 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
 RULE = Rule(
     "odd-mass",
     "a strut, platform, tool or carriage is heavier than solid steel in its place",
-    "Steel has 7850 kg/m3. A strut is compared with a bar half as thick as long, a body with a cube "
-    "as large as the whole machine: real ones have less than a hundredth.",
+    "Steel has 7850 kg/m3. A strut is compared with a bar half as thick as long, a body with a "
+    "cube as large as the whole machine: real ones have less than a hundredth.",
     inspect,
 )

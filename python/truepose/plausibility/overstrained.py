@@ -8,8 +8,8 @@ import numpy as np
 
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
-MOST = 0.002
-"""Share of its length by which a strut gives way."""
+MOST = {"m": 0.002, "rad": 0.01}
+"""Share of its length by which a strut gives way; rad by which a crank does."""
 
 LOADED = ("elastic", "loads")
 """Sources that say by how much the machine gives way."""
@@ -21,25 +21,28 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         if name not in LOADED:
             continue
         columns = deviation.parameters.tolist()
-        shares = np.abs(deviation.shift[0]) / np.array([view.lever(c) for c in columns])
-        if shares.max(initial=0.0) <= MOST:
+        most = [view.lever(c) * MOST.get(view.machine.units[c], np.inf) for c in columns]
+        over = np.abs(deviation.shift[0]) / np.array(most)
+        if over.max(initial=0.0) <= 1.0:
             continue
-        worst = int(np.argmax(shares))
+        worst = int(np.argmax(over))
         parameter = view.machine.parameters[columns[worst]]
-        by = view.quantity(float(deviation.shift[0, worst]), columns[worst])
+        by = view.quantity(abs(float(deviation.shift[0, worst])), columns[worst])
         yield (
-            f"under the file's forces {parameter} gives way by {by}, {100 * shares[worst]:.2g} % of "
-            "its strut; usual is less than 0.2 %, at which steel yields. Look at the unit of forces "
-            "(N or kN), and at sections and stiffnesses. If it is meant, leave it, but deflections "
-            "are computed as small ones",
+            f"under the file's forces {parameter} gives way by {by}; usual is less than "
+            f"{view.quantity(most[worst], columns[worst])}: 0.2 % of a strut, at which steel "
+            "yields, or 0.01 rad of a crank. Look at the unit of forces (N or kN), and at "
+            "sections and stiffnesses. If it is meant, leave it, but deflections are computed as "
+            "small ones",
             (parameter,),
         )
 
 
 RULE = Rule(
     "overstrained",
-    "the forces make a strut give way by more than 0.2 % of its length",
+    "the forces make a strut give way by more than 0.2 % of its length, or a crank by 0.01 rad",
     "0.2 % is the strain of the yield strength Rp0.2 itself (ISO 6892-1); structural steel of 235 "
-    "MPa yields at 0.11 %. The elastic law holds below only.",
+    "MPa yields at 0.11 %. The elastic law holds below only. A crank that is held by a belt or a "
+    "gear gives way by more, but by 1 % of a radian deflections are no longer small.",
     inspect,
 )

@@ -23,9 +23,10 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         diameter, length = next(iter(odd.values()))
         yield (
-            f"{listed(odd)}: a section_area like that of a round bar {view.length(diameter)} thick, "
-            f"the strut {view.length(length)} long; usual is a bar from 1/2000 to 1/2 of its "
-            'length. Look at the unit: a bare number is in the square of the file\'s length, "28 '
+            f"{listed(odd)}: a section_area like that of a round bar {view.length(diameter)} "
+            f"thick, the strut {view.length(length)} long; usual is a bar from 1/2000 to 1/2 of "
+            "its length. Look at the unit: a bare number is in the square of the file's length, "
+            '"28 '
             'mm^2" is not. If it is meant, leave it',
             tuple(f"{part}.section_area" for part in odd),
         )

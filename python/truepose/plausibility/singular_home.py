@@ -26,9 +26,9 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
 RULE = Rule(
     "singular-home",
     "conditioning at home is below 0.002",
-    "Conditioning is the least over the largest singular value of the Jacobian, rotations scaled by "
-    "the characteristic length: errors grow up to its inverse, 500 times. Hexapods whose base and "
-    "platform are similar and turned alike are singular everywhere (Merlet, Parallel Robots, 2nd "
-    "ed., ch. 6).",
+    "Conditioning is the least over the largest singular value of the Jacobian, rotations scaled "
+    "by the characteristic length: errors grow up to its inverse, 500 times. Hexapods whose base "
+    "and platform are similar and turned alike are singular everywhere (Merlet, Parallel Robots, "
+    "2nd ed., ch. 6).",
     inspect,
 )

@@ -15,23 +15,24 @@ FACTOR = 5.0
 FAR = 0.2
 """Of the machine's size: a joint centre that is less far from the others is not looked at."""
 
-ALIKE = 2.0
-"""Largest over smallest of the others."""
+ALIKE = 1.01
+APART = 2.0
+"""Largest over smallest of the others: of sizes, and of distances."""
 
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
     """What struts and drives have in common: sizes, and how far apart their points are."""
     for values in _sizes(view):
-        yield from _largest(values)
+        yield from _largest(values, ALIKE)
         yield from _smallest(values)
     for values in _distances(view):
         # One joint may well stand in the middle of the others.
-        yield from _largest(values)
+        yield from _largest(values, APART)
 
 
-def _largest(values: dict[str, float]) -> Iterator[Remark]:
+def _largest(values: dict[str, float], alike: float) -> Iterator[Remark]:
     path, *rest = sorted(values, key=lambda path: -values[path])
-    if len(rest) > 1 and 0.0 < values[rest[0]] <= ALIKE * values[rest[-1]]:
+    if len(rest) > 1 and 0.0 < values[rest[0]] <= alike * values[rest[-1]]:
         factor = values[path] / values[rest[0]]
         if factor > FACTOR:
             yield _remark(path, f"{factor:.3g} times as large as")
@@ -61,9 +62,7 @@ def _sizes(view: MachineAtHome) -> Iterator[dict[str, float]]:
 def _every_size(view: MachineAtHome) -> Iterator[dict[str, float]]:
     machine, struts, drives = view.machine, view.machine.struts, view.machine.drives
     nominal = view.nominal
-    yield {
-        path: nominal[path] for strut in struts if (path := f"{strut.part}.length") in nominal
-    }
+    yield {path: nominal[path] for strut in struts if (path := f"{strut.part}.length") in nominal}
     yield {f"{s.part}.section_area": s.area for s in struts if s.area is not None}
     yield {f"{s.part}.modulus": s.modulus for s in struts if s.modulus is not None}
     yield {f"{s.part}.stiffness": s.stiffness for s in struts if s.stiffness is not None}
@@ -100,7 +99,8 @@ def _distances(view: MachineAtHome) -> Iterator[dict[str, float]]:
 RULE = Rule(
     "slipped-decimal",
     "one length, section, stiffness, mass, travel, tolerance or distance is 5 times off all others",
-    "A slipped decimal point is a factor of ten. At least two others must be within a factor of two "
-    "of each other; sizes that are chosen differently rarely differ by five where all others agree.",
+    "A slipped decimal point is a factor of ten. At least two others must be the same but for 1 "
+    "%, as they are where one was typed and copied; distances of joint centres from the middle "
+    "of their kind within a factor of two. Who chooses sizes one by one has others that differ.",
     inspect,
 )

@@ -45,7 +45,8 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
 
 RULE = Rule(
     "odd-stiffness",
-    "a stiffness like that of a steel bar thinner than 1/5000 of the strut's length or thicker than half",
+    "a stiffness like that of a steel bar thinner than 1/5000 of the strut's length or thicker "
+    "than half",
     "EA/L of a steel bar (210 GPa). A toothed belt of 6 mm, the softest drive in use, has EA of "
     "some 1e4 N and is as stiff as a bar of 1/1000 of half a metre (a thirtieth of N/µm); a 1/5000 "
     "leaves a factor of 25, N/m for N/µm is a million.",

@@ -1,4 +1,4 @@
-"""A telescope that becomes more than three times as long as it was: a forgotten offset."""
+"""A telescope that becomes more than five times as long as it was: a forgotten offset."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
-MOST = 3.0
+MOST = 5.0
 """Longest over shortest length."""
 
 
@@ -20,18 +20,20 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         short, long = next(iter(odd.values()))
         yield (
-            f"{listed(odd)}: the strut goes from {view.length(short)} to {view.length(long)}; usual "
-            "is less than twice as long as at its shortest, and less than three times with two "
-            "stages. Look whether the travel is a stroke: offset is the length at zero. If it is "
-            "meant, as of screws that pass through their joint, leave it",
+            f"{listed(odd)}: the strut goes from {view.length(short)} to {view.length(long)}; "
+            "usual is up to twice as long as at its shortest, and up to five times of four "
+            "stages or a screw that passes through its joint. Look whether the travel is a "
+            "stroke: offset is the length at zero. If it is meant, leave it",
             tuple(f"{part}.travel" for part in odd),
         )
 
 
 RULE = Rule(
     "telescope-stroke",
-    "a telescopic strut's longest length is more than three times its shortest",
-    "A rod that slides out of a tube as long as itself makes it at most twice as long, each further "
-    "stage once more; two stages are the most in use. A stroke without its offset begins at zero.",
+    "a telescopic strut's longest length is more than five times its shortest",
+    "A rod that slides out of a tube as long as itself makes it at most twice as long, each "
+    "further stage once more, and the bodies of a tube of four take what is left of 5. Screws "
+    "that pass through their joint have no such bound, but a part as short needs their own "
+    "length behind it. A stroke without its offset begins near zero.",
     inspect,
 )

@@ -26,9 +26,9 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     kelvin = max(odd.values(), key=lambda value: abs(value - 293.15))
     yield (
         f"{listed(odd)}: a temperature of {view.degrees(kelvin)}; usual is from "
-        f"{view.degrees(COLDEST)}, the coldest air on Earth, to {view.degrees(HOTTEST)}, from which "
-        "on bearings grow for good. Look at the unit of temperatures: 35 °C is 308 K and 95 °F. If "
-        "it is meant, leave it, but expansion is taken as the same at all temperatures",
+        f"{view.degrees(COLDEST)}, the coldest air on Earth, to {view.degrees(HOTTEST)}, from "
+        "which on bearings grow for good. Look at the unit of temperatures: 35 °C is 308 K and "
+        "95 °F. If it is meant, leave it, but expansion is taken as the same at all temperatures",
         ("condition.temperature",),
     )
 

@@ -38,8 +38,9 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
 
 RULE = Rule(
     "wide-band",
-    "clearance, backlash, sensor, actuator or guideway is off by more than 1 % of the strut's length",
-    "Rod ends, the poorest joints in use, have some 0.1 mm of play (ISO 12240-4, group N) on struts "
-    "of 50 mm and more: 0.2 %. mm for µm is a factor of 1000.",
+    "clearance, backlash, sensor, actuator or guideway is off by more than 1 % of the strut's "
+    "length",
+    "Rod ends, the poorest joints in use, have some 0.1 mm of play (ISO 12240-4, group N) on "
+    "struts of 50 mm and more: 0.2 %. mm for µm is a factor of 1000.",
     inspect,
 )

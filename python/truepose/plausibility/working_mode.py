@@ -21,9 +21,10 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
             wrong.append(drive.part)
     if wrong:
         yield (
-            f"{listed(wrong)}: home is out of travel, and inside it in the other working mode; usual "
-            "is a home that all drives reach. Look at working_mode, on which side of the platform "
-            "joint the carriage or the elbow stands. If it is meant, give [workspace] another home",
+            f"{listed(wrong)}: home is out of travel, and inside it in the other working mode; "
+            "usual is a home that all drives reach. Look at working_mode, on which side of the "
+            "platform joint the carriage or the elbow stands. If it is meant, give [workspace] "
+            "another home",
             tuple(f"{part}.working_mode" for part in wrong),
         )
 

@@ -32,8 +32,8 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
 RULE = Rule(
     "workspace-angles",
     "the workspace tilts by more than 120°, or turns by more than one turn",
-    "A platform tilted by 90° has its struts beside it, and passive joints lean by at most some 60° "
-    "to 90° (Merlet, Parallel Robots, 2nd ed., ch. 2.2): 120° is not reached. Two radians are 115°, "
-    "so that degrees read as radians are outside from 3° on.",
+    "A platform tilted by 90° has its struts beside it, and passive joints lean by at most some "
+    "60° to 90° (Merlet, Parallel Robots, 2nd ed., ch. 2.2): 120° is not reached. Two radians "
+    "are 115°, so that degrees read as radians are outside from 3° on.",
     inspect,
 )

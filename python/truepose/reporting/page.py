@@ -77,6 +77,7 @@ def render(study: Study, machine_text: str = "") -> str:
         else calibration.of_page(study.calibration, study.units),
         results=results,
         warnings=tables.warnings(study),
+        oddities=tables.oddities(study.machine),
         inputs=[
             table(study.machine)
             for table in (inputs.machine, inputs.condition, inputs.sources, inputs.deviations)

@@ -321,6 +321,15 @@ def warnings(study: Study) -> Table | None:
     return Table("warnings", "Warnings", ("",), tuple(rows)) if rows else None
 
 
+def oddities(it: Machine) -> Table | None:
+    """What looks odd about the machine; None where nothing does."""
+    from truepose import plausibility
+
+    sentences = [oddity.sentence for oddity in plausibility.oddities(it)]
+    rows = [(f"{text[:1].upper()}{text[1:]}.",) for text in sentences]
+    return Table("oddities", "What looks odd", ("",), tuple(rows)) if rows else None
+
+
 def poses_left_out(study: Study) -> Table | None:
     """Poses that cannot be used and why, the first of them; None where all can be used."""
     count = len(study.left_out)

@@ -58,9 +58,9 @@ class SkipReason:
 class WorkspaceCheck:
     """What became of the poses of a workspace.
 
-    `codes` (n_pose,): kernel status, `status` (n_pose,) the same by name. `worst_conditioning` of the usable poses (smallest
-    over largest scaled singular value: 1 best, 0 singular) and the pose where it is, SI; NaN
-    where no pose is usable.
+    `codes` (n_pose,): kernel status, `status` (n_pose,) the same by name. `worst_conditioning` of
+    the usable poses (smallest over largest scaled singular value: 1 best, 0 singular) and the pose
+    where it is, SI; NaN where no pose is usable.
     """
 
     poses: Floats

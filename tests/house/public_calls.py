@@ -117,6 +117,13 @@ def monte_carlo() -> None:
     expect(xr.Dataset, tp.monte_carlo(small(), POSE, 200))
 
 
+@use("oddities")
+def oddities() -> None:
+    hot = tp.load(MACHINES / "planar_two_slider.toml", ["condition.temperature=308"])
+    assert [oddity.code for oddity in tp.oddities(hot)] == ["odd-temperature"]
+    assert tp.oddities(small()) == ()
+
+
 @use("over_time")
 def over_time() -> None:
     with tempfile.TemporaryDirectory() as folder:

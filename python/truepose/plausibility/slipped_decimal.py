@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 from truepose.sources.tolerance import bands_of
 
@@ -83,6 +84,13 @@ def _every_size(view: MachineAtHome) -> Iterator[dict[str, float]]:
         }
 
 
+def _median(points: Floats) -> Floats:
+    """(3,) of each coordinate of points (n, 3); numpy's own imports numpy.ma."""
+    ranked = np.sort(points, axis=0)
+    middle: Floats = 0.5 * (ranked[(len(points) - 1) // 2] + ranked[len(points) // 2])
+    return middle
+
+
 def _distances(view: MachineAtHome) -> Iterator[dict[str, float]]:
     """Of joint centres and origins from the median of their kind, where that is far."""
     struts, drives = view.machine.struts, view.machine.drives
@@ -91,7 +99,7 @@ def _distances(view: MachineAtHome) -> Iterator[dict[str, float]]:
         points = np.array([point for path in paths if (point := view.vector(path)) is not None])
         if len(points) == len(paths):
             # From the median, so that no rule asks where the frame's origin stands.
-            away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+            away = np.linalg.norm(points - _median(points), axis=1)
             if away.max(initial=0.0) > FAR * view.size:
                 yield dict(zip(paths, away.tolist(), strict=True))
 

@@ -144,11 +144,11 @@ def test_without_an_answer_it_stands_above_the_error(capsys: pytest.CaptureFixtu
     assert [p["code"] for p in json.loads(in_json.out)["problems"]] == ["no-pose-left"]
 
 
-def test_a_machine_without_a_workspace_and_without_sources_is_looked_at() -> None:
+def test_a_machine_of_one_pose_and_without_sources_is_looked_at() -> None:
     file = file_at(MACHINES / "tripod.toml")
-    for table in ("workspace", "tolerance", "condition", "accuracy", "frame"):
+    for table in ("tolerance", "condition", "accuracy", "frame"):
         file.pop(table, None)
-    file["workspace"] = {"home": {"z": 450}}
+    file["workspace"] = {"poses": [[0, 0, 450]]}
     for strut in file["strut"]:
         for key in ("length_tolerance", "stiffness", "material"):
             strut.pop(key)

@@ -66,14 +66,14 @@ def _check(request: Request) -> int:
     from truepose.cli._show import show_answers, show_oddities, show_tables
     from truepose.errors import TrueposeError
     from truepose.files.writing import replacing, written_together
-    from truepose.plausibility import oddities
+    from truepose.plausibility import oddities_where_checked
     from truepose.reporting.accuracy import gains, told
     from truepose.reporting.workspace_check import check_workspace
     from truepose.verdict.answer import AFTER, BEFORE, met
 
     machine = _steps.read_machine(request, [".json", ".csv"])
     check = check_workspace(machine)
-    odd = oddities(machine, check.codes)
+    odd = oddities_where_checked(machine, check.codes)
     try:
         answers, warnings = _answers(request, machine, check)
     except TrueposeError:

@@ -91,14 +91,21 @@ RULES: tuple[Rule, ...] = (
 """Every rule, in the order in which oddities are told: what the others follow from goes first."""
 
 
-def oddities(machine: Machine, status: Codes | None = None) -> tuple[Oddity, ...]:
+def oddities(machine: Machine) -> tuple[Oddity, ...]:
     """What looks odd about a machine, the likeliest cause first; none of a sound one.
 
-    At its home pose, nominal, in the base frame, and over its workspace. `status` (n_pose,): kernel
-    status codes of the workspace's poses, where they are known. Raises nothing of its own.
+    At its home pose, nominal, in the base frame, and over its workspace. Raises nothing of its own.
     """
-    view = MachineAtHome(machine, status)
+    return _looked_at(MachineAtHome(machine))
+
+
+def oddities_where_checked(machine: Machine, status: Codes) -> tuple[Oddity, ...]:
+    """The same where the kernel's status codes (n_pose,) of the workspace's poses are known."""
+    return _looked_at(MachineAtHome(machine, status))
+
+
+def _looked_at(view: MachineAtHome) -> tuple[Oddity, ...]:
     return tuple(oddity for rule in RULES for oddity in rule.oddities(view))
 
 
-__all__ = ["RULES", "Oddity", "Rule", "oddities"]
+__all__ = ["RULES", "Oddity", "Rule", "oddities", "oddities_where_checked"]

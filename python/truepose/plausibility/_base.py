@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 OK = STATUS.index("ok")
 
-MEANT = "If it is meant, leave it: no answer depends on this."
-"""How a sentence ends that has no better advice."""
+READABLE = 1e7
+"""Of the file's unit: longer lengths are said as a power of ten."""
 
 
 @dataclass(frozen=True)
@@ -224,15 +224,19 @@ class MachineAtHome:
         return tuple(done)
 
     def length(self, metres: float) -> str:
-        """A length for people, in the unit of the file."""
-        return self.machine.shown.length.text(metres)
+        """A length for people, in the unit of the file; no more digits than are worth reading."""
+        unit = self.machine.shown.length
+        if abs(metres) * unit.per_si < READABLE:
+            return unit.text(metres)
+        return f"{metres * unit.per_si:.3g} {unit.label}"
 
     def quantity(self, value: float, column: int) -> str:
         """A deviation of a parameter for people."""
         shown = self.machine.shown
         unit = self.machine.units[column]
-        coarse = unit == "m" and abs(value) >= shown.least_dimension
-        return (shown.of(unit) if coarse else shown.small(unit)).text(value)
+        if unit == "m" and abs(value) >= shown.least_dimension:
+            return self.length(value)
+        return shown.small(unit).text(value)
 
     def degrees(self, kelvin: float) -> str:
         """A temperature for people, on the scale of the file."""

@@ -87,7 +87,10 @@ def test_a_band_that_has_no_bound_is_no_yes(
     assert (after["answer"], after["met"], after["bound"]) == ("undecided", False, None)
     assert 0 < after["witness"] < 10_000
     assert after["rests_on"].startswith("no proof within ")
-    first = call(capsys, "check", path, "--set", "accuracy.target=10 m").out.splitlines()[0]
+    shown = call(capsys, "check", path, "--set", "accuracy.target=10 m").out
+    odd, _, answer = shown.partition("\n\n")
+    assert odd.startswith("looks odd[")
+    first = answer.splitlines()[0]
     assert first.startswith("undecided  position before compensation: ")
     assert " µm or more, asked 10 m (10000000 µm), at " in first
     assert "; no proof within " in first
@@ -124,7 +127,9 @@ def test_absurd_tolerances(value: str, tmp_path: Path, capsys: pytest.CaptureFix
         # A band is no error of the file: some machine inside it is the witness of a no.
         assert outcome.code == 1
         lost = "NOT met  position before compensation: a machine that cannot be assembled"
-        assert outcome.out.startswith(lost)
+        odd, _, answer = outcome.out.partition("\n\n")
+        assert odd.startswith("looks odd[wide-tolerance]")
+        assert answer.startswith(lost)
         return
     assert outcome.code == 2
     assert outcome.codes[0] == ("too-large" if value in ("1e60", "1e308") else "not-finite")

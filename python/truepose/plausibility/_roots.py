@@ -45,6 +45,21 @@ def within(drive: Drive, coordinates: Floats) -> bool:
     return bool(coordinates.size and ((coordinates >= first) & (coordinates <= last)).all())
 
 
+def inside_otherwise(view: MachineAtHome, *, mode: float = 1.0, turn: float = 1.0) -> list[str]:
+    """Paths of drives whose coordinate at home is out of travel, and would be inside otherwise.
+
+    With the working mode times `mode`, the axis times `turn`. None where home is reached.
+    """
+    paths = []
+    for drive in () if view.is_reached else filter(sided, view.machine.drives):
+        own = 1.0 if drive.working_mode == "+" else -1.0
+        if within(drive, roots(view, drive, mode=own, turn=1.0)):
+            continue
+        if within(drive, roots(view, drive, mode=mode * own, turn=turn)):
+            paths.append(drive.part)
+    return paths
+
+
 def sided(drive: Drive) -> bool:
     """Whether the drive has a working mode and an axis, and two roots for them."""
     return drive.kind in ("slider", "crank") and drive.working_mode in ("+", "-")

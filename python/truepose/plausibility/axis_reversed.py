@@ -5,21 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
-from truepose.plausibility._roots import roots, sided, within
+from truepose.plausibility._roots import inside_otherwise
 
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
     """Drives whose coordinate at home is out of travel, but not with the opposite axis."""
-    if view.is_reached:
-        return
-    wrong = []
-    for drive in filter(sided, view.machine.drives):
-        mode = 1.0 if drive.working_mode == "+" else -1.0
-        if within(drive, roots(view, drive, mode=mode, turn=1.0)):
-            continue
-        # A carriage turned with its axis stays on the side of the platform that it was on.
-        if within(drive, roots(view, drive, mode=mode, turn=-1.0)):
-            wrong.append(drive.part)
+    wrong = inside_otherwise(view, turn=-1.0)
     if wrong:
         yield (
             f"{listed(wrong)}: home is out of travel, and inside it were the axis to point the "

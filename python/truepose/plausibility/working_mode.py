@@ -5,20 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
-from truepose.plausibility._roots import roots, sided, within
+from truepose.plausibility._roots import inside_otherwise
 
 
 def inspect(view: MachineAtHome) -> Iterator[Remark]:
-    """Sliders and cranks whose coordinate at home is out of travel, but not in the other mode."""
-    if view.is_reached:
-        return
-    wrong = []
-    for drive in filter(sided, view.machine.drives):
-        mode = 1.0 if drive.working_mode == "+" else -1.0
-        if within(drive, roots(view, drive, mode=mode, turn=1.0)):
-            continue
-        if within(drive, roots(view, drive, mode=-mode, turn=1.0)):
-            wrong.append(drive.part)
+    """Drives whose coordinate at home is out of travel, but not in the other mode."""
+    wrong = inside_otherwise(view, mode=-1.0)
     if wrong:
         yield (
             f"{listed(wrong)}: home is out of travel, and inside it in the other working mode; "

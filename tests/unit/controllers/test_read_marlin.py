@@ -181,11 +181,29 @@ def test_what_was_filled_in_is_left_out(tmp_path: Path) -> None:
 )
 def test_heights_of_g33_that_say_too_little(command: str, reason: str, tmp_path: Path) -> None:
     log = (FILES / "g33_dry_run.log").read_text("utf-8").replace("G33 V0", command)
-    whole = (FILES / "m503.txt").read_text("utf-8") + log
-    (tmp_path / "all.log").write_text(whole, "utf-8")
-    read = tp.import_machine(tmp_path / "all.log")
+    (tmp_path / "g33.log").write_text(log, "utf-8")
+    (tmp_path / "m503.txt").write_text((FILES / "m503.txt").read_text("utf-8"), "utf-8")
+    read = tp.import_machine(tmp_path / "m503.txt", settings={"logs": "g33.log"})
     assert any(reason in lost for lost in read.lost)
     assert read.measurements is None
+
+
+def test_numbers_that_change_within_a_session(tmp_path: Path) -> None:
+    dump = (FILES / "m503.txt").read_text("utf-8")
+    probed = (FILES / "g30.log").read_text("utf-8")
+    after = dump.replace("R106.2000", "R106.3000")
+    told = refusal(tmp_path, dump + probed + "Send: G33\nRecv: G33 Auto Calibrate\n")
+    assert "G33 changed the numbers" in told
+    (tmp_path / "all.log").write_text(dump + probed + "Send: G33\n" + after + probed, "utf-8")
+    read = tp.import_machine(tmp_path / "all.log")
+    assert read.holds["M665 R"] == "106.3000"
+    assert read.measurements is not None
+    assert read.measurements.n_row == 7  # those of the numbers that the machine file has
+    assert any("7 heights from before line" in lost for lost in read.lost)
+    (tmp_path / "all.log").write_text(dump + probed + dump + probed, "utf-8")
+    unchanged = tp.import_machine(tmp_path / "all.log").measurements
+    assert unchanged is not None
+    assert unchanged.n_row == 14
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ Sources: https://marlinfw.org/docs/gcode/M665.html, M666.html, M851.html, M503.h
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from decimal import Decimal
 
 from truepose.controllers._commands import FirmwareCommand, commands
@@ -59,24 +60,36 @@ PROBES = (
 """Any of these makes a bed probe, without which its offset is not used."""
 
 
-def of_commands(text: str, file: str) -> tuple[dict[str, Held], list[Problem], Decimal]:
-    """The numbers by their words, problems, and mm of a unit; of a word that stands twice the last.
+@dataclass
+class Session:
+    """What commands say: the numbers by their words, problems, mm of a unit.
 
-    A word of M665 counts until another M665 has it.
+    A word counts until it stands again. `changed`: the line of the last one that said another
+    geometry than before; what was probed above it was probed with another.
     """
-    held: dict[str, Held] = {}
-    problems: list[Problem] = []
-    scale = Decimal(1)
+
+    held: dict[str, Held] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    scale: Decimal = Decimal(1)
+    changed: int = 0
+
+
+def of_commands(text: str, file: str) -> Session:
+    """The numbers of commands, printed or sent."""
+    session = Session()
     for command in commands(text):
         if command.code in ("G20", "G21"):
-            scale = INCH if command.code == "G20" else Decimal(1)
+            session.scale = INCH if command.code == "G20" else Decimal(1)
         elif command.code in WORDS:
-            for found in _words(command, file, scale):
-                if isinstance(found, Problem):
-                    problems.append(found)
-                else:
-                    held[found.name] = found
-    return held, problems, scale
+            for word in _words(command, file, session.scale):
+                if isinstance(word, Problem):
+                    session.problems.append(word)
+                    continue
+                before = session.held.get(word.name)
+                if before is not None and before.value != word.value and word.name not in BARE:
+                    session.changed = word.line
+                session.held[word.name] = word
+    return session
 
 
 def _words(command: FirmwareCommand, file: str, scale: Decimal) -> Iterator[Held | Problem]:
@@ -168,4 +181,4 @@ def _computed(
     return []
 
 
-__all__ = ["INCH", "of_commands", "of_definitions"]
+__all__ = ["INCH", "Session", "of_commands", "of_definitions"]

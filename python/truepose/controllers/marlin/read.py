@@ -33,8 +33,9 @@ from truepose.controllers._reader import (
 from truepose.controllers._towers import Held, Three, Towers, bridged, require
 from truepose.controllers.marlin._definitions import Definitions, definitions
 from truepose.controllers.marlin._logs import Bounds, logged, mesh
-from truepose.controllers.marlin._numbers import INCH, of_commands, of_definitions
+from truepose.controllers.marlin._numbers import INCH, Session, of_commands, of_definitions
 from truepose.errors import Fault, MachineFileError, Problem
+from truepose.files.wording import counted
 
 ANGLES = (210, 330, 90)
 NEEDED = {"M665 L": "length of the diagonal rods", "M665 R": "delta radius"}
@@ -89,13 +90,15 @@ class MarlinReader:
     def read(cls, file: ControllerFile, settings: Mapping[str, float | str]) -> ControllerReading:
         """The delta. Raises `MachineFileError` with everything that is wrong."""
         known: Definitions | None = None
-        scale = Decimal(1)
+        session = Session()
         if _DEFINES.search(file.text):
             known = definitions(file.text)
             _require_delta(file, known)
-            held, problems = of_definitions(known, str(file.path))
+            session.held, session.problems = of_definitions(known, str(file.path))
         else:
-            held, problems, scale = of_commands(file.text, str(file.path))
+            session = of_commands(file.text, str(file.path))
+            session.problems += _calibrated_since(file, session.held)
+        held, problems = session.held, session.problems
         missing = list(require(held, NEEDED))
         if missing and not problems:
             problems += [file.problem(fault) for fault in _of_missing(missing, known)]
@@ -103,7 +106,7 @@ class MarlinReader:
         refuse(_impossible(held))
         rods = rods_of(settings)
         towers = _towers(held, settings)
-        points, unused = _points(file, settings, held, scale)
+        points, unused = _points(file, settings, session)
         delta = towers.file("Linear delta", f"Marlin's {file.path.name}.", rods)
         return ControllerReading(
             delta.text(),
@@ -111,7 +114,7 @@ class MarlinReader:
             {name: number.text for name, number in held.items()},
             (
                 *delta.assumptions(),
-                *_assumptions(held, known, scale),
+                *_assumptions(held, known, session.scale),
                 *((ASSUMED_PROBE,) if points else ()),
             ),
             unused,
@@ -213,12 +216,10 @@ def _mm(value: float | str) -> Decimal:
 
 
 def _points(
-    file: ControllerFile,
-    settings: Mapping[str, float | str],
-    held: Mapping[str, Held],
-    scale: Decimal,
+    file: ControllerFile, settings: Mapping[str, float | str], session: Session
 ) -> tuple[tuple[Probed, ...], tuple[str, ...]]:
     """The heights in the file and in its logs, and in sentences what of them cannot be used."""
+    held, scale = session.held, session.scale
     radius = None
     if "g33.radius" in settings:
         radius = _mm(settings["g33.radius"])
@@ -242,12 +243,42 @@ def _points(
         bounds = (values[0], values[1], values[2], values[3])
     found = ProbedPoints()
     if not _DEFINES.search(file.text):
-        found += logged(file.text, str(file.path), scale, radius, bounds)
+        found += _with_these_numbers(
+            logged(file.text, str(file.path), scale, radius, bounds), session.changed
+        )
     for other in logs_beside(file, str(settings.get("logs", ""))):
         found += logged(other.text, str(other.path), scale, radius, bounds)
     if not found.points:
         found += mesh(file.text, str(file.path), scale, bounds)
     return found.points, found.unused
+
+
+def _with_these_numbers(points: ProbedPoints, changed: int) -> ProbedPoints:
+    """What was probed after the line in which the numbers changed for the last time."""
+    kept = tuple(point for point in points.points if point.line > changed)
+    out = len(points.points) - len(kept)
+    if not out:
+        return points
+    why = f"{counted(out, 'height')} from before line {changed}, where the numbers changed"
+    return ProbedPoints(kept, (*points.unused, why))
+
+
+def _calibrated_since(file: ControllerFile, held: Mapping[str, Held]) -> Iterator[Problem]:
+    """A G33 that was sent after the numbers were printed: the controller holds others now."""
+    for asked in commands(file.text):
+        printed = asked.echoed or "A" in asked.words  # "G33 Auto Calibrate"
+        if asked.code != "G33" or printed or asked.words.get("V") == "0":
+            continue
+        radius = held.get("M665 R")
+        if radius is not None and asked.line > radius.line:
+            fault = Fault(
+                "import-value",
+                "G33 changed the numbers after they were printed",
+                "no M665 below it",
+                "what M503 prints after it",
+                "send M503 once more; G33 V0 changes nothing",
+            )
+            yield file.problem(fault, asked.line)
 
 
 def _assumptions(

@@ -9,11 +9,14 @@ page halcmd(1).
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 _SECTION = re.compile(r"\[\s*+([^\]\s]++)\s*+\]")
 _OF_INI = re.compile(r"\[([A-Za-z0-9_]++)\](?:\(([A-Za-z0-9_]++)\)|([A-Za-z0-9_]++))")
+
+
+INCLUDED = "#INCLUDE"
 
 
 @dataclass(frozen=True)
@@ -45,11 +48,17 @@ class HalText:
 
 
 def ini_entries(text: str, file: str) -> list[HalEntry]:
-    """The entries of an INI; a line that is none is left out, as LinuxCNC does."""
+    """The entries of an INI; a line that is none is left out, as LinuxCNC does.
+
+    `#INCLUDE file` is an entry of the key INCLUDED.
+    """
     entries = []
     section = ""
     for line, number in _whole_lines(text):
         said = line.strip()
+        if said.startswith("#INCLUDE"):
+            name = said.removeprefix("#INCLUDE").strip()
+            entries.append(HalEntry(section, INCLUDED, name, file, number))
         if not said or said[0] in "#;":
             continue
         if match := _SECTION.match(said):
@@ -69,14 +78,25 @@ def value_of(entries: Sequence[HalEntry], section: str, key: str) -> HalEntry | 
     return None
 
 
-def hal_text(text: str, file: str, ini: Sequence[HalEntry] = ()) -> HalText:
-    """What a HAL file says, with the values of an INI where it asks for them."""
+def values_of(entries: Iterable[HalEntry]) -> dict[str, str]:
+    """What HAL reads for `[SECTION]KEY`: of each the first."""
+    known: dict[str, str] = {}
+    for entry in entries:
+        known.setdefault(str(entry), entry.text)
+    return known
+
+
+_NOTHING: Mapping[str, str] = {}
+
+
+def hal_text(text: str, file: str, known: Mapping[str, str] = _NOTHING) -> HalText:
+    """What a HAL file says; `known`: the INI's values, by `[SECTION]KEY`."""
     pins: list[HalEntry] = []
     nets: list[HalEntry] = []
     files: list[HalEntry] = []
     modules: list[HalEntry] = []
     for line, number in _whole_lines(text):
-        words = _with_ini(line.split("#")[0], ini).split()
+        words = _with_ini(line.split("#")[0], known).split()
         if len(words) < 2:
             continue
         if words[0] == "setp" and len(words) > 2:
@@ -93,12 +113,11 @@ def hal_text(text: str, file: str, ini: Sequence[HalEntry] = ()) -> HalText:
     return HalText(tuple(pins), tuple(nets), tuple(files), tuple(modules))
 
 
-def _with_ini(line: str, ini: Sequence[HalEntry]) -> str:
+def _with_ini(line: str, known: Mapping[str, str]) -> str:
     """A line with `[SECTION]KEY` replaced by the INI's value; what it does not have stays."""
 
     def value(match: re.Match[str]) -> str:
-        entry = value_of(ini, match[1], match[2] or match[3])
-        return match[0] if entry is None else entry.text
+        return known.get(f"[{match[1]}]{match[2] or match[3]}", match[0])
 
     return _OF_INI.sub(value, line)
 
@@ -118,4 +137,4 @@ def _whole_lines(text: str) -> Iterator[tuple[str, int]]:
         yield begun, first
 
 
-__all__ = ["HalEntry", "HalText", "hal_text", "ini_entries", "value_of"]
+__all__ = ["INCLUDED", "HalEntry", "HalText", "hal_text", "ini_entries", "value_of", "values_of"]

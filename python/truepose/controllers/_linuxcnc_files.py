@@ -8,11 +8,19 @@ name and the other ending. Of a pin that is set twice the last counts.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
 
 from truepose.controllers._decimals import decimal_of
-from truepose.controllers._hal_text import HalEntry, HalText, hal_text, ini_entries, value_of
+from truepose.controllers._hal_text import (
+    INCLUDED,
+    HalEntry,
+    HalText,
+    hal_text,
+    ini_entries,
+    value_of,
+    values_of,
+)
 from truepose.errors import Problem
 
 Beside = Callable[[str], tuple[str, str] | None]
@@ -37,7 +45,7 @@ class Configuration:
 
     `pins`: name -> where it is set. `driven`: pins that a signal drives, not a value. `left_out`:
     files that are named and were not read. `kinematics`: the module's name, None where neither
-    file says.
+    file says. `known`: the INI's values as HAL reads them.
     """
 
     ini: list[HalEntry]
@@ -46,6 +54,7 @@ class Configuration:
     left_out: list[str]
     files: list[str]
     kinematics: HalEntry | None
+    known: dict[str, str] = field(default_factory=dict)
 
     def number(self, section: str, key: str, problems: list[Problem]) -> Decimal | None:
         """A number of the INI, None without one; one that cannot be read is a problem."""
@@ -82,17 +91,32 @@ def configuration(text: str, file: str, stem: str, beside: Beside) -> Configurat
     """What a file and those that go with it say. `stem`: its name without the ending."""
     config = Configuration([], {}, {}, [], [file], None)
     if is_ini(text):
-        config.ini = ini_entries(text, file)
+        _take_ini(config, text, file, beside, 0)
         _hal_of_ini(config, stem, beside)
     else:
         other = beside(f"{stem}.ini")
         if other is not None and is_ini(other[1]):
             config.files.append(other[0])
-            config.ini = ini_entries(other[1], other[0])
-        _take(config, hal_text(text, file, config.ini), beside, 0)
+            _take_ini(config, other[1], other[0], beside, 0)
+        _take(config, hal_text(text, file, config.known), beside, 0)
     named = value_of(config.ini, "KINS", "KINEMATICS")
     config.kinematics = named or config.kinematics
     return config
+
+
+def _take_ini(config: Configuration, text: str, file: str, beside: Beside, depth: int) -> None:
+    """The entries of an INI and of those that it includes."""
+    for entry in ini_entries(text, file):
+        if entry.key != INCLUDED:
+            config.ini.append(entry)
+            continue
+        other = beside(entry.text) if depth < DEEPEST else None
+        if other is None:
+            config.left_out.append(entry.text)
+        elif other[0] not in config.files:
+            config.files.append(other[0])
+            _take_ini(config, other[1], other[0], beside, depth + 1)
+    config.known = values_of(config.ini)
 
 
 def _hal_of_ini(config: Configuration, stem: str, beside: Beside) -> None:
@@ -101,7 +125,7 @@ def _hal_of_ini(config: Configuration, stem: str, beside: Beside) -> None:
         if entry.section != "HAL":
             continue
         if entry.key == "HALCMD":
-            _take(config, hal_text(entry.text, entry.file, config.ini), beside, 0, entry.line)
+            _take(config, hal_text(entry.text, entry.file, config.known), beside, 0, entry.line)
         elif entry.key == "HALFILE":
             named = True
             _take_file(config, entry.text.split()[:1], beside, 0)
@@ -116,7 +140,7 @@ def _take_file(config: Configuration, names: Iterable[str], beside: Beside, dept
             config.left_out.append(name)
         elif other[0] not in config.files:
             config.files.append(other[0])
-            _take(config, hal_text(other[1], other[0], config.ini), beside, depth)
+            _take(config, hal_text(other[1], other[0], config.known), beside, depth)
 
 
 def _take(

@@ -176,6 +176,20 @@ def test_files_that_are_not_beside_it_are_told(tmp_path: Path) -> None:
     assert "../other.hal cannot be read here" in refusal(path)
 
 
+def test_an_ini_includes_and_a_hal_file_sources(tmp_path: Path) -> None:
+    head, _, joints = INI.partition("[JOINT_0]")
+    path = folder_of(tmp_path, ini=f"{head}#INCLUDE joints.inc\n")
+    (tmp_path / "joints.inc").write_text(f"[JOINT_0]{joints}", "utf-8")
+    pins = [line for line in HAL.splitlines() if "genhexkins.platform" in line]
+    (tmp_path / "platform.hal").write_text("\n".join([*pins, ""]), "utf-8")
+    rest = "\n".join(line for line in HAL.splitlines() if line not in pins)
+    (tmp_path / "hexapod.hal").write_text(f"{rest}\nsource platform.hal\n", "utf-8")
+    machine = tp.import_machine(path).machine
+    assert machine.drives[0].travel == pytest.approx((0.43, 0.7))
+    poses, joints_found = of_poses(TRUTH["poses"])
+    assert np.abs(machine.inverse(poses) - joints_found).max() < 1e-12
+
+
 def test_units_and_limits_that_are_none(tmp_path: Path) -> None:
     path = folder_of(tmp_path, ini=INI.replace("LINEAR_UNITS = mm", "LINEAR_UNITS = cubit"))
     assert "hexapod.ini:27:" in refusal(path)

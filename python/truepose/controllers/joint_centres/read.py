@@ -12,7 +12,6 @@ of all data files (docs/data_files.md).
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping
 from decimal import Decimal
@@ -36,6 +35,9 @@ COLUMNS = (
 
 MM = 1000.0
 
+LONGEST_HEADER = 1000
+"""Characters of a line that may be such a header."""
+
 
 class JointCentresReader:
     """A CSV file of joint centres."""
@@ -51,7 +53,7 @@ class JointCentresReader:
         """Whether the first line that is no comment names x, y, z and role."""
         for line in io.StringIO(text):
             if line.strip() and not line.lstrip().startswith("#"):
-                cells = next(csv.reader([line]), [])
+                cells = line[:LONGEST_HEADER].replace('"', "").split(",")
                 names = {cell.split("(")[0].split("[")[0].strip() for cell in cells}
                 return names >= {"x", "y", "z", "role"}
         return False

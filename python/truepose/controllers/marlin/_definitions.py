@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal, DivisionByZero, InvalidOperation, Overflow
+from itertools import islice
 from typing import NamedTuple
 
 DEEPEST = 40
@@ -18,6 +19,9 @@ DEEPEST = 40
 
 LONGEST = 2000
 """Characters of a value that is computed."""
+
+MOST_LISTED = 8
+"""Of a list in braces: one for each axis."""
 
 _DEFINED = "defined"
 
@@ -69,11 +73,11 @@ class Definitions:
         return _Expression(text, self.of).whole_text().value
 
     def numbers(self, text: str) -> list[Decimal]:
-        """The constants of `{ 1, 2, 3 }`. Raises `NotComputedError`."""
+        """The first constants of `{ 1, 2, 3 }`. Raises `NotComputedError`."""
         inside = text.strip()
         if not (inside.startswith("{") and inside.endswith("}")):
             raise NotComputedError("not a list in braces")
-        return [self.number(part) for part in _parts(inside[1:-1])]
+        return [self.number(part) for part in islice(_parts(inside[1:-1]), MOST_LISTED)]
 
 
 def definitions(text: str) -> Definitions:

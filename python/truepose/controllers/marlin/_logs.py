@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from decimal import Decimal
 
 from truepose.controllers._commands import FirmwareCommand, Line, command, lines
@@ -30,6 +30,9 @@ _AT = re.compile(r"\b(c|x|y|z|yz|zx|xy)\s*+:\s*+([+-]?\d++\.\d++)")
 GRID = "Bilinear Leveling Grid"
 ANGLES = {"x": 210, "y": 330, "z": 90, "yz": 30, "zx": 150, "xy": 270}
 """Where G33 probes, degrees about z."""
+
+HEADING = 3
+"""Lines of a grid's heading at most, before its rows."""
 
 MOST = 200
 """Points along a side of a mesh."""
@@ -59,7 +62,7 @@ def logged(
     alone = True  # the grid's points were not printed one by one
     for at, line in enumerate(every):
         if line.text.lower().startswith("g33 auto"):
-            kept, why = _circle(every[at + 1 :], asked, file, scale, radius)
+            kept, why = _circle(_below(every, at), asked, file, scale, radius)
             points += kept
             unused += why
         elif _SAYS.match(line.text) or (line.echoed and line.text.startswith("G29 W")):
@@ -70,7 +73,7 @@ def logged(
             alone = False
             points += _points([(match[1], match[2], match[3], line)], file, scale)
         elif line.text.startswith(GRID):
-            rows = list(_grid(every[at + 1 :]))
+            rows = list(_grid(_below(every, at)))
             if alone:
                 kept, why = _placed(rows, asked, file, scale, bounds)
                 points += kept
@@ -88,15 +91,20 @@ def _points(
             yield Probed(given[0], given[1], given[2], file, line.number)
 
 
-def _grid(below: Sequence[Line]) -> Iterator[tuple[list[str], Line]]:
+def _below(every: Sequence[Line], at: int) -> Iterator[Line]:
+    """The lines after one, without a copy of them for each."""
+    return (every[number] for number in range(at + 1, len(every)))
+
+
+def _grid(below: Iterable[Line]) -> Iterator[tuple[list[str], Line]]:
     """The rows of heights below a grid's heading; the first is of the smallest y."""
     begun = False
-    for line in below:
+    for number, line in enumerate(below):
         match = _ROW.fullmatch(line.text)
         if match is not None:
             begun = True
             yield match[2].split(), line
-        elif begun or command(line) is not None:
+        elif begun or number == HEADING:
             return
 
 
@@ -185,7 +193,7 @@ def _bounds(asked: FirmwareCommand | None) -> Bounds | None:
 
 
 def _circle(
-    below: Sequence[Line],
+    below: Iterable[Line],
     asked: FirmwareCommand | None,
     file: str,
     scale: Decimal,

@@ -230,7 +230,7 @@ def _lost(held: Mapping[str, Held], said: RepRapNumbers) -> Iterator[str]:
     if a or b:
         yield (
             f"the bed's tilt, M666 A{a} B{b}: z of this machine is that of the guideways, so that "
-            f"a command x y z of the firmware is x, y, z + ({a} x + {b} y) / 100 here; "
+            f"a command x y z of the firmware is x, y, z + ({a} x {b:+} y) / 100 here; "
             "measurements are written so, programs must be"
         )
     for name in said.missing:

@@ -32,4 +32,4 @@ def numbers_of(text: str) -> list[Decimal]:
     return known if len(known) == len(values) else []
 
 
-__all__ = ["decimal_of", "numbers_of", "plain"]
+__all__ = ["LARGEST", "decimal_of", "numbers_of", "plain"]

@@ -286,8 +286,10 @@ def _listed(value: float | Sequence[float]) -> str:
 
 
 __all__ = [
+    "EFFECTOR",
     "LIMBS",
     "SETTINGS",
+    "SPACING",
     "WIDE_LENGTH",
     "DeltaFile",
     "LinearDeltaFile",

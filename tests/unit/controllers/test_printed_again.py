@@ -63,8 +63,16 @@ def options_of(read: Import) -> dict[str, str]:
     return {"switches": ", ".join(f"{value} {unit}" for value in held)}
 
 
-@pytest.mark.parametrize("adapter", ENDINGS)
-def test_what_is_printed_comes_back(adapter: str, tmp_path: Path) -> None:
+RODS = {"family.effector_radius": "30", "family.spacing": "50"}
+"""What makes two rods of one."""
+
+
+@pytest.mark.parametrize(
+    ("adapter", "rods"),
+    [*((adapter, {}) for adapter in ENDINGS)]
+    + [(adapter, RODS) for adapter in ENDINGS if adapter != "linuxcnc-genhexkins"],
+)
+def test_what_is_printed_comes_back(adapter: str, rods: dict[str, str], tmp_path: Path) -> None:
     machines = 0
     for name in NAMES:
         folder, again = tmp_path / name, tmp_path / f"{name}_again"
@@ -74,7 +82,7 @@ def test_what_is_printed_comes_back(adapter: str, tmp_path: Path) -> None:
         if not files:
             continue
         machines += 1
-        read = tp.import_machine(files[0])
+        read = tp.import_machine(files[0], settings=rods)
         assert read.kind == adapter
         first = written(read.machine, adapter, again, ENDINGS[adapter][0], options_of(read))
         for ending, before in zip(ENDINGS[adapter], files, strict=True):

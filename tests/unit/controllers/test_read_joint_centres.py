@@ -73,6 +73,7 @@ def _tool(point: np.ndarray) -> str:
         (table(BASE, PLATFORM, "leg 1, 1, 2, 3, base"), "twice"),
         (table(BASE, PLATFORM, _tool(TOOL), "leg 7, 1, 2, 3, base"), "one end"),
         (table(BASE, PLATFORM).replace("x (mm)", "x"), "unit"),
+        (table(BASE * 1e30, PLATFORM), "too-large"),
         (table(BASE, PLATFORM).replace("leg 3", 'leg" 3'), "name"),
     ],
 )

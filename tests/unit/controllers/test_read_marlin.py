@@ -55,6 +55,29 @@ def test_m503_is_the_controllers_machine_at_1e5_positions() -> None:
     np.testing.assert_allclose(centres / MM, np.array(held["rail_foot"])[:, :2], atol=1e-9)
 
 
+def test_rods_that_are_known_are_a_family_with_the_same_joints() -> None:
+    said = {"family.effector_radius": "33.3", "family.spacing": "45"}
+    pairs = tp.import_machine(FILES / "m503.txt", settings=said)
+    assert 'kind = "linear_delta"' in pairs.text
+    assert len(pairs.machine.struts) == 6
+    single = tp.import_machine(FILES / "m503.txt").machine
+    positions = tower_heights.positions(90.0, 190.0, 1000, 5)
+    away = joints(pairs.machine, positions) - joints(single, positions)
+    assert np.abs(away).max() < 1e-9
+
+
+def test_an_effector_that_configuration_h_knows(tmp_path: Path) -> None:
+    text = (FILES / "Configuration.h").read_text("utf-8")
+    text += "#define DELTA_EFFECTOR_OFFSET 33.3\n"
+    (tmp_path / "Configuration.h").write_text(text, "utf-8")
+    path = tmp_path / "Configuration.h"
+    pairs = tp.import_machine(path, settings={"family.spacing": "45"})
+    assert "effector_radius = 33.3\n" in pairs.text
+    other = {"family.spacing": "45", "family.effector_radius": "30"}
+    assert "effector_radius = 30.0\n" in tp.import_machine(path, settings=other).text
+    assert len(tp.import_machine(path).machine.struts) == 3
+
+
 def test_configuration_h_holds_the_same_machine() -> None:
     dumped = tp.import_machine(FILES / "m503.txt").machine
     defined = tp.import_machine(FILES / "Configuration.h").machine

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from decimal import Decimal
 from typing import ClassVar
 
+from truepose.controllers._decimals import LARGEST
 from truepose.controllers._hexapod_text import STRUTS, Hexapod, Point, hexapod_text
 from truepose.controllers._reader import Assumption, ControllerFile, ControllerReading, Setting
 from truepose.errors import Fault, MachineFileError, Problem
@@ -105,9 +106,13 @@ def _points(
     for row in range(table.n_row):
         role, name = table.texts["role"][row], table.texts["name"][row]
         x, y, z = (_mm(float(table.numbers[axis][row])) for axis in "xyz")
+        large = max(abs(x), abs(y), abs(z)) > LARGEST
         twice = tool is not None if role == "tool" else role in points.get(name, {})
         fault = None
-        if twice:
+        if large:
+            shown = f"{max(x, y, z, key=abs):.6g} mm"
+            fault = Fault("too-large", "a point of no place that a machine has", shown)
+        elif twice:
             fault = Fault(
                 "duplicate-name", "a point that stands twice", f"{name}, {role}", "one row"
             )

@@ -15,7 +15,7 @@ from typing import ClassVar
 
 from truepose.controllers._commands import commands, only_reprap
 from truepose.controllers._decimals import numbers_of
-from truepose.controllers._delta_file import SETTINGS, rods_of
+from truepose.controllers._delta_file import EFFECTOR, SETTINGS, SPACING, rods_of
 from truepose.controllers._probed import (
     ASSUMED_PROBE,
     Probed,
@@ -104,7 +104,7 @@ class MarlinReader:
             problems += [file.problem(fault) for fault in _of_missing(missing, known)]
         refuse(problems)
         refuse(_impossible(held))
-        rods = rods_of(settings)
+        rods = rods_of(_with_effector(held, settings))
         towers = _towers(held, settings)
         points, unused = _points(file, settings, session)
         delta = towers.file("Linear delta", f"Marlin's {file.path.name}.", rods)
@@ -213,6 +213,16 @@ def _towers(held: Mapping[str, Held], settings: Mapping[str, float | str]) -> To
 def _mm(value: float | str) -> Decimal:
     """A setting's length, m, in mm."""
     return Decimal(f"{float(value) * 1000.0:.12g}")
+
+
+def _with_effector(
+    held: Mapping[str, Held], settings: Mapping[str, float | str]
+) -> Mapping[str, float | str]:
+    """The settings, and the effector's radius where Configuration.h has it and nobody else."""
+    offset = held.get("DELTA_EFFECTOR_OFFSET")
+    if offset is None or SPACING not in settings or EFFECTOR in settings:
+        return settings
+    return {**settings, EFFECTOR: float(offset.value) / 1000.0}
 
 
 def _points(

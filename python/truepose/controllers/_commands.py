@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 _PREFIX = re.compile(
     r"\s*+(?:(?P<echo>echo\s*+:)|(?:recv|send|sending|sent|read|write|tx|rx)\s*+:|[<>]{1,3}+"
-    r"|\[[^\]\n]{0,40}+\]|\d{1,2}:\d\d:\d\d[\d.,:]*+(?:\s*+[ap]m)?)\s*+",
+    r"|\[[^\]\n]{0,40}+\]|#++(?=\s*+(?:recv|sent|send)\b)"
+    r"|\d{1,2}:\d\d:\d\d[\d.,:]*+(?:\s*+[ap]m)?(?:\s++:)?+)\s*+",
     re.IGNORECASE,
 )
 _CODE_AND_WORDS = re.compile(r"(?:N\d++\s*+)?([GM])\s*+(\d++(?:\.\d++)?)", re.IGNORECASE)

@@ -159,6 +159,30 @@ def test_names_of_configuration_h(
     np.testing.assert_allclose(np.array(lengths) / MM, rods, atol=1e-9)
 
 
+def test_a_condition_that_is_not_understood_is_told_where_it_matters(tmp_path: Path) -> None:
+    body = (
+        "#define DELTA\n#if UNKNOWN_MACRO(3)\n#define OTHER 1\n#endif\n#define DELTA_RADIUS 124\n"
+        "#define PRINTABLE_RADIUS 90\n#define DELTA_HEIGHT 250\n"
+    )
+    rod = "#define DELTA_DIAGONAL_ROD 250\n"
+    path = tmp_path / "Configuration.h"
+    path.write_text(body + rod, "utf-8")
+    clear = tp.import_machine(path)
+    assert not any("not understood" in assumed.sentence for assumed in clear.assumptions)
+    assert np.hypot(*clear.machine.poses()[:, :2].T).max() / MM == pytest.approx(90.0)
+    path.write_text(f"{body}#if UNKNOWN_MACRO(3)\n#ifndef X\n{rod}#endif\n#endif\n", "utf-8")
+    told = [assumed.sentence for assumed in tp.import_machine(path).assumptions]
+    assert any("DELTA_DIAGONAL_ROD, line 8" in sentence for sentence in told)
+
+
+@pytest.mark.parametrize(
+    "before", ["# RECV: echo:  ", "17:19:24.482 : echo:  ", "[12:00:01] Recv: echo:", "N12 ", "< "]
+)
+def test_what_hosts_write_before_a_line(before: str, tmp_path: Path) -> None:
+    machine = imported(tmp_path, f"{before}M665 L215.0 R106.2 H232.15 A0.05 B-0.08 C0.0\n")
+    assert machine.nominal[machine.parameters.index("strut.a.length")] == pytest.approx(0.21505)
+
+
 def test_logs_are_measurements() -> None:
     read = tp.import_machine(FILES / "m503.txt", settings={"logs": "g30.log"})
     assert read.measurements is not None

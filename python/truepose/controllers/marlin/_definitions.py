@@ -50,18 +50,21 @@ class Constant(NamedTuple):
 
 @dataclass(frozen=True)
 class Definition:
-    """What a name stands for, as written, and the line of its `#define`."""
+    """What a name stands for, as written, and the line of its `#define`.
+
+    `doubt`: the line of a condition about it that is not understood, None without one.
+    """
 
     text: str
     line: int
+    doubt: int | None = None
 
 
 @dataclass
 class Definitions:
-    """Names as they stand at the end of a file; `doubtful`: lines of unclear conditions."""
+    """Names as they stand at the end of a file."""
 
     of: dict[str, Definition] = field(default_factory=dict)
-    doubtful: list[int] = field(default_factory=list)
 
     def enabled(self, name: str) -> bool:
         """Marlin's ENABLED: defined, and as nothing, 1 or true."""
@@ -91,18 +94,19 @@ def definitions(text: str) -> Definitions:
         word, rest = match[1], match[2].strip()
         if word in ("if", "ifdef", "ifndef"):
             outer = not branches or branches[-1].active
-            branches.append(_Branch(outer))
-            branches[-1].turn(_holds(word, rest, known, number) if outer else False)
+            branches.append(_Branch(outer, doubt=branches[-1].doubt if branches else None))
+            branches[-1].turn(_holds(word, rest, known) if outer else False, number)
         elif word == "elif" and branches:
             now = branches[-1]
-            now.turn(_holds("if", rest, known, number) if now.open else False)
+            now.turn(_holds("if", rest, known) if now.open else False, number)
         elif word == "else" and branches:
-            branches[-1].turn(True)
+            branches[-1].turn(True, number)
         elif word == "endif" and branches:
             branches.pop()
         elif not branches or branches[-1].active:
             if word == "define" and (name := _DEFINE.match(rest)):
-                known.of[name[1]] = Definition(name[3].strip(), number)
+                doubt = branches[-1].doubt if branches else None
+                known.of[name[1]] = Definition(name[3].strip(), number, doubt)
             elif word == "undef":
                 known.of.pop(rest, None)
     return known
@@ -110,31 +114,36 @@ def definitions(text: str) -> Definitions:
 
 @dataclass
 class _Branch:
-    """`#if` to `#endif`: whether its lines count now, and whether another way is still open."""
+    """`#if` to `#endif`: whether its lines count now, and whether another way is still open.
+
+    `doubt`: the line of its first condition that is not understood, or of one around it.
+    """
 
     reached: bool
     active: bool = False
+    doubt: int | None = None
     open: bool = field(init=False)
 
     def __post_init__(self) -> None:
         self.open = self.reached
 
-    def turn(self, holds: bool | None) -> None:
+    def turn(self, holds: bool | None, line: int) -> None:
         """To the next way; `holds`: its condition, None where it is not understood."""
+        if holds is None and self.doubt is None:
+            self.doubt = line
         self.active = self.open and holds is not False
         if holds is True:
             self.open = False
 
 
-def _holds(word: str, rest: str, known: Definitions, line: int) -> bool | None:
-    """Whether a condition holds; None, and noted, where it is not understood."""
+def _holds(word: str, rest: str, known: Definitions) -> bool | None:
+    """Whether a condition holds; None where it is not understood."""
     if word != "if":
         name = rest.split()[0] if rest else ""
         return (name in known.of) == (word == "ifdef")
     try:
         return _Expression(rest, known.of, known.enabled).whole_text().value != 0
     except NotComputedError:
-        known.doubtful.append(line)
         return None
 
 

@@ -39,6 +39,7 @@ SINGLE = {
     "DELTA_RADIUS": "M665 R",
     "DELTA_HEIGHT": "M665 H",
     "MANUAL_Z_HOME_POS": "M665 H",
+    "PRINTABLE_RADIUS": "DELTA_PRINTABLE_RADIUS",
     "DELTA_PRINTABLE_RADIUS": "DELTA_PRINTABLE_RADIUS",
     "DELTA_EFFECTOR_OFFSET": "DELTA_EFFECTOR_OFFSET",
     "DELTA_CALIBRATION_RADIUS": "DELTA_CALIBRATION_RADIUS",
@@ -138,6 +139,15 @@ def of_definitions(known: Definitions, file: str) -> tuple[dict[str, Held], list
     return held, problems
 
 
+def in_doubt(known: Definitions) -> dict[str, int]:
+    """The names of those above whose `#define` stands under a condition that is not understood."""
+    return {
+        name: definition.doubt
+        for name in (*SINGLE, *LISTS, *TRIMS)
+        if (definition := known.of.get(name)) is not None and definition.doubt is not None
+    }
+
+
 def _of_towers(
     known: Definitions, name: str, problems: list[Problem], file: str
 ) -> list[tuple[int, Decimal]]:
@@ -181,4 +191,4 @@ def _computed(
     return []
 
 
-__all__ = ["INCH", "Session", "of_commands", "of_definitions"]
+__all__ = ["INCH", "Session", "in_doubt", "of_commands", "of_definitions"]

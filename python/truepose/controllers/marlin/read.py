@@ -33,7 +33,13 @@ from truepose.controllers._reader import (
 from truepose.controllers._towers import Held, Three, Towers, bridged, require
 from truepose.controllers.marlin._definitions import Definitions, definitions
 from truepose.controllers.marlin._logs import Bounds, logged, mesh
-from truepose.controllers.marlin._numbers import INCH, Session, of_commands, of_definitions
+from truepose.controllers.marlin._numbers import (
+    INCH,
+    Session,
+    in_doubt,
+    of_commands,
+    of_definitions,
+)
 from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.wording import counted
 
@@ -315,9 +321,9 @@ def _assumptions(
             "DELTA_RADIUS_TRIM_TOWER is 0: it stands in Configuration.h and is not printed",
             "drive.*.origin",
         )
-    elif known.doubtful:
-        lines = ", ".join(str(line) for line in known.doubtful[:5])
-        yield Assumption(f"both ways of conditions that are not understood: line {lines}", "drive")
+    elif doubts := in_doubt(known):
+        shown = ", ".join(f"{name}, line {line}" for name, line in doubts.items())
+        yield Assumption(f"conditions that are not understood hold: of {shown}", "drive")
     if scale == INCH:
         yield Assumption("M503 in inches divides the towers' angles by 25.4 too", "drive.*.origin")
 

@@ -95,7 +95,7 @@ def fault_of(declined: Declined, found: str) -> Fault:
         "import-declined",
         f"{declined.what} is not imported: {declined.missing}",
         found[:60],
-        "a machine that a reader takes: truepose import --help",
+        "a machine that a reader takes: truepose import --list",
         declined.hint,
     )
 

@@ -109,7 +109,8 @@ def pins(
 
 def _where(config: Configuration) -> str:
     if config.left_out:
-        return f"{', '.join(config.left_out[:3])} cannot be read here: copy it beside the INI"
+        named = ", ".join(config.left_out[:3])
+        return f"{named} cannot be read here: what is named belongs beside the INI"
     return "the HAL file that sets them is the one to read, or the INI that names it"
 
 

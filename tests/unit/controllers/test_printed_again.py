@@ -69,7 +69,7 @@ RODS = {"family.effector_radius": "30", "family.spacing": "50"}
 
 @pytest.mark.parametrize(
     ("adapter", "rods"),
-    [*((adapter, {}) for adapter in ENDINGS)]
+    [(adapter, {}) for adapter in ENDINGS]
     + [(adapter, RODS) for adapter in ENDINGS if adapter != "linuxcnc-genhexkins"],
 )
 def test_what_is_printed_comes_back(adapter: str, rods: dict[str, str], tmp_path: Path) -> None:

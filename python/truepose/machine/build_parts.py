@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, cast
 
 from pydantic import BaseModel
 
@@ -18,6 +18,7 @@ from truepose.machine.condition import (
 )
 from truepose.machine.cutting import cutting_force, kienzle_force
 from truepose.machine.elements import drive_kinds, strut_geometry
+from truepose.machine.families.parameters import FamilyParameters
 from truepose.machine.limbs import Limb
 from truepose.machine.materials import MATERIALS
 from truepose.machine.parts import Body, Drive, Guide, Joint, Strut, carriage_part
@@ -31,6 +32,9 @@ from truepose.machine.tables.limb import LimbPartTable, LimbTable, section_of
 from truepose.machine.tables.mounting import MountingTable
 from truepose.machine.tables.strut import StrutTable
 from truepose.machine.validation import Model, Validated
+
+_DIRECTIONS = ("axis", "normal")
+"""Endings of the fields of drives and guides that are directions."""
 
 _NOTHING: Vector = (0.0, 0.0, 0.0)
 
@@ -65,6 +69,21 @@ def drives(validated: Validated) -> tuple[Drive, ...]:
 
 def _carriage(row: DriveTable) -> Body:
     return _body(carriage_part(row.name), row.carriage or CarriageTable())
+
+
+def family(validated: Validated, parts: Iterable[Drive | Guide]) -> FamilyParameters | None:
+    """`[family]`, with the directions of the drives and guides."""
+    if validated.family is None:
+        return None
+    return FamilyParameters(
+        validated.family,
+        {
+            f"{part.part}.{key}": cast("Vector", value)
+            for part in parts
+            for key, value in part.fields.items()
+            if key.endswith(_DIRECTIONS)
+        },
+    )
 
 
 def guides(validated: Validated) -> tuple[Guide, ...]:

@@ -139,6 +139,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
     kernel = build_kernel.kernel(described)
     _raise(build_kernel.problems(described, kernel))
     platform, frame, tool = build_parts.bodies(validated)
+    family = build_parts.family(validated, (*drives, *guides))
     parts = SourceBuilder(
         document,
         validated,
@@ -150,6 +151,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         bodies=(platform, frame, tool),
         condition=condition,
         data_files=data_files,
+        family=family,
     )
     built = [source.build(parts) for source in registry]
     _raise([*parts.problems, *data_files.problems])
@@ -180,6 +182,7 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         data_files=data_files.hashes,
         calibration=validated.table(CalibrationTable),
         controller_holds=None if controller is None else controller.holds,
+        family=family,
     )
 
 

@@ -28,6 +28,7 @@ from truepose.machine.compliances import (
 )
 from truepose.machine.condition import DEFAULT_PART, Condition
 from truepose.machine.equality import equal
+from truepose.machine.families.parameters import FamilyParameters
 from truepose.machine.limbs import Limb
 from truepose.machine.parts import BODIES, Body, Drive, Guide, Strut
 from truepose.machine.tables.calibration import CalibrationTable
@@ -106,6 +107,9 @@ class Machine(Represented):
     controller_holds: Holds | None = None
     """Which geometry the nominal one is, that the controller works with: that of the drawing, or
     a calibrated one that was loaded into it. None where the file does not say."""
+
+    family: FamilyParameters | None = None
+    """What the file's `[family]` says; None where it has none."""
 
     forward: OfJoints = field(init=False, repr=False)
     inverse: OfPoses = field(init=False, repr=False)

@@ -16,6 +16,7 @@ from truepose.files.tolerance_standards import ToleranceClassError
 from truepose.files.units import QuantityError
 from truepose.files.wording import did_you_mean
 from truepose.machine.condition import Condition
+from truepose.machine.families.parameters import FamilyParameters
 from truepose.machine.limbs import Limb
 from truepose.machine.parts import Body, Drive, Guide, Strut
 from truepose.machine.validation import Validated
@@ -58,6 +59,7 @@ class SourceBuilder:
         limbs: tuple[Limb, ...] = (),
         condition: Condition,
         data_files: DataFiles,
+        family: FamilyParameters | None = None,
     ) -> None:
         self.kernel = kernel
         self.drives = drives
@@ -67,6 +69,7 @@ class SourceBuilder:
         self.guides = guides
         self.limbs = limbs
         self.condition = condition
+        self.family = family
         self.problems: list[Problem] = []
         self._document = document
         self._validated = validated

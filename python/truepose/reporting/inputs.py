@@ -13,6 +13,8 @@ from truepose.reporting.result import in_file_units
 from truepose.reporting.table import Table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from truepose.machine import Condition, Machine
     from truepose.sources.deviation import Deviation, Source
 
@@ -173,8 +175,11 @@ def deviations(it: Machine) -> Table:
     The known shift and the unknown half band about it; parameters that move alike share a row.
     """
     alike: dict[tuple[str, str, str, str], list[str]] = {}
+    rows: list[tuple[str, ...]] = []
     for source, deviation in _deviations_at_middle(it):
-        for at, parameter in enumerate(deviation.parameters):
+        rows += _quantities(it, source.name, deviation)
+        for at in np.flatnonzero(~deviation.of_quantities):
+            parameter = deviation.parameters[at]
             unit = it.shown.small(it.units[parameter])
             shift = float(deviation.shift[0, at])
             low, high = (number(float(ends[0, at]) * unit.per_si, 3) for ends in deviation.ends)
@@ -185,7 +190,7 @@ def deviations(it: Machine) -> Table:
                 band = f"\N{PLUS-MINUS SIGN}{high}"
             key = (source.name, number(shift * unit.per_si, 3), band, unit.label)
             alike.setdefault(key, []).append(it.parameters[parameter])
-    rows = [(name, _listed(parameters), *others) for (name, *others), parameters in alike.items()]
+    rows += [(name, _listed(parameters), *others) for (name, *others), parameters in alike.items()]
     more = f" The first {MOST_DEVIATIONS} of {len(rows)}." if len(rows) > MOST_DEVIATIONS else ""
     return Table(
         "deviations",
@@ -195,6 +200,20 @@ def deviations(it: Machine) -> Table:
         words=2,
         note="Actual minus nominal, at the usable pose nearest the middle of the workspace." + more,
     )
+
+
+def _quantities(it: Machine, source: str, deviation: Deviation) -> Iterator[tuple[str, ...]]:
+    """Groups that are the deviation of something by itself, such as a radius: a row each."""
+    for group, quantity in deviation.group_quantities.items():
+        unit = it.shown.small(quantity.unit)
+        half = number(quantity.half * unit.per_si, 3)
+        yield (
+            source,
+            deviation.group_names[group],
+            number(quantity.shift * unit.per_si, 3),
+            f"\N{PLUS-MINUS SIGN}{half}" if quantity.half else MISSING,
+            unit.label,
+        )
 
 
 def _listed(names: list[str]) -> str:

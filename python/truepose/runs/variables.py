@@ -211,7 +211,7 @@ def _part(machine: Machine, source: Source, deviation: Deviation) -> _Part:
         moved = [machine.parameters[parameter] for parameter in columns[variables == at]]
         group = deviation.group_names.get(int(deviation.groups[column]))
         direction = any(at in members for members in deviation.domain.directions)
-        if len(moved) == 1 and not direction:
+        if len(moved) == 1 and not direction and not deviation.of_quantities[column]:
             names.append(moved[0])
         else:
             names.append(group or f"{source.name}: {moved[0]} and others")

@@ -180,7 +180,9 @@ class _Names:
         columns = zip(bands.parameters, bands.groups, bands.variables.tolist(), strict=True)
         for parameter, group, number in columns:
             name = self._parameters[parameter]
-            self._variable[name] = number
+            # What a family's parameter moves does not stand for it.
+            if int(group) not in bands.group_quantities:
+                self._variable[name] = number
             self.of_variable[number] = bands.group_names.get(int(group), name)
             if int(group) in bands.group_names:
                 self._groups[bands.group_names[int(group)]] = number

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Protocol, Self
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,6 +41,18 @@ OWN_GROUP = -1
 """Group of a column that moves by itself, correlated with no other."""
 
 
+class GroupQuantity(NamedTuple):
+    """What the variable of a group is, where it is the deviation of something by itself.
+
+    Its `shift` and `half` band as of a column, in its own SI `unit`; the members deviate by what
+    follows from it.
+    """
+
+    shift: float
+    half: float
+    unit: str
+
+
 @dataclass(frozen=True, repr=False)
 class Deviation(Represented):
     """What one source does to the k columns of parameters it touches, for n poses.
@@ -60,6 +72,8 @@ class Deviation(Represented):
     `correlation` (n_variable, n_variable), of the numbers in `variables`: Pearson's coefficients
     of the variables t; None where all are independent.
     `group_names`: what a group is called, where it has a name.
+    `group_quantities`: of groups that are the deviation of something by itself, as the radius is
+    on which joint centres lie: then a parameter may be in it and have a column of its own too.
     `directions`: groups whose two or three variables are together a unit vector, as the components
     of a direction that is not known are.
 
@@ -75,6 +89,7 @@ class Deviation(Represented):
     distribution: tuple[Distribution, ...] = field(default=())
     correlation: Floats | None = None
     group_names: Mapping[int, str] = field(default_factory=dict)
+    group_quantities: Mapping[int, GroupQuantity] = field(default_factory=dict)
     directions: tuple[tuple[int, ...], ...] = ()
 
     @classmethod
@@ -90,6 +105,7 @@ class Deviation(Represented):
         distribution: Distribution | Sequence[Distribution] = UNIFORM,
         correlation: ArrayLike | None = None,
         group_names: Mapping[int, str] | None = None,
+        group_quantities: Mapping[int, GroupQuantity] | None = None,
         directions: Sequence[Sequence[int]] = (),
     ) -> Self:
         """A deviation from plain values: a number or a (k,) array stands for every pose."""
@@ -108,6 +124,7 @@ class Deviation(Represented):
             tuple(distributions),
             None if correlation is None else np.array(correlation, np.float64),
             dict(group_names or {}),
+            dict(group_quantities or {}),
             tuple(tuple(groups) for groups in directions),
         )
 
@@ -157,6 +174,11 @@ class Deviation(Represented):
             raise ValueError("a correlation is not from -1 to 1")
         if not (np.array_equal(given, given.T) and (np.diagonal(given) == 1.0).all()):
             raise ValueError("a correlation is not symmetric, or not one with itself")
+
+    @cached_property
+    def of_quantities(self) -> Flags:
+        """(k,) columns of groups that are the deviation of something by itself."""
+        return np.isin(self.groups, list(self.group_quantities))
 
     @cached_property
     def signed_half(self) -> Floats:
@@ -296,6 +318,7 @@ __all__ = [
     "UNIFORM",
     "Deviation",
     "Distribution",
+    "GroupQuantity",
     "Source",
     "normal",
 ]

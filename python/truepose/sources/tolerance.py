@@ -10,6 +10,7 @@ references.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -23,6 +24,8 @@ from truepose.files.data_file import Column
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.quantity import LengthTolerance
 from truepose.files.tolerance import LISTED, Band
+from truepose.files.wording import one_of
+from truepose.machine.families.parameters import is_of_family
 from truepose.machine.parts import gives_way_only
 from truepose.probability.distributions import (
     ARCSINE,
@@ -38,7 +41,7 @@ from truepose.probability.distributions import (
 )
 from truepose.representation import Represented
 from truepose.sources._correlation import CorrelationTable, read_correlation
-from truepose.sources.deviation import OWN_GROUP, Deviation
+from truepose.sources.deviation import OWN_GROUP, Deviation, GroupQuantity
 from truepose.sources.pose_block import PoseBlock
 
 if TYPE_CHECKING:
@@ -83,6 +86,23 @@ class _Stated:
     distribution: Distribution
 
 
+@dataclass(frozen=True)
+class _Member:
+    """A column of the bands: the parameter, what moves it, and by how much of its variable.
+
+    `family`: the family's parameter whose deviation the variable is; None: the column's own.
+    """
+
+    column: int
+    stated: _Stated
+    effect: float = 1.0
+    family: str | None = None
+
+    @property
+    def group(self) -> str | None:
+        return self.family or self.stated.tolerance.group
+
+
 @dataclass(frozen=True, repr=False)
 class DimensionalTolerance(Represented):
     """Bands of any parameters, the same at every pose; members of a group vary together."""
@@ -103,26 +123,33 @@ class DimensionalTolerance(Represented):
         """From `length_tolerance` and `[tolerance]`; None where neither says anything."""
         stated = _of_struts(parts)
         stated |= _of_table(parts, stated)
-        columns = sorted(stated)
-        entries = [stated[column] for column in columns]
-        if _mixed_groups(parts, entries):
+        entries = [_Member(column, stated[column]) for column in sorted(stated)]
+        if _mixed_groups(parts, [member.stated for member in entries]):
             return None
+        quantities: dict[str, GroupQuantity] = {}
+        entries += _of_family(parts, quantities)
         names = parts.kernel.parameters
-        given = [entry.tolerance.group for entry in entries]
-        groups = [group for group in dict.fromkeys(given) if group is not None]
+        groups = list(dict.fromkeys(m.group for m in entries if m.group is not None))
+        edges = {
+            group: all(names[m.column].endswith(EDGE_ENDINGS) for m in entries if m.group == group)
+            for group in quantities
+        }
         bands = Deviation.of(
-            columns,
-            [entry.band.shift for entry in entries],
-            [entry.band.half for entry in entries],
-            groups=[OWN_GROUP if group is None else groups.index(group) for group in given],
-            sign=[entry.tolerance.sign for entry in entries],
-            edge=[names[column].endswith(EDGE_ENDINGS) for column in columns],
-            distribution=[entry.distribution for entry in entries],
+            [member.column for member in entries],
+            [member.stated.band.shift * member.effect for member in entries],
+            [member.stated.band.half * abs(member.effect) for member in entries],
+            groups=[OWN_GROUP if m.group is None else groups.index(m.group) for m in entries],
+            sign=[math.copysign(m.stated.tolerance.sign, m.effect) for m in entries],
+            edge=[
+                edges.get(m.group or "", names[m.column].endswith(EDGE_ENDINGS)) for m in entries
+            ],
+            distribution=[member.stated.distribution for member in entries],
             group_names=dict(enumerate(groups)),
+            group_quantities={groups.index(group): one for group, one in quantities.items()},
         )
         # A tolerance that is wrong would be missed here, and told twice.
         correlation = None if parts.problems else read_correlation(parts, bands)
-        return cls(replace(bands, correlation=correlation)) if stated else None
+        return cls(replace(bands, correlation=correlation)) if entries else None
 
     def acts(self, condition: Condition) -> bool:
         """In every condition."""
@@ -191,6 +218,12 @@ def _strut_sizes(parts: SourceBuilder) -> np.ndarray:
     return sizes
 
 
+def _entries(parts: SourceBuilder) -> Mapping[str, object]:
+    """The `[tolerance]` table."""
+    table = parts.table(ToleranceTable)
+    return {} if table is None else table.model_extra or {}
+
+
 def _of_table(parts: SourceBuilder, of_struts: Mapping[int, _Stated]) -> dict[int, _Stated]:
     """What the `[tolerance]` table says, by parameter.
 
@@ -198,8 +231,7 @@ def _of_table(parts: SourceBuilder, of_struts: Mapping[int, _Stated]) -> dict[in
     strut's own `length_tolerance` counts as a full name. Two of one kind for one parameter are
     refused.
     """
-    table = parts.table(ToleranceTable)
-    entries = {} if table is None else table.model_extra or {}
+    entries = {key: value for key, value in _entries(parts).items() if not is_of_family(key)}
     names = parts.kernel.parameters
     stated: dict[int, _Stated] = {}
     taken = {column: stated_before.path for column, stated_before in of_struts.items()}
@@ -222,6 +254,67 @@ def _of_table(parts: SourceBuilder, of_struts: Mapping[int, _Stated]) -> dict[in
             stated |= _stated(parts, key, columns, entries[key])
         decided = set(taken)
     return stated
+
+
+def _of_family(parts: SourceBuilder, quantities: dict[str, GroupQuantity]) -> list[_Member]:
+    """What the `[tolerance]` table says of the family's parameters: a column each that they move.
+
+    `quantities` is filled with what they are. A parameter that they move may have a tolerance of
+    its own too.
+    """
+    members: list[_Member] = []
+    named = {key: value for key, value in _entries(parts).items() if is_of_family(key)}
+    known = () if parts.family is None else parts.family.names
+    # In the family's order, whichever the file has.
+    for key in sorted(named, key=lambda key: known.index(key) if key in known else -1):
+        value = named[key]
+        if not _is_of_family(parts, key, value):
+            continue
+        assert parts.family is not None
+        path = f"tolerance.{key}"
+        tolerance = parts.tolerance(value, parts.family.dimension(key), path)
+        if tolerance is None:
+            continue
+        entry = _entry(parts, tolerance, parts.family.value(key), path)
+        if entry is None:
+            continue
+        quantities[key] = GroupQuantity(entry.band.shift, entry.band.half, parts.family.unit(key))
+        names = parts.kernel.parameters
+        moved = {names.index(name): slope for name, slope in parts.family.effects(key).items()}
+        members += [_Member(column, entry, moved[column], key) for column in sorted(moved)]
+    return members
+
+
+def _is_of_family(parts: SourceBuilder, key: str, value: object) -> bool:
+    """Whether a key is a parameter of the family, varying by itself; a problem, if not."""
+    path = f"tolerance.{key}"
+    if parts.family is None or key not in parts.family.names:
+        known = () if parts.family is None else parts.family.names
+        parts.refuse(
+            Fault(
+                "tolerance-matches-nothing",
+                f"no parameter of this machine's family is called {key!r}"
+                if known
+                else "the file has no [family]",
+                found=key,
+                expected=one_of(known) if known else "a [family], or names of joint centres",
+                hint=parts.suggest(key, known),
+            ),
+            path,
+        )
+        return False
+    if isinstance(value, dict) and ("group" in value or "sign" in value):
+        parts.refuse(
+            Fault(
+                "excluding-keys",
+                "a parameter of the family is a variable by itself, in no other group",
+                found="group" if "group" in value else "sign",
+                expected="no such key; what varies with it is told by [[correlation]]",
+            ),
+            path,
+        )
+        return False
+    return True
 
 
 def _rank(key: str, names: Iterable[str]) -> int:

@@ -1,8 +1,9 @@
 """What is to be found: variables of the tolerances, further parameters, properties, instruments.
 
 An unknown moves parameters in proportion to itself. One of a tolerance is the tolerance's own
-variable, be it one parameter's or a group's, in the unit of the parameter that it moves most; the
-band about it is what is known beforehand:
+variable, be it one parameter's or a group's, in the unit of the parameter that it moves most; one
+of the family (`family.radius`) is that parameter's own change. The band about it is what is known
+beforehand:
 
     mean = shift,  standard deviation = half / sigmas,  correlations as the file states them.
 """
@@ -26,6 +27,7 @@ from truepose.files.shown_units import METRIC, ShownUnits
 from truepose.files.units import QuantityError, UnitSystem
 from truepose.files.wording import did_you_mean
 from truepose.machine import Machine
+from truepose.machine.families.parameters import is_of_family
 from truepose.machine.parts import gives_way_only
 from truepose.representation import Facts, Represented
 from truepose.sources import Deviation
@@ -41,9 +43,10 @@ class Unknowns(Represented):
 
     `names`, `units` and `labels` (for people). `columns` (k,): parameters that machine unknowns
     move, each by `effects` (k, n) times the unknown's value; the largest effect of an unknown is
-    +-1. Properties have none there: what they move differs from row to row. `prior_mean` (n,),
-    `prior_covariance` (n, n): infinite on the diagonal where nothing is known beforehand. `half`
-    (n,): half bands, infinite likewise. `properties`: by the number of their unknown.
+    +-1, but for a parameter of the family, whose effects are its derivatives. Properties have none
+    there: what they move differs from row to row. `prior_mean` (n,), `prior_covariance` (n, n):
+    infinite on the diagonal where nothing is known beforehand. `half` (n,): half bands, infinite
+    likewise. `properties`: by the number of their unknown.
     `readings`: of each unknown bias what it is added to, (instrument, observable, strut or -1).
     """
 
@@ -108,6 +111,9 @@ class Unknowns(Represented):
         for number in range(self.n_machine):
             rows = np.flatnonzero(self.effects[:, number])
             nominal = machine.nominal[self.columns[rows]]
+            if machine.family is not None and self.names[number] in machine.family.names:
+                sizes[number] = machine.family.value(self.names[number])
+                continue
             # Rods that are equal are one number for people, coordinates that move apart are not.
             alike = rows.size and (self.effects[rows, number] == 1.0).all()
             if alike and np.ptp(nominal) <= 1e-9 * np.abs(nominal).max():
@@ -222,10 +228,13 @@ def _tolerance_unknowns(machine: Machine, bands: Deviation | None) -> list[_Mach
     for variable in dict.fromkeys(bands.variables[bands.banded].tolist()):
         members = np.flatnonzero(bands.variables == variable)
         leader = members[np.argmax(np.abs(half_width[members]))]
-        half = float(abs(half_width[leader]))
+        number = int(bands.groups[leader])
+        group, quantity = bands.group_names.get(number), bands.group_quantities.get(number)
+        half = float(abs(half_width[leader])) if quantity is None else quantity.half
         effects = half_width[members] / half
-        group = bands.group_names.get(int(bands.groups[leader]))
         mean = float(shift[leader] * np.sign(effects[members == leader][0]))
+        if quantity is not None:
+            mean = quantity.shift
         if np.abs(shift[members] - effects * mean).max() > SCREEN * half:
             raise RequestError(
                 Problem(
@@ -242,8 +251,8 @@ def _tolerance_unknowns(machine: Machine, bands: Deviation | None) -> list[_Mach
         unknowns.append(
             _MachineUnknown(
                 name,
-                machine.units[parameter],
-                label_of(name) if group is None else group,
+                machine.units[parameter] if quantity is None else quantity.unit,
+                label_of(name) if group is None or quantity is not None else group,
                 dict(zip(bands.parameters[members].tolist(), effects.tolist(), strict=True)),
                 mean,
                 half / bands.distribution[leader].sigmas,
@@ -267,6 +276,16 @@ def _chosen_unknowns(
             known[name] = _MachineUnknown(
                 name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf
             )
+    family = machine.family
+    for name in () if family is None else family.names:
+        assert family is not None
+        effects = {
+            machine.parameters.index(moved): effect
+            for moved, effect in family.effects(name).items()
+        }
+        known[name] = _MachineUnknown(
+            name, family.unit(name), label_of(name), effects, 0.0, np.inf, np.inf
+        )
     for name, identifiable in properties_of(machine).items():
         unit, label = identifiable.unit, identifiable.label(machine)
         known[name] = _MachineUnknown(
@@ -276,6 +295,7 @@ def _chosen_unknowns(
     of_group = {
         machine.parameters[column]: unknown.name
         for unknown in tolerated
+        if not is_of_family(unknown.name)
         for column in unknown.effects
     }
     known |= {unknown.name: unknown for unknown in tolerated}
@@ -288,7 +308,7 @@ def _chosen_unknowns(
         if pattern in known:
             names = [pattern]
         else:
-            names = [name for name in known if fnmatchcase(name, pattern)]
+            names = [name for name in known if _matches(name, pattern)]
         if not names:
             problems.append(_no_parameter(machine, pattern, known))
         for name in dict.fromkeys(of_group.get(name, name) for name in names):
@@ -318,6 +338,13 @@ def _chosen_unknowns(
     return sorted(chosen.values(), key=lambda unknown: order[unknown.name])
 
 
+def _matches(name: str, pattern: str) -> bool:
+    """Of a family's parameters a pattern names all limbs together, `family.*`, or each its own."""
+    if is_of_family(name) and not (is_of_family(pattern) and pattern.count(".") == name.count(".")):
+        return False
+    return fnmatchcase(name, pattern)
+
+
 def _with_measured(
     machine: Machine,
     measurements: Measurements,
@@ -333,7 +360,8 @@ def _with_measured(
             continue
         name, unit = machine.parameters[column], machine.units[column]
         alone = _MachineUnknown(name, unit, label_of(name), {column: 1.0}, 0.0, np.inf, np.inf)
-        unknown = next((one for one in tolerated if column in one.effects), alone)
+        grouped = (one for one in tolerated if not is_of_family(one.name))
+        unknown = next((one for one in grouped if column in one.effects), alone)
         moved.update(unknown.effects)
         chosen = [*chosen, unknown]
     return chosen
@@ -455,6 +483,9 @@ _POINTS = {"base": "base joint", "platform": "platform joint", "origin": "origin
 def label_of(parameter: str) -> str:
     """A parameter for people: "length of strut 1", "base joint x of strut 1", "tool x"."""
     words = parameter.split(".")
+    if is_of_family(parameter):
+        what, *limb = (word.replace("_", " ") for word in words[1:])
+        return " of limb ".join([what, *limb])
     if words[0] == "tool":
         return f"tool point {words[1]}"
     *middle, last = words[2:]

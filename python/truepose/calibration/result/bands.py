@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.arrays import Floats, Indices
+from truepose.arrays import Flags, Floats, Indices
 from truepose.machine import Machine
+from truepose.machine.families.parameters import is_of_family
 from truepose.sources.tolerance import bands_of
 
 
@@ -29,17 +30,19 @@ class ToleranceCovariance:
         return np.asarray(self.effects @ self.correlation @ self.effects.T)
 
 
-def tolerance_covariance(machine: Machine) -> ToleranceCovariance:
-    """What the tolerances of a machine's file say of its parameters."""
+def tolerance_covariance(machine: Machine, kept: Flags | None = None) -> ToleranceCovariance:
+    """What the tolerances of a machine's file say of its parameters; `kept` (k,): these columns."""
     count = len(machine.parameters)
     bands = bands_of(machine)
     if bands is None:
         return ToleranceCovariance(np.zeros(count), np.zeros((count, 0)), np.zeros((0, 0)))
+    some = np.ones(bands.parameters.size, np.bool_) if kept is None else kept
     shift = np.zeros(count)
-    np.add.at(shift, bands.parameters, bands.shift[0])
+    np.add.at(shift, bands.parameters, np.where(some, bands.shift[0], 0.0))
     effects = np.zeros((count, bands.n_variable))
     sigmas = np.array([distribution.sigmas for distribution in bands.distribution], np.float64)
-    np.add.at(effects, (bands.parameters, bands.variables), bands.signed_half[0] / sigmas)
+    deviations = np.where(some, bands.signed_half[0] / sigmas, 0.0)
+    np.add.at(effects, (bands.parameters, bands.variables), deviations)
     correlation = np.eye(bands.n_variable) if bands.correlation is None else bands.correlation
     return ToleranceCovariance(shift, effects, correlation)
 
@@ -49,14 +52,25 @@ class Banded:
     """Bands to be written: one variable for each column, or for the columns of a group.
 
     `columns` (k,): parameters; `effects` (k, v): what one standard deviation of its one variable
-    does to each; `correlation` (v, v); `names` (v,) of the groups, empty for a variable of one
-    parameter.
+    does to each, and one of every parameter of the family that moves it besides; `correlation`
+    (v, v); `names` (v,) of groups and of the family's parameters, empty for a variable of one
+    parameter. `deviations` (v,): standard ones, of the family's parameters in their own unit.
     """
 
     columns: Indices
     effects: Floats
     correlation: Floats
     names: tuple[str, ...]
+    deviations: Floats
+
+    def of_family(self) -> list[int]:
+        """The variables that are parameters of the family."""
+        return [at for at, name in enumerate(self.names) if is_of_family(name)]
+
+    def own(self, column: int) -> int | None:
+        """The variable of the k-th column that is no parameter of the family."""
+        variables = np.flatnonzero(self.effects[column]).tolist()
+        return next((at for at in variables if not is_of_family(self.names[at])), None)
 
 
 _ROUNDING = 1e-12
@@ -68,7 +82,8 @@ def banded(columns: Indices, effects: Floats, covariance: Floats, names: tuple[s
 
     An unknown that shares its parameters with no other becomes a variable, of a group where it
     moves several. Where unknowns share parameters, which a machine file cannot say, each of these
-    parameters has a variable of its own, and the covariance is the same.
+    parameters has a variable of its own, and the covariance is the same. A parameter of the family
+    is a variable in any case, for it may share what it moves.
     """
     effects = np.where(
         np.abs(effects) > _ROUNDING * np.abs(effects).max(axis=0, initial=0.0), effects, 0.0
@@ -78,7 +93,8 @@ def banded(columns: Indices, effects: Floats, covariance: Floats, names: tuple[s
     rows: list[Floats] = []
     called: list[str] = []
     mixed: list[int] = []
-    shared = _shared(effects)
+    of_family = np.array([is_of_family(name) for name in names], np.bool_)
+    shared = _shared(np.where(of_family, 0.0, effects))
     column_effects: list[tuple[int, int, float]] = []
     for unknown in range(effects.shape[1]):
         members: list[int] = np.flatnonzero(effects[:, unknown]).tolist()
@@ -88,15 +104,16 @@ def banded(columns: Indices, effects: Floats, covariance: Floats, names: tuple[s
             continue
         row = np.zeros(effects.shape[1])
         # A parameter's own variable is its deviation; a group's is the unknown, whatever the signs.
-        row[unknown] = np.sign(effects[members[0], unknown]) if len(members) == 1 else 1.0
+        alone = len(members) == 1 and not of_family[unknown]
+        row[unknown] = np.sign(effects[members[0], unknown]) if alone else 1.0
         for member in members:
             effect = float(effects[member, unknown] * row[unknown])
             column_effects.append((member, len(rows), effect))
         rows.append(row)
-        called.append(names[unknown] if len(members) > 1 else "")
+        called.append("" if alone else names[unknown])
     for member in dict.fromkeys(mixed):
         column_effects.append((member, len(rows), 1.0))
-        rows.append(effects[member])
+        rows.append(np.where(of_family, 0.0, effects[member]))
         called.append("")
     to_variables = np.array(rows).reshape(len(rows), effects.shape[1])
     of_variables = to_variables @ covariance @ to_variables.T
@@ -108,7 +125,7 @@ def banded(columns: Indices, effects: Floats, covariance: Floats, names: tuple[s
     by_variable = np.zeros((len(columns), len(rows)))
     for at, variable, effect in column_effects:
         by_variable[at, variable] = effect * deviation[variable]
-    return Banded(columns[moved], by_variable[moved], correlation, tuple(called))
+    return Banded(columns[moved], by_variable[moved], correlation, tuple(called), deviation)
 
 
 def _shared(effects: Floats) -> list[bool]:

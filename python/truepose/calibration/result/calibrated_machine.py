@@ -28,7 +28,7 @@ from truepose.machine import Machine
 from truepose.machine.source_builder import ErrorSource
 from truepose.probability.distributions import UNIFORM, Distribution, normal
 from truepose.sources import REGISTRY
-from truepose.sources.deviation import OWN_GROUP, Deviation
+from truepose.sources.deviation import OWN_GROUP, Deviation, GroupQuantity
 from truepose.sources.tolerance import EDGE_ENDINGS, DimensionalTolerance
 
 
@@ -54,14 +54,18 @@ def calibrated_machine(
     found = machine
     for number, identified in unknowns.properties.items():
         found = identified.changed(found, float(own_values[number])) or found
-    names = [machine.parameters[column] for column in result.moved]
-    nominal = result.nominal[result.moved].tolist()
+    # A family's parameters move what keeps its own tolerance.
+    others = np.flatnonzero(result.nominal != machine.nominal)
+    columns = np.union1d(result.moved, others)
+    names = [machine.parameters[column] for column in columns]
+    nominal = result.nominal[columns].tolist()
     found = found.replace(dict(zip(names, nominal, strict=True)))
     asked = machine.accuracy
     if asked.at is None and (asked.target is not None or asked.angle_target is not None):
         asked = replace(asked, at=AT)
     return replace(
         found,
+        family=result.family,
         sources=_sources(machine, result, coverage),
         accuracy=asked,
         controller_holds="calibrated",
@@ -102,14 +106,21 @@ def _bands(machine: Machine, result: CalibratedValues, coverage: float) -> Devia
     filed = [] if result.forgotten is None else _filed(result.forgotten)
     moved = set(result.moved.tolist())
     banded = set(result.bands.columns.tolist())
-    columns = [column for column in filed if column.parameter not in moved]
+    columns = [column for column, stays in zip(filed, result.kept, strict=True) if stays]
     columns += [  # what was found without any uncertainty
         column._replace(shift=0.0, half=0.0, group=None, sign=1.0, distribution=UNIFORM)
-        for column in filed
-        if column.parameter in moved - banded
+        for column, stays in zip(filed, result.kept, strict=True)
+        if not stays and column.parameter in moved - banded
     ]
     columns += _found(machine, result.bands, coverage)
-    columns.sort(key=lambda column: column.parameter)
+    # As a file's are: the parameters' own first, then what the family's parameters move.
+    family = () if machine.family is None else machine.family.names
+    columns.sort(
+        key=lambda column: (
+            family.index(column.group) if column.group in family else -1,
+            column.parameter,
+        )
+    )
     groups = list(dict.fromkeys(column.group for column in columns if column.group is not None))
     names = machine.parameters
     bands = Deviation.of(
@@ -123,8 +134,27 @@ def _bands(machine: Machine, result: CalibratedValues, coverage: float) -> Devia
         edge=[names[column.parameter].endswith(EDGE_ENDINGS) for column in columns],
         distribution=[column.distribution for column in columns],
         group_names=dict(enumerate(groups)),
+        group_quantities={
+            groups.index(name): quantity
+            for name, quantity in _quantities(result, coverage).items()
+            if name in groups
+        },
     )
     return replace(bands, correlation=_correlation(bands, columns, result))
+
+
+def _quantities(result: CalibratedValues, coverage: float) -> dict[str, GroupQuantity]:
+    """Of the family's parameters that have a band: as filed, or as found."""
+    old, bands = result.forgotten, result.bands
+    quantities = (
+        {} if old is None else {old.group_names[n]: q for n, q in old.group_quantities.items()}
+    )
+    for variable in bands.of_family():
+        name = bands.names[variable]
+        assert result.family is not None
+        half = coverage * float(bands.deviations[variable])
+        quantities[name] = GroupQuantity(0.0, half, result.family.unit(name))
+    return quantities
 
 
 def _filed(old: Deviation) -> list[_Column]:
@@ -147,12 +177,12 @@ def _found(machine: Machine, bands: Banded, coverage: float) -> Iterator[_Column
     """The columns of what was found: normal, each moved by its one variable."""
     called = variable_names(machine, bands)
     for parameter, effects in zip(bands.columns.tolist(), bands.effects, strict=True):
-        variable = int(np.flatnonzero(effects)[0])
-        effect = float(effects[variable])
-        group = called[variable] if bands.names[variable] else None
-        sign = -1.0 if group is not None and effect < 0.0 else 1.0
-        half = coverage * abs(effect)
-        yield _Column(parameter, 0.0, half, group, sign, normal(coverage), (_FOUND, variable))
+        for variable in np.flatnonzero(effects).tolist():
+            effect = float(effects[variable])
+            group = called[variable] if bands.names[variable] else None
+            sign = -1.0 if group is not None and effect < 0.0 else 1.0
+            half = coverage * abs(effect)
+            yield _Column(parameter, 0.0, half, group, sign, normal(coverage), (_FOUND, variable))
 
 
 def _correlation(

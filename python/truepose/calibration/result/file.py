@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import tomlkit
 
-from truepose.arrays import Floats, Indices
+from truepose.arrays import Flags, Floats, Indices
 from truepose.calibration.identification.properties import Property
 from truepose.calibration.result.bands import (
     Banded,
@@ -38,6 +38,7 @@ from truepose.calibration.result.toml_edits import MachineText, warning_comment
 from truepose.errors import MachineFileError, Problem, RequestError
 from truepose.files.writing import replacing, require_writable
 from truepose.machine import Machine, load
+from truepose.machine.families.parameters import FamilyParameters, is_of_family
 from truepose.machine.tables.controller import Holds
 from truepose.machine.workspace import Accuracy
 from truepose.sources import REGISTRY
@@ -190,7 +191,9 @@ class CalibratedValues:
     """What the file is to say: nominal values and axes, shifts of all parameters, bands.
 
     `nominal` (n_parameter,) has 0 for the tilts of the directions that `axes` gives anew; `moved`
-    (k,) are the parameters whose tolerance is replaced.
+    (k,) are the parameters whose own tolerance is replaced. `found_family`: what was found of the
+    family's parameters; `family` is as they then are, `family_shift` what stays to be known of
+    them, SI. `own_shift` (n_parameter,) is what `shift` is without them.
     """
 
     nominal: Floats
@@ -199,6 +202,20 @@ class CalibratedValues:
     bands: Banded
     moved: Indices
     forgotten: Deviation | None
+    own_shift: Floats
+    family: FamilyParameters | None
+    found_family: tuple[str, ...]
+    family_shift: Mapping[str, float]
+
+    @property
+    def kept(self) -> Flags:
+        """(k,) columns of the file's bands that stay: of what was not identified."""
+        old = self.forgotten
+        if old is None:
+            return np.zeros(0, np.bool_)
+        found = [n for n in old.group_quantities if old.group_names[n] in self.found_family]
+        of_parameters = ~np.isin(old.parameters, self.moved)
+        return np.where(old.of_quantities, ~np.isin(old.groups, found), of_parameters)
 
     @classmethod
     def of(
@@ -216,7 +233,15 @@ class CalibratedValues:
         count = len(machine.parameters)
         effects = np.zeros((count, unknowns.n_machine))
         np.add.at(effects, np.asarray(unknowns.columns), unknowns.effects[:, : unknowns.n_machine])
-        moved = np.asarray(effects.any(axis=1), np.bool_)
+        names = unknowns.names[: unknowns.n_machine]
+        of_family = np.array([is_of_family(name) for name in names], np.bool_)
+        found_family = tuple(name for name in names if is_of_family(name))
+        changes = dict(zip(found_family, values[of_family].tolist(), strict=True))
+        family = machine.family
+        if family is not None and not stays:
+            family = family.changed(changes)
+        moved = np.asarray(effects[:, ~of_family].any(axis=1), np.bool_)
+        anything = np.asarray(effects.any(axis=1), np.bool_)
         deviation = effects @ values
         nominal = np.array(machine.nominal) + (0.0 if stays else deviation)
         axes = []
@@ -225,17 +250,36 @@ class CalibratedValues:
             if not nominal[at].any():
                 continue
             axis = direction_at(direction.axis, nominal[at])
-            if moved[at].any():
+            if anything[at].any():
                 effects[at] = deviation_jacobian(direction.axis, nominal[at], axis) @ effects[at]
                 if stays:
                     deviation[at] = effects[at] @ values
-                moved[at] = True
+                anything[at] = True
+                moved[at] = moved[at].any()
             nominal[at] = 0.0
             axes.append((direction, axis))
-        columns = np.flatnonzero(moved)
-        bands = banded(columns, effects[columns], covariance, unknowns.names[: unknowns.n_machine])
-        shift = deviation if stays else np.zeros(count)
-        return cls(nominal, tuple(axes), shift, bands, columns, bands_of(machine))
+        if family is not None:
+            # The file's effects are those of its family, about its axes.
+            family = family.about({f"{d.table}.{d.part}.{d.key}": axis for d, axis in axes})
+            for number in np.flatnonzero(of_family):
+                effects[:, number] = 0.0
+                for name, effect in family.effects(names[number]).items():
+                    effects[machine.parameters.index(name), number] = effect
+        columns = np.flatnonzero(anything)
+        bands = banded(columns, effects[columns], covariance, names)
+        nothing = np.zeros(count)
+        return cls(
+            nominal,
+            tuple(axes),
+            deviation if stays else nothing,
+            bands,
+            np.flatnonzero(moved),
+            bands_of(machine),
+            effects[:, ~of_family] @ values[~of_family] if stays else nothing,
+            family,
+            found_family,
+            changes if stays else dict.fromkeys(changes, 0.0),
+        )
 
 
 def _held(machine: Machine, asked: Holds) -> Holds:
@@ -247,14 +291,41 @@ def _write_values(text: MachineText, machine: Machine, result: CalibratedValues)
     """Nominal values and directions that differ from those of the file."""
     turned_columns = {column for direction, _ in result.axes for column in direction.columns}
     filed = np.array(machine.nominal)
+    of_family = np.zeros(filed.size, np.bool_)
+    for name, value in _write_family(text, machine, result).items():
+        column = machine.parameters.index(name)
+        filed[column], of_family[column] = value, True
     for name in machine.replaced:
         filed[machine.parameters.index(name)] = np.nan
+    # What the family gives anew, it gives to its rounding.
+    slack = np.where(of_family, _SAME * np.abs(result.nominal), 0.0)
+    changed = ~(np.abs(result.nominal - filed) <= slack)
+    # A point is written as a whole: beside one component the family's others are not read.
+    points = {
+        name.rpartition(".")[0]
+        for name, is_changed in zip(machine.parameters, changed, strict=True)
+        if is_changed
+    }
     for column, name in enumerate(machine.parameters):
-        same = result.nominal[column] == filed[column]
-        if not same and column not in turned_columns and not name.endswith((".u", ".v")):
+        beside = of_family[column] and name.rpartition(".")[0] in points
+        written = (changed[column] or beside) and column not in turned_columns
+        if written and not name.endswith((".u", ".v")):
             text.set_parameter(name, float(result.nominal[column]))
     for direction, axis in result.axes:
         text.set_direction(direction.table, direction.part, direction.key, axis)
+
+
+def _write_family(
+    text: MachineText, machine: Machine, result: CalibratedValues
+) -> dict[str, float]:
+    """What was found of the family's parameters; the values that then follow, where others."""
+    old, new = machine.family, result.family
+    if old is None or new is None:
+        return {}
+    text.set_family(
+        new, [name for name in result.found_family if new.value(name) != old.value(name)]
+    )
+    return new.moved(old)
 
 
 def _write_bands(
@@ -263,14 +334,20 @@ def _write_bands(
     """The bands of what was identified, in place of those of the file, and their correlations."""
     names, bands, old = machine.parameters, result.bands, result.forgotten
     variables = variable_names(machine, bands)
-    member = {
-        int(column): int(np.flatnonzero(row)[0])
-        for column, row in zip(bands.columns, bands.effects, strict=True)
-    }
     at = {int(column): index for index, column in enumerate(bands.columns)}
-    covered = set() if old is None else set(old.parameters.tolist())
+    own = {column: bands.own(index) for column, index in at.items()}
+    member = {column: variable for column, variable in own.items() if variable is not None}
+    covered = set() if old is None else set(old.parameters[~old.of_quantities].tolist())
+    banded_family = {bands.names[variable]: variable for variable in bands.of_family()}
+    for name in result.found_family:
+        shift = result.family_shift[name]
+        if name in banded_family:
+            deviation = float(bands.deviations[banded_family[name]])
+            text.set_tolerance(name, _normal(shift, deviation, coverage, None))
+        else:
+            text.set_tolerance(name, {"band": [shift, shift]})
     for column in result.moved.tolist():
-        shift = float(result.shift[column])
+        shift = float(result.own_shift[column])
         if column in member:
             effect = float(bands.effects[at[column], member[column]])
             grouped = bands.names[member[column]]
@@ -325,9 +402,10 @@ def _forget_correlations(text: MachineText, machine: Machine, result: Calibrated
     kept: dict[str, int] = {}
     columns = zip(old.parameters.tolist(), old.groups.tolist(), old.variables, strict=True)
     for parameter, group, number in columns:
-        names = [machine.parameters[parameter]]
+        names = [] if group in old.group_quantities else [machine.parameters[parameter]]
         names += [old.group_names[group]] if group in old.group_names else []
-        if parameter in moved:
+        found = group in old.group_quantities and old.group_names[group] in result.found_family
+        if found or (parameter in moved and group not in old.group_quantities):
             gone |= set(names)
         else:
             kept |= dict.fromkeys(names, int(number))
@@ -389,27 +467,30 @@ def _require_same(
 def _require_same_bands(
     path: Path, machine: Machine, result: CalibratedValues, written: Machine
 ) -> None:
-    read_back, filed, moved, bands = (
+    read_back, filed, bands = (
         tolerance_covariance(written),
         tolerance_covariance(machine),
-        result.moved,
         result.bands,
     )
+    # Also of what a family's parameter moves that was found, whose own tolerances stay.
+    moved = np.union1d(result.moved, bands.columns)
     count = len(machine.parameters)
-    wanted = np.zeros((count, count))
-    wanted[np.ix_(bands.columns, bands.columns)] = (
+    kept = tolerance_covariance(machine, result.kept)
+    wanted = kept.covariance
+    wanted[np.ix_(bands.columns, bands.columns)] += (
         bands.effects @ bands.correlation @ bands.effects.T
     )
+    shift = result.shift + kept.shift
     deviation = np.sqrt(np.diagonal(wanted))[moved]
     # Of a band about a shift the ends are written, which have the shift's rounding.
-    slack = _SAME_BAND * deviation + _SAME * np.abs(result.shift[moved])
+    slack = _SAME_BAND * deviation + _SAME * np.abs(shift[moved])
     most = np.outer(slack, deviation) + np.outer(deviation, slack)
     off = np.abs(read_back.covariance - wanted)[np.ix_(moved, moved)] > most
     if off.any():
         raise _not_written(
             path, f"the band of {_first(machine, moved, np.asarray(off.any(axis=1)))} differs"
         )
-    shifted = np.asarray(np.abs(read_back.shift - result.shift)[moved] > slack)
+    shifted = np.asarray(np.abs(read_back.shift - shift)[moved] > slack)
     if shifted.any():
         raise _not_written(path, f"the shift of {_first(machine, moved, shifted)} differs")
     others = np.setdiff1d(np.arange(count), moved)

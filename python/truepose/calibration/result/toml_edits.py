@@ -10,18 +10,23 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomlkit
 from tomlkit.items import AoT, Array, InlineTable, Table
 
 from truepose.arrays import Floats
 from truepose.errors import RequestError
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
-from truepose.files.document import Document, read
+from truepose.files.document import ARRAY_TABLES, Document, read
 from truepose.files.one_run import real_path
-from truepose.files.settings import apply
+from truepose.files.settings import apply, of_table
 from truepose.files.text_file import FileKind, read_text
 from truepose.files.units import UnitSystem, meant
 from truepose.machine import Machine, validation
+from truepose.machine.families.expansion import TABLE as FAMILY
+from truepose.machine.families.expansion import expand
+from truepose.machine.families.parameters import FamilyParameters, is_of_family
+from truepose.machine.families.text import row_tables, write_rows
 from truepose.machine.shared_keys import share_each
 from truepose.machine.tables import owners
 from truepose.sources import REGISTRY
@@ -50,21 +55,54 @@ class MachineText:
             raise changed
         owned = owners(source.tables for source in REGISTRY)
         self.toml = tomlkit.parse(_without_warnings(text, machine))
+        expand(self._document, machine.settings, owned)
+        self._units: UnitSystem = validation.validate_alone(self._document, owned, "units").units
+        self._machine = machine
+        self._folder = original.parent
         # The settings go into the text, and into what was read, which says what rows share.
         written = Document(self._document.file, self._document.name, "", self.toml)
+        apply(written, of_table(dict(machine.settings), FAMILY), owned.free_tables)
+        if any(path.split(".")[0] in ARRAY_TABLES for path in machine.settings):
+            self.write_rows()
         apply(written, dict(machine.settings), owned.free_tables)
         share_each(self._document, dict(machine.settings), owned.free_tables)
         apply(self._document, dict(machine.settings), owned.free_tables)
-        self._units: UnitSystem = validation.validate(self._document, owned)[0].units
-        self._machine = machine
-        self._folder = original.parent
 
     @property
     def document(self) -> Document:
         """What was read, as validated: settings, and what rows share, stand in it."""
         return self._document
 
+    def write_rows(self) -> None:
+        """Write the rows that the machine's family gives, with all of their geometry."""
+        if self._machine.family is not None:
+            write_rows(
+                self.toml,
+                self._document,
+                self._machine.family.family,
+                lambda value: self.written(value, "length", None),
+            )
+
+    def write_rows_for_family(self) -> None:
+        """Write them in place of `[family]`."""
+        self.write_rows()
+        self.toml.pop(FAMILY, None)
+
     # --- values
+
+    def set_family(self, family: FamilyParameters, names: Collection[str]) -> None:
+        """Write the parameters `names` of the family, each limb's own where they differ."""
+        table = self.toml[FAMILY]
+        for key in dict.fromkeys(name.split(".")[1] for name in names):
+            values = np.atleast_1d(family.family.values()[key])
+            dimension, old = family.dimension(f"{FAMILY}.{key}"), table.get(key)
+            given = old if isinstance(old, list) else [old] * values.size
+            alike = not isinstance(old, list) and old is not None and np.ptp(values) == 0.0
+            written = [
+                self.written(float(value), dimension, one)
+                for value, one in zip(values, given, strict=True)
+            ]
+            table[key] = written[0] if alike else written
 
     def set_parameter(self, name: str, value: float) -> None:
         """Write a parameter (no direction's) of the kernel, SI."""
@@ -102,7 +140,12 @@ class MachineText:
             if table not in self.toml:
                 self.toml[table] = tomlkit.table()
             return self.toml[table]
-        return next(row for row in self.toml[table] if row.get("name") == part)
+        rows = self.toml.get(table, ())
+        if self._machine.family is not None:
+            names = [row.get("name") for row in rows]
+            if part not in names:  # one that the family gives
+                rows = row_tables(self.toml, self._document, table)
+        return next(row for row in rows if row.get("name") == part)
 
     def written(self, value: float, dimension: str, old: Any) -> float | str:
         """An SI value as the file writes such: with the unit of the `old` one, or the declared.
@@ -157,12 +200,16 @@ class MachineText:
     # --- tolerances
 
     def set_tolerance(self, name: str, stated: Mapping[str, Any]) -> None:
-        """Write the tolerance of a parameter, in place of all that the file says of it.
+        """Write the tolerance of a parameter, also a family's, in place of all that is said of it.
 
         `stated`: keys of a tolerance's table, `standard_deviation` and `band` in SI.
         """
-        at = self._machine.parameters.index(name)
-        dimension = BY_UNIT[self._machine.units[at]]
+        family = self._machine.family
+        if family is not None and is_of_family(name):
+            at, dimension = -1, family.dimension(name)
+        else:
+            at = self._machine.parameters.index(name)
+            dimension = BY_UNIT[self._machine.units[at]]
         written: dict[str, Any] = dict(stated)
         if "band" in written:
             written["band"] = [self.written(end, dimension, None) for end in written["band"]]
@@ -172,7 +219,8 @@ class MachineText:
         inline = inline_table(written)
         for index, column in enumerate(self._machine.kernel.length_parameters[: self._n_strut]):
             if column == at and _LENGTH_TOLERANCE in self._document.data["strut"][index]:
-                _put(self.toml["strut"][index], _LENGTH_TOLERANCE, inline)
+                row = self.row("strut", self._machine.struts[index].name)
+                _put(row, _LENGTH_TOLERANCE, inline)
                 return
         if "tolerance" not in self.toml:
             self.toml["tolerance"] = tomlkit.table()
@@ -264,7 +312,9 @@ class MachineText:
         names = [f"{path}.{axis}" for axis in _XYZ]
         shared = self._document.value((*self._document.key(f"{table}.{part}"), key))
         nominal = dict(zip(self._machine.parameters, self._machine.kernel.nominal, strict=True))
-        values_given = shared if isinstance(shared, list) else [None] * len(_XYZ)
+        # What a family gave stands in the document in m; the file may have another unit.
+        by_hand = isinstance(shared, list) and self._machine.family is None
+        values_given = shared if by_hand else [None] * len(_XYZ)
         row[key] = [
             value if value is not None else self.written(float(nominal[name]), dimension, None)
             for name, value in zip(names, values_given, strict=True)

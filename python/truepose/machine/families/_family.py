@@ -9,12 +9,13 @@ analytic functions, SIAM J. Numer. Anal. 4 (1967) 202-210).
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from truepose.arrays import Floats
 from truepose.files.file_table import FileTable
 
 Numbers: TypeAlias = NDArray[Any]
@@ -24,6 +25,9 @@ Values: TypeAlias = Mapping[str, Numbers]
 """Parameter -> its value () or, of one that each limb has its own of, (n_limb,); m, rad."""
 
 X, Y, Z = np.eye(3)
+
+_NOTHING = 1e-15
+"""Relative to the largest component: what rounding leaves of the sine of half a turn."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +67,23 @@ class MachineFamily(FileTable):
         """Home by freedom, m and rad, where it follows from a parameter."""
         return {}
 
+    def real_rows(self) -> list[Row]:
+        """The machine's rows as they are, real and without rounding of what is nothing."""
+        rows = type(self).rows(self.values())
+        return [
+            replace(row, numbers={key: _clean(value) for key, value in row.numbers.items()})
+            for row in rows
+        ]
+
     def values(self) -> dict[str, Numbers]:
         """The value of every parameter that has one, () or (n_limb,)."""
         given = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: np.asarray(value) for name, value in given.items() if value is not None}
+
+
+def _clean(value: Numbers) -> Floats:
+    numbers: Floats = np.asarray(value, np.float64)
+    return np.where(np.abs(numbers) <= _NOTHING * np.abs(numbers).max(), 0.0, numbers)
 
 
 def outward(angle: Numbers) -> tuple[Numbers, Numbers]:

@@ -32,9 +32,6 @@ EQUAL = 1e-8
 Of a machine of half a metre 5 nm: what is left when a file writes nine digits.
 """
 
-_NOTHING = 1e-15
-"""Relative to the largest coordinate: what rounding leaves of the sine of half a turn."""
-
 _DERIVED = ("drive", "strut", "guide", EACH)
 """Tables about which nothing is known where `[family]` is no good."""
 
@@ -76,13 +73,15 @@ def expand(
 class _Expanding:
     def __init__(self, document: Document, family: MachineFamily, validated: Validated) -> None:
         self.document, self.family, self.units = document, family, validated.units
-        self.rows = list(family.rows(family.values()))
+        self.rows = family.real_rows()
         self.line = document.line((TABLE,))
+        # What a calibration found of one joint centre stands in its row, beside the family.
+        self.is_calibrated = isinstance(document.data.get("calibration"), dict)
         lengths = [
             np.abs(value).max()
             for row in self.rows
             for key, value in row.numbers.items()
-            if _dimension(row.table, key) == "length"
+            if _unit(row.table, key)
         ]
         self.size = float(max(lengths, default=1.0))
 
@@ -163,7 +162,7 @@ class _Expanding:
             if not shared and key not in data:
                 data[key] = self._written(row, key, value)
                 self._at_family(where)
-            elif key not in row.defaults:
+            elif key not in row.defaults and not self.is_calibrated:
                 said = common[key] if shared else data[key]
                 fault = self._contradiction(row, key, value, said)
                 if fault is not None:
@@ -174,17 +173,11 @@ class _Expanding:
         """A value as a file would have it, exact and without a unit of the file's own."""
         if isinstance(value, str):
             return value
-        numbers, unit = self._clean(row, key, value)
+        numbers, unit = value, _unit(row.table, key)
         if unit is None:
             return numbers.tolist()
         texts = [f"{float(number)!r} {unit}" for number in np.atleast_1d(numbers)]
         return texts if numbers.ndim else texts[0]
-
-    def _clean(self, row: Row, key: str, value: Any) -> tuple[Floats, str | None]:
-        dimension = _dimension(row.table, key)
-        size, unit = (self.size, "m") if dimension == "length" else (1.0, None)
-        numbers: Floats = np.asarray(value, np.float64)
-        return np.where(np.abs(numbers) <= _NOTHING * size, 0.0, numbers), unit
 
     def _contradiction(self, row: Row, key: str, value: Any, said: Any) -> Fault | None:
         """What is wrong with a key of the file that the family gives too; None if nothing."""
@@ -193,7 +186,7 @@ class _Expanding:
             if said == value or not isinstance(said, str):
                 return None
             return self._fault(part, shown_value(said), shown_value(value))
-        numbers, unit = self._clean(row, key, value)
+        numbers, unit = value, _unit(row.table, key)
         try:
             given = _read(said, numbers.ndim, "ratio" if unit is None else "length", self.units)
         except QuantityError:
@@ -236,11 +229,12 @@ def _read(said: Any, ndim: int, dimension: str, units: UnitSystem) -> Floats:
     return np.array([units.read(component, dimension) for component in said])
 
 
-def _dimension(table: str, key: str) -> str:
-    """`length` or `direction`, as the kernel says of a field."""
-    fields = {
-        field["name"]: field["dimension"]
+def _unit(table: str, key: str) -> str | None:
+    """SI; None of a direction."""
+    directions = {
+        field["name"]
         for entry in elements()[table]
         for field in entry["fields"]
+        if field["dimension"] == "direction"
     }
-    return str(fields.get(key, "length"))
+    return None if key in directions else "m"

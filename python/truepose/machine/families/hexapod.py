@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from truepose.files.quantity import Length, NonNegativeAngle, PositiveLength
+from truepose.files.quantity import Angle, Length, PositiveLength
 from truepose.machine.families._family import MachineFamily, Row, Values, outward
 
 _BASE = ((150.0, -0.5), (30.0, 0.5), (30.0, -0.5), (270.0, 0.5), (270.0, -0.5), (150.0, 0.5))
@@ -43,11 +43,11 @@ turned.
 
     base_radius: PositiveLength = Field(description="Radius of the circle of base joints.")
     platform_radius: PositiveLength = Field(description="Radius of the circle of platform joints.")
-    base_angle: NonNegativeAngle = Field(
+    base_angle: Angle = Field(
         description="Between the two base joints of a pair, seen from the middle; 0 where they "
         "coincide."
     )
-    platform_angle: NonNegativeAngle = Field(
+    platform_angle: Angle = Field(
         description="Between the two platform joints of a pair, seen from the middle."
     )
     height: Length | None = Field(

@@ -148,6 +148,7 @@ CATALOGUE: dict[str, str] = {
     "no-witness": "a witness is wanted where no machine exceeds the accuracy asked",
     "witness-not-written": "a witness that a machine file cannot say",
     "unknown-kind": "a kind of machine that is not in the library",
+    "no-family": "joint centres are to follow from a family, in a file without one",
     "unknown-code": "a code to be explained that nothing gives",
     # controllers
     "unknown-controller": "a controller that there is no adapter for",

@@ -40,9 +40,15 @@ if TYPE_CHECKING:
         help="Check again whenever the file, or a data file that it names, changes, until Ctrl-C; "
         "the exit code is that of the last check.",
     ),
+    click.option(
+        "--expand",
+        is_flag=True,
+        help="Write the file with the joint centres that follow from its [family], and check "
+        "nothing: to --output FILE.toml, else to stdout.",
+    ),
     verbose_option,
 )
-def command(*, watch: bool, **options: Any) -> int:
+def command(*, watch: bool, expand: bool, **options: Any) -> int:
     """Describe a machine, and say if it is accurate enough.
 
     Exit code 1 unless it is certain that the machine, commanded as it is, keeps the accuracy
@@ -50,6 +56,10 @@ def command(*, watch: bool, **options: Any) -> int:
     above the answer, and changes neither it nor the exit code.
     """
     request = Request(**options)
+    if expand:
+        if watch or request.witness is not None or request.strict:
+            raise click.UsageError("--expand checks nothing: it goes with --set and --output only.")
+        return _expand(request)
     if not watch:
         return _check(request)
     from truepose.cli._watch import watched
@@ -125,6 +135,23 @@ def _answers(
         if [problem.code for problem in error.problems] != ["no-pose-left"]:
             raise
         return answers, []
+
+
+def _expand(request: Request) -> int:
+    """Write the machine file with its joint centres."""
+    from truepose.calibration.result.expanded import expanded
+    from truepose.cli import _steps
+    from truepose.files.writing import replacing
+
+    machine = _steps.read_machine(request, [".toml"])
+    text = expanded(machine, request.machine_file)
+    if request.output is None:
+        click.echo(text, nl=False)
+        return 0
+    with replacing(request.output) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    _steps.note_written(request.output)
+    return 0
 
 
 def _tables(machine: Machine, check: WorkspaceCheck, answers: tuple[Answer, ...]) -> list[Table]:

@@ -12,11 +12,66 @@ from truepose.cli import _complete
 from truepose.cli._options import OutputFile, format_option, takes
 
 if TYPE_CHECKING:
+    from truepose.machine.families import MachineFamily
     from truepose.machine.library import LibraryMachine
     from truepose.reporting.table import Table
 
 
-@click.command("init")
+class _InitCommand(click.Command):
+    """The options of a family stand in its own class: they are read where they are asked for."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Learn first of which kind the file is to be."""
+        own = {name for option in self.params for name in (*option.opts, *option.secondary_opts)}
+        own -= {"kind"}
+        asked = [word.partition("=")[0] for word in args if word.startswith("-")]
+        if any(word not in own for word in asked):
+            ctx.meta[_FAMILY] = _family_in(args)
+        return super().parse_args(ctx, args)
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """And those of the family, if it is one."""
+        return [*super().get_params(ctx), *_options(ctx.meta.get(_FAMILY))]
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The family's drawing."""
+        super().format_epilog(ctx, formatter)
+        family = ctx.meta.get(_FAMILY)
+        if family is not None:
+            with formatter.section(f"{family.kind}: {family.doc.rstrip('.')}"):
+                formatter.write("".join(f"  {line}\n" for line in family.drawing.splitlines()))
+
+
+_FAMILY = "truepose.family"
+_OPTION = "family_"
+"""What the options of a family begin with among the values of the command."""
+
+
+def _family_in(args: Sequence[str]) -> type[MachineFamily] | None:
+    """The family that a command line names, if any."""
+    from truepose.machine.families import REGISTRY
+
+    return next((family for family in REGISTRY if family.kind in args), None)
+
+
+def _options(family: type[MachineFamily] | None) -> list[click.Parameter]:
+    if family is None:
+        return []
+    return [
+        click.Option(
+            [f"--{key.replace('_', '-')}", f"{_OPTION}{key}"],
+            metavar="VALUE",
+            help=f"{'' if field.is_required() else '(Optional.) '}{field.description}",
+        )
+        for key, field in family.model_fields.items()
+    ]
+
+
+@click.command(
+    "init",
+    cls=_InitCommand,
+    epilog="KIND --help shows the parameters of a kind that is a family, and its drawing.",
+)
 @takes(
     click.argument("kind", required=False, shell_complete=_complete.kinds),
     click.option("--list", "listed", is_flag=True, help="Describe every kind, and write nothing."),
@@ -30,11 +85,24 @@ if TYPE_CHECKING:
     ),
     format_option,
 )
-def command(kind: str | None, listed: bool, output: Path | None, format: str) -> int:  # noqa: A002
+@click.pass_context
+def command(
+    context: click.Context,
+    /,
+    kind: str | None,
+    listed: bool,
+    output: Path | None,
+    format: str,  # noqa: A002
+    **parameters: str | None,
+) -> int:
     """Write a commented machine file of a kind to begin with.
 
     It is complete: every command reads it as it stands. A file that is already there is not
     touched. Its first line is for editors: `truepose schema` says how they complete its keys.
+
+    With the parameters of its family (`--radius 138`, in mm and degrees, or with a unit) it is
+    that machine, [family] in place of joint centres: all else is the library's, the workspace as
+    large as the machine, a travel as long as the workspace needs.
     """
     if listed == (kind is not None):
         raise click.UsageError("Give a KIND, or --list to see which there are.")
@@ -47,13 +115,24 @@ def command(kind: str | None, listed: bool, output: Path | None, format: str) ->
     from truepose.files.writing import replacing, require_new, require_writable
 
     machine = library.machine_of(kind)
+    given = {
+        key.removeprefix(_OPTION): value for key, value in parameters.items() if value is not None
+    }
     path = output or Path(f"{kind}.toml")
     require_writable(path, [".toml"])
     require_new(path)
+    text = machine.template if not given else _of_family(context.meta[_FAMILY], given)
     with replacing(path) as temporary:
-        temporary.write_text(machine.template, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8")
     note_written(path)
     return 0
+
+
+def _of_family(family: type[MachineFamily], given: dict[str, str]) -> str:
+    import truepose
+    from truepose.machine.families.template import template
+
+    return template(family, given, truepose.load)
 
 
 def _show(machines: Sequence[LibraryMachine], form: str) -> None:

@@ -82,12 +82,19 @@ def validate(document: Document, owners: Owners) -> tuple[Validated, list[Proble
     return validated, _one_per_unit(problems)
 
 
-def validate_alone(document: Document, owners: Owners, table: str) -> Validated:
-    """Fill the models of one table that the file has; what is wrong with it `validate` says."""
-    unsaid: list[Problem] = []
-    validated = Validated(_units(document, unsaid))
-    _single(document, table, owners.by_table[table], validated, unsaid)
-    return validated
+def units_of(document: Document) -> UnitSystem:
+    """The units that the file declares, those that are good."""
+    return _units(document, [])
+
+
+def validate_alone(
+    document: Document, owners: Owners, table: str
+) -> tuple[Validated, list[Problem]]:
+    """Fill the models of one table that the file has, and what is wrong with it."""
+    problems: list[Problem] = []
+    validated = Validated(units_of(document))
+    _single(document, table, owners.by_table[table], validated, problems)
+    return validated, problems
 
 
 def _one_per_unit(problems: list[Problem]) -> list[Problem]:

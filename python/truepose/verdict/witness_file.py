@@ -102,6 +102,8 @@ class _Writing:
         self._path, self._temporary = path, temporary
         self._causes_stay = causes_stay
         self._text = MachineText(original, machine, _changed(original, machine))
+        # One machine has joint centres, which need not be those of any family.
+        self._text.write_rows_for_family()
         self._edits = OneValues(self._text, machine, witness.by_source)
 
     def written(self) -> str:

@@ -56,7 +56,7 @@ class MachineText:
         owned = owners(source.tables for source in REGISTRY)
         self.toml = tomlkit.parse(_without_warnings(text, machine))
         expand(self._document, machine.settings, owned)
-        self._units: UnitSystem = validation.validate_alone(self._document, owned, "units").units
+        self._units: UnitSystem = validation.units_of(self._document)
         self._machine = machine
         self._folder = original.parent
         # The settings go into the text, and into what was read, which says what rows share.

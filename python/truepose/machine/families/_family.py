@@ -57,11 +57,21 @@ class MachineFamily(FileTable):
     """Names of the limbs, for parameters that each may have its own of."""
     dof: ClassVar[tuple[str, ...]]
     commanded: ClassVar[tuple[str, ...]]
+    example: ClassVar[Mapping[str, Any]]
+    """The parameters of the library's machine of the family, as a file in its units has them."""
 
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:
         """The machine's rows, in their order."""
         raise NotImplementedError
+
+    def size(self) -> float:
+        """m, with which the workspace goes: half as large a machine has half of it."""
+        raise NotImplementedError
+
+    def level(self) -> float:
+        """Height in m from which the workspace is told."""
+        return 0.0
 
     def home(self) -> Mapping[str, float]:
         """Home by freedom, m and rad, where it follows from a parameter."""

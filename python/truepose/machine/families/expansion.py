@@ -63,7 +63,7 @@ def expand(
     apply(document, of_table(settings, TABLE), owners.free_tables)
     if not isinstance(document.data.get(TABLE), dict):
         return Expansion()
-    validated = validate_alone(document, owners, TABLE)
+    validated, _ = validate_alone(document, owners, TABLE)  # the whole file's problems come later
     family = validated.family
     if family is None:
         return Expansion()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -40,6 +40,13 @@ turned.
     limbs: ClassVar[tuple[str, ...]] = ("1", "2", "3", "4", "5", "6")
     dof: ClassVar[tuple[str, ...]] = ("x", "y", "z", "a", "b", "c")
     commanded: ClassVar[tuple[str, ...]] = dof
+    example: ClassVar[Mapping[str, Any]] = {
+        "base_radius": 26.5,
+        "platform_radius": 11.5434,
+        "base_angle": 0,
+        "platform_angle": 9.9414,
+        "height": 20,
+    }
 
     base_radius: PositiveLength = Field(description="Radius of the circle of base joints.")
     platform_radius: PositiveLength = Field(description="Radius of the circle of platform joints.")
@@ -55,6 +62,14 @@ turned.
         description="Height of the platform joints over the base joints at home: the z of "
         "`[workspace] home` where that is not written. No joint centre depends on it.",
     )
+
+    def size(self) -> float:
+        """The height, or where that is not said the base."""
+        return self.base_radius if self.height is None else self.height
+
+    def level(self) -> float:
+        """The platform at home."""
+        return 0.0 if self.height is None else self.height
 
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import ClassVar
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -36,6 +36,12 @@ o o  the two joints of a pair, spacing apart: so do they stand on the effector t
     limbs: ClassVar[tuple[str, ...]] = ("a", "b", "c")
     dof: ClassVar[tuple[str, ...]] = ("x", "y", "z", "a", "b", "c")
     commanded: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    example: ClassVar[Mapping[str, Any]] = {
+        "radius": 204.75,
+        "effector_radius": 30,
+        "rod": 333,
+        "spacing": 50,
+    }
 
     radius: ThreePositiveLengths = Field(
         description="From the machine's axis to the middle of each carriage's two joints."
@@ -49,6 +55,10 @@ o o  the two joints of a pair, spacing apart: so do they stand on the effector t
         default_factory=lambda: (math.radians(210.0), math.radians(330.0), math.radians(90.0)),
         description="Direction of each tower from x. Default: 210, 330 and 90 degrees.",
     )
+
+    def size(self) -> float:
+        """What the rods reach over."""
+        return sum(self.radius) / 3.0 - self.effector_radius
 
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import ClassVar
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
 
 from pydantic import Field
 
@@ -36,6 +36,14 @@ o o  the two joints of a pair at the elbows, spacing apart: so do they stand on 
     limbs: ClassVar[tuple[str, ...]] = ("a", "b", "c")
     dof: ClassVar[tuple[str, ...]] = ("x", "y", "z", "a", "b", "c")
     commanded: ClassVar[tuple[str, ...]] = ("x", "y", "z")
+    example: ClassVar[Mapping[str, Any]] = {
+        "shoulder_radius": 63.9,
+        "effector_radius": 30,
+        "upper_arm": 170,
+        "lower_arm": 320,
+        "spacing": 50,
+        "shoulder_height": 412.9,
+    }
 
     shoulder_radius: PositiveLength = Field(
         description="From the machine's axis to each shoulder, the axis of a crank."
@@ -51,6 +59,14 @@ o o  the two joints of a pair at the elbows, spacing apart: so do they stand on 
         default_factory=lambda: (math.radians(30.0), math.radians(150.0), math.radians(270.0)),
         description="Direction of each arm from x. Default: 30, 150 and 270 degrees.",
     )
+
+    def size(self) -> float:
+        """Both arms."""
+        return (sum(self.upper_arm) + sum(self.lower_arm)) / 3.0
+
+    def level(self) -> float:
+        """The shoulders."""
+        return self.shoulder_height
 
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:

@@ -49,22 +49,8 @@ def _rotary_delta(file: File) -> File:
     }
 
 
-def _hexapod(file: File) -> File:
-    return {
-        "base_radius": 26.5,
-        "base_angle": 0,
-        "platform_radius": 11.5434,
-        "platform_angle": 9.9414,
-        "height": 20,
-    }
-
-
-OF_KIND = {
-    "linear_delta": _linear_delta,
-    "rotary_delta": _rotary_delta,
-    "hexapod": _hexapod,
-}
-"""Kind -> the parameters of `[family]` of its machine in the library, in the file's units."""
+OF_KIND = {"linear_delta": _linear_delta, "rotary_delta": _rotary_delta}
+"""Kinds whose library machine is calibrated: what its file says of each limb by itself."""
 
 
 def library_file(kind: str) -> File:
@@ -73,8 +59,10 @@ def library_file(kind: str) -> File:
 
 
 def family_of(kind: str) -> File:
-    """`[family]` of the library's machine."""
-    return {"kind": kind, **OF_KIND[kind](library_file(kind))}
+    """`[family]` of the library's machine, in its file's units."""
+    family = next(family for family in REGISTRY if family.kind == kind)
+    own = OF_KIND[kind](library_file(kind)) if kind in OF_KIND else family.example
+    return {"kind": kind, **own}
 
 
 def family_file(kind: str, **changed: Any) -> File:

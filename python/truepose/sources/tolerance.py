@@ -139,7 +139,7 @@ class DimensionalTolerance(Represented):
             [member.stated.band.shift * member.effect for member in entries],
             [member.stated.band.half * abs(member.effect) for member in entries],
             groups=[OWN_GROUP if m.group is None else groups.index(m.group) for m in entries],
-            sign=[math.copysign(m.stated.tolerance.sign, m.effect) for m in entries],
+            sign=[math.copysign(1.0, m.effect) * m.stated.tolerance.sign for m in entries],
             edge=[
                 edges.get(m.group or "", names[m.column].endswith(EDGE_ENDINGS)) for m in entries
             ],

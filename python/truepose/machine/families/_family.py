@@ -8,6 +8,7 @@ analytic functions, SIAM J. Numer. Anal. 4 (1967) 202-210).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, TypeAlias
@@ -94,6 +95,11 @@ class MachineFamily(FileTable):
 def _clean(value: Numbers) -> Floats:
     numbers: Floats = np.asarray(value, np.float64)
     return np.where(np.abs(numbers) <= _NOTHING * np.abs(numbers).max(), 0.0, numbers)
+
+
+def between(middle: float, side: float, angle: Numbers) -> Numbers:
+    """The direction (3,) of one of two points `angle` apart, on its side of their middle, deg."""
+    return outward(math.radians(middle) + 0.5 * side * angle)[0]
 
 
 def outward(angle: Numbers) -> tuple[Numbers, Numbers]:

@@ -49,6 +49,10 @@ _OPTION = "family_"
 
 def _family_in(args: Sequence[str]) -> type[MachineFamily] | None:
     """The family that a command line names, if any."""
+    from truepose.machine.library import kinds
+
+    if not set(kinds()).intersection(args):
+        return None
     from truepose.machine.families import REGISTRY
 
     return next((family for family in REGISTRY if family.kind in args), None)

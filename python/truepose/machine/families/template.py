@@ -40,6 +40,9 @@ UNITS = {"length": "mm", "angle": "deg"}
 _WIDE = 1e3
 """Travel with which a workspace is tried, in sizes of the machine."""
 
+_SHORTEST = 0.75
+"""Of the shortest strut of the library's machine at this size, where its limb has beams."""
+
 _MARGIN = 0.1
 _SMALLER = 0.9
 _TRIES = 60
@@ -226,8 +229,8 @@ class _Template:
         for name, row in tried["drive"].items():
             if self._is_length(name):
                 row.pop("fixed_at", None)
-                positive = self._kind(name) == "telescopic"
-                row["travel"] = [self._mm(1e-9) if positive else -wide, wide]
+                row.pop("offset", None)
+                row["travel"] = [self._shortest(row) if self._sets_length(name) else -wide, wide]
         with TemporaryDirectory() as folder:
             path = Path(folder) / f"{self._family.kind}.toml"
             path.write_text(self._written(tried, axes), encoding="utf-8")
@@ -254,22 +257,40 @@ class _Template:
     def _is_length(self, drive: str) -> bool:
         return self._kind(drive) != "crank"
 
+    def _sets_length(self, drive: str) -> bool:
+        return self._kind(drive) == "telescopic"
+
+    def _shortest(self, row: Mapping[str, Any]) -> float:
+        """Of a telescopic strut, mm: it has to hold what its limb is made of."""
+        if "limb" not in self._toml:
+            return self._mm(1e-9)
+        return self._mm(_SHORTEST * self._ratio * self._length(row["travel"][0]))
+
     def _set_travels(self, rows: Any, machine: Machine, joints: np.ndarray) -> None:
         spans = [
             (float(of.min()), float(of.max())) for of in joints.reshape(-1, joints.shape[-1]).T
         ]
         by_name = dict(zip(machine.joints, spans, strict=True))
+        home = machine.inverse(
+            machine.home[[machine.dof.index(name) for name in machine.commanded]]
+        )
         for name, row in rows["drive"].items():
             if not self._is_length(name):
                 continue
-            low, high = (self._mm(end) for end in by_name[name])
+            ends = by_name[name]
+            if "offset" in row:
+                # The coordinate is the stroke from home.
+                at_home = float(home[machine.joints.index(name)])
+                row["offset"] = self._mm(at_home)
+                ends = (ends[0] - at_home, ends[1] - at_home)
+            low, high = (self._mm(end) for end in ends)
             more = max(_MARGIN * (high - low), 1e-3 * max(abs(low), abs(high)))
             digits = _DIGITS - 1 - math.floor(math.log10(high - low + 2.0 * more))
             travel = [
                 _round(low - more, digits, math.floor),
                 _round(high + more, digits, math.ceil),
             ]
-            if self._kind(name) == "telescopic":
+            if self._sets_length(name) and "offset" not in row:
                 travel[0] = max(travel[0], _round(0.5 * low, digits, math.floor), 0.0)
             if "fixed_at" in row:
                 # A bearing at an end of the travel is there again.
@@ -297,7 +318,7 @@ class _Template:
         toml["machine"]["name"] = self._family.kind.replace("_", " ").capitalize()
         toml["machine"]["description"] = self._family.doc
         toml["machine"]["origin"] = tomlkit.string(
-            f"The parameters of [family] as given; all else is that of the library's "
+            f"The parameters of the family as given; all else is that of the library's "
             f"{self._family.kind}, its workspace\ngone with the size of the machine.\n",
             multiline=True,
         )

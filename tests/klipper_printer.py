@@ -155,6 +155,18 @@ def saved(
     return "\n".join(lines) + "\n"
 
 
+def as_saved(text: str) -> str:
+    """Sections as SAVE_CONFIG writes them below a printer.cfg."""
+    head = (
+        "",
+        "#*# <---------------------- SAVE_CONFIG ---------------------->",
+        "#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.",
+        "#*#",
+    )
+    lines = (f"#*# {line}".rstrip() for line in text.replace(": ", " = ").splitlines())
+    return "\n".join([*head, *lines, ""])
+
+
 LINEAR = Printer(
     "delta", 150.0, (300.0, 300.0, 300.0), (310.0, 310.0, 310.0), (210.0, 330.0, 90.0), 90.0
 )
@@ -169,4 +181,4 @@ ROTARY = Printer(
     height=400.0,
 )
 
-__all__ = ["LINEAR", "ROTARY", "Printer", "saved"]
+__all__ = ["LINEAR", "ROTARY", "Printer", "as_saved", "saved"]

@@ -30,6 +30,5 @@ def kinematics_of(text: str, *, steps: bool = False, measured: bool = False) -> 
         lines += [f"{k}: {v}" for k, v in parsed.items(section) if k in wanted]
     if measured:
         lines.append("[delta_calibrate]")
-        lines += [f"{k}: {v}" for k, v in parsed.items("delta_calibrate") if k[-1] in "0123456789s"]
-        lines.append("radius: 50")
+        lines += [f"{k}: {v}" for k, v in parsed.items("delta_calibrate")]
     return "\n".join(lines) + "\n"

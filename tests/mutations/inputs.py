@@ -8,9 +8,12 @@ from functools import cache
 from pathlib import Path
 
 import truepose
+from klipper_printer import LINEAR, ROTARY, as_saved, saved
 from made_measurement_files import GOOD, several
 from truepose._kernel import toml_lines
 from truepose.calibration import read_measurements
+from truepose.controllers import ControllerFile
+from truepose.controllers.klipper.read import KlipperReader
 from truepose.errors import MachineFileError
 from truepose.files.document import read
 from truepose.machine import Machine
@@ -128,6 +131,11 @@ def _planar_line(start: str) -> str:
     return line
 
 
+KLIPPER = (
+    "[include none*.cfg]\n" + LINEAR.config() + saved(LINEAR, LINEAR, z_offset=0.5),
+    ROTARY.config(probe=False) + as_saved(saved(ROTARY, ROTARY, z_offset=0.0)),
+)
+
 MARLIN = _lines_with(_controller_file("marlin/m503.txt"), "G21", "M665 L", "M666 X", "M851 X")
 G29 = "Send: G29 L-70 R70 F-70 B70\n" + _controller_file("marlin/g29_bilinear.log")
 REPRAP = _lines_with(_controller_file("reprap/config.g"), "M665", "M666", "M584", "G31")
@@ -174,6 +182,18 @@ KINDS = {
         _load,
         ("check", "{folder}/machine.toml"),
         _planar_with(_planar_line("grid = "), 'poses = "poses.csv"'),
+    ),
+    "klipper": Kind(
+        KLIPPER,
+        "printer.cfg",
+        lambda folder: _imported(folder, "printer.cfg"),
+        ("import", "{folder}/printer.cfg"),
+    ),
+    "klipper-reader": Kind(
+        KLIPPER,
+        "printer.cfg",
+        lambda folder: KlipperReader.read(ControllerFile.at(folder / "printer.cfg"), {}),
+        ("import", "{folder}/printer.cfg"),
     ),
     "marlin": Kind(
         (MARLIN, "G20\n" + MARLIN.replace("Recv: echo:  G21 ; (mm)\n", "")),

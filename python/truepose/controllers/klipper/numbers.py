@@ -13,6 +13,10 @@ STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
 """The sections of the three drives."""
 
 
+LARGEST = 1e12
+"""Of any number, and of one by it: no machine has a larger one, and products stay numbers."""
+
+
 class Numbers:
     """Reads options; what cannot be read is NaN, and among the `problems`.
 
@@ -47,7 +51,8 @@ class Numbers:
             return math.nan
         value = finite(option.text)
         if value is None:
-            self.refuse(option, section, name, "not-a-number", "this is no number", expected)
+            message = "this is no number of a machine"
+            self.refuse(option, section, name, "not-a-number", message, expected)
             return math.nan
         if not value > above or value < at_least:
             code, message = "import-value", f"Klipper wants more than {above:.10g} here"
@@ -142,12 +147,12 @@ class Numbers:
 
 
 def finite(text: str) -> float | None:
-    """A finite number as Klipper reads it."""
+    """A number as Klipper reads it, zero or from 1 / `LARGEST` to `LARGEST` in size."""
     try:
         value = float(text)
     except ValueError:
         return None
-    return value if math.isfinite(value) else None
+    return value if value == 0.0 or 1.0 / LARGEST <= abs(value) <= LARGEST else None
 
 
 __all__ = ["STEPPERS", "Numbers", "finite"]

@@ -154,6 +154,7 @@ CATALOGUE: dict[str, str] = {
     "unknown-controller": "a controller that there is no adapter for",
     "bad-option": "an option of a controller's adapter that it does not have or cannot read",
     "controller-cannot": "a machine that the controller has no way to take",
+    "no-difference": "a difference to a file is wanted that has no lines for the numbers",
     "import-unrecognised": "a file that no reader of a controller's format knows",
     "import-declined": "a controller's file of a machine that is not imported",
     "import-incomplete": "a controller's file that does not say what a machine needs",

@@ -38,6 +38,14 @@ from truepose.cli._verbose import verbose_option
         help="Write the files into FOLDER, which is made where it is not there. Without it they "
         "are printed.",
     ),
+    click.option(
+        "--against",
+        "against",
+        metavar="FILE",
+        type=InputFile(".cfg", ".g", ".h", ".hal", ".ini"),
+        help="Print what is to change in your own configuration FILE instead, as a difference that "
+        "`patch` applies: comments and order stay.",
+    ),
     click.option("--list", "listed", is_flag=True, help="Describe every controller, and stop."),
     verbose_option,
 )
@@ -47,6 +55,7 @@ def command(
     settings: tuple[str, ...],
     options: tuple[str, ...],
     folder: Path | None,
+    against: Path | None,
     listed: bool,
 ) -> int:
     """Print what a CONTROLLER is to be given for the machine.
@@ -60,6 +69,11 @@ def command(
         return 0
     if controller is None or machine_file is None:
         raise click.UsageError("Give a CONTROLLER and a MACHINE.toml, or --list.")
+    if against is not None and folder is not None:
+        raise click.UsageError(
+            "--against prints a difference and writes no file: leave --output away, or write it "
+            "with > FILE.patch."
+        )
     from truepose.cli._progress import progress
     from truepose.cli._steps import load_machine, note_written
     from truepose.controllers import controller as adapter_of
@@ -72,7 +86,14 @@ def command(
     machine = load_machine(machine_file, settings)
     with progress(f"export {controller}"):
         result = export(machine, controller, options)
-    if folder is None:
+    if against is not None:
+        from truepose.controllers import difference
+
+        changes = difference(controller, result, against)
+        click.echo(changes, nl=False)
+        if not changes:
+            click.echo(f"nothing to change: {against} has these numbers", err=True)
+    elif folder is None:
         for name, text in result.files.items():
             if len(result.files) > 1:
                 click.echo(f"==> {name} <==")

@@ -13,6 +13,7 @@ from truepose.lazy_names import imported_when_used
 
 if TYPE_CHECKING:
     from truepose.controllers._adapters import controller, export
+    from truepose.controllers._against import difference
     from truepose.controllers._export import Controller, Export, Option
     from truepose.controllers._import import Import, import_machine, reader
     from truepose.controllers._reader import (
@@ -34,6 +35,7 @@ _WHERE = {
     "Reader": "truepose.controllers._reader",
     "Setting": "truepose.controllers._reader",
     "controller": "truepose.controllers._adapters",
+    "difference": "truepose.controllers._against",
     "export": "truepose.controllers._adapters",
     "import_machine": "truepose.controllers._import",
     "reader": "truepose.controllers._import",
@@ -53,6 +55,7 @@ __all__ = [
     "Reader",
     "Setting",
     "controller",
+    "difference",
     "export",
     "import_machine",
     "reader",

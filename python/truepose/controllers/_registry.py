@@ -23,3 +23,12 @@ READERS: dict[str, str] = {
     "joint-centres": "truepose.controllers.joint_centres.read:JointCentresReader",
 }
 """Name on the command line -> module and class of the reader of that controller's files."""
+
+EDITORS: dict[str, str] = {
+    "linuxcnc-genhexkins": "truepose.controllers._hal_lines:edits",
+    "linuxcnc-lineardelta": "truepose.controllers._hal_lines:edits",
+    "klipper": "truepose.controllers.klipper.against:edits",
+    "marlin": "truepose.controllers.marlin.against:edits",
+    "reprap": "truepose.controllers.reprap.against:edits",
+}
+"""Name on the command line -> what says which lines of the user's own file are to change."""

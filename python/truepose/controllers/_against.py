@@ -9,27 +9,15 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from truepose.controllers._adapters import by_name
+from truepose.controllers._edit import Edit, no_difference
 from truepose.controllers._export import Export
 from truepose.controllers._reader import CONTROLLER_FILE, ControllerFile
 from truepose.controllers._registry import EDITORS, REGISTRY
-from truepose.errors import Fault, RequestError
 from truepose.files.text_file import read_text
 from truepose.files.wording import one_of
-
-
-@dataclass(frozen=True)
-class Edit:
-    """What becomes of a line of a file, from 1: its new text, or lines `below` it, 0 the top."""
-
-    file: ControllerFile
-    line: int
-    text: str | None = None
-    below: tuple[str, ...] = ()
-
 
 Editor = Callable[[ControllerFile, Export], Iterable[Edit]]
 
@@ -94,20 +82,4 @@ def _marked(lines: Iterable[str]) -> Iterator[str]:
         yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
 
 
-def no_difference(message: str, found: str, expected: str, hint: str | None = None) -> RequestError:
-    """The refusal of a file, or of a controller, of which no lines can be told."""
-    return RequestError(Fault("no-difference", message, found, expected, hint).at())
-
-
-def same_number(one: str, other: str) -> bool:
-    """Whether two texts are one number, or one list of them: a line that says it stays."""
-    if one == other:
-        return True
-    try:
-        pairs = zip(one.split(":"), other.split(":"), strict=True)
-        return all(float(a) == float(b) for a, b in pairs)
-    except ValueError:
-        return False
-
-
-__all__ = ["Edit", "difference", "edited", "no_difference", "same_number"]
+__all__ = ["difference", "edited"]

@@ -29,6 +29,6 @@ EDITORS: dict[str, str] = {
     "linuxcnc-lineardelta": "truepose.controllers._hal_lines:edits",
     "klipper": "truepose.controllers.klipper.against:edits",
     "marlin": "truepose.controllers.marlin.against:edits",
-    "reprap": "truepose.controllers.reprap.against:edits",
+    "reprap": "truepose.controllers._word_lines:edits",
 }
 """Name on the command line -> what says which lines of the user's own file are to change."""

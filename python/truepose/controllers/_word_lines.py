@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator
 
-from truepose.controllers._against import Edit, same_number
+from truepose.controllers._edit import Edit, same_number
 from truepose.controllers._export import Export
 from truepose.controllers._reader import ControllerFile
 
@@ -13,6 +13,15 @@ CODES = ("M665", "M666")
 
 _WORD = re.compile(r"(?<![A-Za-z])([A-Z])([-+.:\d]+)")
 _COMMENT = re.compile(r"\s*(;.*)?$")
+
+
+RADIUS_OF_WORKSPACE = ("M665 B",)
+"""Of RepRapFirmware; it is printed beside the numbers that were fitted."""
+
+
+def edits(file: ControllerFile, export: Export) -> Iterator[Edit]:
+    """M665 and M666 of RepRapFirmware."""
+    yield from word_edits(file, printed_words(export), RADIUS_OF_WORKSPACE)
 
 
 def printed_words(export: Export) -> dict[str, dict[str, str]]:
@@ -82,4 +91,4 @@ def _with_word(line: str, code: str, word: str, value: str) -> str:
     return f"{body} {word}{value}{line[len(body) :]}"
 
 
-__all__ = ["CODES", "printed_words", "word_edits"]
+__all__ = ["CODES", "edits", "printed_words", "word_edits"]

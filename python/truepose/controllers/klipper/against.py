@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from truepose.controllers._against import Edit, no_difference, same_number
+from truepose.controllers._edit import Edit, no_difference, same_number
 from truepose.controllers._export import Export
 from truepose.controllers._reader import ControllerFile
 from truepose.controllers.klipper.config import Entry, read_config

@@ -30,7 +30,7 @@ from truepose.controllers.klipper.rotary import arm_angles
 ANGLES = (30.0, 150.0, 270.0)
 """Degrees, where an angle is not given."""
 
-WIDE_END = 1.0
+WIDE_END = 0.5
 """Degrees: assumed of where an endstop trips."""
 
 

@@ -69,7 +69,7 @@ def failures(
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         if kind.companion is not None:
-            (folder / "machine.toml").write_text(kind.companion, "utf-8")
+            (folder / kind.companion_name).write_text(kind.companion, "utf-8")
         for number in range(count):
             text = mutation(kind, name, seed, number)
             (folder / kind.file).write_text(text, "utf-8", newline="")

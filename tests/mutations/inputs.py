@@ -59,7 +59,8 @@ class Kind:
     read: Callable[[Path], object]
     arguments: tuple[str, ...]
     companion: str | None = None
-    """Text of the machine file beside it, where it is not one itself."""
+    """Text of the machine file beside it, or of another file with this name."""
+    companion_name: str = "machine.toml"
     most_read: float = 0.6
     """The share of spoilt texts that may be read; of a log nearly all, whose other lines pass."""
 
@@ -92,21 +93,6 @@ def _measured(folder: Path) -> object:
 
 def _imported(folder: Path, file: str, **settings: str) -> object:
     return truepose.import_machine(folder / file, settings=settings)
-
-
-def _hexapod_of_hal(folder: Path) -> object:
-    (folder / "hexapod.ini").write_text(_controller_file("linuxcnc/hexapod.ini"), "utf-8")
-    return _imported(folder, "hexapod.hal")
-
-
-def _height_map(folder: Path) -> object:
-    (folder / "config.g").write_text(REPRAP, "utf-8")
-    return _imported(folder, "config.g", logs="heightmap.csv")
-
-
-def _reprap_log(folder: Path) -> object:
-    (folder / "config.g").write_text(REPRAP, "utf-8")
-    return _imported(folder, "config.g", logs="session.log")
 
 
 def _controller_file(name: str) -> str:
@@ -225,23 +211,27 @@ KINDS = {
         ("import", "{folder}/config.g"),
     ),
     "reprap-log": Kind(
-        (PLACES, _controller_file("reprap/g30_s-1.log")),
-        "session.log",
-        _reprap_log,
-        ("import", "{folder}/session.log"),
-        most_read=1.0,
+        (REPRAP + PLACES, REPRAP + _controller_file("reprap/g30_s-1.log")),
+        "config.g",
+        lambda folder: _imported(folder, "config.g"),
+        ("import", "{folder}/config.g"),
+        most_read=0.95,
     ),
     "reprap-height-map": Kind(
         (_controller_file("reprap/heightmap.csv"),),
         "heightmap.csv",
-        _height_map,
-        ("import", "{folder}/heightmap.csv"),
+        lambda folder: _imported(folder, "config.g", logs="heightmap.csv"),
+        ("import", "{folder}/config.g", "--set", "logs=heightmap.csv"),
+        REPRAP,
+        "config.g",
     ),
     "linuxcnc-hal": Kind(
         (_lines_with(_controller_file("linuxcnc/hexapod.hal"), "setp genhexkins", "net tool"),),
         "hexapod.hal",
-        _hexapod_of_hal,
-        ("import", "{folder}/hexapod.hal", "--set", "units.length=mm"),
+        lambda folder: _imported(folder, "hexapod.hal"),
+        ("import", "{folder}/hexapod.hal"),
+        _controller_file("linuxcnc/hexapod.ini"),
+        "hexapod.ini",
     ),
     "joint-centres": Kind(
         (CENTRES,),

@@ -99,6 +99,23 @@ def test_logs_and_map_are_measurements() -> None:
     np.testing.assert_allclose(stopped.placements[1, :2] / MM, [90.0, 0.0], atol=1e-9)
 
 
+def test_a_session_in_one_file(tmp_path: Path) -> None:
+    whole = "".join((FILES / name).read_text("utf-8") for name in ("config.g", "bed.g", "g32.log"))
+    read = imported(tmp_path, whole)
+    assert read.measurements is not None
+    assert read.measurements.n_row == 10
+
+
+@pytest.mark.parametrize("name", ["missing.log", "../outside.log"])
+def test_a_log_that_is_not_beside_the_file(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "sys"
+    folder.mkdir()
+    (tmp_path / "outside.log").write_text("", "utf-8")
+    with pytest.raises(MachineFileError) as failure:
+        imported(folder, LINEAR, logs=name)
+    assert "import-include" in str(failure.value)
+
+
 def test_heights_without_their_places_are_told() -> None:
     read = tp.import_machine(FILES / "config.g", settings={"logs": "g32.log"})
     assert read.measurements is None

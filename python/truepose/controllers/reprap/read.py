@@ -197,8 +197,8 @@ def _towers(held: Mapping[str, Held], settings: Mapping[str, float | str]) -> To
 def _points(
     file: ControllerFile, settings: Mapping[str, float | str], held: Mapping[str, Held]
 ) -> ProbedPoints:
-    """The heights in logs and height maps, the places of their points from any of the files."""
-    logs = list(logs_beside(file, str(settings.get("logs", ""))))
+    """The heights in the file, in logs and in height maps; places of points from any of them."""
+    logs = [file, *logs_beside(file, str(settings.get("logs", "")))]
     places: dict[int, Place] = {}
     for log in logs:
         places = points_asked(log.text, places)

@@ -94,6 +94,8 @@ class DeltaFile(ABC):
     family: ClassVar[str]
     drive: ClassVar[str]
     described: ClassVar[str]
+    lengths: ClassVar[Sequence[str]]
+    """Parameters of the family that are known to `WIDE_LENGTH`."""
 
     @abstractmethod
     def parameters(self, rods: Rods) -> Iterator[tuple[str, float | Sequence[float]]]:
@@ -106,6 +108,10 @@ class DeltaFile(ABC):
     @abstractmethod
     def groups(self) -> Iterator[tuple[str, Mapping[str, float]]]:
         """What varies together: a name, and the parameters with their shares of `WIDE_LENGTH`."""
+
+    @abstractmethod
+    def lever(self, rods: Rods) -> float:
+        """How far from the tool's axis a limb goes that stands beside its angle, mm."""
 
     def struts(self, limb: int) -> tuple[str, ...]:
         """Names of a limb's rods."""
@@ -181,12 +187,7 @@ class DeltaFile(ABC):
         yield f'"drive.*.offset" = {self.wide_end()} # endstops'
         yield f'"drive.*.scale" = "{WIDE_SCALE}" # steps'
         yield f'"strut.*.length" = {WIDE_ROD} # rods'
-        for group, members in self.groups():
-            for parameter, share in members.items():
-                if abs(share) > _NOTHING:
-                    band = f"band = {WIDE_LENGTH * abs(share):.9g}"
-                    sign = ", sign = -1" if share < 0.0 else ""
-                    yield f'"{parameter}" = {{ {band}, group = "{group}"{sign} }}'
+        yield from self._grouped() if self.rods is None else self._of_family(self.rods)
         radius, low, high = self.workspace
         step = max(radius, high - low) / 5.0
         cylinder = f"{{ radius = {radius!r}, z = [{low!r}, {high!r}], step = {step:.6g} }}"
@@ -196,6 +197,21 @@ class DeltaFile(ABC):
             yield f"home = {{ z = {self.home!r} }}"
         yield f"cylinder = {cylinder}{note}"
         yield from ("", "[accuracy]", f'target = "{ACCURACY}" # {ASSUMED}')
+
+    def _grouped(self) -> Iterator[str]:
+        for group, members in self.groups():
+            for parameter, share in members.items():
+                if abs(share) > _NOTHING:
+                    band = f"band = {WIDE_LENGTH * abs(share):.9g}"
+                    sign = ", sign = -1" if share < 0.0 else ""
+                    yield f'"{parameter}" = {{ {band}, group = "{group}"{sign} }}'
+
+    def _of_family(self, rods: Rods) -> Iterator[str]:
+        for parameter in self.lengths:
+            yield f'"family.{parameter}" = {WIDE_LENGTH}'
+        for name in LIMBS[:-1]:  # the last one says where y is
+            band = math.degrees(WIDE_LENGTH / self.lever(rods))
+            yield f'"family.angle.{name}" = {band:.4g} # {WIDE_LENGTH:g} mm sideways'
 
     @abstractmethod
     def lowest(self) -> float:
@@ -227,12 +243,13 @@ class LinearDeltaFile(DeltaFile):
     family: ClassVar[str] = "linear_delta"
     drive: ClassVar[str] = "slider"
     described: ClassVar[str] = "Three carriages on vertical guideways"
+    lengths: ClassVar[Sequence[str]] = ("radius",)
 
     def parameters(self, rods: Rods) -> Iterator[tuple[str, float | Sequence[float]]]:
         """Radii with the effector's."""
-        yield "radius", [radius + rods.effector_radius for radius in self.radius]
+        yield "radius", _one([radius + rods.effector_radius for radius in self.radius])
         yield "effector_radius", rods.effector_radius
-        yield "rod", self.arms
+        yield "rod", _one(self.arms)
         yield "spacing", rods.spacing
         yield "angle", self.angles
 
@@ -244,6 +261,10 @@ class LinearDeltaFile(DeltaFile):
         yield "", ""
         yield "base", "[0, 0, 0]"
         yield "length", repr(self.arms[limb])
+
+    def lever(self, rods: Rods) -> float:
+        """The nearest carriage."""
+        return min(self.radius) + rods.effector_radius
 
     def lowest(self) -> float:
         """mm, where no carriage comes."""
@@ -277,6 +298,11 @@ def quoted(text: str) -> str:
     """Text as a string of TOML, on one line."""
     plain = " ".join(text.split()).replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(mark for mark in plain if mark.isprintable()) + '"'
+
+
+def _one(values: Sequence[float]) -> float | Sequence[float]:
+    """One number for all limbs, where they have the same."""
+    return values[0] if len(set(values)) == 1 else values
 
 
 def _listed(value: float | Sequence[float]) -> str:

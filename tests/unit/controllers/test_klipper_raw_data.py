@@ -142,6 +142,26 @@ def test_with_its_rods_the_machine_tilts(tmp_path: Path) -> None:
     assert not any("tilt" in each.sentence for each in two.assumptions)
 
 
+@pytest.mark.parametrize("kind", PRINTERS)
+def test_a_machine_with_its_rods_is_calibrated_in_its_owners_words(
+    kind: str, tmp_path: Path
+) -> None:
+    printer: Printer = PRINTERS[kind]
+    text = printer.config() + saved(printer, printer, z_offset=0.5)
+    found = imported(tmp_path, text, family_spacing="45", family_effector_radius="30")
+    assert found.measurements is not None
+    calibration = tp.calibrate(found.machine, found.measurements)
+    radius = "family.shoulder_radius" if printer.turns else "family.radius"
+    assert radius in calibration.dataset["unknown"].values
+    assert np.abs(calibration.dataset["residual_before"].values).max() < 0.02 * MM
+
+
+@pytest.mark.parametrize("rods", [{}, {"family_spacing": "45", "family_effector_radius": "30"}])
+@pytest.mark.parametrize("kind", PRINTERS)
+def test_nothing_looks_odd_about_it(kind: str, rods: dict[str, str], tmp_path: Path) -> None:
+    assert tp.oddities(imported(tmp_path, PRINTERS[kind].config(), **rods).machine) == ()
+
+
 def test_what_the_machine_file_cannot_say_is_told(tmp_path: Path) -> None:
     text = LINEAR.config() + "[bed_mesh]\nmesh_radius: 80\n"
     assert any("[bed_mesh]" in sentence for sentence in imported(tmp_path, text).lost)

@@ -50,6 +50,11 @@ class RotaryDeltaFile(DeltaFile):
     family: ClassVar[str] = "rotary_delta"
     drive: ClassVar[str] = "crank"
     described: ClassVar[str] = "Three cranks"
+    lengths: ClassVar[Sequence[str]] = (
+        "shoulder_radius",
+        "shoulder_height",
+        *(f"upper_arm.{name}" for name in LIMBS),
+    )
 
     def parameters(self, rods: Rods) -> Iterator[tuple[str, float | Sequence[float]]]:
         """The shoulders' radius with the effector's."""
@@ -83,6 +88,10 @@ class RotaryDeltaFile(DeltaFile):
             parts = [f"strut.{strut}.base" for strut in self.struts(limb)]
             yield f"upper arm {name}", components(parts, along(self.angles[limb]))
         yield from self.sideways()
+
+    def lever(self, rods: Rods) -> float:
+        """The nearest elbow, its arm level."""
+        return self.radius + rods.effector_radius + min(self.upper)
 
     def lowest(self) -> float:
         """Degrees: straight down."""

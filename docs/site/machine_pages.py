@@ -12,7 +12,7 @@ from truepose.reporting.accuracy import gains, told
 
 ROOT = Path(__file__).resolve().parents[2]
 NEWLINE = "\n"
-HEAD = """# Machines
+HEAD = """# Every machine and its answer
 
 Every machine file that comes with truepose, with the accuracy that it asks and the answer to it,
 before and after compensation. The numbers are computed when this page is made. `truepose init KIND`

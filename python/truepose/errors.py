@@ -80,6 +80,7 @@ CATALOGUE: dict[str, str] = {
     "tolerance-of-offset": "a band of what a limb or a carriage gives way by",
     "tolerance-matches-nothing": "a tolerance for parameters that the machine does not have",
     "tolerance-twice": "two tolerances for one parameter",
+    "tolerance-without-effect": "a tolerance that is set where all parameters have another",
     "tolerance-mixes-kinds": "one tolerance for parameters of several kinds, such as m and rad",
     "unwanted-lead-error": "a lead error of a drive whose position is measured behind it",
     "unwanted-guideway": "a guideway of a drive that runs on none",

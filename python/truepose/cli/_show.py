@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,9 +12,10 @@ import click
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
+    from truepose.machine import Machine
     from truepose.plausibility import Oddity
-    from truepose.reporting.accuracy import Told
     from truepose.reporting.table import Table
+    from truepose.verdict.answer import Answer
 
 PIPED_WIDTH = 160
 """Columns where the output is no terminal, so that no table is squeezed."""
@@ -71,17 +72,24 @@ COLOURS = {"met": "green", "missed": "red", "open": "yellow", "none": "default"}
 """Of an answer's word."""
 
 
-def show_answers(answers: Iterable[Told], gains: Iterable[str] = ()) -> None:
-    """Print the answers, a line each, before anything else; then what compensation gains."""
+def show_answers(machine: Machine, answers: Sequence[Answer]) -> None:
+    """Print for which poses the answers are, then each, before anything else.
+
+    At the end what compensation gains.
+    """
     from rich.table import Table as RichTable
     from rich.text import Text
 
+    from truepose.reporting.accuracy import gains, told, where_answered
+
     lines = RichTable.grid(padding=(0, 2))
-    for answer in answers:
+    if answers:
+        lines.add_row("", Text(where_answered(answers)))
+    for answer in told(machine, answers):
         lines.add_row(Text(answer.word, f"bold {COLOURS[answer.colour]}"), Text(answer.line))
         if answer.witness:
             lines.add_row("", Text(f"witness: {answer.witness}", style="dim"))
-    for sentence in gains:
+    for sentence in gains(answers):
         lines.add_row("", Text(sentence))
     if lines.row_count:
         _print([lines, Text()])

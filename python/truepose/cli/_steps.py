@@ -24,7 +24,6 @@ from truepose.files.text_file import read_text
 from truepose.files.wording import counted
 from truepose.files.writing import replacing, require_writable, written_together
 from truepose.reporting import formats
-from truepose.reporting.accuracy import gains, told
 from truepose.reporting.display import nearest_middle, pose_text, where_highest
 from truepose.reporting.result import Result
 from truepose.reporting.study import Study
@@ -206,7 +205,7 @@ def deliver(
             with replacing(path) as temporary:
                 temporary.write_text(text, encoding="utf-8", newline="\n")
     if request.format == "table":
-        show_answers(told(result.machine, answers), gains(answers))
+        show_answers(result.machine, answers)
         show_tables(table for table in tables if table is not None)
     else:
         sys.stdout.writelines(formats.text(result, f".{request.format}"))

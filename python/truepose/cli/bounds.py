@@ -96,4 +96,6 @@ def command(
     _steps.deliver(request, result, tables)
     if region is not None and request.format == "table":
         click.echo(uncertainty_tables.sentence(machine, proven))
+        for said in uncertainty_tables.against_target(machine, proven):
+            click.echo(said)
     return _steps.exit_code(request, _uncertainty.keeps_accuracy(machine, proven))

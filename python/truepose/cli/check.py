@@ -77,7 +77,6 @@ def _check(request: Request) -> int:
     from truepose.errors import TrueposeError
     from truepose.files.writing import replacing, written_together
     from truepose.plausibility import oddities_where_checked
-    from truepose.reporting.accuracy import gains, told
     from truepose.reporting.workspace_check import check_workspace
     from truepose.verdict.answer import AFTER, BEFORE, met
 
@@ -100,7 +99,7 @@ def _check(request: Request) -> int:
                 temporary.write_text(text + "\n", encoding="utf-8")
     if request.format == "table":
         show_oddities(odd)
-        show_answers(told(machine, answers), gains(answers))
+        show_answers(machine, answers)
         show_tables(_tables(machine, check, answers))
     else:
         click.echo(_text(request.format, machine, check, odd, answers, warnings))

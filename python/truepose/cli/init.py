@@ -101,8 +101,9 @@ def command(
 ) -> int:
     """Write a commented machine file of a kind to begin with.
 
-    It is complete: every command reads it as it stands. A file that is already there is not
-    touched. Its first line is for editors: `truepose schema` says how they complete its keys.
+    It is complete: every command reads it as it stands, and each key says what it is. A file that
+    is already there is not touched. Its first line is for editors: `truepose schema` says how they
+    complete its keys.
 
     With the parameters of its family (`--radius 138`, in mm and degrees, or with a unit) it is
     that machine, [family] in place of joint centres: all else is the library's, the workspace as
@@ -117,6 +118,8 @@ def command(
         return 0
     from truepose.cli._steps import note_written
     from truepose.files.writing import replacing, require_new, require_writable
+    from truepose.machine.template import commented
+    from truepose.sources import REGISTRY
 
     machine = library.machine_of(kind)
     given = {
@@ -125,9 +128,9 @@ def command(
     path = output or Path(f"{kind}.toml")
     require_writable(path, [".toml"])
     require_new(path)
-    text = machine.template if not given else _of_family(context.meta[_FAMILY], given)
+    text = machine.text if not given else _of_family(context.meta[_FAMILY], given)
     with replacing(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(commented(text, REGISTRY), encoding="utf-8")
     note_written(path)
     return 0
 

@@ -58,7 +58,6 @@ def command(**options: Any) -> int:
     from truepose.files.one_run import is_stdin
     from truepose.files.writing import require_writable
     from truepose.reporting import how_far, tables, uncertainty_tables
-    from truepose.reporting.accuracy import gains, told
     from truepose.verdict.answer import AFTER, met
 
     if options["output"] is None:
@@ -78,7 +77,7 @@ def command(**options: Any) -> int:
     say_result(study.budget)
     with step(f"{request.output} written"):
         page.write(study, request.output, text)
-    show_answers(told(machine, study.accuracy), gains(study.accuracy))
+    show_answers(machine, study.accuracy)
     shown = [
         tables.ranking(study),
         tables.highest_absolute(study),

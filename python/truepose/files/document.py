@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -182,7 +183,18 @@ def _not_toml(error: TomlError, file: str, text: str) -> Problem:
         error.line,
         found=found or None,
         expected=MACHINE_FILE.phrase,
+        hint=next((hint for slip, hint in _SLIPS if found and slip.search(found)), None),
     )
+
+
+_SLIPS = (
+    (re.compile(r"=\s*[-+]?\d+,\d+\s*(#|$)"), "a number has a decimal point: 250.5, not 250,5"),
+    (
+        re.compile(r"=\s*[-+]?\d[\d.]*\s*[A-Za-zµ°%][^\"]*$"),
+        'a value with its unit stands in quotation marks: "0.2 mm"',
+    ),
+)
+"""What people write in place of TOML, and what they are told."""
 
 
 def named_rows(data: Mapping[str, Any], table: str) -> list[tuple[int, str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from fnmatch import fnmatchcase
@@ -15,6 +16,9 @@ from truepose.files.units import shown_value
 
 _SETTINGS = 'settings, such as ["condition.temperature=30"], or a dict of them'
 
+_QUOTED = re.compile(r"""(["'])([^"']*)\1""")
+"""A part of a path as TOML has it; as names may hold points anyway, the marks say nothing more."""
+
 _COMPONENTS = {"x": 0, "y": 1, "z": 2}
 
 
@@ -26,8 +30,9 @@ def apply(
     """Write the settings into the document, in order.
 
     A key is a path: `accuracy.target`, `strut.1.length` (rows by name, `strut.*.length` for all),
-    `strut.1.base.x`. In a table of `free_tables` the rest of the path is one key. A value is a TOML
-    value; text that is none is taken as a string (`501 mm`). Whether a key is one that the file may
+    `strut.1.base.x`. In a table of `free_tables` the rest of the path is one key. Quotation marks
+    round a key with points may stay. A value is a TOML value; text that is none is taken as a
+    string (`501 mm`). Whether a key is one that the file may
     have is left to validation. Raises `RequestError` with all settings that lead nowhere.
     """
     problems: list[Problem] = []
@@ -98,7 +103,7 @@ def _pairs(
         return
     for setting in settings:
         path, equals, text = setting.partition("=")
-        path = path.strip()
+        path = _QUOTED.sub(r"\2", path.strip())
         if not equals or not all(path.split(".")):
             problems.append(
                 Problem(

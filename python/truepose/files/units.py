@@ -113,6 +113,11 @@ def default_units() -> dict[str, FileUnit]:
     return {name: FileUnit(dimension.si) for name, dimension in DIMENSIONS.items()}
 
 
+_ONE_TEMPERATURE = (
+    "a temperature is known: of a range ask at both ends, such as --set condition.temperature=26"
+)
+
+
 class UnitSystem:
     """The units that one file declares for its bare numbers, and the reader of its quantities."""
 
@@ -143,6 +148,7 @@ class UnitSystem:
                 f"expected {wanted.phrase}, found {type_phrase(value)}",
                 found=shown_value(value),
                 expected=_expected(wanted),
+                hint=_ONE_TEMPERATURE if wanted.name == "temperature" else None,
             )
         if not math.isfinite(result):
             raise _not_finite(value, wanted)

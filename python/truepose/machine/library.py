@@ -40,11 +40,6 @@ class LibraryMachine:
     """The file as it is."""
 
     @property
-    def template(self) -> str:
-        """The file to begin with: it names the schema for editors too."""
-        return SCHEMA_LINE + self.text
-
-    @property
     def parasitic(self) -> tuple[str, ...]:
         """Freedoms of the platform that cannot be commanded."""
         return tuple(freedom for freedom in self.dof if freedom not in self.commanded)

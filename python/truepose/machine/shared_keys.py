@@ -7,9 +7,9 @@ know; a problem with one of them is said once, where it is written.
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from truepose.errors import Fault, Problem
+from truepose.errors import Fault, Problem, RequestError
 from truepose.files.document import ARRAY_TABLES, Document, Key
 from truepose.files.settings import apply, of_table
 from truepose.files.units import shown_value, type_phrase
@@ -28,7 +28,9 @@ def share_each(
 
     A key is shared as a whole: a row that writes one keeps all of its own value.
     """
-    apply(document, of_table(settings, EACH), free_tables)
+    changes = of_table(settings, EACH)
+    apply(document, changes, free_tables)
+    _require_effect(document, changes)
     tables = document.data.get(EACH)
     if not isinstance(tables, dict):
         return
@@ -41,6 +43,27 @@ def share_each(
                 if isinstance(row, dict) and key not in row and key != "name":
                     row[key] = copy.deepcopy(value)
                     document.shared[table, index, key] = (EACH, table, key)
+
+
+def _require_effect(document: Document, settings: Iterable[str]) -> None:
+    """Raise `RequestError` (bad-setting) for what every row says otherwise: it would do nothing."""
+    problems = []
+    for path in (setting.partition("=")[0].strip() for setting in settings):
+        _, table, key, *_ = *path.split("."), "", ""
+        rows = document.data.get(table) if table in ARRAY_TABLES else None
+        if rows and isinstance(rows, list) and all(isinstance(r, dict) and key in r for r in rows):
+            problems.append(
+                Problem(
+                    "bad-setting",
+                    f"--set {path}: changes nothing, for every {table} has a {key} of its own",
+                    path=path,
+                    found=path,
+                    expected="a key that some row leaves to the others",
+                    hint=f"--set {table}.*.{key}=... changes the rows themselves",
+                )
+            )
+    if problems:
+        raise RequestError(*problems)
 
 
 def problems(document: Document) -> list[Problem]:

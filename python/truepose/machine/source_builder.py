@@ -88,6 +88,10 @@ class SourceBuilder:
         """Whether the file writes a key: `condition.force`, `strut.1.length_tolerance`."""
         return self._document.has(path)
 
+    def is_set(self, path: str) -> bool:
+        """Whether a setting, not the file, writes a key."""
+        return self._document.setting(self._document.key(path)) is not None
+
     def tolerance(self, value: object, dimension: str, path: str) -> Tolerance | None:
         """A raw value of the file as a tolerance; None, and a problem, where it is none."""
         try:

@@ -163,6 +163,17 @@ def told(machine: Machine, answers: Sequence[Answer]) -> tuple[Told, ...]:
     return tuple(Told(machine, answer) for answer in answers)
 
 
+def where_answered(answers: Sequence[Answer]) -> str:
+    """For which poses the answers are, in a sentence: a verdict is read as one on everything."""
+    used, left_out = answers[0].poses_used, answers[0].poses_left_out
+    if left_out == 0:
+        return f"At all {used:,} poses of the workspace; nothing is said between them."
+    return (
+        f"At {used:,} of the workspace's {used + left_out:,} poses ONLY: the machine cannot take "
+        f"the other {left_out:,}, and nothing is said of them, nor of what lies between."
+    )
+
+
 def gains(answers: Sequence[Answer]) -> tuple[str, ...]:
     """What compensation does to each quantity, in a sentence; empty without both states."""
     sentences = []
@@ -220,10 +231,12 @@ def as_data(machine: Machine, answer: Answer) -> dict[str, Any]:
         "linear": of(answer.linear.value),
         "bound": of(answer.bound.value),
         "rests_on": answer.rests_on,
+        "poses_used": answer.poses_used,
+        "poses_left_out": answer.poses_left_out,
         "example": answer.example.as_data()
         if answer.answer == NOT_MET and answer.example is not None
         else None,
     }
 
 
-__all__ = ["AFTER", "BEFORE", "Told", "as_data", "gains", "told"]
+__all__ = ["AFTER", "BEFORE", "Told", "as_data", "gains", "told", "where_answered"]

@@ -15,6 +15,9 @@ MISSING = "–"
 LOWER, UPPER = "all at lower ends", "all at upper ends"
 """Where lengths and offsets stand in their tolerance bands: the paper's minimum and maximum."""
 
+NOTHING = 1e-15
+"""m or rad: a coordinate so small is the rounding of 0."""
+
 ROUNDING = 1e-9
 """Values that differ relatively by less are equal where one of them has to be named."""
 
@@ -61,7 +64,8 @@ def pose_text(pose: ArrayLike, coordinates: Sequence[str], units: ShownUnits) ->
     parts = []
     for name, value in zip(coordinates, np.asarray(pose, np.float64).tolist(), strict=True):
         unit = units.pose(name)
-        parts.append(f"{name} {value * unit.per_si + 0.0:.6g} {unit.label}")  # -0 is 0
+        shown = value * unit.per_si if abs(value) > NOTHING else 0.0
+        parts.append(f"{name} {shown:.6g} {unit.label}")
     return ", ".join(parts).replace("-", "\N{MINUS SIGN}")
 
 

@@ -11,7 +11,7 @@ import jinja2
 from truepose.calibration.acceptance.sentences import sentence
 from truepose.files.writing import replacing
 from truepose.reporting import calibration, how_far, inputs, tables, uncertainty_tables
-from truepose.reporting.accuracy import gains, told
+from truepose.reporting.accuracy import gains, told, where_answered
 from truepose.reporting.figures import DrawnFigure, draw
 from truepose.reporting.figures._json import as_json
 from truepose.reporting.study import Study
@@ -69,6 +69,7 @@ def render(study: Study, machine_text: str = "") -> str:
         attrs=study.budget.attrs,
         answers=told(study.machine, study.accuracy),
         gains=gains(study.accuracy),
+        where_answered=where_answered(study.accuracy) if study.accuracy else "",
         figures=[each for each in drawn if not _of_calibration(each)],
         calibration=None if study.calibration is None else study.calibration.attrs,
         calibration_figures=[each for each in drawn if _of_calibration(each)],

@@ -377,6 +377,29 @@ def sentence(machine: Machine, result: xr.Dataset) -> str:
     )
 
 
+def against_target(machine: Machine, result: xr.Dataset) -> list[str]:
+    """A region's answer to the accuracy asked, a sentence for each quantity that has a target."""
+    asked = {"position": machine.accuracy.target, "orientation": machine.accuracy.angle_target}
+    sentences = []
+    for name, bound, reached, _ in region_answers(result):
+        target = asked.get(name)
+        if target is None:
+            continue
+        unit = machine.shown.error(name)
+        said = f"Accuracy asked, {name}: {machine.accuracy.said(name)}:"
+        if str(result["status"].values) == PROVEN and bound <= target:
+            sentences.append(f"{said} met, everywhere in the region.")
+        elif reached > target:
+            sentences.append(f"{said} NOT met: what is reached exceeds it.")
+        else:
+            (least,) = rounded(np.array([reached]) * unit.per_si, (-1,))
+            sentences.append(
+                f"{said} undecided, for between {least} {unit.label} and the bound nothing is "
+                "known; a smaller --gap, such as --gap 0.01, looks closer."
+            )
+    return sentences
+
+
 LACKING = {
     "monte_carlo": "sampled answer",
     "ellipses": "coverage ellipse",

@@ -248,6 +248,11 @@ def _of_table(parts: SourceBuilder, of_struts: Mapping[int, _Stated]) -> dict[in
             if not _is_one_kind(parts, key, matches, entries[key]):
                 continue
             columns = [column for column in matches if column not in decided]
+            path = f"tolerance.{key}"
+            if not columns and parts.is_set(path):
+                # In a file it may stand: a calibrated one has full names beside the old patterns.
+                parts.refuse(_without_effect(key, names[matches[0]], taken[matches[0]]), path)
+                continue
             if _is_twice(parts, key, columns, taken):
                 continue
             taken |= dict.fromkeys(columns, f"tolerance.{key}")
@@ -315,6 +320,16 @@ def _is_of_family(parts: SourceBuilder, key: str, value: object) -> bool:
         )
         return False
     return True
+
+
+def _without_effect(key: str, name: str, by: str) -> Fault:
+    return Fault(
+        "tolerance-without-effect",
+        f"{key!r} changes nothing: what it matches has a tolerance that says more exactly which",
+        found=f"for {name}, say: {by}",
+        expected="a pattern that some parameter is left for",
+        hint="change or remove the other; a strut's length_tolerance counts as its full name",
+    )
 
 
 def _rank(key: str, names: Iterable[str]) -> int:

@@ -12,7 +12,7 @@ the proof engine's, asked with an effort counted in boxes. At a coverage the num
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -73,7 +73,9 @@ def accuracy(
     every: list[Answer] = []
     for state in asked:
         every += answers(population, state)
-    return tuple(every)
+    used = population.used
+    left_out = len(population.table) - used
+    return tuple(replace(a, poses_used=used, poses_left_out=left_out) for a in every)
 
 
 def _required_states(states: Sequence[str]) -> tuple[str, ...]:

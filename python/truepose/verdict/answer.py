@@ -39,6 +39,8 @@ class Answer(Represented):
     coverage they are the estimated quantile (linear) and the ends of its confidence interval.
     `rests_on`: what the answer rests on, in words. `example`: the witness as a machine; None where
     none was looked for. `coverage`: what was sampled, where the answer is at a coverage.
+    `poses_used`: for how many poses it is the answer; `poses_left_out`: how many were asked for
+    besides, which the machine cannot take, and of which nothing is said.
     """
 
     quantity: str
@@ -51,6 +53,8 @@ class Answer(Represented):
     rests_on: str
     example: Witness | None = None
     coverage: CoverageAnswer | None = None
+    poses_used: int = 0
+    poses_left_out: int = 0
 
     def _facts(self) -> Facts:
         yield "quantity", self.quantity
@@ -61,6 +65,8 @@ class Answer(Represented):
         yield "linear maximum", self.linear.value
         yield "proven bound", self.bound.value
         yield "rests on", self.rests_on
+        yield "poses used", self.poses_used
+        yield "poses left out", self.poses_left_out
 
     @property
     def met(self) -> bool | None:

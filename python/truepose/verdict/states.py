@@ -83,6 +83,14 @@ class Population:
         self.condition, self.sources = run.condition, run.sources
         self._poses, self._progress = poses, progress
         self._kept: dict[str, list[State]] = {}
+        self._used = 0
+
+    @property
+    def used(self) -> int:
+        """How many of the poses of `table` belong to it: those that the machine can take."""
+        if self._used == 0:
+            self._used = sum(block.indices.size for block, _ in self._blocks())
+        return self._used
 
     def states(self, name: str) -> Iterator[State]:
         """The population in one state, in blocks.
@@ -110,12 +118,13 @@ class Population:
 
     def _blocks(self) -> Iterator[tuple[PoseBlock, Variables]]:
         run = Run(self.machine, self._poses, self.condition, self._progress)
-        none = True
+        used = 0
         for block, variables in run.with_variables():
-            none = False
+            used += block.indices.size
             yield block, variables
-        if none:
+        if used == 0:
             raise run.no_pose_left()
+        self._used = used
 
     def _state(self, name: str, block: PoseBlock, variables: Variables) -> State:
         if name == BEFORE:

@@ -75,7 +75,8 @@ def test_the_exit_code_turns_at_the_largest_error(
 def test_the_first_lines_are_the_answers(state: str, capsys: pytest.CaptureFixture[str]) -> None:
     size, poses = FARTHEST[state]
     outcome = call(capsys, "check", PLANAR)
-    before, witness, after, other, gains, *_ = outcome.out.splitlines()
+    where, before, witness, after, other, gains, *_ = outcome.out.splitlines()
+    assert where.strip() == "At all 25 poses of the workspace; nothing is said between them."
     line, machine = (before, witness) if state.startswith("before") else (after, other)
     assert line in {
         f"NOT met  position {state}: {size * 1e3:.1f} µm, asked 0.5 mm (500 µm), at x {x:.0f} mm, "
@@ -101,7 +102,8 @@ def test_programs_get_the_known_numbers(capsys: pytest.CaptureFixture[str]) -> N
         size, poses = FARTHEST[answer["state"]]
         assert set(answer) == {
             "quantity", "state", "highest", "asked", "units", "pose", "at", "met", "not_assembled",
-            "answer", "witness", "linear", "bound", "rests_on", "example",
+            "answer", "witness", "linear", "bound", "rests_on", "example", "poses_used",
+            "poses_left_out",
         }  # fmt: skip
         assert (answer["quantity"], answer["asked"], answer["units"]) == ("position", 0.5, "mm")
         assert (answer["answer"], answer["met"], answer["not_assembled"]) == ("NOT met", False, 0)
@@ -164,7 +166,7 @@ def test_check_says_where_in_the_units_of_the_file(capsys: pytest.CaptureFixture
     )
     assert [float(cell) for cell in first.split(",")[-6:]] == list(answer["at"].values())
     shown = call(capsys, "check", machine).out
-    assert shown.startswith(
+    assert shown.splitlines()[1].startswith(
         "NOT met  position before compensation: 4138.4 µin, asked 0.1 mm (3937 µin), at x 4 in, "
     )
 
@@ -173,6 +175,12 @@ def test_check_says_why_poses_are_left_out(capsys: pytest.CaptureFixture[str]) -
     setting = ["--set", "workspace.grid.x=[-100, 200, 3]"]
     document = json.loads(call(capsys, "check", PLANAR, *setting, "--format", "json").out)
     assert document["workspace"]["status"] == {"ok": 5, "unreachable": 10}
+    assert {(a["poses_used"], a["poses_left_out"]) for a in document["answers"]} == {(5, 10)}
+    first, *_ = call(capsys, "check", PLANAR, *setting).out.splitlines()
+    assert first.strip() == (
+        "At 5 of the workspace's 15 poses ONLY: the machine cannot take the other 10, and nothing "
+        "is said of them, nor of what lies between."
+    )
     # The second guideway is at x = 600 mm and its strut 500 mm long: x = -100 is 200 mm too far.
     (reason,) = document["workspace"]["reasons"]
     assert (reason["what"], reason["name"], reason["count"]) == ("strut", "2", 10)

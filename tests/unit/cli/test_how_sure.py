@@ -224,9 +224,17 @@ def test_a_region_is_answered_in_words(
         "gap": 0.01,
         "region": {"x": (0.2, 0.4), "y": (0.1, 0.3)},
     }
-    assert outcome.out.splitlines()[-1].startswith("Nowhere in this region does the tool deviate")
+    sentence, verdict = outcome.out.splitlines()[-2:]
+    assert sentence.startswith("Nowhere in this region does the tool deviate")
+    assert verdict == "Accuracy asked, position: 0.5 mm: met, everywhere in the region."
     machine = truepose.load(PLANAR)
     found = made.region(machine)
+    bound, reached = (float(found[f"{of}magnitude"][0]) * 1e3 for of in ("", "reached_"))
+    for target, word in ((bound, "undecided"), (reached, "undecided"), (0.99 * reached, "NOT met")):
+        smaller = f"accuracy.target={target * (1.0 - 1e-9)!r} mm"
+        last = call(capsys, *asked, "--set", smaller).out.splitlines()[-1]
+        expected = "NOT met" if target == reached else word
+        assert f"mm: {expected}" in last
     rows = list(csv.DictReader(io.StringIO(call(capsys, *asked, "--format", "csv").out)))
     assert [row["name"] for row in rows] == ["x", "y", "position"]
     assert float(rows[0]["lower"]) == pytest.approx(1e3 * float(found["lower"][0]))

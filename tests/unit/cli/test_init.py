@@ -18,13 +18,15 @@ import truepose
 from build_machine import machine_files
 from command_line import call
 from truepose.machine.library import FOLDER, SCHEMA_LINE, machine_of, machines
+from truepose.machine.template import commented
+from truepose.sources import REGISTRY
 
 ROOT = Path(__file__).parents[3]
 KINDS = [path.stem for path in machine_files()]
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_file_of_a_kind_is_written_as_it_is_shipped_with_a_line_for_editors(
+def test_the_file_of_a_kind_is_what_is_shipped_with_more_comments(
     kind: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -32,17 +34,31 @@ def test_the_file_of_a_kind_is_written_as_it_is_shipped_with_a_line_for_editors(
     assert (outcome.code, outcome.out) == (0, "")
     assert outcome.err == f"wrote {kind}.toml\n"
     written = tmp_path / f"{kind}.toml"
-    shipped = (ROOT / "machines" / written.name).read_bytes()
-    assert written.read_bytes() == SCHEMA_LINE.encode() + shipped
+    text, shipped = written.read_text("utf-8"), ROOT / "machines" / written.name
+    assert text.startswith(SCHEMA_LINE)
+    added = [line for line in text.splitlines() if not line.startswith("#")]
+    kept = [line for line in shipped.read_text("utf-8").splitlines() if not line.startswith("#")]
+    assert added == kept
+    assert tomllib.loads(text) == tomllib.loads(shipped.read_text("utf-8"))
     assert list(tmp_path.iterdir()) == [written]
-    assert "#" in written.read_text("utf-8")
     assert truepose.load(written).name == machine_of(kind).name
 
 
 def test_the_output_may_be_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     assert call(capsys, "init", "3rrr", "--output", file).code == 0
-    assert file.read_text("utf-8") == machine_of("3rrr").template
+    assert file.read_text("utf-8") == commented(machine_of("3rrr").text, REGISTRY)
+
+
+def test_each_key_is_explained_once_where_the_file_does_not() -> None:
+    lines = commented(machine_of("linear_delta").text, REGISTRY).splitlines()
+    at = lines.index("base = [-12.500012092, 21.6506281133, 0]")
+    assert lines[at - 1].startswith("# Base-side joint centre")
+    assert sum(line.startswith("# Base-side joint centre") for line in lines) == 1
+    assert lines[lines.index("[tolerance]") - 1].startswith("# A pattern over parameter names")
+    own = lines.index('commanded = ["x", "y", "z"] # the tilt is what the rods make of it')
+    assert not lines[own - 1].startswith("#")
+    assert max(map(len, (line for line in lines if line.startswith("# ")))) <= 100
 
 
 def test_a_file_that_is_there_is_not_touched(

@@ -16,6 +16,8 @@ from family_machines import KINDS, family_of, library_file
 from sweeps import thinned
 from truepose.machine.families import REGISTRY
 from truepose.machine.library import machine_of
+from truepose.machine.template import commented
+from truepose.sources import REGISTRY as SOURCES
 
 DELTA = ["--radius", "138", "--effector-radius", "33", "--rod", "217", "--spacing", "45"]
 
@@ -204,5 +206,5 @@ def test_the_library_of_the_family_stays_as_it_is(
 ) -> None:
     file = tmp_path / "mine.toml"
     assert call(capsys, "init", "linear_delta", "-o", file).code == 0
-    assert file.read_text("utf-8") == machine_of("linear_delta").template
+    assert file.read_text("utf-8") == commented(machine_of("linear_delta").text, SOURCES)
     assert family_of("hexapod")["kind"] == "hexapod"

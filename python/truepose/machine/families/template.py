@@ -25,7 +25,7 @@ from truepose.files.document import Document
 from truepose.files.toml_text import TomlError, parse_toml
 from truepose.files.units import UnitSystem, unit_of
 from truepose.machine.families._family import MachineFamily
-from truepose.machine.library import SCHEMA_LINE, machine_of
+from truepose.machine.library import machine_of
 from truepose.machine.tables import owners
 from truepose.machine.validation import units_of, validate_alone
 
@@ -60,7 +60,7 @@ def template(family: type[MachineFamily], given: Mapping[str, str], load: Load) 
     """
     made = _parameters(family, given)
     library = machine_of(family.kind)
-    return SCHEMA_LINE + _Template(family, given, made, tomlkit.parse(library.text), load).text()
+    return _Template(family, given, made, tomlkit.parse(library.text), load).text()
 
 
 def _parameters(family: type[MachineFamily], given: Mapping[str, str]) -> MachineFamily:

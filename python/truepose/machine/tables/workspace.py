@@ -230,7 +230,9 @@ class WorkspaceTable(FileTable):
         "Default: the middle of the poses.",
     )
     grid: GridTable | None = Field(
-        None, description="A grid of poses, such as `{ x = [200, 400, 5], y = [100, 300, 5] }`."
+        None,
+        description="A grid of poses, from, to and how many: `{ x = [200, 400, 5], "
+        "y = [100, 300, 5] }`.",
     )
     box: BoxTable | None = Field(
         None,

@@ -188,9 +188,12 @@ def _not_toml(error: TomlError, file: str, text: str) -> Problem:
 
 
 _SLIPS = (
-    (re.compile(r"=\s*[-+]?\d+,\d+\s*(#|$)"), "a number has a decimal point: 250.5, not 250,5"),
     (
-        re.compile(r"=\s*[-+]?\d[\d.]*\s*[A-Za-zµ°%][^\"]*$"),
+        re.compile(r"=\s*+[-+]?+\d++,\d++\s*+(#|$)"),
+        "a number has a decimal point: 250.5, not 250,5",
+    ),
+    (
+        re.compile(r"=\s*+[-+]?+[\d.]++\s*+[A-Za-zµ°%][^\"]*+$"),
         'a value with its unit stands in quotation marks: "0.2 mm"',
     ),
 )

@@ -16,7 +16,7 @@ from truepose.files.units import shown_value
 
 _SETTINGS = 'settings, such as ["condition.temperature=30"], or a dict of them'
 
-_QUOTED = re.compile(r"""(["'])([^"']*)\1""")
+_QUOTED = re.compile(r"""(["'])([^"']*+)\1""")
 """A part of a path as TOML has it; as names may hold points anyway, the marks say nothing more."""
 
 _COMPONENTS = {"x": 0, "y": 1, "z": 2}

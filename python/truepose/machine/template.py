@@ -27,8 +27,8 @@ HEAD = (
     "# Sizes, tolerances, temperatures, loads and the accuracy asked are an example to change.\n"
 )
 
-_TABLE = re.compile(r"\[{1,2}([\w.]+)\]{1,2}")
-_KEY = re.compile(r'("?)([\w.*]+)\1 *= *(.*)')
+_TABLE = re.compile(r"\[\[?+([\w.]++)\]")
+_KEY = re.compile(r'"?+([\w.*]++)"?+ *+=')
 _SENTENCE_END = re.compile(r"(?<=\.) (?=[A-Z])")
 _UNSAID = frozenset(
     {("machine", "name"), ("machine", "description"), ("machine", "origin")}
@@ -55,7 +55,7 @@ def _lines(text: str, descriptions: Mapping[tuple[str, str], str]) -> Iterator[s
             if (table, "") in descriptions and "#" not in line:
                 yield from _comment(descriptions[table, ""])
         elif key is not None and not inside:
-            here = (table, key[2])
+            here = (table, key[1])
             own = before.startswith("#") or "#" in line
             if here in descriptions and here not in said and not own:
                 yield from _comment(descriptions[here])

@@ -143,3 +143,33 @@ def test_a_setting_that_leads_nowhere(setting: str, words: str, tmp_path: Path) 
     assert [problem.code for problem in problems] == ["bad-setting", "bad-setting"]
     assert words in str(problems[0])
     assert problems[1].found == "also bad"
+
+
+@pytest.mark.parametrize("key", ['"strut.*.base.*"', "'strut.*.base.*'", "strut.*.base.*"])
+def test_a_key_may_stand_in_quotation_marks_as_in_the_file(key: str, tmp_path: Path) -> None:
+    machine = load_text(tmp_path, PLANAR, f"tolerance.{key}=0.01")
+    (bands,) = (source.bands for source in machine.sources if source.name == "tolerance")
+    named = {machine.parameters[column] for column in bands.parameters}
+    assert "strut.1.base.x" in named
+
+
+@pytest.mark.parametrize(
+    ("setting", "code", "hint"),
+    [
+        ("each.strut.section_area=1 mm^2", "bad-setting", "strut.*.section_area"),
+        ("tolerance.strut.1*.length=0.01", "tolerance-without-effect", "length_tolerance"),
+    ],
+)
+def test_what_would_change_nothing_is_refused(
+    setting: str, code: str, hint: str, tmp_path: Path
+) -> None:
+    with pytest.raises((RequestError, MachineFileError)) as raised:
+        load_text(tmp_path, PLANAR, setting)
+    (problem,) = raised.value.problems
+    assert problem.code == code
+    assert hint in str(problem.hint)
+
+
+def test_what_some_row_leaves_to_the_others_may_be_set(tmp_path: Path) -> None:
+    text = PLANAR.replace("length_tolerance = [-0.3, 0.3]\n", "", 1)
+    assert load_text(tmp_path, text, "each.strut.length_tolerance=0.01").settings

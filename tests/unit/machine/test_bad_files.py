@@ -472,6 +472,27 @@ def test_a_file_that_is_not_toml(
     assert (problem.code, problem.line, problem.found) == ("not-toml", line, found)
 
 
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        ("length = 250,5", "decimal point"),
+        ("length = -250,5 # mm", "decimal point"),
+        ("length = 0.2mm", "quotation marks"),
+        ("length = .2 mm", "quotation marks"),
+        ("length = = 3", None),
+        ("length = [1, 2", None),
+    ],
+)
+def test_what_people_write_for_a_number_is_told(
+    line: str, hint: str | None, tmp_path: Path
+) -> None:
+    path = tmp_path / "machine.toml"
+    path.write_text(f"schema = 1\n{line}\n[machine]\n", encoding="utf-8")
+    problem = only_problem(path)
+    assert problem.code == "not-toml"
+    assert (hint in problem.hint) if hint else problem.hint is None
+
+
 def test_a_byte_order_mark_and_windows_lines_do_no_harm(tmp_path: Path) -> None:
     path = tmp_path / "machine.toml"
     path.write_bytes(b"\xef\xbb\xbf" + PLANAR.replace("\n", "\r\n").encode())

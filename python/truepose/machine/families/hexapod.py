@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from truepose.files.quantity import Angle, Length, PositiveLength
+from truepose.machine.families._circles import telescopic_drives
 from truepose.machine.families._family import MachineFamily, Row, Values, outward
 
 _BASE = ((150.0, -0.5), (30.0, 0.5), (30.0, -0.5), (270.0, 0.5), (270.0, -0.5), (150.0, 0.5))
@@ -74,8 +75,7 @@ turned.
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:
         """Drives `d1` to `d6`; struts `1` to `6`."""
-        for name in cls.limbs:
-            yield Row("drive", f"d{name}", {"kind": "telescopic"}, {})
+        yield from telescopic_drives(cls.limbs)
         for name, base, platform in zip(cls.limbs, _BASE, _PLATFORM, strict=True):
             below, _ = outward(math.radians(base[0]) + base[1] * values["base_angle"])
             above, _ = outward(math.radians(platform[0]) + platform[1] * values["platform_angle"])

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from truepose.files.quantity import Angle, Length, PositiveLength
+from truepose.machine.families._circles import PAIRS_ABOVE, PAIRS_BELOW, telescopic_drives
 from truepose.machine.families._family import MachineFamily, Row, Values, Z, between
 
 
@@ -68,11 +69,8 @@ base_height, platform_height: of the planes of the joints over the pivot.
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:
         """Drives `d1` to `d6`; struts `1` to `6`."""
-        middles = ((30.0, 1), (150.0, -1), (150.0, 1), (270.0, -1), (270.0, 1), (30.0, -1))
-        above = ((90.0, -1), (90.0, 1), (210.0, -1), (210.0, 1), (330.0, -1), (330.0, 1))
-        for name in cls.limbs:
-            yield Row("drive", f"d{name}", {"kind": "telescopic"}, {})
-        for name, below, pair in zip(cls.limbs, middles, above, strict=True):
+        yield from telescopic_drives(cls.limbs)
+        for name, below, pair in zip(cls.limbs, PAIRS_BELOW, PAIRS_ABOVE, strict=True):
             base = values["base_radius"] * between(*below, values["base_angle"])
             platform = values["platform_radius"] * between(*pair, values["platform_angle"])
             joints = {

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from truepose.files.quantity import Angle, PositiveLength
+from truepose.machine.families._circles import PAIRS_ABOVE
 from truepose.machine.families._family import MachineFamily, Row, Values, X, Z, between
 
 
@@ -58,12 +59,11 @@ class LinapodFamily(MachineFamily):
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:
         """Drives `d1` to `d6`; struts `1` to `6`."""
-        pairs = [(90.0, -1), (90.0, 1), (210.0, -1), (210.0, 1), (330.0, -1), (330.0, 1)]
-        for name, pair in zip(cls.limbs, pairs, strict=True):
+        for name, pair in zip(cls.limbs, PAIRS_ABOVE, strict=True):
             place = {"origin": values["rail_radius"] * between(*pair, values["rail_angle"])}
             place["axis"] = Z
             yield Row("drive", f"d{name}", {"kind": "slider"}, place, {"working_mode": "+"})
-        for name, pair in zip(cls.limbs, pairs, strict=True):
+        for name, pair in zip(cls.limbs, PAIRS_ABOVE, strict=True):
             platform = values["platform_radius"] * between(*pair, values["platform_angle"])
             joints = {"base": 0.0 * X, "platform": platform, "length": values["rod"]}
             yield Row("strut", name, {"drive": f"d{name}"}, joints)

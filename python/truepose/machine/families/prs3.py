@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
-import numpy as np
 from pydantic import Field
 
 from truepose.files.quantity import PositiveLength, ThreePositiveLengths
+from truepose.machine.families._circles import THIRDS, planes_of_swing
 from truepose.machine.families._family import MachineFamily, Row, Values, X, Z, outward
 
 
@@ -55,18 +55,14 @@ rod: length of the struts, each of which swings in the plane of its guideway and
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:
         """Drives `d1` to `d3`; struts `1` to `3`; guides `g1` to `g3`."""
-        angles = np.radians((90.0, 210.0, 330.0))
-        for name, angle in zip(cls.limbs, angles, strict=True):
+        for name, angle in zip(cls.limbs, THIRDS, strict=True):
             place = {"origin": values["rail_radius"] * outward(angle)[0], "axis": Z}
             yield Row("drive", f"d{name}", {"kind": "slider"}, place, {"working_mode": "+"})
-        for limb, (name, angle) in enumerate(zip(cls.limbs, angles, strict=True)):
+        for limb, (name, angle) in enumerate(zip(cls.limbs, THIRDS, strict=True)):
             joints = {
                 "base": 0.0 * X,
                 "platform": values["platform_radius"] * outward(angle)[0],
                 "length": values["rod"][limb],
             }
             yield Row("strut", name, {"drive": f"d{name}"}, joints)
-        for name, angle in zip(cls.limbs, angles, strict=True):
-            out, across = outward(angle)
-            plane = {"normal": across, "platform": values["platform_radius"] * out}
-            yield Row("guide", f"g{name}", {"kind": "plane"}, plane)
+        yield from planes_of_swing(cls.limbs, values)

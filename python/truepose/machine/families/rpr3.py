@@ -9,11 +9,12 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from truepose.files.quantity import Angle, PositiveLength
-from truepose.machine.families._family import MachineFamily, Row, Values, outward
+from truepose.files.quantity import Angle
+from truepose.machine.families._circles import TwoCircles, telescopic_drives
+from truepose.machine.families._family import Row, Values, outward
 
 
-class PlanarRprFamily(MachineFamily):
+class PlanarRprFamily(TwoCircles):
     """The origin amid the base joints, the tool point amid the platform joints."""
 
     kind: ClassVar[str] = "3rpr"
@@ -36,25 +37,14 @@ class PlanarRprFamily(MachineFamily):
         "platform_angle": 90,
     }
 
-    base_radius: PositiveLength = Field(
-        description="Radius of the circle of base joints.",
-    )
-    platform_radius: PositiveLength = Field(
-        description="Radius of the circle of platform joints.",
-    )
     platform_angle: Angle = Field(
         description="By which the platform joints are ahead of the base joints at c = 0.",
     )
 
-    def size(self) -> float:
-        """The base."""
-        return self.base_radius
-
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:
         """Drives `d1` to `d3`; struts `1` to `3`."""
-        for name in cls.limbs:
-            yield Row("drive", f"d{name}", {"kind": "telescopic"}, {})
+        yield from telescopic_drives(cls.limbs)
         for name, degrees in zip(cls.limbs, (210.0, 330.0, 90.0), strict=True):
             angle = math.radians(degrees)
             joints = {

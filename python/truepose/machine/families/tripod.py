@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from truepose.files.quantity import Length, PositiveLength
+from truepose.machine.families._circles import telescopic_drives
 from truepose.machine.families._family import MachineFamily, Row, Values, X, Z, outward
 
 
@@ -54,8 +55,7 @@ from above                          from the side
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:
         """Drives `d1` to `d3`; struts `1` to `3`."""
-        for name in cls.limbs:
-            yield Row("drive", f"d{name}", {"kind": "telescopic"}, {})
+        yield from telescopic_drives(cls.limbs)
         for name, degrees in zip(cls.limbs, (210.0, 330.0, 90.0), strict=True):
             out, _ = outward(np.asarray(math.radians(degrees)))
             base = values["base_radius"] * out + values["base_height"] * Z

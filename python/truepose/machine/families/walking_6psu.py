@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 from pydantic import Field
 
 from truepose.files.quantity import Angle, Length, PositiveLength
+from truepose.machine.families._circles import PAIRS_ABOVE, PAIRS_BELOW
 from truepose.machine.families._family import MachineFamily, Row, Values, X, Z, between
 
 
@@ -66,14 +67,12 @@ slide_height: of the carriage joints at joint coordinate 0, mostly below z = 0.
     @classmethod
     def rows(cls, values: Values) -> Iterator[Row]:
         """Drives `d1` to `d6`; struts `1` to `6`."""
-        middles = ((30.0, 1), (150.0, -1), (150.0, 1), (270.0, -1), (270.0, 1), (30.0, -1))
-        above = ((90.0, -1), (90.0, 1), (210.0, -1), (210.0, 1), (330.0, -1), (330.0, 1))
-        for name, pair in zip(cls.limbs, middles, strict=True):
+        for name, pair in zip(cls.limbs, PAIRS_BELOW, strict=True):
             out = between(*pair, values["slide_angle"])
             place = {"origin": values["slide_radius"] * out + values["slide_height"] * Z}
             place["axis"] = Z
             yield Row("drive", f"d{name}", {"kind": "slider"}, place, {"working_mode": "-"})
-        for name, pair in zip(cls.limbs, above, strict=True):
+        for name, pair in zip(cls.limbs, PAIRS_ABOVE, strict=True):
             platform = values["platform_radius"] * between(*pair, values["platform_angle"])
             joints = {"base": 0.0 * X, "platform": platform, "length": values["rod"]}
             yield Row("strut", name, {"drive": f"d{name}"}, joints)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from truepose.machine import Condition, Machine
+    from truepose.machine.families.parameters import FamilyParameters
     from truepose.sources.deviation import Deviation, Source
 
 MOST_DEVIATIONS = 60
@@ -29,6 +30,7 @@ def machine(it: Machine) -> Table:
         ("name", it.name),
         ("freedoms of the platform", " ".join(it.dof)),
         ("commanded", " ".join(it.commanded)),
+        *([] if it.family is None else [("family", _family(it.family, it.shown))]),
         ("drives", ", ".join(f"{drive.name} ({drive.kind})" for drive in it.drives)),
         ("struts (closures)", f"{len(it.struts)}: " + ", ".join(strut.name for strut in it.struts)),
         *(
@@ -41,6 +43,16 @@ def machine(it: Machine) -> Table:
         ("home", pose_text(it.home, it.dof, it.shown)),
     ]
     return Table("machine", "Machine", ("", ""), tuple(rows), words=2)
+
+
+def _family(parameters: FamilyParameters, shown: ShownUnits) -> str:
+    """Its kind and its parameters; of those that the limbs differ in, their own."""
+    texts = [parameters.family.kind]
+    for key, values in parameters.family.values().items():
+        unit = shown.angle if parameters.dimension(f"family.{key}") == "angle" else shown.length
+        distinct = dict.fromkeys(values.reshape(-1).tolist())
+        texts.append(f"{key} {', '.join(unit.text(value, 6) for value in distinct)}")
+    return "; ".join(texts)
 
 
 def condition(of: Machine) -> Table:

@@ -43,7 +43,8 @@ AT_END = 1e-9
 class Cause:
     """One variable of a witness, or the force of unknown direction.
 
-    `parameter`: the first that it moves, `more` how many others move with it; `end` is "upper" or
+    `parameter`: of the family what the variable is, else the first that it moves, `more` how many
+    others move with it; `end` is "upper" or
     "lower" where that parameter stands at an end of its band, else empty; `deviation` of that
     parameter by its source, `unit` m, rad or 1. `sigmas`: of a distribution that has no end, the
     standard deviations at which the variable stands, else 0. `share`: of the witness's size, to
@@ -183,14 +184,22 @@ class Witness(Represented):
         )
         room = AT_END * (upper - lower)
         end = 1.0 if value >= upper - room else -1.0 if value <= lower + room else 0.0
+        name, unit = machine.parameters[parameter], machine.units[parameter]
+        more = len({int(variables.columns[column]) for column in columns}) - 1
+        family = machine.family
+        if family is not None and variables.names[variable] in family.names:
+            # The owner's word for it, and its own deviation, of which all others are the effect.
+            moved, name = name, variables.names[variable]
+            slope, more, unit = family.effects(name)[moved], 0, family.unit(name)
+            half_width, deviation = half_width / slope, half_width * value / slope
         end *= math.copysign(1.0, half_width)
         return Cause(
             source,
-            machine.parameters[parameter],
-            len({int(variables.columns[column]) for column in columns}) - 1,
+            name,
+            more,
             {1.0: "upper", -1.0: "lower"}.get(end, ""),
             deviation,
-            machine.units[parameter],
+            unit,
             0.0 if distribution.bounded else value * math.copysign(distribution.sigmas, half_width),
             share,
         )

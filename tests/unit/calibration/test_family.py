@@ -15,6 +15,7 @@ from truepose.calibration.result.bands import tolerance_covariance
 from truepose.errors import MachineFileError
 from truepose.machine import Machine
 from truepose.sources.tolerance import bands_of
+from truepose.verdict.witness_file import write_witness
 
 DELTA = """\
 schema = 1
@@ -118,6 +119,25 @@ def test_a_budget_of_a_known_deviation_is_that_of_another_file(tmp_path: Path) -
     budget = tp.budget(machine, poses)
     told = budget["error"].sel(source="tolerance", component=["x", "y", "z"]).values
     np.testing.assert_allclose(told, error, rtol=0, atol=1e-11)
+
+
+def test_a_witness_speaks_of_the_family_and_is_a_file_of_joint_centres(tmp_path: Path) -> None:
+    text = edited(DELTA, ('target = "0.5 mm"', 'target = "0.1 mm"'))
+    machine = written(tmp_path, text, "family.spacing=46", "strut.c1.length=217.01")
+    witness = tp.accuracy(machine)[0].example
+    assert witness is not None
+    causes = {cause.parameter: cause for cause in witness.causes()}
+    radius = causes["family.radius"]
+    assert abs(radius.deviation) == pytest.approx(0.5e-3, rel=1e-12)
+    assert (radius.more, radius.unit, radius.end) == (
+        0, "m", "upper" if radius.deviation > 0.0 else "lower"
+    )  # fmt: skip
+    other = write_witness(
+        machine, witness, tmp_path / "witness.toml", original=tmp_path / "machine.toml"
+    )
+    assert other.family is None
+    error = tp.budget(other)["error"].sel(source="tolerance").values
+    assert np.linalg.norm(error[0][:3]) == pytest.approx(witness.size, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Run before a page: a folder of its own, with the checkout's machines/ and examples/.
+"""Run before a page: a folder of its own, with the checkout's machines/, examples/ and tests/.
 
 `drawing_of(KIND)` shows a machine of the library.
 """
@@ -17,7 +17,7 @@ from IPython.display import HTML
 DOCS = Path(os.environ["TRUEPOSE_SITE_DOCS"])
 sys.path.insert(0, str(DOCS))
 os.chdir(tempfile.mkdtemp(prefix="truepose-page-"))
-for name in ("machines", "examples"):
+for name in ("machines", "examples", "tests"):
     Path(name).symlink_to(DOCS.parent / name, target_is_directory=True)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -30,6 +30,19 @@ def show_tables(tables: Iterable[Table]) -> None:
         if table.note:
             shown.append(Text(table.note, style="dim"))
         _print([*shown, Text()])
+
+
+def show_described(
+    title: str, header: tuple[str, ...], rows: Iterable[tuple[str, str, Mapping[str, Any]]]
+) -> None:
+    """A table of what there is: a name, what it is, and what it takes, each with its `doc`."""
+    from truepose.reporting.table import Table
+
+    described = tuple(
+        (name, doc, "; ".join(f"{key}: {told.doc}" for key, told in options.items()))
+        for name, doc, options in rows
+    )
+    show_tables([Table(title.lower(), title, header, described, words=len(header))])
 
 
 def _print(shown: Iterable[Any]) -> None:

@@ -111,15 +111,10 @@ def command(
 
 
 def _show_controllers() -> None:
-    from truepose.cli._show import show_tables
+    from truepose.cli._show import show_described
     from truepose.controllers import REGISTRY
     from truepose.controllers import controller as adapter_of
-    from truepose.reporting.table import Table
 
+    adapters = map(adapter_of, REGISTRY)
     header = ("controller", "what it is given", "options")
-    rows = []
-    for name in REGISTRY:
-        adapter = adapter_of(name)
-        described = (f"{key}: {option.doc}" for key, option in adapter.options.items())
-        rows.append((name, adapter.doc, "; ".join(described)))
-    show_tables([Table("controllers", "Controllers", header, tuple(rows), words=len(header))])
+    show_described("Controllers", header, ((a.name, a.doc, a.options) for a in adapters))

@@ -115,15 +115,10 @@ def _statement(found: Import, measurements: Path | None) -> list[str]:
 
 
 def _show_readers() -> None:
-    from truepose.cli._show import show_tables
+    from truepose.cli._show import show_described
     from truepose.controllers import READERS
     from truepose.controllers import reader as reader_of
-    from truepose.reporting.table import Table
 
+    readers = map(reader_of, READERS)
     header = ("controller", "what is read", "--set")
-    rows = []
-    for name in READERS:
-        reader = reader_of(name)
-        settings = (f"{key}: {setting.doc}" for key, setting in reader.settings.items())
-        rows.append((name, reader.doc, "; ".join(settings)))
-    show_tables([Table("readers", "Files of controllers", header, tuple(rows), words=len(header))])
+    show_described("Files of controllers", header, ((r.name, r.doc, r.settings) for r in readers))

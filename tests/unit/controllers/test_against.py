@@ -130,6 +130,15 @@ def test_what_is_included_is_changed_where_it_stands(tmp_path: Path) -> None:
     assert f"--- {tmp_path / 'printer.cfg'}" not in changes
 
 
+def test_a_number_over_several_lines_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "printer.cfg"
+    path.write_text(LINEAR.config().replace("delta_radius: ", "delta_radius:\n  "), "utf-8")
+    exported = export(tp.load(MACHINES / "linear_delta.toml"), "klipper")
+    with pytest.raises(RequestError) as refused:
+        difference("klipper", exported, path)
+    assert [problem.code for problem in refused.value.problems] == ["no-difference"]
+
+
 @pytest.mark.parametrize("end", ["\r\n", "\n"])
 @pytest.mark.parametrize("last", ["", "end"])
 def test_line_ends_are_the_files_own(end: str, last: str, tmp_path: Path) -> None:

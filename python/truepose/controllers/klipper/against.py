@@ -66,7 +66,12 @@ def _changed(entry: Entry, name: str, value: str) -> str:
     """The line with another value; what stands before and behind it stays."""
     line = entry.file.lines[entry.line - 1]
     start = re.match(rf"(?:#\*# )?\s*{re.escape(name)}\s*[:=]\s*", line, re.IGNORECASE)
-    assert start is not None, "an option begins with its name"
+    if start is None or not line.startswith(entry.text, start.end()):
+        raise no_difference(
+            f"{entry.file.path}:{entry.line}: this number is not in one line",
+            line.strip()[:80],
+            f"{name}: {value}, in one line",
+        )
     return line[: start.end()] + value + line[start.end() + len(entry.text) :]
 
 

@@ -19,8 +19,11 @@ def kinematics_of(text: str, *, steps: bool = False, measured: bool = False) -> 
     `steps`: with what says how far they go for a step; `measured`: with [delta_calibrate].
     """
     parsed = configparser.RawConfigParser(strict=False, inline_comment_prefixes=(";", "#"))
-    lines = [line.removeprefix("#*#").partition("#")[0] for line in text.splitlines()]
-    parsed.read_string("\n".join(line.strip() if line[:1] == " " else line for line in lines))
+    saved = "#*#"
+    lines = [
+        line[len(saved) + 1 :] if line.startswith(saved) else line for line in text.split("\n")
+    ]
+    parsed.read_string("\n".join(line.partition("#")[0] for line in lines))
     lines = []
     for section in ("printer", "stepper_a", "stepper_b", "stepper_c"):
         wanted = KEYS.get(section, KEYS["stepper_a"])

@@ -42,8 +42,10 @@ def read_linear(numbers: Numbers, rods: Rods | None) -> Geometry | None:
     switches = [
         e + math.sqrt(arm * arm - radius * radius) for arm, e in zip(arms, ends, strict=True)
     ]
-    reach = min(min(arms) - radius, NARROWEST * min(arms) - radius)
-    wanted, assumed = bed_radius(numbers, reach, numbers.number_if("printer", "print_radius"))
+    said = numbers.number_if("printer", "print_radius")
+    farthest = radius if said is None else said  # Klipper's default
+    reach = min(farthest, min(arms) - radius, NARROWEST * min(arms) - radius)
+    wanted, assumed = bed_radius(numbers, reach, said)
     # Above this height Klipper's workspace narrows to a cone.
     cone = min(switch - arm for switch, arm in zip(switches, arms, strict=True))
     high = cone if cone > low else min(ends)

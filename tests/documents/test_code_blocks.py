@@ -22,6 +22,7 @@ import truepose as tp
 from document_blocks import INLINE, LANGUAGES, ROOT, Block, blocks_of, pages
 from truepose.calibration import read_measurements
 from truepose.cli import cli, run
+from truepose.machine.families import REGISTRY
 
 CODE_PAGES = [page for page in pages() if any(block.is_code for block in blocks_of(page))]
 QUESTIONS = {"check", "calibrate", "compare"}
@@ -169,7 +170,11 @@ def test_commands_in_sentences_exist() -> None:
                 continue
             name, *words = said.split()[1:]
             command = cli.get_command(context, name)
-            known = {word for each in (command.params if command else ()) for word in each.opts}
+            kinds = REGISTRY if name == "init" else ()
+            of_families = {f"--{key}".replace("_", "-") for k in kinds for key in k.model_fields}
+            known = of_families | {
+                word for each in (command.params if command else ()) for word in each.opts
+            }
             options = {word.partition("=")[0] for word in words if re.match(r"--?[a-z]", word)}
             seen += 1
             if command is None or not options <= known | {"--help"}:

@@ -290,6 +290,11 @@ def _tolerance_in_metres(file: File) -> None:
         strut["length_tolerance"] = "2e-5 um"
 
 
+@_blunder("linear_delta", "idle-tolerance")
+def _rods_by_a_pattern_beside_their_own(file: File) -> None:
+    file["tolerance"]["strut.*.length"] = 0.01
+
+
 @_blunder("hexapod_all_sources", "wide-band")
 def _millimetres_of_play_for_micrometres(file: File) -> None:
     for drive in file["drive"]:

@@ -26,6 +26,7 @@ from truepose.plausibility import (
     fixed_at,
     gradient,
     home_out_of_reach,
+    idle_tolerance,
     machine_size,
     mass,
     mirrored_order,
@@ -85,6 +86,7 @@ RULES: tuple[Rule, ...] = (
     overstrained.RULE,
     wide_tolerance.RULE,
     fine_tolerance.RULE,
+    idle_tolerance.RULE,
     wide_band.RULE,
     target.RULE,
 )

@@ -105,7 +105,11 @@ class _Member:
 
 @dataclass(frozen=True, repr=False)
 class DimensionalTolerance(Represented):
-    """Bands of any parameters, the same at every pose; members of a group vary together."""
+    """Bands of any parameters, the same at every pose; members of a group vary together.
+
+    `idle`: patterns of `[tolerance]` all of whose parameters have another, each with a parameter
+    and the key that counts for it.
+    """
 
     name: ClassVar[str] = "tolerance"
     doc: ClassVar[str] = "dimensional tolerance of lengths, coordinates, offsets and directions"
@@ -117,12 +121,14 @@ class DimensionalTolerance(Represented):
     sets_overall_edges: ClassVar[bool] = True
 
     bands: Deviation
+    idle: tuple[tuple[str, str, str], ...] = ()
 
     @classmethod
     def build(cls, parts: SourceBuilder) -> Self | None:
         """From `length_tolerance` and `[tolerance]`; None where neither says anything."""
         stated = _of_struts(parts)
-        stated |= _of_table(parts, stated)
+        of_table, idle = _of_table(parts, stated)
+        stated |= of_table
         entries = [_Member(column, stated[column]) for column in sorted(stated)]
         if _mixed_groups(parts, [member.stated for member in entries]):
             return None
@@ -149,7 +155,7 @@ class DimensionalTolerance(Represented):
         )
         # A tolerance that is wrong would be missed here, and told twice.
         correlation = None if parts.problems else read_correlation(parts, bands)
-        return cls(replace(bands, correlation=correlation)) if entries else None
+        return cls(replace(bands, correlation=correlation), tuple(idle)) if entries else None
 
     def acts(self, condition: Condition) -> bool:
         """In every condition."""
@@ -224,13 +230,16 @@ def _entries(parts: SourceBuilder) -> Mapping[str, object]:
     return {} if table is None else table.model_extra or {}
 
 
-def _of_table(parts: SourceBuilder, of_struts: Mapping[int, _Stated]) -> dict[int, _Stated]:
-    """What the `[tolerance]` table says, by parameter.
+def _of_table(
+    parts: SourceBuilder, of_struts: Mapping[int, _Stated]
+) -> tuple[dict[int, _Stated], list[tuple[str, str, str]]]:
+    """What the `[tolerance]` table says, by parameter, and its patterns that are idle.
 
     A full parameter name goes before a pattern that names its part, and that before any other; a
     strut's own `length_tolerance` counts as a full name. Two of one kind for one parameter are
-    refused.
+    refused, and a setting that is idle.
     """
+    idle: list[tuple[str, str, str]] = []
     entries = {key: value for key, value in _entries(parts).items() if not is_of_family(key)}
     names = parts.kernel.parameters
     stated: dict[int, _Stated] = {}
@@ -248,17 +257,17 @@ def _of_table(parts: SourceBuilder, of_struts: Mapping[int, _Stated]) -> dict[in
             if not _is_one_kind(parts, key, matches, entries[key]):
                 continue
             columns = [column for column in matches if column not in decided]
-            path = f"tolerance.{key}"
-            if not columns and parts.is_set(path):
-                # In a file it may stand: a calibrated one has full names beside the old patterns.
-                parts.refuse(_without_effect(key, names[matches[0]], taken[matches[0]]), path)
+            if not columns:
+                idle.append((key, names[matches[0]], taken[matches[0]]))
+                if parts.is_set(f"tolerance.{key}"):
+                    parts.refuse(_without_effect(*idle[-1]), f"tolerance.{key}")
                 continue
             if _is_twice(parts, key, columns, taken):
                 continue
             taken |= dict.fromkeys(columns, f"tolerance.{key}")
             stated |= _stated(parts, key, columns, entries[key])
         decided = set(taken)
-    return stated
+    return stated, idle
 
 
 def _of_family(parts: SourceBuilder, quantities: dict[str, GroupQuantity]) -> list[_Member]:

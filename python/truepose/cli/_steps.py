@@ -147,7 +147,8 @@ def answers_of(machine: Machine, *states: str) -> tuple[Answer, ...]:
 def study_of(request: Request, machine: Machine) -> Study:
     """The machine with both results, and the verdict on both."""
     evaluated, corrected = evaluate(request, machine), correct(request, machine)
-    return Study(machine, evaluated, corrected, answers_of(machine))
+    odd = truepose.oddities(machine)
+    return Study(machine, evaluated, corrected, answers_of(machine), oddities=odd)
 
 
 def with_time(study: Study) -> Study:

@@ -109,6 +109,11 @@ def _statement(found: Import, measurements: Path | None) -> list[str]:
     lines = [f"{found.kind}: {found.machine.name}, by {len(found.holds)} values of the file"]
     lines += [f"assumed: {each.sentence} ({each.key})" for each in found.assumptions]
     lines += [f"lost: {sentence}" for sentence in found.lost]
+    if any("tolerance" in each.key for each in found.assumptions):
+        lines.append(
+            "next: put in what you know of what is assumed: until then `truepose check` answers "
+            "for the assumptions, not for this machine"
+        )
     if found.measurements is not None and measurements is None:
         lines.append("the file keeps measurements: --measurements FILE.csv writes them")
     return lines

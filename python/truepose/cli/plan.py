@@ -87,7 +87,7 @@ _INSTRUMENT = (
         "--program",
         metavar="FILE",
         type=OutputFile(),
-        help="Also write a measuring program (G-code) that dwells at every pose.",
+        help="Also write a program (G-code) that dwells at every pose; it does not probe.",
     ),
     click.option(
         "--template",

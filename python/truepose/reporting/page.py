@@ -78,7 +78,7 @@ def render(study: Study, machine_text: str = "") -> str:
         else calibration.of_page(study.calibration, study.units),
         results=results,
         warnings=tables.warnings(study),
-        oddities=tables.oddities(study.machine),
+        oddities=tables.oddities(study),
         inputs=[
             table(study.machine)
             for table in (inputs.machine, inputs.condition, inputs.sources, inputs.deviations)

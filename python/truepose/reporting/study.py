@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from truepose.files.shown_units import ShownUnits
     from truepose.machine import Machine
+    from truepose.plausibility import Oddity
     from truepose.verdict.answer import Answer
 
 
@@ -38,7 +39,8 @@ class Study:
     poses, `ellipses` is a `monte_carlo` at more of them with fewer samples; `missing` says, by
     name, why one of them is not there. `calibration` is that of `truepose.calibrate`, where there
     are measurements. `accuracy` are the answers of `truepose.accuracy` over the same poses,
-    `sampled` the same at a coverage of 95 %. All values here are SI.
+    `sampled` the same at a coverage of 95 %. `oddities` are those of `truepose.oddities`. All
+    values here are SI.
     """
 
     machine: Machine
@@ -55,6 +57,7 @@ class Study:
     shares: xr.Dataset | None = None
     missing: Mapping[str, str] = field(default_factory=dict)
     calibration: xr.Dataset | None = None
+    oddities: tuple[Oddity, ...] = ()
 
     @property
     def strained(self) -> xr.Dataset:

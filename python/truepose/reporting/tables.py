@@ -321,11 +321,9 @@ def warnings(study: Study) -> Table | None:
     return Table("warnings", "Warnings", ("",), tuple(rows)) if rows else None
 
 
-def oddities(it: Machine) -> Table | None:
+def oddities(study: Study) -> Table | None:
     """What looks odd about the machine; None where nothing does."""
-    from truepose import plausibility
-
-    sentences = [oddity.sentence for oddity in plausibility.oddities(it)]
+    sentences = [oddity.sentence for oddity in study.oddities]
     rows = [(f"{text[:1].upper()}{text[1:]}.",) for text in sentences]
     return Table("oddities", "What looks odd", ("",), tuple(rows)) if rows else None
 

@@ -154,8 +154,9 @@ def test_a_region_is_proven_and_what_is_reached_lies_in_it(
         assert 195 <= float(row["where_y [mm]"]) <= 205
     size = rows[2]
     assert float(size["upper"]) <= 1.1 * float(size["reached_upper"])
-    said = call(capsys, *asked, "table").out.splitlines()[-1]
+    said, verdict = call(capsys, *asked, "table").out.splitlines()[-2:]
     assert said.startswith("Nowhere in this region does the tool deviate more than ")
+    assert verdict == "Accuracy asked, position: 0.5 mm: NOT met: what is reached exceeds it."
 
 
 # A child of a background job starts deaf to Ctrl-C. The first sign of progress is told to the test.

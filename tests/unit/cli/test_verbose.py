@@ -32,6 +32,8 @@ COMPUTING: dict[str, tuple[str, ...]] = {
     "gcode": ("gcode", "m.toml", "part.ngc", "--dry-run"),
     "export": ("export", "c", "m.toml"),
 }
+IMPORTING = "import"
+"""Computes little, but reads files whose hashes count."""
 NOT_COMPUTING = {"init", "explain", "schema", "completion"}
 STEP = re.compile(r"^ *(\d+\.\d{3}) s  (.+)$", re.MULTILINE)
 
@@ -51,7 +53,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_every_command_that_computes_has_it() -> None:
-    assert COMPUTING.keys() | NOT_COMPUTING == COMMANDS.keys()
+    assert COMPUTING.keys() | NOT_COMPUTING | {IMPORTING} == COMMANDS.keys()
 
 
 @pytest.mark.parametrize("name", COMPUTING)
@@ -108,4 +110,11 @@ def test_help_offers_it_where_it_is() -> None:
         command = cli.get_command(None, name)  # type: ignore[arg-type]
         assert command is not None
         options = {option for param in command.params for option in param.opts}
-        assert ("--verbose" in options) == (name in COMPUTING)
+        assert ("--verbose" in options) == (name in COMPUTING or name == IMPORTING)
+
+
+def test_an_import_says_what_it_read(folder: Path, capsys: Capture) -> None:
+    file = PLANAR.parents[1] / "examples" / "data" / "printer.cfg"
+    said = call(capsys, IMPORTING, file, "-o", "printer.toml", "--verbose").err
+    assert re.search(r"machine .+: 3 drives, 3 struts, \d+ parameters", said)
+    assert STEP.findall(said)

@@ -154,6 +154,11 @@ def _lines(
     yield f"; planned by truepose {version()} for {_ascii(machine.file)}"
     yield "; in machine coordinates: without work offsets and tool length"
     yield f"; G4 P is in seconds; the machine rests {dwell:g} s at every pose"
+    lowest = ""
+    if "z" in machine.commanded:
+        z = min(stop[machine.commanded.index("z")] for stop in way.stops)
+        lowest = f", down to Z{_number(z / scale, DIGITS[unit])}"
+    yield f"; it moves and rests, and probes nothing: see that nothing is in its way{lowest}"
     yield "; begins and ends at home" + (
         f"; {way.by_home} legs lead by home" if way.by_home > 1 else
         "; 1 leg leads by home" if way.by_home else ""

@@ -10,6 +10,7 @@ from truepose.controllers._export import Export
 from truepose.controllers._reader import ControllerFile
 
 _SETP = re.compile(r"(?P<begin>\s*setp\s+(?P<key>\S+)\s+)(?P<value>\S+)(?P<rest>.*)$")
+_NET = re.compile(r"\s*net\s+\S+(?P<pins>[^#]*+)")
 _SECTION = re.compile(r"\s*\[(\w+)\]")
 _KEY = re.compile(r"(?P<begin>\s*(?P<key>\w+)\s*=\s*)(?P<value>\S+)(?P<rest>.*)$")
 
@@ -38,8 +39,12 @@ def edits(file: ControllerFile, export: Export) -> Iterator[Edit]:
             "a file with " + ", ".join(_told(place) for place in list(wanted)[:2]) + ", ...",
         )
     below: dict[int, list[str]] = {}
+    # A pin that a signal drives is not set.
+    driven = {pin for line in file.lines for pin in _driven(line)}
     for place, value in wanted.items():
         if place not in last:
+            if place[1] in driven:
+                continue
             new = f"{place[1]} = {value}" if ini else f"setp {place[1]} {value}"
             below.setdefault(sections.get(place[0], max(sections.values())), []).append(new)
             continue
@@ -63,6 +68,12 @@ def _placed(lines: list[str]) -> Iterator[tuple[tuple[str, str], int, str]]:
         match = _SETP.match(line) or (_KEY.match(line) if section else None)
         if match is not None:
             yield (section, match["key"]), number, match["value"]
+
+
+def _driven(line: str) -> list[str]:
+    """Pins of a net; arrows between them are for people."""
+    net = _NET.match(line)
+    return [] if net is None else net["pins"].split()
 
 
 def _told(place: tuple[str, str]) -> str:

@@ -97,6 +97,16 @@ def test_the_file_holds_the_numbers_then(case: str, tmp_path: Path) -> None:
         assert after.count(mark) == text.count(mark)
 
 
+def test_a_pin_that_a_signal_drives_is_not_set(tmp_path: Path) -> None:
+    _, name, text = CASES["linuxcnc-genhexkins"]
+    assert "net tool-offset genhexkins.tool-offset <= motion.tooloffset.z" in text
+    (tmp_path / name).write_text(text, "utf-8")
+    exported = export(tp.load(MACHINES / "hexapod.toml"), "linuxcnc-genhexkins")
+    changes = difference("linuxcnc-genhexkins", exported, tmp_path / name)
+    assert "+setp genhexkins.base.0.x" in changes
+    assert "+setp genhexkins.tool-offset" not in changes
+
+
 @pytest.mark.parametrize("case", ["klipper", "klipper-saved", "klipper-rotary", "reprap"])
 def test_what_is_read_of_it_is_what_was_exported(case: str, tmp_path: Path) -> None:
     """By the reader of that format: the same numbers, printed again."""

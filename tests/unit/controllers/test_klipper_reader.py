@@ -103,6 +103,13 @@ def test_a_block_that_was_changed_is_not_read(text: str, line: int, tmp_path: Pa
     assert f"line {line} " in (told[0].hint or "")
 
 
+def test_a_misspelt_option_is_pointed_at(tmp_path: Path) -> None:
+    text = DELTA.replace("delta_radius: 174.75", "delta_raduis: 174.75")
+    (problem,) = problems(tmp_path, text)
+    number = text.splitlines().index("delta_raduis: 174.75") + 1
+    assert problem.hint == f'line {number} has "delta_raduis": is it meant?'
+
+
 @pytest.mark.parametrize(
     ("text", "code", "line"),
     [

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 from truepose.controllers.klipper.config import Config, Entry
 from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.wording import did_you_mean, one_of
+
+SLIP = 0.85
+"""Likeness of a misspelt option: `print_radius` is not `delta_radius`."""
 
 STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
 """The sections of the three drives."""
@@ -128,7 +132,10 @@ class Numbers:
         """Note that an option is not there."""
         place = self.config.sections.get(section)
         hidden = self.config.unread_line
+        written = {key: e for (of, key), e in self.config.options.items() if of == section}
         hint = None
+        for near in get_close_matches(name, written, n=1, cutoff=SLIP):
+            hint = f'line {written[near].line} has "{near}": is it meant?'
         if hidden is not None:
             hint = (
                 f"what SAVE_CONFIG wrote is not read, by Klipper neither: line {hidden} is no line "

@@ -44,7 +44,8 @@ o o  the two joints of a pair, spacing apart: so do they stand on the effector t
     }
 
     radius: ThreePositiveLengths = Field(
-        description="From the machine's axis to the middle of each carriage's two joints."
+        description="From the machine's axis to the middle of each carriage's two joints: a "
+        "firmware's delta radius and the effector_radius together."
     )
     effector_radius: PositiveLength = Field(
         description="From the tool's axis to the middle of each two joints of the effector."

@@ -23,13 +23,16 @@ COMMANDS = {
 JUDGING = {BEFORE: ("check", "budget", "bounds"), AFTER: ("compensate",)}
 """Commands whose exit code is of that state."""
 
-OTHER = 0.5
+OTHER = 0.05
 """m or rad, asked of the quantity that is not looked at."""
 
 
 def answers_of(outcome: Outcome, state: str) -> list[str]:
     """The answers of a state as they are printed first, each in one line."""
     first = " ".join(outcome.out.partition("\n\n")[0].split())
+    where, *told = re.split(r"(?<=between them\.) |(?<=what lies between\.) ", first, maxsplit=1)
+    assert where.startswith("At ")
+    first = " ".join(told)
     pieces = re.split(r"(?=\b(?:NOT met|met|undecided|not asked) (?:position|orientation) )", first)
     # "met" of "NOT met" begins no answer.
     found, whole = [], ""

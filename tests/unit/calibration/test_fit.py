@@ -438,3 +438,17 @@ def test_variables_that_are_one_have_a_prior_all_the_same(tmp_path: Path) -> Non
     found = fitted(machine, tracked(machine))
     rails = [number for number, name in enumerate(found.unknowns.names) if "origin" in name]
     assert abs(found.values[rails[0]] - found.values[rails[1]]) < 1e-9
+
+
+def test_what_nothing_checks_does_not_look_odd() -> None:
+    """As many unknowns as readings: residuals are rounding, over a deviation that is none."""
+    file = Path(__file__).parents[3] / "examples" / "data" / "printer.cfg"
+    rods = ["family.effector_radius=33", "family.spacing=45"]
+    found = tp.import_machine(file, settings=rods)
+    result = tp.calibrate(found.machine, found.measurements, use_prior=False)
+    assert result.fit.unknowns.n_machine >= result.fit.measurements.n_observation
+    assert result.fit.redundancy.max() < 1e-6
+    assert (result.fit.standardised == 0.0).all()
+    told = tp.calibrate(found.machine, found.measurements)
+    assert told.fit.redundancy.max() > 0.1
+    assert np.abs(told.fit.standardised).max() > 0.01

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from truepose.arrays import Flags, Floats
+from truepose.calibration.identification.data_snooping import UNCHECKED
 from truepose.calibration.identification.equations import Equations, whitened
 from truepose.calibration.identification.placement import Placements, place_instruments
 from truepose.calibration.identification.problem import IdentificationProblem, Prior
@@ -72,12 +73,16 @@ class Fit(Represented):
 
     @property
     def standardised(self) -> Floats:
-        """(m,) residuals in units of their own standard deviation after the fit."""
-        left = np.maximum(1.0 - self.leverage, 1e-12)
+        """(m,) residuals in units of their own standard deviation after the fit.
+
+        0 where nothing checks a reading: its residual is rounding, and so is its deviation.
+        """
+        left = 1.0 - self.leverage
         # What a reading without weight differs by from the others holds their uncertainty too.
         variance = np.where(self.weights > 0.0, left, 1.0 + self.prediction / self.birge**2)
-        standardised: Floats = self.residual / (self.birge * np.sqrt(variance))
-        return standardised
+        checked = variance > UNCHECKED
+        deviation = self.birge * np.sqrt(np.where(checked, variance, 1.0))
+        return np.where(checked, self.residual / deviation, 0.0)
 
     @property
     def prediction(self) -> Floats:

@@ -97,6 +97,8 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     "plan": (
         tp.plan, {"machine": MACHINE, "instrument": instrument(), "budget": 3, "starts": 1},
     ),
+    "import_machine": (tp.import_machine, {"path": "none.cfg"}),
+    "oddities": (tp.oddities, {"machine": MACHINE}),
     "load": (tp.load, {"path": MACHINES / "planar_two_slider.toml"}),
     "threads": (tp.threads, {}),
     "Condition": (tp.Condition, {}),

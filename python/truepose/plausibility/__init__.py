@@ -49,6 +49,7 @@ from truepose.plausibility import (
     workspace_size,
 )
 from truepose.plausibility._base import MachineAtHome, Oddity, Rule
+from truepose.runs.arguments import checked
 
 if TYPE_CHECKING:
     from truepose.arrays import Codes
@@ -93,10 +94,12 @@ RULES: tuple[Rule, ...] = (
 """Every rule, in the order in which oddities are told: what the others follow from goes first."""
 
 
+@checked
 def oddities(machine: Machine) -> tuple[Oddity, ...]:
     """What looks odd about a machine, the likeliest cause first; none of a sound one.
 
-    At its home pose, nominal, in the base frame, and over its workspace. Raises nothing of its own.
+    At its home pose, nominal, in the base frame, and over its workspace. Raises `ArgumentError`
+    (bad-argument) for what is no machine.
     """
     return _looked_at(MachineAtHome(machine))
 

@@ -18,8 +18,8 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
                 yield (
                     f'"{pattern}" under [tolerance] changes nothing: what counts for {parameter} '
                     f"is {by}, and each other that it matches has its own too; usual is a pattern "
-                    "that some parameter is left for. Change what counts, or take the pattern out. "
-                    "If it is meant, leave it",
+                    "that some parameter is left for. Look at what counts, and change that or take "
+                    "the pattern out. If it is meant, leave it",
                     (f"tolerance.{pattern}",),
                 )
 

@@ -259,6 +259,12 @@ def test_numbers_that_change_within_a_session(tmp_path: Path) -> None:
         ("echo:  M665 L215 Rx H200", 1, "M665 R cannot be read"),
         ("\necho:  M665 L100 R106", 2, "does not reach"),
         ("echo:  M665 L215 R-1", 1, "not above zero"),
+        (
+            "#define DELTA\n#define DELTA_RADIUS 90\n#define DELTA_RADIUS_TRIM_TOWER {0, 20, 0}\n"
+            "#define DELTA_DIAGONAL_ROD 100",
+            4,
+            "does not reach",
+        ),
         ("echo:  M665 L215 R106\necho:  M666 X0.1 Y0 Z0", 2, "above zero"),
         ("echo:  M665 L215 R9999999999", 1, "M665 R cannot be read"),
         ("#define COREXY\n#define X_BED_SIZE 200", 1, "COREXY"),

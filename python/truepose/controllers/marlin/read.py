@@ -154,11 +154,17 @@ def _of_missing(missing: Sequence[Fault], known: Definitions | None) -> Iterator
 
 def _impossible(held: Mapping[str, Held]) -> Iterator[Problem]:
     """What no delta has, and what Marlin refuses."""
-    rods = {"M665 L": _rods(held)}
-    if min(_radius(held)) <= 0:
+    rods, radius = _rods(held), _radius(held)
+    if min(radius) <= 0:
         yield held["M665 R"].problem("not-positive", "this is not above zero", "mm, above zero")
-    else:
-        yield from bridged(held, "M665 R", rods)
+    elif min(rods) <= held["M665 R"].value:
+        yield from bridged(held, "M665 R", {"M665 L": rods})
+    elif any(rod <= out for rod, out in zip(rods, radius, strict=True)):
+        yield held["M665 L"].problem(
+            "import-value",
+            "a rod that does not reach from its tower to the middle",
+            f"mm, longer than the delta radius with its trim, {max(radius)}",
+        )
     for letter in "XYZ":
         adjusted = held.get(f"M666 {letter}")
         if adjusted is not None and adjusted.value > 0:

@@ -32,8 +32,8 @@ def apply(
     A key is a path: `accuracy.target`, `strut.1.length` (rows by name, `strut.*.length` for all),
     `strut.1.base.x`. In a table of `free_tables` the rest of the path is one key. Quotation marks
     round a key with points may stay. A value is a TOML value; text that is none is taken as a
-    string (`501 mm`). Whether a key is one that the file may
-    have is left to validation. Raises `RequestError` with all settings that lead nowhere.
+    string (`501 mm`). Whether a key is one that the file may have is left to validation. Raises
+    `RequestError` with all settings that lead nowhere.
     """
     problems: list[Problem] = []
     for path, text in _pairs(settings, problems):
@@ -99,11 +99,11 @@ def _pairs(
     settings: Mapping[str, str] | Sequence[str], problems: list[Problem]
 ) -> Iterable[tuple[str, str]]:
     if isinstance(settings, Mapping):
-        yield from ((str(path).strip(), str(text)) for path, text in settings.items())
+        yield from ((_unquoted(str(path)), str(text)) for path, text in settings.items())
         return
     for setting in settings:
         path, equals, text = setting.partition("=")
-        path = _QUOTED.sub(r"\2", path.strip())
+        path = _unquoted(path)
         if not equals or not all(path.split(".")):
             problems.append(
                 Problem(
@@ -115,6 +115,10 @@ def _pairs(
             )
             continue
         yield path, text.strip()
+
+
+def _unquoted(path: str) -> str:
+    return _QUOTED.sub(r"\2", path.strip())
 
 
 def _shortened(setting: str) -> str:

@@ -387,15 +387,18 @@ def against_target(machine: Machine, result: xr.Dataset) -> list[str]:
             continue
         unit = machine.shown.error(name)
         said = f"Accuracy asked, {name}: {machine.accuracy.said(name)}:"
-        if str(result["status"].values) == PROVEN and bound <= target:
-            sentences.append(f"{said} met, everywhere in the region.")
-        elif reached > target:
+        proven = str(result["status"].values) == PROVEN
+        if reached > target:
             sentences.append(f"{said} NOT met: what is reached exceeds it.")
+        elif proven and bound <= target:
+            sentences.append(f"{said} met, everywhere in the region.")
+        elif not proven:
+            sentences.append(f"{said} undecided, for no bound is proven.")
         else:
             (least,) = rounded(np.array([reached]) * unit.per_si, (-1,))
             sentences.append(
                 f"{said} undecided, for between {least} {unit.label} and the bound nothing is "
-                "known; a smaller --gap, such as --gap 0.01, looks closer."
+                "known; a smaller --gap looks closer."
             )
     return sentences
 

@@ -230,11 +230,11 @@ def test_a_region_is_answered_in_words(
     machine = truepose.load(PLANAR)
     found = made.region(machine)
     bound, reached = (float(found[f"{of}magnitude"][0]) * 1e3 for of in ("", "reached_"))
-    for target, word in ((bound, "undecided"), (reached, "undecided"), (0.99 * reached, "NOT met")):
-        smaller = f"accuracy.target={target * (1.0 - 1e-9)!r} mm"
-        last = call(capsys, *asked, "--set", smaller).out.splitlines()[-1]
-        expected = "NOT met" if target == reached else word
-        assert f"mm: {expected}" in last
+    for below, word in ((bound, "undecided"), (reached, "NOT met")):
+        smaller = f"accuracy.target={below * (1.0 - 1e-9)!r} mm"
+        outcome = call(capsys, *asked, "--set", smaller, "--require-accuracy")
+        assert f"mm: {word}" in outcome.out.splitlines()[-1]
+        assert outcome.code == 1
     rows = list(csv.DictReader(io.StringIO(call(capsys, *asked, "--format", "csv").out)))
     assert [row["name"] for row in rows] == ["x", "y", "position"]
     assert float(rows[0]["lower"]) == pytest.approx(1e3 * float(found["lower"][0]))
@@ -289,6 +289,18 @@ def test_what_is_not_proven_is_not_kept(
     outcome = call(capsys, "bounds", PLANAR, *setting, *cut, "--require-accuracy")
     assert outcome.code == 1
     assert "Poses without a proof: 1 of 3" in outcome.out
+
+
+def test_a_region_without_a_proof_is_undecided(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stand_in = Asked(lambda machine, poses: made.region(machine, "box_too_wide"))
+    monkeypatch.setattr(truepose, "bounds", stand_in, raising=False)
+    region = ["--region", "x=200:400,y=100:300", "--set", "accuracy.target=9 m"]
+    outcome = call(capsys, "bounds", PLANAR, *region, "--require-accuracy")
+    assert outcome.code == 1
+    last = outcome.out.splitlines()[-1]
+    assert last == "Accuracy asked, position: 9 m: undecided, for no bound is proven."
 
 
 def test_shares_are_shown_and_written(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+import truepose as tp
 from machine_texts import HEXAPOD, PLANAR, edited, load_text
 from truepose.errors import MachineFileError, RequestError
 
@@ -148,6 +149,9 @@ def test_a_setting_that_leads_nowhere(setting: str, words: str, tmp_path: Path) 
 @pytest.mark.parametrize("key", ['"strut.*.base.*"', "'strut.*.base.*'", "strut.*.base.*"])
 def test_a_key_may_stand_in_quotation_marks_as_in_the_file(key: str, tmp_path: Path) -> None:
     machine = load_text(tmp_path, PLANAR, f"tolerance.{key}=0.01")
+    again = tp.load(tmp_path / "machine.toml", {f"tolerance.{key}": "0.01"})
+    assert again.settings == machine.settings
+    assert again == machine
     (bands,) = (source.bands for source in machine.sources if source.name == "tolerance")
     named = {machine.parameters[column] for column in bands.parameters}
     assert "strut.1.base.x" in named

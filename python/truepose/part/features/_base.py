@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, Self
 
 from truepose.arrays import Floats
+from truepose.errors import ReadingError
 from truepose.part.element import Element
 
 if TYPE_CHECKING:
@@ -17,6 +18,10 @@ Method = Literal["iso", "least-squares"]
 
 Rule = Literal["between", "spread", "length"]
 """How a value follows from linear forms, see `Forms`."""
+
+
+class FeatureError(ReadingError):
+    """Elements that are not what the kind of a feature is about; `fault` says why."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +94,7 @@ class Feature(Protocol):
     ) -> Self:
         """From its checked row; `datums` by name, in the order of the row.
 
-        Raises `FeatureError` with a `Fault` where the elements are not what the kind is about:
+        Raises `FeatureError` where the elements are not what the kind is about:
         points that are no circle, too few of them, datums that form no frame.
         """
         ...

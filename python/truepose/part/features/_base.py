@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, Self
@@ -54,10 +55,13 @@ class Forms:
     `weights` (K, n, 3) over the points of all elements, those of datums after the feature's own.
     The value lies, but for the second order:
         between   at the smallest, or the largest, form as `side` -1 or +1 says; K 1: it is that one
-        spread    at most at the largest less the smallest form
+        spread    at most at `factor` times the largest less the smallest form
         length    at `factor` times the Euclidean length of all forms
-    `curvature`, 1/m: by what the geometry bends, no more than `curvature` rho^2 is added or taken
-    where no point is off by more than rho. `base` (K,), SI.
+    Each of `plus`, forms of rule "spread", says by how much the value may lie elsewhere besides, up
+    or down, to first order too: a datum's own form, which moves what touches it. `curvature`, 1/m
+    (rad/m^2 of an angle): by what the geometry bends, no more than `curvature` rho^2 is added or
+    taken where no point is off by more than rho, and rho is at most `reach`, m; it holds what those
+    of `plus` bend. `base` (K,), SI.
     """
 
     rule: Rule
@@ -66,6 +70,8 @@ class Forms:
     curvature: float
     side: int = 1
     factor: float = 1.0
+    plus: tuple[Forms, ...] = ()
+    reach: float = math.inf
 
 
 class Feature(Protocol):

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from truepose.cli._options import (
-    FileName,
     InputFile,
     OutputFile,
     _note_format,
@@ -18,6 +17,7 @@ from truepose.cli._options import (
     set_option,
     takes,
 )
+from truepose.cli._program import Quantities, program_options
 from truepose.cli._verbose import verbose_option
 
 if TYPE_CHECKING:
@@ -60,39 +60,7 @@ if TYPE_CHECKING:
         help="What the controller does between two blocks: pose, it solves its kinematics all "
         "along, as LinuxCNC does; either, it may also drive its joints straight to the end.",
     ),
-    click.option(
-        "--units",
-        type=click.Choice(["mm", "inch"]),
-        help="What holds before the first G20 or G21. Without it lengths before that are refused.",
-    ),
-    click.option(
-        "--start",
-        metavar="x=..,y=..",
-        help="Where the machine stands before the program, in machine coordinates. Axes that are "
-        "not named: the machine's home.",
-    ),
-    click.option(
-        "--offset",
-        "offsets",
-        metavar="G54 x=..,y=..",
-        type=(str, str),
-        multiple=True,
-        help="Offset of a coordinate system, G54 to G59.3, that the controller has stored; r is "
-        "its rotation about Z. May be repeated. A program that selects one that is not given is "
-        "refused.",
-    ),
-    click.option(
-        "--var",
-        "parameter_file",
-        metavar="FILE",
-        type=FileName(".var"),
-        help="LinuxCNC's parameter file (linuxcnc.var), which has all offsets.",
-    ),
-    click.option(
-        "--block-delete",
-        type=click.Choice(["on", "off"]),
-        help="Whether lines that begin with / are left out. Without it they are refused.",
-    ),
+    *program_options,
     click.option(
         "--digits",
         type=click.IntRange(0, 8),
@@ -138,9 +106,11 @@ def command(
     settings: tuple[str, ...],
     form: str,
     tolerance: str | None,
-    start: str | None,
     dry_run: bool,
+    units: str | None,
+    start: str | None,
     offsets: tuple[tuple[str, str], ...],
+    parameter_file: Path | None,
     block_delete: str | None,
     acceleration: str | None,
     **options: Any,
@@ -171,7 +141,7 @@ def command(
     if output is not None:
         require_writable(output, [output.suffix.lower()], [machine_file])
     machine = load_machine(machine_file, settings)
-    read = _Reading(machine)
+    read = Quantities(machine)
     said = "" if tolerance is None else read.said(tolerance)
     try:
         with progress("corrected program", "lines") as report:
@@ -180,15 +150,13 @@ def command(
                 program,
                 output,
                 tolerance=None if tolerance is None else read.length("--tolerance", tolerance),
-                start=read.position("--start", start or ""),
-                offsets={name: read.position("--offset", text, "abcr") for name, text in offsets},
-                block_delete=None if block_delete is None else block_delete == "on",
                 acceleration=(
                     ACCELERATION
                     if acceleration is None
                     else read.acceleration("--acceleration", acceleration)
                 ),
                 progress=report,
+                **vars(read.program(units, start, offsets, parameter_file, block_delete)),
                 **options,
             )
             say_file(program)
@@ -214,64 +182,6 @@ def _show(machine: Machine, proof: Proof, form: str, said: str, *, written: bool
         sys.stdout.write("\n")
     else:
         show_tables(_tables(machine, proof, said))
-
-
-class _Reading:
-    """Reads quantities of options, bare numbers in the units of the machine file."""
-
-    def __init__(self, machine: Machine) -> None:
-        from truepose.files.units import UnitSystem
-
-        self._units = UnitSystem(machine.file_units)
-
-    def length(self, option: str, text: str) -> float:
-        """M. Raises `RequestError` (bad-correction)."""
-        return self._quantity(option, text, "length")
-
-    def acceleration(self, option: str, text: str) -> float:
-        """m/s^2. Raises `RequestError` (bad-correction)."""
-        return self._quantity(option, text, "acceleration")
-
-    def said(self, text: str) -> str:
-        """A length as it was asked for, a bare number with the unit of the file."""
-        try:
-            return f"{float(text):.15g} {self._units.shown()['length'].label}"
-        except ValueError:
-            return text.strip()
-
-    def position(self, option: str, text: str, turning: str = "abc") -> dict[str, float]:
-        """Coordinates by axis, m and rad, of "x=10,y=2 in". Raises `RequestError`."""
-        offsets = {}
-        for part in filter(None, (part_text.strip() for part_text in text.split(","))):
-            name, equals, value = part.partition("=")
-            axis = name.strip().lower()
-            if not equals:
-                raise self._refusal(option, part, "an axis and a coordinate, such as x=10")
-            if axis in offsets:
-                raise self._refusal(option, part, "every axis once")
-            offsets[axis] = self._quantity(option, value, "angle" if axis in turning else "length")
-        return offsets
-
-    def _quantity(self, option: str, text: str, dimension: str) -> float:
-        from truepose.errors import ReadingError
-        from truepose.files.dimensions import DIMENSIONS
-
-        try:
-            try:
-                return self._units.read(float(text), dimension)
-            except ValueError:
-                return self._units.read(text, dimension)
-        except ReadingError as failure:
-            expected = failure.expected or DIMENSIONS[dimension].phrase
-            raise self._refusal(option, failure.found or text, expected) from None
-
-    @staticmethod
-    def _refusal(option: str, found: str, expected: str) -> Exception:
-        from truepose.errors import Problem, RequestError
-
-        return RequestError(
-            Problem("bad-correction", f"{option} cannot be read", found=found, expected=expected)
-        )
 
 
 def _tables(machine: Machine, proof: Proof, said: str) -> Iterable[Table]:

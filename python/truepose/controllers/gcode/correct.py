@@ -19,7 +19,7 @@ from typing import cast, get_args
 
 import numpy as np
 
-from truepose._kernel import GcodeCorrector, GcodeError, GcodeMoves, GcodeReader, threads
+from truepose._kernel import GcodeCorrector, GcodeError, threads
 from truepose.compensation.commands import ActualMachine
 from truepose.controllers.gcode import _refusals
 from truepose.controllers.gcode._axes import AXES, Axes
@@ -38,6 +38,15 @@ from truepose.controllers.gcode.exact_stops import (
     ExactStops,
     is_blending,
 )
+from truepose.controllers.gcode.program import (
+    BATCH,
+    PROGRAM,
+    ProgramOptions,
+    Reading,
+    bad_option,
+    moves_of,
+    problems_of,
+)
 from truepose.controllers.gcode.proof import Errors, Proof, Proving, improves
 from truepose.controllers.gcode.tolerance import (
     MOST,
@@ -46,9 +55,9 @@ from truepose.controllers.gcode.tolerance import (
     rounding_of,
     tolerance_for,
 )
-from truepose.controllers.gcode.work_offsets import Positions, WorkOffsets, named, work_offsets
+from truepose.controllers.gcode.work_offsets import Positions
 from truepose.errors import Problem, RequestError
-from truepose.files.text_file import FileKind, on_disk, require_input
+from truepose.files.text_file import on_disk, require_input
 from truepose.files.wording import one_of
 from truepose.files.writing import replacing, require_writable
 from truepose.machine import Condition, Machine
@@ -59,9 +68,6 @@ from truepose.runs.controller_geometry import (
     require_known_controller,
 )
 from truepose.runs.poses import required_sources
-
-BATCH = 8192
-"""Moves worked on at a time."""
 
 LOOKED_THROUGH = 1 << 15
 """Moves of a program from which the tolerance follows: reading a long one twice takes its time.
@@ -81,22 +87,12 @@ TURN = 5e-4
 DIGITS = 6
 """Decimals of mm and degrees; inches have one more."""
 
-PROGRAM = FileKind("a program of G-code", ".ngc")
-
-HINTS = {
-    "gcode-no-offset": "say what it is: --offset G54 x=..,y=.., or --var with LinuxCNC's parameter "
-    "file, or take the code out to be in machine coordinates",
-    "gcode-no-units": "or say what holds at first: --units mm",
-    "gcode-block-delete": "say what the operator's switch is: --block-delete on",
-}
-"""What helps against problems of a program that an option solves."""
-
 Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
 class _Options:
-    """What was asked, checked; coordinates by the axes' letters, mm and degrees.
+    """What was asked, checked.
 
     `tolerance`, m; None: it follows from the error before. `opened`: the file that the program is
     read from, which is another one than it is called where it comes from standard input.
@@ -105,11 +101,7 @@ class _Options:
     tolerance: float | None
     interpolation: Interpolation
     digits: int
-    axes: str
-    units: str | None
-    start: dict[str, float]
-    offsets: WorkOffsets
-    block_delete: bool | None
+    reading: Reading
     path_mode: str | None
     acceleration: float
     opened: Path = Path()
@@ -124,27 +116,10 @@ class _Options:
         return GcodeCorrector(
             self.opened,
             target,
-            units=self.units,
-            start=self.start,
-            offsets=self.offsets.systems,
-            system=self.offsets.active,
-            block_delete=self.block_delete,
-            axes=self.axes,
+            **self.reading.arguments(),
             digits=self.digits,
             path_mode=self.path_mode,
-            heading=f"truepose for {name[:LONGEST_NAME].strip()}: {self.offsets.words}",
-        )
-
-    def reader(self, program: Path) -> GcodeReader:
-        """What reads a program as the same controller does."""
-        return GcodeReader(
-            program,
-            units=self.units,
-            start=self.start,
-            offsets=self.offsets.systems,
-            system=self.offsets.active,
-            block_delete=self.block_delete,
-            axes=self.axes,
+            heading=f"truepose for {name[:LONGEST_NAME].strip()}: {self.reading.offsets.words}",
         )
 
 
@@ -201,12 +176,9 @@ def correct_program(
     axes = Axes(machine)
     options = _options(
         axes,
+        ProgramOptions(units, start, offsets, parameters, block_delete),
         tolerance,
         interpolation,
-        units,
-        start,
-        (offsets, parameters),
-        block_delete,
         digits,
         path_mode,
         acceleration,
@@ -215,7 +187,7 @@ def correct_program(
     given = machine.condition if condition is None else condition
     required_sources(machine, given)
     actual = ActualMachine(machine, given)
-    with on_disk(program) as opened, _problems_of(program):
+    with on_disk(program) as opened, problems_of(program):
         options = replace(options, opened=opened)
         allowed = _tolerance(actual, axes, options)
         division = Division(actual, axes, options.limits(allowed.value))
@@ -235,13 +207,13 @@ def _tolerance(actual: ActualMachine, axes: Axes, options: _Options) -> PathTole
         if options.tolerance < least:
             raise _refusals.of_tolerance(actual.machine, options.tolerance, least, options.digits)
         return PathTolerance(options.tolerance, "asked")
-    reader = options.reader(options.opened)
+    reader = options.reading.reader(options.opened)
 
     def batches() -> Iterator[Moves]:
         # What cannot be read is refused in the order of lines where the program is corrected.
         with suppress(GcodeError):
             left = LOOKED_THROUGH
-            while left > 0 and (moves := _moves_of(reader.read(min(BATCH, left)))):
+            while left > 0 and (moves := moves_of(reader.read(min(BATCH, left)))):
                 left -= len(moves.line)
                 yield moves
 
@@ -263,7 +235,7 @@ class _Session:
         self._program = program
         self._options = options
         self._allowed = allowed
-        self._reader = options.reader(options.opened)
+        self._reader = options.reading.reader(options.opened)
         self._writing = _Writing(division, temporary, options)
         length = division.actual.machine.characteristic_length
         self._stops = CountedStops(
@@ -279,7 +251,7 @@ class _Session:
         # While one batch is written and proven, the next is divided, where there are threads.
         with _quick_turns(), ThreadPoolExecutor(max_workers=1) as aside:
             task: Future[None] | None = None
-            while moves := _moves_of(self._reader.read(BATCH)):
+            while moves := moves_of(self._reader.read(BATCH)):
                 if approach is None:
                     approach = int(moves.line[0])
                 count += len(moves.line)
@@ -301,7 +273,7 @@ class _Session:
 
     def _start(self) -> MachineState:
         point = np.full(len(AXES), np.nan)
-        for letter, value in self._options.start.items():
+        for letter, value in self._options.reading.start.items():
             point[AXES.index(letter)] = value
         try:
             return self._division.at_start(point)
@@ -337,13 +309,13 @@ class _Session:
             machine=machine.name,
             source=str(self._program),
             target=target,
-            coordinates=self._options.offsets.words,
+            coordinates=self._options.reading.offsets.words,
             commanded=machine.commanded,
             tolerance=limits.chord,
             tolerance_from=self._allowed,
             improves=improves(before, after, length, least),
             interpolation=limits.interpolation,
-            start=self._options.start,
+            start=self._options.reading.start,
             approach=approach,
             moves=moves,
             blocks=proving.blocks,
@@ -379,7 +351,7 @@ class _Writing:
         self._temporary = temporary
         machine = division.actual.machine.name
         self._corrector = options.corrector(temporary, machine)
-        self._back = options.reader(temporary)
+        self._back = options.reading.reader(temporary)
         self._waiting: list[tuple[Moves, Divided]] = []
 
     def add(self, moves: Moves, divided: Divided) -> None:
@@ -448,42 +420,6 @@ def _quick_turns() -> Iterator[None]:
         sys.setswitchinterval(interval)
 
 
-def _moves_of(moves: GcodeMoves) -> Moves | None:
-    """The moves as arrays, each made once; None behind the last."""
-    if not len(moves):
-        return None
-    return Moves(
-        moves.line,
-        moves.kind,
-        moves.start,
-        moves.end,
-        moves.length,
-        moves.points,
-        moves.speed,
-        moves.stops,
-    )
-
-
-@contextmanager
-def _problems_of(program: Path) -> Iterator[None]:
-    """The interpreter's refusals as problems of the program's file."""
-    try:
-        yield
-    except GcodeError as refusal:
-        raise RequestError(
-            Problem(
-                refusal.code,
-                refusal.message,
-                file=str(program),
-                line=refusal.line,
-                column=refusal.column,
-                found=refusal.found,
-                expected=refusal.expected,
-                hint=HINTS.get(refusal.code, refusal.hint),
-            )
-        ) from None
-
-
 def _require_files(program: Path, written: Path | None, parameters: Path | None) -> None:
     """Refuse what cannot be read or written before any work is done."""
     require_input(program, PROGRAM)
@@ -511,12 +447,9 @@ def _file_problem(
 
 def _options(
     axes: Axes,
+    program: ProgramOptions,
     tolerance: float | None,
     interpolation: str,
-    units: str | None,
-    start: Positions | None,
-    offsets: tuple[Mapping[str, Positions] | None, Path | None],
-    block_delete: bool | None,
     digits: int,
     path_mode: str | None,
     acceleration: float,
@@ -525,40 +458,26 @@ def _options(
     problems: list[Problem] = []
 
     def refuse(name: str, found: object, expected: str) -> None:
-        problems.append(
-            Problem(
-                "bad-correction",
-                f"the correction of a program cannot have this {name}",
-                found=str(found),
-                expected=expected,
-            )
-        )
+        problems.append(bad_option(name, found, expected))
 
     if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0.0):
         refuse("tolerance", tolerance, "a length above zero, m")
     if interpolation not in get_args(Interpolation):
         refuse("interpolation", interpolation, one_of(get_args(Interpolation)))
-    if units not in (None, "mm", "inch"):
-        refuse("unit", units, "mm or inch")
     if not (isinstance(digits, int) and 0 <= digits <= 8):
         refuse("number of digits", digits, "a whole number from 0 to 8")
     if path_mode is not None and not is_blending(path_mode):
         refuse("path mode", path_mode, "G64 with P above zero, and Q where wanted: G64 P0.002")
     if not (np.isfinite(acceleration) and acceleration > 0.0):
         refuse("acceleration", acceleration, "an acceleration above zero, m/s^2")
-    begin = {**axes.home(), **named(start or {}, "start", refuse)}
-    shifted = work_offsets(axes.machine, *offsets, refuse)
+    reading = program.reading(axes, refuse)
     if problems:
         raise RequestError(*problems)
     return _Options(
         tolerance,
         cast("Interpolation", interpolation),
         digits,
-        axes.names,
-        units,
-        begin,
-        shifted,
-        block_delete,
+        reading,
         path_mode,
         acceleration,
     )

@@ -49,6 +49,15 @@ def of_move(
             expected=f"at most {MOST_PIECES:,} pieces of the moves that are divided together",
             hint="allow more with --tolerance, or give the move in parts",
         )
+    return of_unusable(failure, machine, axes, moves, file)
+
+
+def of_unusable(
+    failure: CannotCorrect, machine: Machine, axes: Axes, moves: Moves, file: Path
+) -> RequestError:
+    """The refusal of a move that has a pose on it which the machine cannot be commanded to."""
+    line = int(moves.line[failure.move])
+    at = axes.in_words(failure.pose)
     why = faults_text(machine, machine.kernel.explain(failure.pose))
     status = failure.status.replace("_", " ")
     if failure.status in ("singular", "branch_lost"):
@@ -206,4 +215,5 @@ __all__ = [
     "of_start",
     "of_tolerance",
     "of_uncommanded_axis",
+    "of_unusable",
 ]

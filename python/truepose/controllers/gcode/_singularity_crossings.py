@@ -47,6 +47,29 @@ def singularity_crossings(actual: ActualMachine, begins: Floats, ends: Floats) -
     return np.unique(np.array(crossing, np.intp))
 
 
+def first_crossing(
+    actual: ActualMachine, begins: Floats, ends: Floats, size: Floats, alone: Flags
+) -> int | None:
+    """Number of the first of ways that follow each other which crosses a singularity.
+
+    `begins` and `ends` (n, n_commanded) of ways so long, `size` (n,), m. Short ones are looked at
+    together, as long as they are no longer than `STEP`; those `alone` (n,) begin no such stretch.
+    """
+    stretch = np.floor(np.cumsum(size) / (STEP * actual.machine.characteristic_length))
+    chosen = np.diff(stretch, prepend=-1.0) > 0
+    chosen |= alone
+    chosen[-1] = True
+    last = np.flatnonzero(chosen)
+    first = np.concatenate([[0], last[:-1] + 1])
+    for way in singularity_crossings(actual, begins[first], ends[last]):
+        # A stretch may bend: what counts are its pieces.
+        within = slice(first[way], last[way] + 1)
+        crossings = singularity_crossings(actual, begins[within], ends[within])
+        if crossings.size:
+            return int(first[way] + crossings[0])
+    return None
+
+
 def _arrives(actual: ActualMachine, begins: Floats, ends: Floats) -> Flags:
     kernel = actual.machine.kernel
     from_joints, placements, _ = kernel.place(begins)
@@ -74,4 +97,4 @@ def _side(actual: ActualMachine, poses: Floats) -> Floats:
         return np.asarray(np.sign(np.linalg.det(jacobians[:, actual.components])))
 
 
-__all__ = ["singularity_crossings"]
+__all__ = ["first_crossing", "singularity_crossings"]

@@ -29,7 +29,7 @@ from truepose.compensation.commands import NO_DEVIATION, ActualMachine, PoseDevi
 from truepose.controllers.gcode._axes import MILLIMETRE, Axes
 from truepose.controllers.gcode._measure import Measure
 from truepose.controllers.gcode._pieces import Nodes, Pieces, SamplePoints, joined, selected
-from truepose.controllers.gcode._singularity_crossings import STEP, singularity_crossings
+from truepose.controllers.gcode._singularity_crossings import first_crossing, singularity_crossings
 from truepose.files.limits import MOST_PIECES
 from truepose.runs.displacement import ParameterDeviation
 from truepose.runs.poses import BLOCK, OK
@@ -468,29 +468,22 @@ class _Batch:
         # The way is gone from a node of every stretch of it to the next, and over every rapid.
         pieces = self.pieces
         ends, begins = pieces.end, pieces.begin
-        stretch = np.floor(np.cumsum(pieces.size) * (SPACING / STEP / self.spacing))
-        chosen = np.diff(stretch, prepend=-1.0) > 0
-        chosen |= moves.kind[nodes.move[ends]] == RAPID
-        chosen[-1] = True
-        last = np.flatnonzero(chosen)
-        first = np.concatenate([[0], last[:-1] + 1])
-        for way in singularity_crossings(
-            self.actual, nodes.asked[begins[first]], nodes.asked[ends[last]]
-        ):
-            # A stretch may bend: what counts are its pieces.
-            within = slice(first[way], last[way] + 1)
-            crossings = singularity_crossings(
-                self.actual, nodes.asked[begins[within]], nodes.asked[ends[within]]
+        crossing = first_crossing(
+            self.actual,
+            nodes.asked[begins],
+            nodes.asked[ends],
+            pieces.size,
+            moves.kind[nodes.move[ends]] == RAPID,
+        )
+        if crossing is not None:
+            at = ends[crossing]
+            raise CannotCorrect(
+                int(nodes.move[at]),
+                float(nodes.share[at]),
+                "singular",
+                nodes.asked[at],
+                of_program=True,
             )
-            if crossings.size:
-                at = ends[within][crossings[0]]
-                raise CannotCorrect(
-                    int(nodes.move[at]),
-                    float(nodes.share[at]),
-                    "singular",
-                    nodes.asked[at],
-                    of_program=True,
-                )
 
     @cached_property
     def pieces(self) -> Pieces:

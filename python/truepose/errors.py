@@ -191,6 +191,8 @@ CATALOGUE: dict[str, str] = {
     "plan-instrument": "an instrument whose readings cannot be planned",
     "plan-option": "an option of a plan or of its program that is not what it can be",
     "plan-way": "a planned pose to which no straight way leads",
+    # parts
+    "no-limits": "a dimension of the part without the limits of its tolerance",
     # programs
     "gcode-not-text": "a byte that no program has outside of comments",
     "gcode-line-too-long": "a line of a program longer than a controller reads",
@@ -225,7 +227,7 @@ CATALOGUE: dict[str, str] = {
     "gcode-start": "the machine cannot be where the program is said to start",
     "gcode-proof": "a corrected program that, read back, does not keep its tolerance",
     "gcode-no-better": "a corrected program that errs as much as the program did, or more",
-    "bad-correction": "an option of a corrected program that is not what it can be",
+    "bad-correction": "an option of a program, or of its correction, that is not what it can be",
 }
 """Every code with its meaning in one line. A `Problem` refuses a code that is not here."""
 

@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from truepose.files import tolerance_standards
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.units import QuantityError, UnitSystem, shown_value, type_phrase
+from truepose.files.varies import HINT, MACHINE, RUN, VISIT
 from truepose.files.wording import did_you_mean, one_of
 from truepose.probability.distributions import student_deviation
 
@@ -43,6 +44,9 @@ LISTED = ("discrete", "empirical")
 LEAST_DOF = 2.0
 """Student's distribution has a standard deviation only above so many degrees of freedom."""
 
+VARIES = (MACHINE, RUN, VISIT)
+"""What a tolerance may vary with."""
+
 DEFAULT_SIGMAS = 3.0
 """The half band of a normal distribution, in standard deviations, where nothing says it."""
 
@@ -58,6 +62,7 @@ TABLE_KEYS = {
     "probabilities": "of a discrete distribution: list of the probability of each of `values`",
     "group": "what varies together has one name",
     "sign": "-1 where it varies the other way than its group",
+    "varies": "with machine (default), with run, or with visit, as what never repeats does",
 }
 """Keys of a tolerance that is written as a table."""
 
@@ -96,7 +101,7 @@ class Tolerance:
     `distribution`: one of `DISTRIBUTIONS`; of a normal or student-t one the half band is `sigmas`
     standard deviations. A discrete or empirical one has `values`, deviations from nominal, and
     `probabilities`, or the name of the file of them, `data`. Tolerances of one `group` vary
-    together, each with its `sign` (+1 or -1).
+    together, each with its `sign` (+1 or -1). `varies`: one of `VARIES`.
     """
 
     dimension: str
@@ -110,6 +115,7 @@ class Tolerance:
     values: tuple[float, ...] = ()
     probabilities: tuple[float, ...] = ()
     data: str | None = None
+    varies: str = MACHINE
 
     def band(self, nominal: float) -> Band:
         """The band for a nominal size in m; not of listed values, whose band is their own.
@@ -228,6 +234,7 @@ def _from_table(table: Mapping[str, Any], dimension: str, units: UnitSystem) -> 
         data=_data(table),
         group=group,
         sign=sign,
+        varies=_varies(table),
     )
 
 
@@ -441,6 +448,19 @@ def _group(table: Mapping[str, Any]) -> tuple[str | None, float]:
             expected='group, such as group = "drilled in one set-up"',
         )
     return group, float(sign)
+
+
+def _varies(table: Mapping[str, Any]) -> str:
+    word = table.get("varies", MACHINE)
+    if word not in VARIES:
+        raise QuantityError(
+            "unknown-choice" if isinstance(word, str) else "wrong-type",
+            f"varies: a tolerance does not vary with {shown_value(word)}",
+            found=shown_value(word),
+            expected=one_of(f'"{one}"' for one in VARIES),
+            hint=HINT,
+        )
+    return str(word)
 
 
 def _designation(text: str, dimension: str) -> str:

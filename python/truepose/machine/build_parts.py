@@ -225,7 +225,9 @@ def condition(table: ConditionTable | None, source_tables: Iterable[BaseModel]) 
         time=table.time,
         gravity=STANDARD_GRAVITY if table.gravity is None else table.gravity,
         acceleration=_vector(table.acceleration),
-        envelope=None if envelope is None else Envelope(envelope.force, envelope.normal),
+        envelope=None
+        if envelope is None
+        else Envelope(envelope.force, envelope.normal, envelope.varies),
         source_tables=tuple(source_tables),
     )
 

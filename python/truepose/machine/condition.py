@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 from truepose.arrays import Floats, is_masked, real_numbers
 from truepose.errors import ArgumentError, Problem, RequestError
 from truepose.files.units import UnitSystem, default_units, shown_value
+from truepose.files.varies import MACHINE, RUN, VISIT
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine.chains import Vector
 from truepose.machine.parts import is_body, is_limb
@@ -46,14 +47,18 @@ class Envelope:
     """A force on the tool of known size (N) and unknown direction.
 
     Any direction in space, or, where a unit `normal` is given, in the plane across it; base axes.
+    `varies`: "run" (one direction in a run), "machine" or "visit".
     """
 
     force: float
     normal: Vector | None = None
+    varies: str = RUN
 
     def __post_init__(self) -> None:
         if not (_finite(self.force) and self.force >= 0.0):
             raise _bad("envelope", str(self.force), "a force of zero or more, N")
+        if self.varies not in (RUN, MACHINE, VISIT):
+            raise _bad("envelope", shown_value(self.varies), '"run", "machine" or "visit"')
         if self.normal is None:
             return
         normal = _vector("envelope", self.normal)

@@ -335,6 +335,7 @@ def _condition(condition: Condition) -> dict[str, object]:
         "moment_Nm": list(condition.moment),
         "envelope_N": None if envelope is None else envelope.force,
         "envelope_normal": None if envelope is None else envelope.normal,
+        **({} if envelope is None else {"envelope_varies": envelope.varies}),
         "gravity_m_per_s2": condition.gravity,
         "acceleration_m_per_s2": list(condition.acceleration),
         **{

@@ -25,6 +25,7 @@ from truepose.representation import Represented
 from truepose.runs.displacement import ParameterDeviation, sum_deviations
 from truepose.sources import Deviation, PoseBlock, Source
 from truepose.sources.deviation import Distribution
+from truepose.sources.variation import Variation
 
 STREAM_BYTES = 4
 """Of a hash: numbers of a variable and of its stream have room together in 64 bits."""
@@ -45,7 +46,8 @@ class Variables(Represented):
     the n_variable variables, and the `domain` that they lie in. `streams`, `numbers`
     (n_variable,): identity for random numbers, whatever else acts: `stream_of` the source's name,
     and the variable's number in that source's deviation. `correlation`
-    (n_variable, n_variable): Pearson's; None where all are independent.
+    (n_variable, n_variable): Pearson's; None where all are independent. `variations` of the
+    variables: what each varies with.
     """
 
     shift: ParameterDeviation
@@ -60,11 +62,17 @@ class Variables(Represented):
     numbers: Indices
     correlation: Floats | None
     domain: Domain
+    variations: tuple[Variation, ...]
 
     @property
     def directions(self) -> tuple[Indices, ...]:
         """Numbers of the variables that are together a unit vector."""
         return self.domain.directions
+
+    @property
+    def varies_along(self) -> Flags:
+        """(n_variable,) whether two poses of one run may have two values of the variable."""
+        return np.array([one.along_the_way for one in self.variations], np.bool_)
 
     def centred(self) -> Variables:
         """The same deviations with every single variable in [-1, 1], a band about its middle.
@@ -172,6 +180,7 @@ def variables_of(
                 for members in part.deviation.domain.directions
             ],
         ),
+        variations=tuple(variation for part in parts for variation in part.variations),
     )
 
 
@@ -199,6 +208,7 @@ class _Part:
     numbers: Indices
     names: tuple[str, ...]
     distributions: tuple[Distribution, ...]
+    variations: tuple[Variation, ...]
 
 
 def _part(machine: Machine, source: Source, deviation: Deviation) -> _Part:
@@ -225,6 +235,7 @@ def _part(machine: Machine, source: Source, deviation: Deviation) -> _Part:
         numbers=numbers,
         names=tuple(names),
         distributions=tuple(deviation.distribution[column] for column in first),
+        variations=tuple(deviation.variation[column] for column in first),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from truepose.sources.deviation import OWN_GROUP, UNIFORM, Deviation, Distribution
+from truepose.sources.variation import WITH_MACHINE, Variation
 
 
 @dataclass
@@ -20,6 +21,7 @@ class Columns:
     _groups: list[int] = field(default_factory=list)
     _edge: list[bool] = field(default_factory=list)
     _distributions: list[Distribution] = field(default_factory=list)
+    _variations: list[Variation] = field(default_factory=list)
 
     def new_group(self) -> int:
         """A group that no column has yet."""
@@ -34,6 +36,7 @@ class Columns:
         group: int = OWN_GROUP,
         edge: bool = True,
         distribution: Distribution = UNIFORM,
+        variation: Variation = WITH_MACHINE,
     ) -> None:
         """A column of the kernel's `parameter`, one number or (n,) of each kind.
 
@@ -45,6 +48,7 @@ class Columns:
         self._groups.append(group)
         self._edge.append(edge)
         self._distributions.append(distribution)
+        self._variations.append(variation)
 
     def deviation(self) -> Deviation:
         """All columns, (n or 1, k)."""
@@ -58,6 +62,7 @@ class Columns:
             sign=np.where(half_width < 0.0, -1.0, 1.0),
             edge=np.array(self._edge, np.bool_),
             distribution=self._distributions,
+            variation=self._variations,
         )
 
 

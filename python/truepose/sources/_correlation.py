@@ -6,7 +6,7 @@ matrix of them. A variable is a parameter's own, or that of a group of tolerance
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from pydantic import Field
 from truepose.arrays import Floats
 from truepose.errors import Fault
 from truepose.files.file_table import FileTable
+from truepose.files.varies import HINT
 from truepose.files.wording import counted
 from truepose.probability.semidefinite import clash
 from truepose.sources.deviation import Deviation
@@ -55,6 +56,7 @@ def read_correlation(parts: SourceBuilder, bands: Deviation) -> Floats | None:
         return None
     names = _Names(parts, bands)
     matrix = np.eye(bands.n_variable)
+    ways = dict(zip(bands.variables.tolist(), (way.word for way in bands.variation), strict=True))
     given: dict[tuple[int, int], str] = {}
     before = len(parts.problems)
     for index, row in enumerate(rows):
@@ -73,6 +75,7 @@ def read_correlation(parts: SourceBuilder, bands: Deviation) -> Floats | None:
                 path,
             )
         given |= dict.fromkeys(pairs, path)
+        _require_one_way(parts, names.of_variable, ways, pairs, path)
         for (i, j), coefficient in pairs.items():
             matrix[i, j] = matrix[j, i] = coefficient
     if len(parts.problems) > before:
@@ -120,6 +123,30 @@ def _coefficients(
         for i, line in enumerate(row.matrix)
         for j, coefficient in enumerate(line)
     }
+
+
+def _require_one_way(
+    parts: SourceBuilder,
+    names: Sequence[str],
+    ways: Mapping[int, str],
+    pairs: Mapping[tuple[int, int], float],
+    path: str,
+) -> None:
+    """Record a problem for the first correlated pair that varies with two things."""
+    for (i, j), coefficient in pairs.items():
+        if coefficient != 0.0 and ways[i] != ways[j]:
+            parts.refuse(
+                Fault(
+                    "excluding-keys",
+                    f"{names[i]} varies with the {ways[i]} and {names[j]} with the {ways[j]}: "
+                    "they are not drawn together",
+                    found=f'varies = "{ways[i]}" and "{ways[j]}" in one correlation',
+                    expected="variables that vary with the same",
+                    hint=HINT,
+                ),
+                path,
+            )
+            return
 
 
 def _require_coefficients(

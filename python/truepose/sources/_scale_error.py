@@ -5,13 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from truepose.sources._columns import Columns
+from truepose.sources.variation import WITH_MACHINE, Variation
 
 if TYPE_CHECKING:
     from truepose.machine import Band, Machine
 
 
 def add_scale_error(
-    columns: Columns, machine: Machine, drive: str, error: Band, zero_at: float
+    columns: Columns,
+    machine: Machine,
+    drive: str,
+    error: Band,
+    zero_at: float,
+    variation: Variation = WITH_MACHINE,
 ) -> None:
     """An error that grows in proportion with the travel from `zero_at` (m or rad) of a drive.
 
@@ -27,4 +33,11 @@ def add_scale_error(
     ):
         # Neither goes to its edge: the offset is here but the other half of a scale.
         if reach != 0.0:
-            columns.add(parameter, error.shift * reach, error.half * reach, group=group, edge=False)
+            columns.add(
+                parameter,
+                error.shift * reach,
+                error.half * reach,
+                group=group,
+                edge=False,
+                variation=variation,
+            )

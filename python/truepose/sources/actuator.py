@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
@@ -32,11 +32,22 @@ from truepose.files.quantity import (
 )
 from truepose.files.ratio import RatioWithin
 from truepose.files.tolerance import Band
+from truepose.files.varies import ByItself
 from truepose.sources._columns import Columns
 from truepose.sources._positioning import COVERAGE, PositioningTable, read_positioning
 from truepose.sources._scale_error import add_scale_error
 from truepose.sources.deviation import ARCSINE, TWO_POINT, Deviation, normal
 from truepose.sources.pose_block import PoseBlock
+from truepose.sources.variation import (
+    WITH_DIRECTION,
+    WITH_MACHINE,
+    WITH_VISIT,
+    Ripple,
+    Variation,
+    refuse_without_band,
+    variation,
+    with_position,
+)
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Drive, Machine, SourceBuilder
@@ -56,6 +67,22 @@ class PeriodicTable(FileTable):
     phase: Angle | None = Field(
         None, description="Of the sine at joint coordinate 0. Default: not known."
     )
+    varies: Literal["position", "machine", "run", "visit"] | None = Field(
+        None,
+        description="What it varies with where its phase is not known. Default: position, a sine "
+        "along the travel.",
+    )
+
+    @model_validator(mode="after")
+    def _unknown_where_it_varies(self) -> PeriodicTable:
+        if self.varies is not None and self.phase is not None:
+            refuse_without_band(
+                "varies",
+                "nothing does where the phase is known",
+                "varies and phase",
+                "one of them",
+            )
+        return self
 
 
 class ActuatorTable(FileTable):
@@ -77,6 +104,11 @@ class ActuatorTable(FileTable):
         None,
         description="CSV file of measured positions, after ISO 230-2, relative to this file: "
         "columns target, direction (`+` or `-`) and deviation, a row for each run.",
+    )
+    varies: ByItself | None = Field(
+        None,
+        description="What the spread of `table` varies with, or `lead_error` within its limits. "
+        "Default: visit, or machine.",
     )
 
     @model_validator(mode="after")
@@ -100,6 +132,16 @@ class ActuatorTable(FileTable):
                     expected="table, or what is known of the screw",
                 )
             )
+        banded = self.lead_error is not None and self.lead_error.half > 0.0
+        if self.varies is not None and self.table is None and not banded:
+            refuse_without_band(
+                "varies",
+                "the spread of a table, or a lead error within limits, is what it is about",
+                "no lead_error and no table"
+                if self.lead_error is None
+                else "a lead_error that is known",
+                'table, limits such as lead_error = "+-66 ppm", or periodic.varies',
+            )
         return self
 
 
@@ -115,7 +157,10 @@ class DriveActuator(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class Actuation:
-    """One drive's actuator: its path and number, and what is known of it; `zero_at` in m or rad."""
+    """One drive's actuator: its path and number, and what is known of it; `zero_at` in m or rad.
+
+    `variation` of the lead error, or of the table's spread.
+    """
 
     drive: str
     joint: int
@@ -123,6 +168,14 @@ class Actuation:
     zero_at: float
     periodic: PeriodicTable | None
     table: PositioningTable | None
+    variation: Variation = WITH_MACHINE
+
+    @property
+    def ripple(self) -> Variation:
+        """What a periodic error of unknown phase varies with."""
+        assert self.periodic is not None
+        by_position = with_position(Ripple(self.joint, self.periodic.period))
+        return variation(self.periodic.varies, by_position)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,17 +210,20 @@ class Actuator:
         for actuation in self.actuations:
             if actuation.lead_error is not None:
                 add_scale_error(
-                    columns, machine, actuation.drive, actuation.lead_error, actuation.zero_at
+                    columns,
+                    machine,
+                    actuation.drive,
+                    actuation.lead_error,
+                    actuation.zero_at,
+                    actuation.variation,
                 )
             offset = machine.parameters.index(f"{actuation.drive}.offset")
             if actuation.periodic is not None:
-                _add_periodic(
-                    columns, offset, actuation.periodic, block.drive_joints[:, actuation.joint]
-                )
+                _add_periodic(columns, offset, actuation, block.drive_joints[:, actuation.joint])
             if actuation.table is not None:
                 travel = None if block.travel is None else block.travel[:, actuation.joint]
                 _add_table(
-                    columns, offset, actuation.table, block.drive_joints[:, actuation.joint], travel
+                    columns, offset, actuation, block.drive_joints[:, actuation.joint], travel
                 )
         return columns.deviation()
 
@@ -207,12 +263,20 @@ def _actuation(parts: SourceBuilder, joint: int, drive: Drive, row: ActuatorTabl
         row.zero_at,
         row.periodic,
         positioning,
+        variation(row.varies, WITH_MACHINE if row.table is None else WITH_VISIT),
     )
 
 
-def _add_periodic(columns: Columns, offset: int, periodic: PeriodicTable, joint: Floats) -> None:
+def _add_periodic(columns: Columns, offset: int, actuation: Actuation, joint: Floats) -> None:
+    periodic = actuation.periodic
+    assert periodic is not None
     if periodic.phase is None:
-        columns.add(offset, half_width=periodic.amplitude, distribution=ARCSINE)
+        columns.add(
+            offset,
+            half_width=periodic.amplitude,
+            distribution=ARCSINE,
+            variation=actuation.ripple,
+        )
     else:
         turns = math.tau * joint / periodic.period
         columns.add(offset, periodic.amplitude * np.sin(turns + periodic.phase))
@@ -221,7 +285,7 @@ def _add_periodic(columns: Columns, offset: int, periodic: PeriodicTable, joint:
 def _add_table(
     columns: Columns,
     offset: int,
-    table: PositioningTable,
+    actuation: Actuation,
     joint: Floats,
     travel: Floats | None,
 ) -> None:
@@ -230,7 +294,8 @@ def _add_table(
     Where the direction is known, that of the table counts, to 2 spreads. Where it is not, the
     middle of both counts; the reversal, at either end as likely, is a variable of its own.
     """
-    means, spreads = table.at(joint)
+    assert actuation.table is not None
+    means, spreads = actuation.table.at(joint)
     way = np.zeros(joint.size) if travel is None else np.sign(travel)
     known = [way < 0.0, way > 0.0]
     columns.add(
@@ -238,6 +303,7 @@ def _add_table(
         np.select(known, list(means), 0.5 * (means[0] + means[1])),
         COVERAGE * np.select(known, list(spreads), spreads.max(axis=0)),
         distribution=normal(COVERAGE),
+        variation=actuation.variation,
     )
     reversal = np.where(way == 0.0, 0.5 * (means[1] - means[0]), 0.0)
-    columns.add(offset, half_width=reversal, distribution=TWO_POINT)
+    columns.add(offset, half_width=reversal, distribution=TWO_POINT, variation=WITH_DIRECTION)

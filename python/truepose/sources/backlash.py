@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -23,6 +23,7 @@ from truepose.files.quantity import NonNegativeCoordinate, NonNegativeDriveLoad
 from truepose.sources._play import pressed
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
+from truepose.sources.variation import WITH_DIRECTION, Variation, variation
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Drive, Machine, SourceBuilder
@@ -34,6 +35,11 @@ class BacklashTable(FileTable):
     play: NonNegativeCoordinate = Field(description="Total play, from flank to flank.")
     threshold: NonNegativeDriveLoad = Field(
         0.0, description="Load on the drive up to which the play stays open, by friction."
+    )
+    varies: Literal["direction", "machine", "run", "visit"] | None = Field(
+        None,
+        description="What the side of an open play varies with. Default: direction, the flank by "
+        "the way of a path; with any other word the way says nothing.",
     )
 
 
@@ -49,7 +55,8 @@ class DriveBacklash(BaseModel):
 class Backlash:
     """Play of drives whose position is measured at the motor.
 
-    `joints` (k): number of each such drive; `plays` in m or rad; `thresholds` in N or N m.
+    `joints` (k): number of each such drive; `plays` in m or rad; `thresholds` in N or N m;
+    `variations` of where each stands while its play is open.
     """
 
     name: ClassVar[str] = "backlash"
@@ -60,6 +67,7 @@ class Backlash:
     joints: tuple[int, ...]
     plays: tuple[float, ...]
     thresholds: tuple[float, ...]
+    variations: tuple[Variation, ...]
 
     @classmethod
     def build(cls, parts: SourceBuilder) -> Self | None:
@@ -72,11 +80,18 @@ class Backlash:
                 continue
             if drive.feedback == "direct":
                 _refuse_direct(parts, drive)
-            of_drives.append((index, row.backlash.play, row.backlash.threshold))
+            of_drives.append(
+                (
+                    index,
+                    row.backlash.play,
+                    row.backlash.threshold,
+                    variation(row.backlash.varies, WITH_DIRECTION),
+                )
+            )
         if not of_drives:
             return None
-        joints, plays, thresholds = zip(*of_drives, strict=True)
-        return cls(joints, plays, thresholds)
+        joints, plays, thresholds, variations = zip(*of_drives, strict=True)
+        return cls(joints, plays, thresholds, variations)
 
     def acts(self, condition: Condition) -> bool:
         """In every condition."""
@@ -96,9 +111,15 @@ class Backlash:
         loads = block.drive_loads(self.joints)
         side, free = pressed(block, columns, loads, self.thresholds, lever)
         if block.travel is not None:
-            side = np.where(free, -np.sign(block.travel[:, self.joints]), side)
+            by_way = np.array([one == WITH_DIRECTION for one in self.variations])
+            side = np.where(free & by_way, -np.sign(block.travel[:, self.joints]), side)
         reach = 0.5 * np.array(self.plays)
-        return Deviation.of(columns, side * reach, np.where(side == 0.0, reach, 0.0))
+        return Deviation.of(
+            columns,
+            side * reach,
+            np.where(side == 0.0, reach, 0.0),
+            variation=self.variations,
+        )
 
 
 def _refuse_direct(parts: SourceBuilder, drive: Drive) -> None:

@@ -23,9 +23,11 @@ from truepose.arrays import Floats
 from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import quantity
+from truepose.files.varies import ByItself
 from truepose.sources._play import pressed
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
+from truepose.sources.variation import WITH_VISIT, Variation, variation
 from truepose.spatial import rotate_about
 
 if TYPE_CHECKING:
@@ -43,6 +45,9 @@ class ClearanceTable(FileTable):
 
     threshold: quantity("force", sign="not negative") = Field(  # type: ignore[valid-type]
         0.0, description="Force in a strut up to which its joints' play stays open, by friction."
+    )
+    varies: ByItself | None = Field(
+        None, description="What play that stays open varies with. Default: visit."
     )
 
 
@@ -65,6 +70,7 @@ class Clearance:
 
     joints: tuple[JointOfStrut, ...]
     threshold: float
+    variation: Variation = WITH_VISIT
 
     @classmethod
     def build(cls, parts: SourceBuilder) -> Self | None:
@@ -88,7 +94,9 @@ class Clearance:
                     )
         if not clearances and table is None:
             return None
-        return cls(tuple(clearances), 0.0 if table is None else table.threshold)
+        if table is None:
+            return cls(tuple(clearances), 0.0)
+        return cls(tuple(clearances), table.threshold, variation(table.varies, WITH_VISIT))
 
     def acts(self, condition: Condition) -> bool:
         """In every condition."""
@@ -105,7 +113,12 @@ class Clearance:
         columns = machine.kernel.length_parameters[struts]
         forces = block.end_forces[:, struts, [joint.end for joint in self.joints]]
         side, _ = pressed(block, columns, forces, self.threshold)
-        return Deviation.of(columns, side * reach, np.where(side == 0.0, reach, 0.0))
+        return Deviation.of(
+            columns,
+            side * reach,
+            np.where(side == 0.0, reach, 0.0),
+            variation=self.variation,
+        )
 
 
 def half_clearances(block: PoseBlock) -> Floats:

@@ -29,6 +29,7 @@ from truepose.probability.distributions import (
 )
 from truepose.probability.domain import Domain
 from truepose.representation import Represented
+from truepose.sources.variation import WITH_MACHINE, Variation
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -76,6 +77,8 @@ class Deviation(Represented):
     on which joint centres lie: then a parameter may be in it and have a column of its own too.
     `directions`: groups whose two or three variables are together a unit vector, as the components
     of a direction that is not known are.
+    `variation` (k,): what each column's variable varies with, equal within a group, within a
+    direction and among correlated variables; one with position has its law's distribution.
 
     Raises `ValueError` where shapes or values contradict this.
     """
@@ -91,6 +94,7 @@ class Deviation(Represented):
     group_names: Mapping[int, str] = field(default_factory=dict)
     group_quantities: Mapping[int, GroupQuantity] = field(default_factory=dict)
     directions: tuple[tuple[int, ...], ...] = ()
+    variation: tuple[Variation, ...] = ()
 
     @classmethod
     def of(
@@ -107,6 +111,7 @@ class Deviation(Represented):
         group_names: Mapping[int, str] | None = None,
         group_quantities: Mapping[int, GroupQuantity] | None = None,
         directions: Sequence[Sequence[int]] = (),
+        variation: Variation | Sequence[Variation] = WITH_MACHINE,
     ) -> Self:
         """A deviation from plain values: a number or a (k,) array stands for every pose."""
         columns = np.atleast_1d(np.asarray(parameters, np.intp))
@@ -126,6 +131,7 @@ class Deviation(Represented):
             dict(group_names or {}),
             dict(group_quantities or {}),
             tuple(tuple(groups) for groups in directions),
+            (variation,) * count if isinstance(variation, Variation) else tuple(variation),
         )
 
     def __post_init__(self) -> None:
@@ -152,6 +158,7 @@ class Deviation(Represented):
                 raise ValueError(f"group {group} has one variable but two distributions")
         self._check_directions(shared)
         self._check_correlation()
+        self._check_variation()
 
     def _check_directions(self, shared: Mapping[int, Distribution]) -> None:
         """A component of a direction that is as likely anywhere (Archimedes): each is so spread."""
@@ -174,6 +181,30 @@ class Deviation(Represented):
             raise ValueError("a correlation is not from -1 to 1")
         if not (np.array_equal(given, given.T) and (np.diagonal(given) == 1.0).all()):
             raise ValueError("a correlation is not symmetric, or not one with itself")
+
+    def _check_variation(self) -> None:
+        if not self.variation:
+            object.__setattr__(self, "variation", (WITH_MACHINE,) * self.parameters.size)
+        if len(self.variation) != self.parameters.size:
+            raise ValueError(f"{len(self.variation)} variations, expected {self.parameters.size}")
+        if all(one is WITH_MACHINE for one in self.variation):
+            return
+        shared: dict[int, Variation] = {}
+        for group, own, spread in zip(
+            self.groups.tolist(), self.variation, self.distribution, strict=True
+        ):
+            if group != OWN_GROUP and shared.setdefault(group, own) != own:
+                raise ValueError(f"group {group} has one variable, but varies in two ways")
+            if own.law is not None and own.law.distribution != spread:
+                raise ValueError(f"{own.law} has not the distribution {spread}")
+        for groups in self.directions:
+            if len({shared[group] for group in groups}) > 1 or shared[groups[0]].law is not None:
+                raise ValueError(f"the groups {groups} are one direction, but vary in two ways")
+        if self.correlation is not None:
+            ways = dict(zip(self.variables.tolist(), self.variation, strict=True))
+            for one, other in np.argwhere(np.triu(self.correlation, 1)).tolist():
+                if ways[one] != ways[other] or ways[one].law is not None:
+                    raise ValueError(f"variables {one} and {other} correlate, but vary in two ways")
 
     @cached_property
     def of_quantities(self) -> Flags:

@@ -26,12 +26,19 @@ from truepose.files.file_table import FileTable
 from truepose.files.quantity import Direction, Length, PositiveLength, refuse
 from truepose.files.ratio import SlopeWithin, one_or_limits
 from truepose.files.tolerance import Band
+from truepose.files.varies import ByItself
 from truepose.machine.chains import Vector
 from truepose.machine.elements import drive_kinds
 from truepose.sources._columns import Columns
 from truepose.sources._coverage import uncovered
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
+from truepose.sources.variation import (
+    WITH_MACHINE,
+    Variation,
+    refuse_without_band,
+    variation,
+)
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Drive, Machine, SourceBuilder
@@ -63,6 +70,9 @@ class StraightnessTable(FileTable):
     known: bool = Field(
         False, description="Whether the amplitude is what was measured, and not its bound."
     )
+    varies: ByItself | None = Field(
+        None, description="What an amplitude that is not known varies with. Default: machine."
+    )
 
     @model_validator(mode="after")
     def _fits(self) -> StraightnessTable:
@@ -84,6 +94,13 @@ class StraightnessTable(FileTable):
                     expected="an amplitude of zero or more, or known = true",
                 )
             )
+        if self.known and self.varies is not None:
+            refuse_without_band(
+                "varies",
+                "nothing does where the amplitude is known",
+                "varies and known = true",
+                "one of them",
+            )
         return self
 
 
@@ -93,6 +110,9 @@ class LeanTable(FileTable):
     band: SlopeWithin = Field(description="Angle, or rise over a length.")
     direction: Direction | None = Field(
         None, description="Towards which it leans, base axes. Default: any, across the guideway."
+    )
+    varies: ByItself | None = Field(
+        None, description="What it varies with inside the band. Default: machine."
     )
 
     @model_validator(mode="after")
@@ -202,6 +222,7 @@ class Shape:
     start: float
     period: float
     known: bool
+    variation: Variation = WITH_MACHINE
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,6 +240,7 @@ class LeanTowards:
 
     band: Band
     direction: Vector | None
+    variation: Variation = WITH_MACHINE
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +302,8 @@ class Guideway:
             joint = block.drive_joints[:, rail.joint]
             for shape in rail.shapes:
                 reach = shape.amplitude * SHAPES[shape.shape]((joint - shape.start) / shape.period)
-                moved.along(shape.direction, **{"shift" if shape.known else "half_width": reach})
+                where = {"shift" if shape.known else "half_width": reach}
+                moved.along(shape.direction, **where, variation=shape.variation)
             for profile in rail.profiles:
                 moved.along(
                     profile.direction, np.interp(joint, profile.positions, profile.deviations)
@@ -302,7 +325,11 @@ class _Moved:
         self._scale, self._offset = machine.nominal[[self._at["scale"], self._at["offset"]]]
 
     def along(
-        self, direction: Vector, shift: Floats | float = 0.0, half_width: Floats | float = 0.0
+        self,
+        direction: Vector,
+        shift: Floats | float = 0.0,
+        half_width: Floats | float = 0.0,
+        variation: Variation = WITH_MACHINE,
     ) -> None:
         """The carriage along a unit direction, m, as one variable; coordinates have no edges."""
         group = self._columns.new_group()
@@ -310,17 +337,27 @@ class _Moved:
             if component != 0.0:
                 parameter = self._at[f"origin.{axis}"]
                 self._columns.add(
-                    parameter, component * shift, component * half_width, group=group, edge=False
+                    parameter,
+                    component * shift,
+                    component * half_width,
+                    group=group,
+                    edge=False,
+                    variation=variation,
                 )
 
     def lean(self, lean: LeanTowards, joint: Floats) -> None:
         """The axis, in both its freedoms by itself, or the carriage by its way along the axis."""
         if lean.direction is None:
             for freedom in ("axis.u", "axis.v"):
-                self._columns.add(self._at[freedom], half_width=lean.band.half, edge=False)
+                self._columns.add(
+                    self._at[freedom],
+                    half_width=lean.band.half,
+                    edge=False,
+                    variation=lean.variation,
+                )
             return
         way = self._scale * joint + self._offset
-        self.along(lean.direction, lean.band.shift * way, lean.band.half * way)
+        self.along(lean.direction, lean.band.shift * way, lean.band.half * way, lean.variation)
 
 
 def _rail(parts: SourceBuilder, joint: int, drive: Drive, row: GuidewayTable) -> Rail:
@@ -330,7 +367,17 @@ def _rail(parts: SourceBuilder, joint: int, drive: Drive, row: GuidewayTable) ->
     for number, entry in enumerate(row.straightness):
         direction = _across(parts, drive, entry.direction, f"{path}.straightness", number)
         period = stop - start if entry.period is None else entry.period
-        shapes.append(Shape(entry.shape, entry.amplitude, direction, start, period, entry.known))
+        shapes.append(
+            Shape(
+                entry.shape,
+                entry.amplitude,
+                direction,
+                start,
+                period,
+                entry.known,
+                variation(entry.varies, WITH_MACHINE),
+            )
+        )
     leans = []
     for key in ("squareness", "parallelism"):
         lean: LeanTable | None = getattr(row, key)
@@ -338,7 +385,7 @@ def _rail(parts: SourceBuilder, joint: int, drive: Drive, row: GuidewayTable) ->
             towards = lean.direction
             if towards is not None:
                 towards = _across(parts, drive, towards, f"{path}.{key}")
-            leans.append(LeanTowards(lean.band, towards))
+            leans.append(LeanTowards(lean.band, towards, variation(lean.varies, WITH_MACHINE)))
     profiles = _profiles(parts, drive, row, path)
     return Rail(drive.part, joint, tuple(shapes), profiles, tuple(leans))
 

@@ -13,7 +13,7 @@ axes d (two, in a plane) a common variable moves all parameters together by
 
     sign * half = load on the parameter under F d * compliance of the parameter
 
-and the variables of the axes are together a unit vector, the direction.
+and the variables of the axes are together a unit vector, the direction, one in a run.
 
 `docs/sources/loads.md` says what this covers.
 """
@@ -30,6 +30,7 @@ from truepose.errors import Problem, TrueposeError
 from truepose.sources._stiffness import lacking
 from truepose.sources.deviation import ARCSINE, OWN_GROUP, UNIFORM, Deviation
 from truepose.sources.pose_block import PoseBlock
+from truepose.sources.variation import WITH_RUN, variation
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -135,6 +136,7 @@ def _with_envelope(block: PoseBlock, envelope: Envelope, shift: np.ndarray) -> D
         distribution=UNIFORM if len(axes) == 3 else ARCSINE,
         group_names=dict.fromkeys(range(len(axes)), UNKNOWN_DIRECTION),
         directions=[range(len(axes))],
+        variation=variation(envelope.varies, WITH_RUN),
     )
 
 

@@ -4,7 +4,8 @@
     scale  moves by   nominal scale * error
     offset moves by  -nominal scale * error * zero_at
 
-so that the error grows from nothing where the sensor has its zero. `docs/sources/sensor.md` has
+so that the error grows from nothing where the sensor has its zero. The joint coordinate is rounded
+on a grid of unknown origin, which varies with position. `docs/sources/sensor.md` has
 the reference.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, model_validator
 
@@ -21,10 +22,19 @@ from truepose.files.file_table import FileTable
 from truepose.files.quantity import Coordinate, NonNegativeCoordinate, refuse
 from truepose.files.ratio import RatioWithin
 from truepose.files.tolerance import Band
+from truepose.files.varies import ByItself
 from truepose.sources._columns import Columns
 from truepose.sources._scale_error import add_scale_error
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
+from truepose.sources.variation import (
+    WITH_MACHINE,
+    Rounding,
+    Variation,
+    refuse_without_band,
+    variation,
+    with_position,
+)
 
 if TYPE_CHECKING:
     from truepose.machine import Condition, Machine, SourceBuilder
@@ -42,6 +52,14 @@ class SensorTable(FileTable):
     zero_at: Coordinate = Field(
         0.0, description="Joint coordinate at which the scale is right, most often its reference."
     )
+    varies: Literal["position", "machine", "run", "visit"] | None = Field(
+        None,
+        description="What the error of `resolution` varies with. Default: position, rounded on a "
+        "grid of unknown origin.",
+    )
+    scale_error_varies: ByItself | None = Field(
+        None, description="What `scale_error` varies with, within its limits. Default: machine."
+    )
 
     @model_validator(mode="after")
     def _says_something(self) -> SensorTable:
@@ -54,7 +72,25 @@ class SensorTable(FileTable):
                     expected='resolution = "1 um", or scale_error = "12 ppm", or both',
                 )
             )
+        if self.varies is not None and not self.resolution:
+            refuse_without_band(
+                "varies",
+                "the error of a resolution is what it is about",
+                "varies, and no resolution",
+                'resolution = "1 um", or scale_error_varies for the scale error',
+            )
+        if self.scale_error_varies is not None and not _has_band(self.scale_error):
+            refuse_without_band(
+                "scale_error_varies",
+                "a scale error within limits is what it is about",
+                "no scale_error" if self.scale_error is None else "a scale_error that is known",
+                'limits, such as scale_error = "+-12 ppm"',
+            )
         return self
+
+
+def _has_band(error: Band | None) -> bool:
+    return error is not None and error.half > 0.0
 
 
 class DriveSensor(BaseModel):
@@ -69,12 +105,17 @@ class DriveSensor(BaseModel):
 
 @dataclass(frozen=True)
 class Reading:
-    """One drive's sensor: the drive's path, resolution and zero in m or rad, scale error as 1."""
+    """One drive's sensor: the drive's path, resolution and zero in m or rad, scale error as 1.
+
+    `variation` of the resolution's error, `of_scale` of the scale error.
+    """
 
     drive: str
     resolution: float
     scale_error: Band | None
     zero_at: float
+    variation: Variation = WITH_MACHINE
+    of_scale: Variation = WITH_MACHINE
 
 
 @dataclass(frozen=True)
@@ -91,14 +132,10 @@ class Sensor:
     @classmethod
     def build(cls, parts: SourceBuilder) -> Self | None:
         """From `sensor` of the drives; None where no drive has it."""
+        rows = zip(parts.drives, parts.rows(DriveSensor), strict=True)
         readings = tuple(
-            Reading(
-                drive.part,
-                row.sensor.resolution or 0.0,
-                row.sensor.scale_error,
-                row.sensor.zero_at,
-            )
-            for drive, row in zip(parts.drives, parts.rows(DriveSensor), strict=True)
+            _reading(drive.part, joint, row.sensor)
+            for joint, (drive, row) in enumerate(rows)
             if row.sensor is not None
         )
         return cls(readings) if readings else None
@@ -115,9 +152,31 @@ class Sensor:
             if reading.resolution > 0.0:
                 # Of the joint coordinate, as the command is: the drive makes `scale` of it.
                 scale = machine.nominal[machine.parameters.index(f"{reading.drive}.scale")]
-                columns.add(offset, half_width=0.5 * scale * reading.resolution)
+                columns.add(
+                    offset,
+                    half_width=0.5 * scale * reading.resolution,
+                    variation=reading.variation,
+                )
             if reading.scale_error is not None:
                 add_scale_error(
-                    columns, machine, reading.drive, reading.scale_error, reading.zero_at
+                    columns,
+                    machine,
+                    reading.drive,
+                    reading.scale_error,
+                    reading.zero_at,
+                    reading.of_scale,
                 )
         return columns.deviation()
+
+
+def _reading(drive: str, joint: int, sensor: SensorTable) -> Reading:
+    resolution = sensor.resolution or 0.0
+    usual = with_position(Rounding(joint, resolution)) if resolution > 0.0 else WITH_MACHINE
+    return Reading(
+        drive,
+        resolution,
+        sensor.scale_error,
+        sensor.zero_at,
+        variation(sensor.varies, usual),
+        variation(sensor.scale_error_varies, WITH_MACHINE),
+    )

@@ -24,6 +24,7 @@ from truepose.files.data_file import Column
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
 from truepose.files.quantity import LengthTolerance
 from truepose.files.tolerance import LISTED, Band
+from truepose.files.varies import HINT
 from truepose.files.wording import one_of
 from truepose.machine.families.parameters import is_of_family
 from truepose.machine.parts import gives_way_only
@@ -43,6 +44,7 @@ from truepose.representation import Represented
 from truepose.sources._correlation import CorrelationTable, read_correlation
 from truepose.sources.deviation import OWN_GROUP, Deviation, GroupQuantity
 from truepose.sources.pose_block import PoseBlock
+from truepose.sources.variation import WITH_MACHINE, Variation, variation
 
 if TYPE_CHECKING:
     from truepose.files import tolerance as file_tolerance
@@ -102,6 +104,10 @@ class _Member:
     def group(self) -> str | None:
         return self.family or self.stated.tolerance.group
 
+    @property
+    def variation(self) -> Variation:
+        return variation(self.stated.tolerance.varies, WITH_MACHINE)
+
 
 @dataclass(frozen=True, repr=False)
 class DimensionalTolerance(Represented):
@@ -150,6 +156,7 @@ class DimensionalTolerance(Represented):
                 edges.get(m.group or "", names[m.column].endswith(EDGE_ENDINGS)) for m in entries
             ],
             distribution=[member.stated.distribution for member in entries],
+            variation=[member.variation for member in entries],
             group_names=dict(enumerate(groups)),
             group_quantities={groups.index(group): one for group, one in quantities.items()},
         )
@@ -175,7 +182,10 @@ def bands_of(machine: Machine) -> Deviation | None:
 
 
 def _mixed_groups(parts: SourceBuilder, entries: Iterable[_Stated]) -> bool:
-    """Whether a group has two distributions though one variable; a problem, if so."""
+    """Whether a group has two distributions, or varies in two ways, though it is one variable.
+
+    A problem, if so.
+    """
     first: dict[str, _Stated] = {}
     refused = set()
     for entry in entries:
@@ -191,6 +201,19 @@ def _mixed_groups(parts: SourceBuilder, entries: Iterable[_Stated]) -> bool:
                     f"the members of group {group!r} vary together, but have two distributions",
                     found=f"{entry.distribution}, and {other.distribution} of {other.path}",
                     expected="one distribution in one group",
+                ),
+                entry.path,
+            )
+        elif other.tolerance.varies != entry.tolerance.varies:
+            refused.add(entry.path)
+            parts.refuse(
+                Fault(
+                    "excluding-keys",
+                    f"the members of group {group!r} vary together, but not with the same",
+                    found=f'varies = "{entry.tolerance.varies}", and "{other.tolerance.varies}" of '
+                    f"{other.path}",
+                    expected="one word in one group",
+                    hint=HINT,
                 ),
                 entry.path,
             )

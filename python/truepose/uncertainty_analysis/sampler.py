@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -115,6 +116,12 @@ class Random:
             linked = self.copula.linked
             drawn[:, linked] = self.copula.variables(drawn[:, linked] @ self.copula.factor.T)
         return drawn
+
+    def with_seed(self, seed: int) -> Random:
+        """The same variables, drawn anew."""
+        other = copy.copy(self)
+        other.seed = seed
+        return other
 
 
 def _described(distribution: Distribution, stream: int, number: int) -> dict[str, object]:

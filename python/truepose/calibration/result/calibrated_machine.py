@@ -30,6 +30,7 @@ from truepose.probability.distributions import UNIFORM, Distribution, normal
 from truepose.sources import REGISTRY
 from truepose.sources.deviation import OWN_GROUP, Deviation, GroupQuantity
 from truepose.sources.tolerance import EDGE_ENDINGS, DimensionalTolerance
+from truepose.sources.variation import WITH_MACHINE, Variation
 
 
 def calibrated_machine(
@@ -96,6 +97,7 @@ class _Column(NamedTuple):
     sign: float
     distribution: Distribution
     variable: tuple[str, int]
+    variation: Variation = WITH_MACHINE
 
 
 _FILED, _FOUND = "filed", "found"
@@ -108,7 +110,14 @@ def _bands(machine: Machine, result: CalibratedValues, coverage: float) -> Devia
     banded = set(result.bands.columns.tolist())
     columns = [column for column, stays in zip(filed, result.kept, strict=True) if stays]
     columns += [  # what was found without any uncertainty
-        column._replace(shift=0.0, half=0.0, group=None, sign=1.0, distribution=UNIFORM)
+        column._replace(
+            shift=0.0,
+            half=0.0,
+            group=None,
+            sign=1.0,
+            distribution=UNIFORM,
+            variation=WITH_MACHINE,
+        )
         for column, stays in zip(filed, result.kept, strict=True)
         if not stays and column.parameter in moved - banded
     ]
@@ -133,6 +142,7 @@ def _bands(machine: Machine, result: CalibratedValues, coverage: float) -> Devia
         sign=[column.sign for column in columns],
         edge=[names[column.parameter].endswith(EDGE_ENDINGS) for column in columns],
         distribution=[column.distribution for column in columns],
+        variation=[column.variation for column in columns],
         group_names=dict(enumerate(groups)),
         group_quantities={
             groups.index(name): quantity
@@ -168,6 +178,7 @@ def _filed(old: Deviation) -> list[_Column]:
             float(old.sign[0, at]),
             old.distribution[at],
             (_FILED, int(old.variables[at])),
+            old.variation[at],
         )
         for at, parameter in enumerate(old.parameters)
     ]

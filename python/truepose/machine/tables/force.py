@@ -15,6 +15,7 @@ from truepose.files.quantity import (
     PositiveLength,
     ProperFraction,
 )
+from truepose.files.varies import RUN, ByItself
 
 
 class ForceTable(FileTable):
@@ -76,6 +77,9 @@ class EnvelopeTable(FileTable):
         None,
         description="Normal of the plane in which it acts, base axes. Default: it may act in any "
         "direction.",
+    )
+    varies: ByItself = Field(
+        RUN, description="What its direction varies with. Default: run, one direction a run."
     )
 
 

@@ -79,7 +79,7 @@ class EnvelopeTable(FileTable):
         "direction.",
     )
     varies: ByItself = Field(
-        RUN, description="What its direction varies with. Default: run, one direction a run."
+        RUN, description="What its direction varies with; run: one direction a run."
     )
 
 

@@ -9,6 +9,7 @@ change, m, rad or a ratio, of a shape that broadcasts to (s, n).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from reference_kinematics import ANGLES, POSITION, Reference, rotation_of, tange
 
 Floats = NDArray[np.float64]
 Deviation = Mapping[str, Floats | float]
+
+NOMINAL: Deviation = MappingProxyType({})
 
 CLOSE = 1e-8
 """m and rad: a step after which one more is all that rounding leaves to be done."""
@@ -52,8 +55,10 @@ class ClosedStruts:
         """Number of a drive's coordinate."""
         return self.names.index(drive)
 
-    def inverse(self, poses: Floats, deviation: Deviation = {}) -> tuple[Floats, Floats, Floats]:  # noqa: B006
-        """Joints (n, n_drive), tool points (n, 3) and rotations (n, 3, 3) at poses (n, n_commanded).
+    def inverse(
+        self, poses: Floats, deviation: Deviation = NOMINAL
+    ) -> tuple[Floats, Floats, Floats]:
+        """Joints (n, n_drive), tool points (n, 3), rotations (n, 3, 3) at poses (n, n_commanded).
 
         A deviation is of one machine: what the control believes.
         """
@@ -125,7 +130,7 @@ class ClosedStruts:
     def _closures(
         self, joints: Floats, points: Floats, rotations: Floats, deviation: Deviation
     ) -> tuple[Floats, Floats, Floats]:
-        """Gaps (..., k), and their slopes to a twist (..., k, 6) and to joints (..., k, n_drive)."""
+        """Gaps (..., k); slopes to a twist (..., k, 6) and to joints (..., k, n_drive)."""
         shape = np.broadcast_shapes(points.shape[:-1], joints.shape[:-1])
 
         def moved(prefix: str, value: Sequence[float] | Floats) -> Floats:

@@ -192,6 +192,14 @@ CATALOGUE: dict[str, str] = {
     "plan-option": "an option of a plan or of its program that is not what it can be",
     "plan-way": "a planned pose to which no straight way leads",
     # parts
+    "part-address": "a place in a program that cannot be read",
+    "part-not-there": "a feature or datum that is said to be where the program has nothing",
+    "part-no-motion": "lines of a feature or datum that move nothing at feed",
+    "part-shared": "lines that belong to two features, or to a feature and a datum, in part",
+    "part-comment": "a comment of a program about a feature that cannot be read",
+    "part-nowhere": "a feature or datum of which nothing says where it is in the program",
+    "no-feature": "a part of which no feature is named",
+    "unknown-datum": "a datum that the part does not have",
     "no-limits": "a dimension of the part without the limits of its tolerance",
     # programs
     "gcode-not-text": "a byte that no program has outside of comments",
@@ -363,6 +371,10 @@ class TrueposeError(Exception):
 
 class MachineFileError(TrueposeError):
     """The machine file, or the machine that it describes, is wrong."""
+
+
+class PartError(TrueposeError):
+    """What is said of a part's features, in their file or in the program, is wrong."""
 
 
 class RequestError(TrueposeError):

@@ -40,6 +40,8 @@ class Document:
     """What a setting wrote: the key, and the setting as it was given."""
     shared: dict[Key, Key] = field(default_factory=dict)
     """Keys of rows that `[each.*]` gave, and where: `("strut", 0, "material")`."""
+    several: tuple[str, ...] = SEVERAL
+    """The tables of which a file of this kind may have several."""
 
     def line(self, key: Key) -> int | None:
         """Line of `key`, or of the nearest table round it; None for what a setting wrote."""
@@ -78,7 +80,7 @@ class Document:
             value = _item(value, part)
             if not isinstance(part, int):
                 words.append(part)
-            elif len(words) == 1 and words[0] in SEVERAL:
+            elif len(words) == 1 and words[0] in self.several:
                 name = value.get("name") if isinstance(value, dict) else None
                 words.append(str(name) if isinstance(name, (str, int)) else f"#{part + 1}")
             else:
@@ -151,13 +153,18 @@ def _step(value: Any, words: list[str]) -> tuple[str | int, int] | None:
 MACHINE_FILE = FileKind("a machine file (TOML)", ".toml")
 
 
-def read(path: str | Path) -> Document:
-    """Read a machine file. Raises `MachineFileError` for what is no readable TOML text."""
-    content, text = read_text(Path(path), MACHINE_FILE)
-    return document_of(path, content, text)
+def read(path: str | Path, kind: FileKind = MACHINE_FILE) -> Document:
+    """Read a machine file, or one of another kind.
+
+    Raises `MachineFileError` for what is no readable TOML text.
+    """
+    content, text = read_text(Path(path), kind)
+    return document_of(path, content, text, kind)
 
 
-def document_of(path: str | Path, content: bytes, text: str) -> Document:
+def document_of(
+    path: str | Path, content: bytes, text: str, kind: FileKind = MACHINE_FILE
+) -> Document:
     """The document that a file at `path` is, or would be, with such bytes and the text of them.
 
     Raises `MachineFileError` (not-toml).
@@ -166,12 +173,12 @@ def document_of(path: str | Path, content: bytes, text: str) -> Document:
     try:
         data = parse_toml(text)
     except TomlError as error:
-        raise MachineFileError(_not_toml(error, file, text)) from None
+        raise MachineFileError(_not_toml(error, file, text, kind)) from None
     file_hash = hashlib.sha256(content).hexdigest()
     return Document(file, Path(path).name, file_hash, data, lines_of(text))
 
 
-def _not_toml(error: TomlError, file: str, text: str) -> Problem:
+def _not_toml(error: TomlError, file: str, text: str, kind: FileKind) -> Problem:
     all_lines = text.split("\n")
     found = None
     if error.line is not None and error.line <= len(all_lines):
@@ -182,7 +189,7 @@ def _not_toml(error: TomlError, file: str, text: str) -> Problem:
         file,
         error.line,
         found=found or None,
-        expected=MACHINE_FILE.phrase,
+        expected=kind.phrase,
         hint=next((hint for slip, hint in _SLIPS if found and slip.search(found)), None),
     )
 

@@ -70,8 +70,8 @@ def validate(document: Document, owners: Owners) -> tuple[Validated, list[Proble
             problems.append(_missing_table(document, table))
     known = {"schema", shared_keys.EACH, *owners.by_table}
     problems += shared_keys.problems(document)
-    problems += [_unknown_key(document, (key,), known) for key in data if key not in known]
-    units = _units(document, problems)
+    problems += [unknown_key(document, (key,), known) for key in data if key not in known]
+    units = read_units(document, problems)
     validated = Validated(units)
     for table, models in owners.by_table.items():
         if table in data and table != "units":
@@ -79,12 +79,12 @@ def validate(document: Document, owners: Owners) -> tuple[Validated, list[Proble
                 _array(document, table, models, validated, problems)
             else:
                 _single(document, table, models, validated, problems)
-    return validated, _one_per_unit(problems)
+    return validated, one_per_unit(problems)
 
 
 def units_of(document: Document) -> UnitSystem:
     """The units that the file declares, those that are good."""
-    return _units(document, [])
+    return read_units(document, [])
 
 
 def validate_alone(
@@ -97,7 +97,7 @@ def validate_alone(
     return validated, problems
 
 
-def _one_per_unit(problems: list[Problem]) -> list[Problem]:
+def one_per_unit(problems: list[Problem]) -> list[Problem]:
     """One missing unit is one problem, however many numbers want it: that of the first."""
     by_dimension: dict[str | None, list[Problem]] = {}
     others = []
@@ -129,10 +129,11 @@ def _missing_table(document: Document, table: str) -> Problem:
     )
 
 
-def _units(document: Document, problems: list[Problem]) -> UnitSystem:
+def read_units(document: Document, problems: list[Problem]) -> UnitSystem:
+    """The units that the file declares, those that are good; what is wrong with the others."""
     table = document.data.get("units", {})
     if not isinstance(table, dict):
-        problems.append(_not_a_table(document, ("units",), table))
+        problems.append(not_a_table(document, ("units",), table))
         return UnitSystem({})
     filled, faults = _fill(document, ("units",), UnitsTable, table, None)
     broken = {str(key[1]) for key, _ in faults if len(key) > 1}
@@ -156,10 +157,10 @@ def _single(
 ) -> None:
     value = document.data[table]
     if not isinstance(value, dict):
-        problems.append(_not_a_table(document, (table,), value))
+        problems.append(not_a_table(document, (table,), value))
         return
     models, value, _ = _of_its_kind(document, (table,), models, value, problems)
-    filled, faults = _share_out(document, (table,), models, value, validated)
+    filled, faults = share_out(document, (table,), models, value, validated)
     problems += faults
     validated.tables |= {model: one for model, one in filled.items() if one is not None}
 
@@ -173,14 +174,14 @@ def _array(
 ) -> None:
     rows = document.data[table]
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        problems.append(_not_an_array(document, table, rows))
+        problems.append(not_an_array(document, table, rows))
         return
     kinds = kinds_of(table)
     for index, row in enumerate(rows):
         key: Key = (table, index)
         of_row, row, kind = _of_its_kind(document, key, models, row, problems)
         coordinate = kind.coordinate if isinstance(kind, DriveKind) else None
-        filled, faults = _share_out(document, key, of_row, row, validated, coordinate)
+        filled, faults = share_out(document, key, of_row, row, validated, coordinate)
         problems += faults
         for model in models:
             validated.every_row.setdefault(model, []).append(filled[model])
@@ -203,15 +204,16 @@ def _of_its_kind(
     kind = kinds.get(value["kind"]) if isinstance(value.get("kind"), str) else None
     if kind is not None:
         return (*models, kind.model), value, kind
-    problems += _unknown_kind(document, key, value, kinds)
+    problems += unknown_kind(document, key, value, kinds)
     # Which keys it may have is not known without its kind: check only the common ones.
     common = {name for model in models for name in model.model_fields}
     return models, {name: entry for name, entry in value.items() if name in common}, None
 
 
-def _unknown_kind(
+def unknown_kind(
     document: Document, key: Key, row: Mapping[str, Any], kinds: Iterable[str]
 ) -> list[Problem]:
+    """The problem of a row whose kind is text that is none of these."""
     if not isinstance(row.get("kind"), str):
         return []  # missing, or of a wrong type: the table's own model says so
     return [
@@ -228,7 +230,7 @@ def _unknown_kind(
     ]
 
 
-def _share_out(
+def share_out(
     document: Document,
     key: Key,
     models: tuple[type[BaseModel], ...],
@@ -255,7 +257,7 @@ def _share_out(
     problems = []
     if not any(takes_every_key(model) for model in models):
         unknown = [name for name in value if name not in named]
-        problems = [_unknown_key(document, (*key, name), named) for name in unknown]
+        problems = [unknown_key(document, (*key, name), named) for name in unknown]
         # "lenght" is one mistake: not also a missing "length".
         meant = {nearest(name, named - value.keys()) for name in unknown}
         validated.misspelt |= {(*key, name) for name in meant if name is not None}
@@ -345,7 +347,7 @@ def _problem(
             key,
         )
     if kind == "extra_forbidden":
-        return _unknown_key(document, key, _keys_beside(model, entry["loc"]))
+        return unknown_key(document, key, _keys_beside(model, entry["loc"]))
     if kind == "literal_error":
         return document.problem(
             Fault(
@@ -420,7 +422,8 @@ def _model_in(annotation: Any) -> type[BaseModel] | None:
     return next((model for model in models if model is not None), None)
 
 
-def _unknown_key(document: Document, key: Key, known: Iterable[str]) -> Problem:
+def unknown_key(document: Document, key: Key, known: Iterable[str]) -> Problem:
+    """The problem of a key that its table does not have, which has those known."""
     word, known = str(key[-1]), sorted(known)
     return document.problem(
         Fault(
@@ -434,7 +437,8 @@ def _unknown_key(document: Document, key: Key, known: Iterable[str]) -> Problem:
     )
 
 
-def _not_a_table(document: Document, key: Key, value: Any) -> Problem:
+def not_a_table(document: Document, key: Key, value: Any) -> Problem:
+    """The problem of a value where a table is expected."""
     name = key[-1]
     return document.problem(
         Fault(
@@ -450,7 +454,8 @@ def _not_a_table(document: Document, key: Key, value: Any) -> Problem:
     )
 
 
-def _not_an_array(document: Document, table: str, value: Any) -> Problem:
+def not_an_array(document: Document, table: str, value: Any) -> Problem:
+    """The problem of a value where one table of several is expected."""
     return document.problem(
         Fault(
             "wrong-type",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -26,8 +27,14 @@ _COMMENT = re.compile(rb"\(([^()]*+)\)|;(.*+)")
 _N = re.compile(rb"/?[Nn]0*+(\d++)")
 _T = re.compile(rb"[Tt]0*+(\d++)")
 _M6 = re.compile(rb"[Mm]0*+6(?![\d.])")
-_BARE = re.compile(rb"(?:/?[Nn][\d.]++)?+")
+_BARE = re.compile(rb"\s*+(?:/?\s*+[Nn][\s\d.]++)?+")
 """What a line is besides its comments where it is a comment alone: nothing, or its N number."""
+
+UNITS = (20, 21)
+"""G codes of inches and millimetres."""
+
+_MODAL = re.compile(rb"[Gg][ \t]*+0*+(1[789]|2[01])(?![\d.])")
+"""Working planes and units, as a program sets them."""
 
 _SAYS = re.compile(r"\s*+(?:(feature|datum)\s*+:|end\s++(?:feature|datum)\s*+\Z)", re.IGNORECASE)
 """How a comment begins that says something of the part."""
@@ -113,13 +120,22 @@ class Said:
 class ProgramText:
     """What is asked of a program's text, found in one reading of it.
 
-    `count` of lines; `said` in comments, in their order; `stretch` of each address, None where it
-    is nowhere in the program.
+    `count` of lines; `said` in comments, in their order; `stretches` of each address, None where it
+    is nowhere in the program; `planes` and `units`: from which line on G17, G18 or G19, and G20 or
+    G21, hold.
     """
 
     count: int
     said: tuple[Said, ...]
     stretches: dict[Address, tuple[Interval, ...] | None]
+    planes: tuple[tuple[int, int], ...] = ()
+    units: tuple[tuple[int, int], ...] = ()
+
+
+def holds_at(line: int, changes: Sequence[tuple[int, int]]) -> int | None:
+    """The code of a group that holds in a line, of its `changes`; None before the first."""
+    at = bisect.bisect_right(changes, line, key=lambda change: change[0])
+    return changes[at - 1][1] if at else None
 
 
 def read_text_of(program: Path, addresses: Iterable[Address]) -> ProgramText:
@@ -167,6 +183,7 @@ class _Scan:
         # Tools that are loaded by M6; and as T selects them, for programs without any M6.
         self._loaded: dict[int, _Open] = {}
         self._selected: dict[int, _Open] = {}
+        self._modal: tuple[list[tuple[int, int]], list[tuple[int, int]]] = [], []
 
     def line(self, number: int, line: bytes) -> None:
         self._count = number
@@ -174,13 +191,18 @@ class _Scan:
         if b"(" in line or b";" in line:
             comments = [match[1] or match[2] or b"" for match in _COMMENT.finditer(line)]
             code = _COMMENT.sub(b"", line)
-            self._comments(number, comments, alone=not code.strip())
+            self._comments(number, comments, alone=_BARE.fullmatch(code) is not None)
+        for match in _MODAL.finditer(code):
+            value = int(match[1])
+            changes = self._modal[value >= UNITS[0]]
+            if not changes or changes[-1][1] != value:
+                changes.append((number, value))
         if not (self._wanted or self._with_tools):
             return
         code = code.translate(None, b" \t\r\n")
-        match = _N.match(code)
-        if match is not None and len(match[1]) < 10 and int(match[1]) in self._wanted:
-            self._numbers.setdefault(int(match[1]), number)
+        numbered = _N.match(code)
+        if numbered is not None and len(numbered[1]) < 10 and int(numbered[1]) in self._wanted:
+            self._numbers.setdefault(int(numbered[1]), number)
         if self._with_tools:
             self._tools(number, code)
 
@@ -220,7 +242,8 @@ class _Scan:
             for (line, word, text), until in zip(self._said, bounds, strict=False)
         )
         stretches = {address: self._stretch(address, tools) for address in self._addresses}
-        return ProgramText(last, said, stretches)
+        planes, units = map(tuple, self._modal)
+        return ProgramText(last, said, stretches, planes, units)
 
     def _stretch(self, address: Address, tools: dict[int, _Open]) -> tuple[Interval, ...] | None:
         parts: list[Sequence[Interval]] = []
@@ -272,6 +295,11 @@ def _common(some: Sequence[Interval], others: Sequence[Interval]) -> Iterator[In
             place += 1
 
 
+def common_lines(some: Sequence[Interval], others: Sequence[Interval]) -> tuple[Interval, ...]:
+    """The lines that both have."""
+    return tuple(_common(some, others))
+
+
 class Stretches:
     """Stretches of lines of which no two have a line in common, each with its number."""
 
@@ -317,11 +345,14 @@ def not_there(name: str, address: Address, text: ProgramText, program: str) -> F
 
 
 __all__ = [
+    "UNITS",
     "Address",
     "Interval",
     "ProgramText",
     "Said",
     "Stretches",
+    "common_lines",
+    "holds_at",
     "lines_of",
     "not_there",
     "numbers_of",

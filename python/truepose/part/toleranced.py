@@ -77,7 +77,11 @@ class _Toleranced(FileType):
             )
         match = _TEXT.fullmatch(value)
         if match is None:
-            units.read(value, self.dimension)  # it may be no quantity at all
+            try:
+                units.read(value, self.dimension)
+            except QuantityError as error:  # it may be no quantity at all, or of another dimension
+                if error.code != "unknown-unit":
+                    raise
             raise QuantityError(
                 "no-limits",
                 "this value has no limits",

@@ -200,7 +200,6 @@ CATALOGUE: dict[str, str] = {
     "part-nowhere": "a feature or datum of which nothing says where it is in the program",
     "no-feature": "a part of which no feature is named",
     "unknown-datum": "a datum that the part does not have",
-    "no-limits": "a dimension of the part without the limits of its tolerance",
     # programs
     "gcode-not-text": "a byte that no program has outside of comments",
     "gcode-line-too-long": "a line of a program longer than a controller reads",

@@ -5,12 +5,13 @@ A comment says what a row of the file says, in one line:
     (feature: NAME, KEY value, KEY value, ...)      (feature: bore A, diameter 40 +0.025 0)
     (datum: NAME)                                   (end feature)
 
-It holds for the moves behind it, up to the next comment of these. A name that stands alone is the
+What follows a value and its unit is its `tolerance`. It holds for the moves behind it, up to the next comment of these. A name that stands alone is the
 next element of a feature that was there before, or of one that the file has without a place.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,6 +45,11 @@ FEATURES = FileKind("a file of a part's features (TOML)", ".toml")
 SCHEMA = 1
 TABLES = ("schema", "units", "part", "datum", "feature")
 SEVERAL = ("datum", "feature")
+
+_WITH_LIMITS = re.compile(
+    r"([+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?+(?:\s*+[A-Za-zµμ°]++)?+)\s++([-+±]?\S.*+)"
+)
+"""A nominal value, with its unit where it has one, and the limits behind it."""
 
 Kinds = Mapping[str, type[Feature]]
 Place = tuple[Interval, ...]
@@ -221,6 +227,7 @@ def _of_file(machine: Machine, document: Document, collected: _Collected) -> Par
             continue
         for index in range(len(rows)):
             collected.row(document, (table, index), units)
+    collected.rows.sort(key=lambda row: document.line(row.key) or 0)
     value = data.get("part", {})
     if not isinstance(value, dict):
         problems.append(validation.not_a_table(document, ("part",), value))
@@ -295,7 +302,13 @@ def _row_of(said: Said, document: Document, collected: _Collected) -> dict[str, 
                 ).at(document.file, said.line)
             )
             return None
-        row[key] = value.split() if key == "datums" else value.strip()
+        nominal = _WITH_LIMITS.fullmatch(value.strip())
+        if key == "datums":
+            row[key] = value.split()
+        elif nominal is not None:
+            row[key], row["tolerance"] = nominal[1], nominal[2]
+        else:
+            row[key] = value.strip()
     return row
 
 

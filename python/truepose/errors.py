@@ -8,6 +8,7 @@ status code in a result, or one `PoseError` for the whole call.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 
 CATALOGUE: dict[str, str] = {
@@ -327,6 +328,13 @@ class Problem:
     def to_dict(self) -> dict[str, str | int | None]:
         """The fields by name, for JSON."""
         return asdict(self)
+
+
+def in_order(problems: Iterable[Problem]) -> list[Problem]:
+    """Each once: file by file, in each file's order."""
+    every = list(dict.fromkeys(problems))
+    files = list(dict.fromkeys(problem.file for problem in every))
+    return sorted(every, key=lambda p: (files.index(p.file), p.line is None, p.line or 0))
 
 
 class ReadingError(ValueError):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from truepose.errors import ArgumentError, Fault, MachineFileError, Problem
+from truepose.errors import ArgumentError, Fault, MachineFileError, Problem, in_order
 from truepose.files.data_file import DataFiles
 from truepose.files.document import Document, document_of, read
 from truepose.files.settings import apply, require_settings
@@ -78,9 +78,7 @@ def _loaded(
 
 def _raise(problems: Iterable[Problem]) -> None:
     """All problems at once, each once: file by file, in each file's order."""
-    every = list(dict.fromkeys(problems))
-    files = list(dict.fromkeys(problem.file for problem in every))
-    every.sort(key=lambda p: (files.index(p.file), p.line is None, p.line or 0))
+    every = in_order(problems)
     if every:
         raise MachineFileError(*every)
 

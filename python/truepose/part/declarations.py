@@ -5,8 +5,9 @@ A comment says what a row of the file says, in one line:
     (feature: NAME, KEY value, KEY value, ...)      (feature: bore A, diameter 40 +0.025 0)
     (datum: NAME)                                   (end feature)
 
-What follows a value and its unit is its `tolerance`. It holds for the moves behind it, up to the next comment of these. A name that stands alone is the
-next element of a feature that was there before, or of one that the file has without a place.
+What follows a value and its unit is its `tolerance`. A comment holds for the moves behind it, up to
+the next comment of these. A name that stands alone is the next element of a feature that was there
+before, or of one that the file has without a place.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import Any, cast
 
 from pydantic import BaseModel
 
-from truepose.errors import Fault, MachineFileError, PartError, Problem
+from truepose.errors import Fault, MachineFileError, PartError, Problem, in_order
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.document import Document, Key, read
 from truepose.files.text_file import FileKind
@@ -171,9 +172,7 @@ def declared(
 
 def raise_all(problems: Iterable[Problem]) -> None:
     """Raise `PartError` with all problems, each once, in the order of files and lines."""
-    every = list(dict.fromkeys(problems))
-    files = list(dict.fromkeys(problem.file for problem in every))
-    every.sort(key=lambda p: (files.index(p.file), p.line is None, p.line or 0))
+    every = in_order(problems)
     if every:
         raise PartError(*every)
 

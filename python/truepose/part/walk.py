@@ -81,7 +81,7 @@ class PathBatch:
 
 
 @dataclass
-class Extent:
+class StretchExtent:
     """What the moves of one stretch are, all together.
 
     `size`, m, of the whole path; `needs`, (m, rad) of each of the first moves: of a line its
@@ -201,7 +201,7 @@ class ProgramWalk:
         self._start = self._start * self._axes.scale
         self._linear = ["xyz".index(name) for name in machine.commanded if name in "xyz"]
         self._from = [at for at, name in enumerate(machine.commanded) if name in "xyz"]
-        self.extents = tuple(Extent() for _ in range(chosen.count))
+        self.extents = tuple(StretchExtent() for _ in range(chosen.count))
         self._survey()
         length = machine.characteristic_length
         most = most_points or [MOST_POINTS] * chosen.count
@@ -416,4 +416,4 @@ class _Layout:
             yield move[rows], share[rows], element[rows], weight[rows]
 
 
-__all__ = ["MOST_POINTS", "Extent", "PathBatch", "ProgramWalk", "Spacing"]
+__all__ = ["MOST_POINTS", "PathBatch", "ProgramWalk", "Spacing", "StretchExtent"]

@@ -210,7 +210,8 @@ def test_units_are_those_of_the_machine_file_unless_the_file_has_its_own(read: R
 
 
 def test_one_wall_may_have_features_of_several_kinds(read: Read) -> None:
-    width = '[[feature]]\nname = "w"\nkind = "size"\nsize = 40\ntolerance = "+-0.1"\nlines = ["13", "15"]\n'
+    width = '[[feature]]\nname = "w"\nkind = "size"\nsize = 40\ntolerance = "+-0.1"\n'
+    width += 'lines = ["13", "15"]\n'
     part = read(width + wall("lines = 13") + '[[datum]]\nname = "A"\nlines = 13\n')
     first, straight = part.features[0].elements[0], part.features[1].elements[0]
     np.testing.assert_array_equal(first.place, straight.place)

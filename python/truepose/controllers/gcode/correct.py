@@ -42,7 +42,7 @@ from truepose.controllers.gcode.program import (
     BATCH,
     PROGRAM,
     ProgramOptions,
-    Reading,
+    ProgramReading,
     bad_option,
     moves_of,
     problems_of,
@@ -101,7 +101,7 @@ class _Options:
     tolerance: float | None
     interpolation: Interpolation
     digits: int
-    reading: Reading
+    reading: ProgramReading
     path_mode: str | None
     acceleration: float
     opened: Path = Path()

@@ -49,7 +49,7 @@ class ProgramOptions:
     parameter_file: str | PathLike[str] | None = None
     block_delete: bool | None = None
 
-    def reading(self, axes: Axes, refuse: Refuse) -> Reading:
+    def reading(self, axes: Axes, refuse: Refuse) -> ProgramReading:
         """The options in the interpreter's form; `refuse` takes what cannot be.
 
         Raises `RequestError` for the parameter file.
@@ -59,11 +59,11 @@ class ProgramOptions:
         parameters = None if self.parameter_file is None else Path(self.parameter_file)
         begin = {**axes.home(), **named(self.start or {}, "start", refuse)}
         shifted = work_offsets(axes.machine, self.offsets, parameters, refuse)
-        return Reading(axes.names, self.units, begin, shifted, self.block_delete)
+        return ProgramReading(axes.names, self.units, begin, shifted, self.block_delete)
 
 
 @dataclass(frozen=True)
-class Reading:
+class ProgramReading:
     """How a program is read; coordinates by the axes' letters, mm and degrees."""
 
     axes: str
@@ -88,7 +88,7 @@ class Reading:
         return GcodeReader(program, **self.arguments())
 
 
-def reading_of(options: ProgramOptions, axes: Axes) -> Reading:
+def reading_of(options: ProgramOptions, axes: Axes) -> ProgramReading:
     """The options in the interpreter's form. Raises `RequestError`, all at once."""
     problems: list[Problem] = []
 
@@ -151,7 +151,7 @@ __all__ = [
     "BATCH",
     "PROGRAM",
     "ProgramOptions",
-    "Reading",
+    "ProgramReading",
     "bad_option",
     "moves_of",
     "problems_of",

@@ -1,4 +1,4 @@
-"""Kinds of features, a file each: what a feature's points are held against, and in which numbers."""
+"""Kinds of features of a part, a file each."""
 
 from __future__ import annotations
 

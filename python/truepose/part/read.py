@@ -84,7 +84,7 @@ def read_part(
     if kinds is None:
         from truepose.part.features import REGISTRY
 
-        kinds = {kind.kind: kind for kind in REGISTRY}
+        kinds = REGISTRY
     path = Path(program)
     require_input(path, PROGRAM)
     file = None if features is None else Path(features)

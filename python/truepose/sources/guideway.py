@@ -117,6 +117,10 @@ class LeanTable(FileTable):
 
     @model_validator(mode="after")
     def _round(self) -> LeanTable:
+        if self.varies is not None and self.band.half == 0.0:
+            refuse_without_band(
+                "varies", "nothing does where the angle is known", "limits that are one", "a band"
+            )
         if self.direction is None and self.band.shift != 0.0:
             refuse(
                 Fault(

@@ -186,7 +186,7 @@ class OneValues:
             for reading in source.readings
         }
         band = readings[path].scale_error
-        row = _without(row, ("resolution",))
+        row = _without(row, ("resolution", "varies", "scale_error_varies"))
         if band is None:
             return {}
         return row if band.half == 0.0 else row | {"scale_error": self._ratio(path, "sensor")}
@@ -201,6 +201,7 @@ class OneValues:
         of = actuations[path]
         if of.table is not None:
             return {}
+        row = _without(row, ("varies",))
         if of.periodic is not None and of.periodic.phase is None:
             row = _without(row, ("periodic",))
         if of.lead_error is not None and of.lead_error.half > 0.0:

@@ -97,6 +97,19 @@ def test_a_machine_without_tolerances_has_nothing_to_identify() -> None:
     assert codes(refused) == ["no-unknowns"]
 
 
+def test_what_is_another_number_in_every_visit_is_not_found(tmp_path: Path) -> None:
+    given = (
+        '[tolerance]\n"drive.d1.offset" = { band = 0.1, varies = "visit" }\n'
+        '"drive.d2.offset" = { band = 0.1, group = "both", varies = "run" }\n[condition]'
+    )
+    machine = load_text(tmp_path, edited(PLANAR, ("[condition]", given)))
+    assert unknowns_of(machine, tracked(machine)).names == ("strut.1.length",)
+    for named, word in (("drive.d1.offset", "visit"), ("drive.*.offset", "run")):
+        with pytest.raises(RequestError, match=f'varies = "{word}"') as refused:
+            unknowns_of(machine, tracked(machine), [named])
+        assert set(codes(refused)) == {"bad-prior"}
+
+
 def test_a_group_whose_middles_go_their_own_way_is_refused(tmp_path: Path) -> None:
     group = (
         '[tolerance]\n"drive.d1.origin.x" = { band = [-0.1, 0.3], group = "rails" }\n'

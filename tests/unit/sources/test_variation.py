@@ -254,6 +254,12 @@ def test_what_varies_with_what(
             "known = true",
         ),
         (
+            of_drive('guideway = { squareness = { band = 0, varies = "run" } }'),
+            "guideway =",
+            "excluding-keys",
+            "the angle is known",
+        ),
+        (
             (ENVELOPE, 'envelope = { force = "300 N", varies = "position" }'),
             "envelope =",
             "unknown-choice",

@@ -165,6 +165,18 @@ coefficient = 0.5
     ),
 )
 
+VARYING = edited(
+    FULL,
+    ("zero_at = 100 }", 'zero_at = 100, varies = "visit", scale_error_varies = "run" }'),
+    ("period = 5 } }", 'period = 5, varies = "machine" }, varies = "run" }'),
+    ('play = "4 um" }', 'play = "4 um", varies = "visit" }'),
+    ("threshold = 2", 'threshold = 2\nvaries = "machine"'),
+    ("normal = [0, 0, 1] }", 'normal = [0, 0, 1], varies = "visit" }'),
+    ('shape = "bow" }', 'shape = "bow", varies = "run" }'),
+    ("direction = [1, 0, 0] }\n[", 'direction = [1, 0, 0], varies = "run" }\n['),
+    ("standard_deviation = 2e-5 }", 'standard_deviation = 2e-5, varies = "visit" }'),
+)
+
 
 def both_states(
     machine: Machine, folder: Path, seed: int = 1
@@ -178,10 +190,14 @@ def both_states(
     return found
 
 
-def test_every_form_of_a_band_becomes_one_value_and_comments_stay(tmp_path: Path) -> None:
-    machine = load_text(tmp_path, FULL)
+@pytest.mark.parametrize("full", [FULL, VARYING], ids=["full", "varying"])
+def test_every_form_of_a_band_becomes_one_value_and_comments_stay(
+    tmp_path: Path, full: str
+) -> None:
+    machine = load_text(tmp_path, full)
     for witness, written, text in both_states(machine, tmp_path):
-        for word in ("resolution", "backlash", "periodic", "clearance", "correlation", "group"):
+        words = ("resolution", "backlash", "periodic", "clearance", "correlation", "group")
+        for word in (*words, "varies"):
             assert word not in text.replace("resolution) is", ""), word
         for comment in ("# how straight", "# of the frame", "# bored together", "# anywhere"):
             assert (comment in text) == (comment != "# anywhere"), comment

@@ -32,6 +32,7 @@ from truepose.machine.parts import gives_way_only
 from truepose.representation import Facts, Represented
 from truepose.sources import Deviation
 from truepose.sources.tolerance import bands_of
+from truepose.sources.variation import WITH_MACHINE
 
 SCREEN = 1e-9
 """Middles of a group's bands may be this far, of its half band, from moving together."""
@@ -151,7 +152,7 @@ def unknowns_of(
     bands = bands_of(machine)
     tolerated = _tolerance_unknowns(machine, bands)
     wanted = _with_measured(
-        machine, measurements, tolerated, _chosen_unknowns(machine, tolerated, identify)
+        machine, measurements, tolerated, _chosen_unknowns(machine, tolerated, identify, bands)
     )
     if not wanted:
         raise RequestError(
@@ -220,12 +221,16 @@ def unknowns_of_instruments(machine: Machine, measurements: Measurements) -> Unk
 
 
 def _tolerance_unknowns(machine: Machine, bands: Deviation | None) -> list[_MachineUnknown]:
-    """One unknown for each variable that has a band, in the order of the parameters."""
+    """One unknown for each variable that has a band, in the order of the parameters.
+
+    What varies with each run or visit is no number to be found.
+    """
     if bands is None:
         return []
     unknowns = []
     half_width, shift = bands.signed_half[0], bands.shift[0]
-    for variable in dict.fromkeys(bands.variables[bands.banded].tolist()):
+    steady = [at for at in bands.banded if bands.variation[at] == WITH_MACHINE]
+    for variable in dict.fromkeys(bands.variables[steady].tolist()):
         members = np.flatnonzero(bands.variables == variable)
         leader = members[np.argmax(np.abs(half_width[members]))]
         number = int(bands.groups[leader])
@@ -264,7 +269,10 @@ def _tolerance_unknowns(machine: Machine, bands: Deviation | None) -> list[_Mach
 
 
 def _chosen_unknowns(
-    machine: Machine, tolerated: Sequence[_MachineUnknown], identify: Sequence[str]
+    machine: Machine,
+    tolerated: Sequence[_MachineUnknown],
+    identify: Sequence[str],
+    bands: Deviation | None,
 ) -> list[_MachineUnknown]:
     if not identify:
         return list(tolerated)
@@ -299,6 +307,7 @@ def _chosen_unknowns(
         for column in unknown.effects
     }
     known |= {unknown.name: unknown for unknown in tolerated}
+    unsteady = {} if bands is None else _varying(machine, bands)
     chosen: dict[str, _MachineUnknown] = {}
     problems = []
     for text in identify:
@@ -330,12 +339,37 @@ def _chosen_unknowns(
             wanted = known[of_group.get(name, name)].property
             if wanted is not None and wanted.changed(machine, 0.0) is None:
                 problems.append(_no_stiffness(machine, name))
+            elif name in unsteady:
+                problems.append(_unsteady(machine, name, unsteady[name]))
     if problems:
         raise RequestError(*problems)
     order = {
         name: at for at, name in enumerate([unknown.name for unknown in tolerated] + list(known))
     }
     return sorted(chosen.values(), key=lambda unknown: order[unknown.name])
+
+
+def _varying(machine: Machine, bands: Deviation) -> dict[str, str]:
+    """Parameters, and groups, whose tolerance is another in every run or visit, and in which."""
+    words = {}
+    for at in bands.banded.tolist():
+        if bands.variation[at] != WITH_MACHINE:
+            group = bands.group_names.get(int(bands.groups[at]))
+            name = machine.parameters[int(bands.parameters[at])]
+            words |= dict.fromkeys([name, group or name], bands.variation[at].word)
+    return words
+
+
+def _unsteady(machine: Machine, name: str, word: str) -> Problem:
+    return Problem(
+        "bad-prior",
+        f"{name} is another number in every {word}: there is not one to be found",
+        machine.file,
+        path=name,
+        found=f'a tolerance with varies = "{word}"',
+        expected="parameters that stay as they are",
+        hint="leave it out of what is identified; readings repeated at a pose show such a spread",
+    )
 
 
 def _matches(name: str, pattern: str) -> bool:

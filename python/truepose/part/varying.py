@@ -27,11 +27,15 @@ from truepose.arrays import Flags, Floats, Indices
 from truepose.files import varies
 from truepose.runs.variables import Variables
 from truepose.sources.deviation import UNIFORM, Distribution
-from truepose.sources.variation import Law, Ripple
+from truepose.sources.variation import Law, Ripple, Rounding
 from truepose.uncertainty_analysis.sampler import Random
 
 SEED_BYTES = 8
 """Of a hash: a seed of the kernel's."""
+
+
+TOGETHER = 16
+"""Samples, or points, that are worked on together: what is made on the way stays near."""
 
 
 class OnTheWay(NamedTuple):
@@ -162,33 +166,46 @@ class Varying:
         cosine of the phase.
         """
         chosen = np.arange(len(self.joints))[points]
-        joints, slopes = self.joints[chosen], effects[chosen]
+        # Component before point: what is added to a component at all points lies side by side.
+        slopes = effects[chosen].transpose(1, 0, 2)
+        factors, matrices = self._product(rows, chosen, slopes)
+        matrix = np.concatenate(matrices, axis=2)
+        errors = np.concatenate(factors, axis=1) @ matrix.reshape(-1, matrix.shape[2]).T
+        errors = errors.reshape(len(rows), *slopes.shape[:2])
+        errors += value[chosen].T
+        for number, law in zip(self._phased.tolist(), self._laws, strict=True):
+            if isinstance(law, Rounding):
+                phases, way = _phase(rows[:, number]), self.joints[chosen, law.joint]
+                _add_rounding(errors, law, way, phases, slopes[:, :, number])
+        if self._visits is not None:
+            self._add_visits(errors, first, chosen, slopes[:, :, self._visiting])
+        return errors.transpose(0, 2, 1)
+
+    def _product(
+        self, rows: Floats, chosen: Indices, slopes: Floats
+    ) -> tuple[list[Floats], list[Floats]]:
+        """Factors (count, f) of each sample, and matrices (m, n_points, f) that they multiply."""
         steady = np.flatnonzero(~self.variables.varies_along)
         factors, matrices = [rows[:, steady]], [slopes[:, :, steady]]
-        rounded = []
         for number, law in zip(self._phased.tolist(), self._laws, strict=True):
-            if not isinstance(law, Ripple):
-                rounded.append((number, law))
-                continue
-            turn = math.tau * _phase(rows[:, number])
-            way = math.tau * joints[:, law.joint] / law.period
-            factors.append(np.stack([np.cos(turn), np.sin(turn)], axis=1))
-            waves = np.stack([np.sin(way), np.cos(way)], axis=1)
-            matrices.append(slopes[:, :, number, np.newaxis] * waves[:, np.newaxis])
-        matrix = np.concatenate(matrices, axis=2).reshape(-1, sum(f.shape[1] for f in factors))
-        errors = np.concatenate(factors, axis=1) @ matrix.T
-        errors = errors.reshape(len(rows), *slopes.shape[:2])
-        errors += value[chosen]
-        for number, law in rounded:
-            t = law.at(joints[:, law.joint], _phase(rows[:, number])[:, np.newaxis])
-            for component in np.flatnonzero(slopes[:, :, number].any(axis=0)).tolist():
-                errors[:, :, component] += t * slopes[:, component, number]
-        if self._visits is not None:
-            for place, point in enumerate(chosen.tolist()):
+            if isinstance(law, Ripple):
+                turn = math.tau * _phase(rows[:, number])
+                way = math.tau * self.joints[chosen, law.joint] / law.period
+                factors.append(np.stack([np.cos(turn), np.sin(turn)], axis=1))
+                waves = np.stack([np.sin(way), np.cos(way)], axis=1)
+                matrices.append(slopes[:, :, number, np.newaxis] * waves)
+        return factors, matrices
+
+    def _add_visits(self, errors: Floats, first: int, chosen: Indices, slopes: Floats) -> None:
+        """Add to `errors` (count, m, n_points) what `slopes` (m, n_points, n_visiting) make."""
+        for start in range(0, chosen.size, TOGETHER):
+            some = chosen[start : start + TOGETHER].tolist()
+            added = np.zeros((*errors.shape[:2], len(some)))
+            for place, point in enumerate(some):
                 if self._is_felt[point]:
-                    t = self._visited(point, first, len(rows))
-                    errors[:, place] += t @ slopes[place][:, self._visiting].T
-        return errors
+                    t = self._visited(point, first, len(errors))
+                    added[:, :, place] = t @ slopes[:, start + place].T
+            errors[:, :, start : start + TOGETHER] += added
 
     def on_the_way(self, t: Floats, parameters: Sequence[str]) -> list[OnTheWay]:
         """What changes on the way where the variables are `t` (n, n_variable): a witness's rows.
@@ -260,6 +277,20 @@ def _phase(drawn: Floats) -> Floats:
     """In [0, 1) of what is uniform in [-1, 1)."""
     phase: Floats = 0.5 * (drawn + 1.0)
     return phase
+
+
+def _add_rounding(
+    errors: Floats, law: Rounding, joint: Floats, phases: Floats, slopes: Floats
+) -> None:
+    """Add to `errors` (count, m, n) what a law makes at `joint` (n,), by `slopes` (m, n)."""
+    felt = np.flatnonzero(slopes.any(axis=1)).tolist()
+    for start in range(0, len(errors), TOGETHER):
+        some = slice(start, start + TOGETHER)
+        t = law.at(joint, phases[some, np.newaxis])
+        added = np.empty_like(t)
+        for component in felt:
+            np.multiply(t, slopes[component], out=added)
+            errors[some, component] += added
 
 
 def _seed(seed: int, *of: str | int) -> int:

@@ -351,7 +351,7 @@ def _chosen_unknowns(
 
 def _varying(machine: Machine, bands: Deviation) -> dict[str, str]:
     """Parameters, and groups, whose tolerance is another in every run or visit, and in which."""
-    words = {}
+    words: dict[str, str] = {}
     for at in bands.banded.tolist():
         if bands.variation[at] != WITH_MACHINE:
             group = bands.group_names.get(int(bands.groups[at]))

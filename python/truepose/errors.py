@@ -172,8 +172,8 @@ CATALOGUE: dict[str, str] = {
     "no-fit": "measurements that no machine near the nominal one explains",
     "no-unknowns": "a calibration with nothing to identify",
     "bad-band": "a half band of an unknown that cannot be read",
-    "bad-prior": "a tolerance that says nothing of one number: a group's whose middles do not move as "
-    "the group does, or one that varies with each run or visit",
+    "bad-prior": "a tolerance that says nothing of one number: a group's whose middles do not move "
+    "as the group does, or one that varies with each run or visit",
     "other-machine": "measurements of another machine: its joints, freedoms or struts differ",
     "unknown-instrument": "a row of an instrument that is not declared",
     "no-uncertainty": "a reading of which nothing says how uncertain it is",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import truepose as tp
 from machine_texts import PLANAR, edited, load_text
-from truepose._kernel import Points, Study, Tallies
+from truepose._kernel import Points, Tallies
 from truepose.machine import Machine
 from truepose.part.varying import Varying
 from truepose.runs.first_order import first_order
@@ -25,6 +25,7 @@ from truepose.runs.run import Run
 from truepose.runs.variables import Variables, variables_at
 from truepose.sources import UNIFORM, PoseBlock, acting
 from truepose.sources.deviation import Distribution
+from truepose.uncertainty_analysis.model import SharedModel
 from truepose.uncertainty_analysis.sampler import Random
 
 Floats = NDArray[np.float64]
@@ -93,6 +94,17 @@ CONSTANT = with_path(
     ),
 )
 """Nothing that changes on the way."""
+
+OVERRIDDEN = edited(
+    EVERYTHING,
+    ('resolution = "5 um"', 'resolution = "5 um", varies = "machine"'),
+    ('resolution = "4 um"', 'resolution = "4 um", varies = "run"'),
+    ("period = 5", 'period = 5, varies = "machine"'),
+    ("period = 7", 'period = 7, varies = "run"'),
+    ('threshold = "9 kN"\n[', 'threshold = "9 kN"\nvaries = "machine"\n['),
+    ('standard_deviation = 0.01, varies = "visit"', "standard_deviation = 0.01"),
+)
+"""The same sources, each with a word by which nothing changes on the way."""
 
 OTHERS = with_path(
     PLANAR,
@@ -166,29 +178,18 @@ def test_each_point_has_the_distribution_of_today(tmp_path: Path, text: str, run
                 assert apart < CRITICAL, (varied.variables.names[column], point, apart)
 
 
-def study(machine: Machine, block: PoseBlock, variables: Variables) -> Study:
-    shifted, shift = variables.shift
-    return Study(
-        machine.kernel,
-        block.joints,
-        block.placements,
-        shifted,
-        np.ascontiguousarray(shift),
-        variables.columns,
-        variables.variable_of.tolist(),
-        np.ascontiguousarray(variables.half_width),
-    )
-
-
-def test_without_anything_that_varies_the_samples_are_those_of_monte_carlo(tmp_path: Path) -> None:
-    machine, block, variables = on_path(tmp_path, CONSTANT)
+@pytest.mark.parametrize("text", [CONSTANT, OVERRIDDEN], ids=["by default", "by the key"])
+def test_without_anything_that_varies_the_samples_are_those_of_monte_carlo(
+    tmp_path: Path, text: str
+) -> None:
+    machine, block, variables = on_path(tmp_path, text)
     varied = Varying(variables, block.joints, seed=5)
     assert varied.constant
     count = 1000
     rows = varied.rows(0, count)
     random = Random(variables, 5)
     assert np.array_equal(rows, random.rows(0, count))
-    exact = study(machine, block, variables)
+    exact = SharedModel(machine, block, variables).study
     tallies = Tallies(np.zeros((len(block.joints), 3)), np.full((len(block.joints), 3), 1e-9), 3, 2)
     kept = np.asarray(exact.sample_keeping(random.variables, 5, 0, count, tallies))
     drawn = tp.monte_carlo(machine, samples=count, seed=5)

@@ -5,6 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from truepose.arrays import Floats, Indices
+from truepose.errors import ReadingError
+
+
+class FeatureError(ReadingError):
+    """Elements that are not what a feature or a frame is about; `fault` says why."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal, Protocol, Self
 
 from truepose.arrays import Floats
-from truepose.errors import ReadingError
 from truepose.part.element import Element
+from truepose.part.element import FeatureError as FeatureError
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -19,10 +19,6 @@ Method = Literal["iso", "least-squares"]
 
 Rule = Literal["between", "spread", "length"]
 """How a value follows from linear forms, see `Forms`."""
-
-
-class FeatureError(ReadingError):
-    """Elements that are not what the kind of a feature is about; `fault` says why."""
 
 
 @dataclass(frozen=True)

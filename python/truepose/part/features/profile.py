@@ -1,0 +1,139 @@
+"""Profile of a contour in the working plane (ISO 1101): how far it is from the drawing anywhere.
+
+The value is twice the largest distance of a point from its place on the drawing, along the
+drawing's normal there: the width of the zone about the drawing that just holds the contour. A point
+at a corner counts along the normals of both sides. With datums the drawing is where their frame is;
+without it lies as it fits best, in the working plane: so that the value is least, or with
+"least-squares" by these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+from pydantic import BaseModel
+
+from truepose.arrays import Floats, Indices
+from truepose.part.features._base import Forms
+from truepose.part.features._evaluated import EvaluatedFeature, ZoneTable
+from truepose.part.features.position import both_sides
+from truepose.part.first_order import FirstOrder
+from truepose.part.fits import Contour, associate
+from truepose.part.outlines import too_few
+from truepose.spatial import norm
+
+_CORNER = np.radians(20.0)
+"""The path turns by more than this at a corner, and by less from point to point of an arc."""
+
+
+class Profile(EvaluatedFeature):
+    """The contour of one element or of several."""
+
+    kind = "profile"
+    doc = "form of any contour, with datums its place too"
+    table: ClassVar[type[BaseModel]] = ZoneTable
+    most_elements = 10_000
+
+    def set_up(self, row: BaseModel) -> None:
+        """Raises `FeatureError` where there are too few points, or datums that are no frame."""
+        assert isinstance(row, ZoneTable)
+        count = sum(len(np.unique(points[:, :2], axis=0)) for points in self.programmed)
+        if count < 4:
+            raise too_few(self.name, count, 4, "a contour that may be moved and turned")
+        places, normals, first = [], [], 0
+        for points in self.programmed:
+            place, normal = _normals(points[:, :2])
+            places.append(place + first)
+            normals.append(normal)
+            first += len(points)
+        self.places = np.concatenate(places)
+        self.normals = np.concatenate(normals)
+        if self.frame is not None:
+            self.frame.require_place(list(np.eye(3)[:2]), self.name)
+            operator = "largest deviation along the normal, twice (ISO 1101)"
+        else:
+            how = "least squares" if self.least_squares else "minimum zone"
+            operator = f"largest deviation along the normal, twice (ISO 1101), placed by {how}"
+        self.quantities = (self.zone("profile", row.zone, operator),)
+
+    def evaluate(self, own: Sequence[Floats], seen: Sequence[Floats]) -> list[Floats]:
+        """The width of the zone."""
+        nominal = np.concatenate(self.programmed)[self.places]
+        points = np.concatenate(seen, axis=1)[:, self.places]
+        if self.frame is None:
+            shape = self._contour(len(points))
+            off = associate(shape, points, least_squares=self.least_squares)[1]
+        else:
+            off = np.einsum("snc,nc->sn", points[..., :2] - nominal[:, :2], self.normals)
+        return [2.0 * np.abs(off).max(axis=1)]
+
+    def ideal(self) -> list[Floats]:
+        """The programmed points."""
+        return self.programmed
+
+    def linear(self, order: FirstOrder) -> list[Forms]:
+        """What each point is off along its normal, as the frame or as least squares see it.
+
+        Moved by m = (shift, turn) to first order, |turn| <= W rho, a point is off by at most
+        W rho^2 + W^2 X rho^2 more. With least squares m itself is off besides: its equations'
+        columns turn by the turn and stretch by a point's deviation, against residuals of V rho.
+        """
+        normals = np.column_stack([self.normals, np.zeros(len(self.normals))])
+        if self.frame is not None:
+            return [both_sides(order, self.places, normals)]
+        contour = self._contour(1)
+        columns = contour.linearised(np.concatenate(self.programmed)[np.newaxis, self.places])[0]
+        rows = columns[:, 0].T
+        inverse = np.linalg.inv(rows.T @ rows)
+        fit = inverse @ rows.T
+        across = order.seen_at(self.places, normals)
+        kept = np.tensordot(np.eye(len(rows)) - rows @ fit, across, 1)
+        sums = np.abs(fit).sum(axis=1)
+        farthest = float(norm(np.concatenate(self.programmed)[:, :2]).max())
+        turned = 1.1 * float(sums[2]) / contour.length
+        off = 1.05 * (1.0 + 1.1 * float(norm(sums[:2])) + turned * farthest)
+        bent = turned * off + turned**2 * farthest
+        curvature, reach = 2.0 * bent, 0.1 * farthest / off
+        if self.least_squares:
+            change = (turned + off / contour.length) * len(rows) * off
+            moved = sums * bent + np.abs(inverse).sum(axis=1) * change
+            curvature += 2.0 * float(np.abs(rows).max(axis=0) @ moved)
+            reach = min(reach, 0.1 * float((sums / moved).min()))
+        return [
+            order.forms("spread", np.concatenate([kept, -kept]), curvature=curvature, reach=reach)
+        ]
+
+    def _contour(self, count: int) -> Contour:
+        nominal = np.concatenate(self.programmed)[self.places, :2]
+        length = float(np.ptp(nominal, axis=0).max())
+        return Contour(nominal, self.normals, length, np.zeros((count, 1)), np.zeros((count, 2)))
+
+
+def _normals(path: Floats) -> tuple[Indices, Floats]:
+    """Places of the points (n, 2) that count, and the normal of each: twice at a corner."""
+    steps = np.diff(path, axis=0)
+    lengths = norm(steps)
+    moves = np.flatnonzero(lengths > 0.0)
+    directions = steps[moves] / lengths[moves, np.newaxis]
+    if not len(moves):
+        return np.zeros(0, np.intp), np.zeros((0, 2))
+    closed = len(path) > 3 and float(norm(path[-1] - path[0])) <= 1e-9 * float(lengths.sum())
+    places: list[int] = []
+    tangents: list[Floats] = []
+    for place in range(len(path)):
+        after = int(np.searchsorted(moves, place))
+        before = after - 1
+        if closed:
+            before, after = before % len(moves), after % len(moves)
+        sides = [directions[k] for k in (before, after) if 0 <= k < len(moves)]
+        together = sides[0] + sides[-1]
+        if len(sides) == 2 and sides[0] @ sides[1] < np.cos(_CORNER):
+            places += [place, place]
+            tangents += sides
+        else:
+            places.append(place)
+            tangents.append(together / norm(together))
+    along = np.array(tangents)
+    return np.array(places, np.intp), np.column_stack([along[:, 1], -along[:, 0]])

@@ -1,0 +1,6 @@
+"""Shapes through points: the minimum zone, and least squares, of many sampled parts at once."""
+
+from truepose.part.fits.associate import associate
+from truepose.part.fits.shapes import AnyPlane, CircleInPlane, Contour, Shape, TurnedPlane
+
+__all__ = ["AnyPlane", "CircleInPlane", "Contour", "Shape", "TurnedPlane", "associate"]

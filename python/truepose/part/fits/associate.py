@@ -1,0 +1,73 @@
+"""A shape brought to points, by the minimum zone or by least squares, and exactly.
+
+The linear problem is solved about where the shape stands, and again from where that takes it, until
+it stays: at a minimum zone the points that touch it are as many as it has freedoms and one, so that
+the steps converge quadratically (Newton's method on these), and with least squares linearly by the
+points' deviation over their size (Gauss and Newton's).
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import numpy as np
+
+from truepose.arrays import Floats
+from truepose.part.fits.chebyshev import Reference, chebyshev, first_reference
+from truepose.part.fits.shapes import Shape
+
+_MOST_STEPS = 40
+_STILL = 1e-13
+"""A step below this part of the size of the points is the last."""
+
+_LEVEL = 2e-15
+"""Of the size of the points: the rounding of some coordinates, to which a level is exact."""
+
+_SAMPLES = 500
+"""Samples at once, so that what is computed on the way stays in the processor's memory."""
+
+AnyShape = TypeVar("AnyShape", bound=Shape)
+
+
+def associate(
+    shape: AnyShape, points: Floats, *, least_squares: bool = False
+) -> tuple[AnyShape, Floats]:
+    """The shape where it fits best, and the residuals (s, n) of the points there, m.
+
+    `points` (s, n, 3). A shape with an offset has it in all residuals: a circle's are radii, a
+    plane's are along its normal, from the origin.
+    """
+    pieces = []
+    residuals = np.empty(points.shape[:2])
+    for first in range(0, len(points), _SAMPLES):
+        some = slice(first, first + _SAMPLES)
+        piece, residuals[some] = _associate(shape.of(some), points[some], least_squares)
+        pieces.append(piece)
+    return shape.joined(pieces), residuals
+
+
+def _associate(shape: AnyShape, points: Floats, least_squares: bool) -> tuple[AnyShape, Floats]:
+    size = float(np.abs(points).max(initial=0.0)) or 1.0
+    reference: Reference | None = None
+    for _ in range(_MOST_STEPS):
+        columns, values = shape.linearised(points)
+        middle = 0.5 * (values.max(axis=1) + values.min(axis=1))[:, np.newaxis]
+        if shape.offset:
+            columns = np.concatenate([columns, np.ones((1, *values.shape))])
+            values = values - middle
+        if least_squares:
+            square = np.einsum("ksn,lsn->skl", columns, columns)
+            right = np.einsum("ksn,sn->sk", columns, values)
+            x = np.linalg.solve(square, right[..., np.newaxis])[..., 0]
+        else:
+            if reference is None:
+                one = first_reference(columns[:, 0])
+                reference = Reference(
+                    np.repeat(one.index, len(values), 0), np.repeat(one.sign, len(values), 0)
+                )
+            x, reference = chebyshev(columns, values, reference, _LEVEL * size)
+        x = x[:, : len(columns) - shape.offset]
+        shape = shape.moved(x)
+        if np.abs(x).max(initial=0.0) <= _STILL * size:
+            break
+    return shape, shape.linearised(points)[1]

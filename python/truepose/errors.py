@@ -200,6 +200,12 @@ CATALOGUE: dict[str, str] = {
     "part-shared": "lines that belong to two features, or to a feature and a datum, in part",
     "part-comment": "a comment of a program about a feature that cannot be read",
     "part-nowhere": "a feature or datum of which nothing says where it is in the program",
+    "feature-elements": "elements that are not what a kind of feature is about",
+    "feature-too-few-points": "so few points that any lie on such a shape exactly",
+    "feature-no-circle": "points that are on no circle",
+    "feature-short-arc": "an arc that is too short for what is asked of it",
+    "feature-direction": "walls or faces that are not parallel, or not at the angle asked for",
+    "feature-datums": "datums that form no frame, or none of what a feature needs",
     "no-feature": "a part of which no feature is named",
     "unknown-datum": "a datum that the part does not have",
     # programs

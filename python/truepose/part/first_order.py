@@ -24,7 +24,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -196,18 +195,13 @@ class FirstOrder:
         """
         effects = self.effect(points, directions)
         if self.level:
-            bows = 0.5 * np.einsum("nc,nc->n", points[:, :2], directions[:, :2])
+            along = np.einsum("nc,nc->n", points[:, :2], directions[:, :2])
+            bow = 0.5 * float(0.5 * np.ptp(along) if ranged else np.abs(along).max())
         else:
-            middle = points.mean(axis=0) if ranged else 0.0
-            bows = norm(points - middle)
-        turned = 1.1 * self.turned + 1.21 * self.turned**2 * self._most(bows, ranged)
-        return turned + float(self._most(effects, ranged) @ self.bends)
-
-    @staticmethod
-    def _most(values: Floats, ranged: bool) -> Any:  # a number, or one of each column
-        if ranged and values.ndim > 1:
-            return np.asarray(0.5 * np.ptp(values, axis=0))
-        return np.asarray(np.abs(values).max(axis=0))
+            bow = float(norm(points - (points.mean(axis=0) if ranged else 0.0)).max())
+        moves = 0.5 * np.ptp(effects, axis=0) if ranged else np.abs(effects).max(axis=0)
+        turned = 1.1 * self.turned + 1.21 * self.turned**2 * bow
+        return float(turned + moves @ self.bends)
 
     def seen(self, first: int, directions: Floats) -> Floats:
         """(n, N, 3) forms of the seen points from `first` on, along `directions` (n, 3)."""

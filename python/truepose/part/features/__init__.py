@@ -19,7 +19,7 @@ from truepose.part.features.flatness import Flatness
 from truepose.part.features.parallelism import Parallelism
 from truepose.part.features.perpendicularity import Perpendicularity
 from truepose.part.features.position import Position
-from truepose.part.features.profile import Profile
+from truepose.part.features.profile import ContourProfile
 from truepose.part.features.size import Size
 from truepose.part.features.straightness import Straightness
 
@@ -35,7 +35,7 @@ REGISTRY: Mapping[str, type[Feature]] = MappingProxyType(
             Perpendicularity,
             Angularity,
             Position,
-            Profile,
+            ContourProfile,
         )
     }
 )

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from truepose.arrays import Floats
 from truepose.files.file_table import FileTable
@@ -21,12 +21,21 @@ from truepose.part.element import Element, FeatureError
 from truepose.part.features._base import Forms, Method, Quantity
 from truepose.part.first_order import FirstOrder
 
+Side = Literal["inside", "outside"] | None
+
+LIMITS = (
+    'Limits: `"+0.025 0"`, `"±0.05 mm"`, `[-0.05, 0.05]`, `0.05` (±), or `"H7"`, `"h7"`, `"JS7"`.'
+)
+SIDE = (
+    "Where the tool is, which has a radius: `inside` a bore or slot, or `outside`, around a boss "
+    "or web."
+)
+
 
 class ZoneTable(FileTable):
     """Keys of a feature that has a zone and nothing else."""
 
-    zone: AllowedLength
-    """Width of the tolerance zone."""
+    zone: AllowedLength = Field(description="Width of the tolerance zone.")
 
 
 class EvaluatedFeature:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import BaseModel, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from truepose.arrays import Floats
 from truepose.errors import Fault
@@ -27,9 +27,11 @@ from truepose.spatial import norm
 class AngularityTable(FileTable):
     """Keys of a feature of kind angularity."""
 
-    angle: PositiveAngle
-    zone: AllowedLength | None = None
-    tolerance: AngleLimits | None = None
+    angle: PositiveAngle = Field(description="Between the wall or face and its first datum.")
+    zone: AllowedLength | None = Field(None, description="Width of the zone at that angle.")
+    tolerance: AngleLimits | None = Field(
+        None, description='Limits of the angle between two walls, such as `"±0.1 deg"`.'
+    )
 
     @model_validator(mode="after")
     def _asks_something(self) -> Self:

@@ -13,10 +13,10 @@ it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Self
 
 import numpy as np
-from pydantic import BaseModel, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from truepose.arrays import Floats, Indices
 from truepose.errors import Fault
@@ -26,7 +26,7 @@ from truepose.files.size_limits import LengthLimits
 from truepose.part.datum_frame import centres
 from truepose.part.element import FeatureError
 from truepose.part.features._base import Forms, Quantity
-from truepose.part.features._evaluated import EvaluatedFeature
+from truepose.part.features._evaluated import LIMITS, SIDE, EvaluatedFeature, Side
 from truepose.part.first_order import Circled, FirstOrder
 from truepose.part.fits import CircleInPlane, associate
 from truepose.part.outlines import Round, circle
@@ -44,11 +44,15 @@ PLACE_OF_CENTRE = "centre of the least-squares circle (ISO 17450-3), diameter of
 class CircleTable(FileTable):
     """Keys of a feature of kind circle."""
 
-    diameter: PositiveLength | None = None
-    tolerance: LengthLimits | None = None
-    roundness: AllowedLength | None = None
-    position: AllowedLength | None = None
-    side: Literal["inside", "outside"] | None = None
+    diameter: PositiveLength | None = Field(
+        None, description="The diameter that the drawing asks for."
+    )
+    tolerance: LengthLimits | None = Field(None, description=LIMITS)
+    roundness: AllowedLength | None = Field(
+        None, description="Width of the zone between two concentric circles."
+    )
+    position: AllowedLength | None = Field(None, description="Diameter of the zone of the centre.")
+    side: Side = Field(None, description=SIDE)
 
     @model_validator(mode="after")
     def _asks_something(self) -> Self:

@@ -28,7 +28,7 @@ _CORNER = np.radians(20.0)
 """The path turns by more than this at a corner, and by less from point to point of an arc."""
 
 
-class Profile(EvaluatedFeature):
+class ContourProfile(EvaluatedFeature):
     """The contour of one element or of several."""
 
     kind = "profile"

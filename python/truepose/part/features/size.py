@@ -9,10 +9,10 @@ distance of the two walls with that normal. Walls are looked at in the working p
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from truepose.arrays import Floats, Indices
 from truepose.files.file_table import FileTable
@@ -20,7 +20,7 @@ from truepose.files.quantity import PositiveLength
 from truepose.files.size_limits import LengthLimits
 from truepose.part.element import FeatureError
 from truepose.part.features._base import Forms
-from truepose.part.features._evaluated import EvaluatedFeature
+from truepose.part.features._evaluated import LIMITS, SIDE, EvaluatedFeature, Side
 from truepose.part.first_order import FirstOrder, Straightened
 from truepose.part.outlines import OFF, straight
 
@@ -28,9 +28,9 @@ from truepose.part.outlines import OFF, straight
 class SizeTable(FileTable):
     """Keys of a feature of kind size."""
 
-    nominal: PositiveLength
-    tolerance: LengthLimits
-    side: Literal["inside", "outside"] | None = None
+    nominal: PositiveLength = Field(description="The width that the drawing asks for.")
+    tolerance: LengthLimits = Field(description=LIMITS)
+    side: Side = Field(None, description=SIDE)
 
 
 class Size(EvaluatedFeature):

@@ -14,9 +14,13 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.part.fits.chebyshev import Reference, chebyshev, first_reference
-from truepose.part.fits.shapes import Shape
+from truepose.part.fits.shapes import FittedShape
 
 _MOST_STEPS = 40
+_MOST_HALVINGS = 12
+"""Of a step to a zone that is wider: where the narrowest one is touched by fewer points than it has
+freedoms, as the shape's bend allows, whole steps would go to and fro."""
+
 _STILL = 1e-13
 """A step below this part of the size of the points is the last."""
 
@@ -26,7 +30,7 @@ _LEVEL = 2e-15
 _SAMPLES = 500
 """Samples at once, so that what is computed on the way stays in the processor's memory."""
 
-AnyShape = TypeVar("AnyShape", bound=Shape)
+AnyShape = TypeVar("AnyShape", bound=FittedShape)
 
 
 def associate(
@@ -49,8 +53,9 @@ def associate(
 def _associate(shape: AnyShape, points: Floats, least_squares: bool) -> tuple[AnyShape, Floats]:
     size = float(np.abs(points).max(initial=0.0)) or 1.0
     reference: Reference | None = None
+    columns, values = shape.linearised(points)
     for _ in range(_MOST_STEPS):
-        columns, values = shape.linearised(points)
+        freedoms = len(columns)
         middle = 0.5 * (values.max(axis=1) + values.min(axis=1))[:, np.newaxis]
         if shape.offset:
             columns = np.concatenate([columns, np.ones((1, *values.shape))])
@@ -58,7 +63,9 @@ def _associate(shape: AnyShape, points: Floats, least_squares: bool) -> tuple[An
         if least_squares:
             square = np.einsum("ksn,lsn->skl", columns, columns)
             right = np.einsum("ksn,sn->sk", columns, values)
-            x = np.linalg.solve(square, right[..., np.newaxis])[..., 0]
+            x = np.linalg.solve(square, right[..., np.newaxis])[:, :freedoms, 0]
+            shape = shape.moved(x)
+            columns, values = shape.linearised(points)
         else:
             if reference is None:
                 one = first_reference(columns[:, 0])
@@ -66,8 +73,27 @@ def _associate(shape: AnyShape, points: Floats, least_squares: bool) -> tuple[An
                     np.repeat(one.index, len(values), 0), np.repeat(one.sign, len(values), 0)
                 )
             x, reference = chebyshev(columns, values, reference, _LEVEL * size)
-        x = x[:, : len(columns) - shape.offset]
-        shape = shape.moved(x)
+            x = x[:, :freedoms]
+            width = _width(shape, values) + _LEVEL * size
+            for _ in range(_MOST_HALVINGS):
+                moved = shape.moved(x)
+                columns, values = moved.linearised(points)
+                wider = _width(shape, values) > width
+                if not wider.any():
+                    break
+                x[wider] *= 0.5
+            else:
+                x[wider] = 0.0
+                moved = shape.moved(x)
+                columns, values = moved.linearised(points)
+            shape = moved
         if np.abs(x).max(initial=0.0) <= _STILL * size:
             break
-    return shape, shape.linearised(points)[1]
+    return shape, values
+
+
+def _width(shape: FittedShape, values: Floats) -> Floats:
+    """(s,) of the zone that residuals (s, n) need."""
+    if shape.offset:
+        return np.asarray(values.max(axis=1) - values.min(axis=1))
+    return np.asarray(2.0 * np.abs(values).max(axis=1))

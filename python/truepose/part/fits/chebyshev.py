@@ -74,12 +74,13 @@ def chebyshev(
     samples = np.arange(len(values))
     solution = np.empty((len(values), len(columns)))
     index, sign = reference.index.copy(), reference.sign.copy()
+    # Signs of a reference that was one of other columns: weights below zero turn round.
+    combination = np.linalg.inv(_basis(columns, index, sign))[:, -1, :]
+    sign[combination < 0.0] *= -1.0
     left, last_index, last_sign = samples, index.copy(), sign.copy()
     for step in range(_MOST):
         rows = np.arange(len(left))[:, np.newaxis]
-        basis = np.ones((len(left), index.shape[1], index.shape[1]))
-        for k, column in enumerate(columns):
-            basis[:, :, k] = sign * column[rows, index]
+        basis = _basis(columns, index, sign)
         inverse: Floats = np.asarray(np.linalg.inv(basis), np.float64)
         right = sign * values[rows, index]
         x = np.einsum("sij,sj->si", inverse, right)
@@ -108,6 +109,15 @@ def chebyshev(
             residual = residual[above]
         _exchange(index, sign, inverse, columns, residual, worst, patient=step < _PATIENT)
     raise RuntimeError("no minimum zone was found")
+
+
+def _basis(columns: Floats, index: Indices, sign: Floats) -> Floats:
+    """(s, k + 1, k + 1) rows of the reference's equations, for x and the level."""
+    rows = np.arange(len(index))[:, np.newaxis]
+    basis = np.ones((len(index), index.shape[1], index.shape[1]))
+    for k, column in enumerate(columns):
+        basis[:, :, k] = sign * column[rows, index]
+    return basis
 
 
 def _exchange(

@@ -17,7 +17,7 @@ from truepose.arrays import Floats
 from truepose.spatial import cross, norm, rotate_about, tangents
 
 
-class Shape:
+class FittedShape:
     """Where a shape stands, of each sample, and how what is left moves with it.
 
     `places` names the fields that are of each sample. Where `offset`, one more freedom moves all
@@ -53,7 +53,7 @@ class Shape:
 
 
 @dataclass(frozen=True, eq=False)
-class TurnedPlane(Shape):
+class TurnedPlane(FittedShape):
     """A plane whose `normal` (s, 3) may turn about an `axis` (s, 3): of a wall, about w.
 
     In the working plane it is a line. `length`: of the points, m.
@@ -76,7 +76,7 @@ class TurnedPlane(Shape):
 
 
 @dataclass(frozen=True, eq=False)
-class AnyPlane(Shape):
+class AnyPlane(FittedShape):
     """A plane whose `normal` (s, 3) may turn to any side; `length` of the points, m."""
 
     normal: Floats
@@ -97,7 +97,7 @@ class AnyPlane(Shape):
 
 
 @dataclass(frozen=True, eq=False)
-class CircleInPlane(Shape):
+class CircleInPlane(FittedShape):
     """A circle in the working plane, `centre` (s, 2); its radius is the offset."""
 
     centre: Floats
@@ -115,7 +115,7 @@ class CircleInPlane(Shape):
 
 
 @dataclass(frozen=True, eq=False)
-class Contour(Shape):
+class Contour(FittedShape):
     """Points (n, 2) with normals (n, 2), moved as one body in the working plane.
 
     `turn` (s, 1) and `origin` (s, 2): a point of the contour at y is seen at R y + origin. The

@@ -20,7 +20,7 @@ import numpy as np
 from truepose.arrays import Floats
 from truepose.part.coordinates import Coordinates
 from truepose.part.element import Element, FeatureError
-from truepose.part.fits import AnyPlane, CircleInPlane, TurnedPlane, associate
+from truepose.part.fits import AnyPlane, TurnedPlane, associate
 from truepose.part.outlines import Round, Straight, outline_of
 from truepose.spatial import cross, skew
 
@@ -201,8 +201,7 @@ def datum_alignment(
 
 def centres(datum: Round, points: Floats) -> Floats:
     """(s, 2) centres of the least-squares circles through points (s, n, 3) of a circle."""
-    start = CircleInPlane(np.tile(datum.centre, (len(points), 1)))
-    return associate(start, points, least_squares=True)[0].centre
+    return associate(datum.placed(points), points, least_squares=True)[0].centre
 
 
 def _datum(name: str, points: Floats) -> Datum:

@@ -81,6 +81,11 @@ class Round:
         """(n, 3) of the programmed points (n, 3), without rounding, each at its own depth."""
         return np.column_stack([self.centre + self.radius * self.spokes, programmed[:, 2]])
 
+    def placed(self, points: Floats) -> CircleInPlane:
+        """Where to look for the circles through points (s, n, 3): moved as their middles are."""
+        middle = self.centre + self.radius * self.spokes.mean(axis=0)
+        return CircleInPlane(self.centre + points[..., :2].mean(axis=1) - middle)
+
 
 def straight(name: str, points: Floats) -> Straight:
     """The wall or face through points (n, 3). Raises `FeatureError`."""

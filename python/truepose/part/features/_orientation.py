@@ -78,10 +78,11 @@ class OrientationFeature(EvaluatedFeature):
         normals = np.tile(self.normal, (order.count, 1))
         effects = order.effect(self._ideal, normals)
         if self.free_axis is None:
+            across = order.seen(0, normals)
             return [
                 order.forms(
                     "spread",
-                    order.seen(0, normals),
+                    across - across.mean(axis=0),
                     curvature=2.0 * order.bent(self._ideal, normals, ranged=True),
                     plus=order.plus(np.ptp(effects, axis=0)),
                 )

@@ -28,7 +28,7 @@ from truepose.part.element import FeatureError
 from truepose.part.features._base import Forms, Quantity
 from truepose.part.features._evaluated import LIMITS, SIDE, EvaluatedFeature, Side
 from truepose.part.first_order import Circled, FirstOrder
-from truepose.part.fits import CircleInPlane, associate
+from truepose.part.fits import associate
 from truepose.part.outlines import Round, circle
 from truepose.spatial import norm
 
@@ -124,7 +124,7 @@ class Circle(EvaluatedFeature):
 
     def evaluate(self, own: Sequence[Floats], seen: Sequence[Floats]) -> list[Floats]:
         """Diameters, roundness and place, as far as they are asked for."""
-        start = CircleInPlane(np.tile(self.outline.centre, (len(own[0]), 1)))
+        start = self.outline.placed(own[0])
         mean, radii = associate(start, own[0], least_squares=True)
         values: list[Floats] = []
         if "diameter" in self._asked:

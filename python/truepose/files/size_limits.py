@@ -22,7 +22,7 @@ from truepose.files.units import QuantityError, UnitSystem, shown_value, type_ph
 _NUMBER = r"[+-]?+(?:\d++\.?\d*+|\.\d++)"
 _UNIT = r"[A-Za-zµμ°'\"]*+"
 _TWO = re.compile(
-    rf"\s*+({_NUMBER})\s*+({_UNIT})(?:\s*+[/;,]\s*+|\s++|(?=[+-]))({_NUMBER})\s*+({_UNIT})\s*+"
+    rf"\s*+({_NUMBER})\s*+({_UNIT})(?:\s*+[/;,]\s*+|\s++|(?<=\s)|(?=[+-]))({_NUMBER})\s*+({_UNIT})\s*+"
 )
 _CLASS = re.compile(r"\s*+(H|h|JS|js|J[sS])\s*+(\d{1,2}+)\s*+")
 _ANY_CLASS = re.compile(r"\s*+[A-Za-z]{1,2}+\s*+\d{1,2}+\s*+")

@@ -19,15 +19,16 @@ class Bore(FileTable):
     diameter: PositiveLength | None = Field(None, description="Of it.")
     tolerance: str | None = Field(None, description="Of the diameter.")
     roundness: PositiveLength | None = Field(None, description="Of it.")
+    position: PositiveLength | None = Field(None, description="Of it.")
 
 
 class Width(FileTable):
-    size: PositiveLength = Field(description="Of it.")
+    nominal: PositiveLength = Field(description="Of it.")
     tolerance: str = Field(description="Of the size.")
 
 
 class Straight(FileTable):
-    straightness: PositiveLength = Field(description="Of it.")
+    zone: PositiveLength = Field(description="Of it.")
 
 
 class _Made:
@@ -87,4 +88,11 @@ class MadeStraight(_Made):
     table = Straight
 
 
-KINDS: dict[str, type[Feature]] = {made.kind: made for made in (MadeBore, MadeWidth, MadeStraight)}
+class MadeFlat(_Made):
+    kind = "flatness"
+    table = Straight
+
+
+KINDS: dict[str, type[Feature]] = {
+    made.kind: made for made in (MadeBore, MadeWidth, MadeStraight, MadeFlat)
+}

@@ -207,6 +207,7 @@ CATALOGUE: dict[str, str] = {
     "feature-direction": "walls or faces that are not parallel, or not at the angle asked for",
     "feature-datums": "datums that form no frame, or none of what a feature needs",
     "no-feature": "a part of which no feature is named",
+    "nothing-found": "features are to be proposed of a program that has none of those looked for",
     "unknown-datum": "a datum that the part does not have",
     # programs
     "gcode-not-text": "a byte that no program has outside of comments",

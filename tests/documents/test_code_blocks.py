@@ -23,6 +23,7 @@ from document_blocks import INLINE, LANGUAGES, ROOT, Block, blocks_of, pages
 from truepose.calibration import read_measurements
 from truepose.cli import cli, run
 from truepose.machine.families import REGISTRY
+from truepose.part.read import read_part
 
 CODE_PAGES = [page for page in pages() if any(block.is_code for block in blocks_of(page))]
 QUESTIONS = {"check", "calibrate", "compare"}
@@ -86,8 +87,17 @@ class Workshop:
         exec(compile(block.text, block.place, "exec"), {"__name__": "page"})  # noqa: S102
 
     def toml(self, block: Block) -> None:
-        """A whole machine file is loaded; of a part of one every key and value is checked."""
+        """A whole machine file is loaded; of a part of one every key and value is checked.
+
+        A features file is read with the program of the examples.
+        """
         content = tomllib.loads(block.text)
+        if "feature" in content:
+            features = self.folder / "features.toml"
+            features.write_text(block.text, encoding="utf-8")
+            delta = tp.load(ROOT / "machines" / "linear_delta.toml")
+            read_part(delta, ROOT / "examples" / "part" / "square.ngc", features)
+            return
         if {"schema", "drive", "strut"} <= set(content):
             whole = self.folder / "whole.toml"
             whole.write_text(block.text, encoding="utf-8")

@@ -17,6 +17,7 @@ from truepose.controllers.klipper.read import KlipperReader
 from truepose.errors import MachineFileError
 from truepose.files.document import read
 from truepose.machine import Machine
+from truepose.part.read import read_part
 
 ROOT = Path(__file__).parent.parent.parent
 PLANAR = ROOT / "machines" / "planar_two_slider.toml"
@@ -71,6 +72,12 @@ def planar() -> Machine:
     return truepose.load(PLANAR)
 
 
+@cache
+def delta() -> Machine:
+    """The machine that makes the parts."""
+    return truepose.load(DELTA)
+
+
 def _load(folder: Path) -> object:
     return truepose.load(folder / "machine.toml")
 
@@ -97,6 +104,14 @@ def _imported(folder: Path, file: str, **settings: str) -> object:
 
 def _controller_file(name: str) -> str:
     return (ROOT / "tests" / "controller_files" / name).read_text("utf-8")
+
+
+def _part(folder: Path) -> object:
+    return read_part(delta(), SQUARE, folder / "features.toml")
+
+
+def _part_of_comments(folder: Path) -> object:
+    return read_part(delta(), folder / "part.ngc")
 
 
 def _lines_with(text: str, *words: str) -> str:
@@ -134,6 +149,27 @@ CENTRES = "name, x (mm), y (mm), z (mm), role\n" + "".join(
         ("platform", (40 * out[1], 40 * out[0], 510)),
     )
 ) + "t, 0, 0, 500, tool\n"  # fmt: skip
+
+DELTA = str(ROOT / "machines" / "linear_delta.toml")
+SQUARE = str(ROOT / "examples" / "part" / "square.ngc")
+
+PART = """G21 G17 G90 G94 F900
+G0 X-20 Y-20 Z20
+G1 Z10
+(datum: A)
+N20 G1 X20
+(feature: corner, perpendicularity 0.05, datums A)
+N30 G1 Y20
+(feature: width, size 40 +-0.1)
+N40 G1 X-20
+(end feature)
+G0 X10 Y0
+(feature: hole, diameter 20 mm +0.025 0, roundness 0.02)
+G3 X10 Y0 I-10 J0
+(feature: width)
+G0 X20 Y-20
+N50 G1 X-20
+"""
 
 KINDS = {
     "machine": Kind(
@@ -232,6 +268,18 @@ KINDS = {
         ("import", "{folder}/hexapod.hal"),
         _controller_file("linuxcnc/hexapod.ini"),
         "hexapod.ini",
+    ),
+    "features": Kind(
+        ((ROOT / "examples" / "part" / "square.toml").read_text("utf-8"),),
+        "features.toml",
+        _part,
+        ("part", DELTA, SQUARE, "--features", "{folder}/features.toml"),
+    ),
+    "feature-comments": Kind(
+        (PART,),
+        "part.ngc",
+        _part_of_comments,
+        ("part", DELTA, "{folder}/part.ngc"),
     ),
     "joint-centres": Kind(
         (CENTRES,),

@@ -312,38 +312,58 @@ def _row_of(said: Said, document: Document, collected: _Collected) -> dict[str, 
 
 
 def _find_kind(row: dict[str, Any], document: Document, key: Key, collected: _Collected) -> bool:
-    """Write the kind of the feature that a comment's keys say into its row."""
+    """Write the kind of the feature that a comment's keys say into its row, in that kind's keys.
+
+    The name of a kind is the key of its value: `size 100 +-0.05`, `flatness 0.02`.
+    """
+    common = FeatureTable.model_fields.keys()
+    asked = [word for word in row if word not in common]
+    kinds = list(collected.kinds.values())
+    if "kind" in row:
+        kinds = [kind for kind in kinds if kind.kind == row["kind"]]
+        if not kinds:
+            return True  # what is none is said of every row
+    fitting = []
+    for kind in kinds:
+        fields = kind.table.model_fields
+        keys = {word: _key_of(word, kind) for word in asked}
+        required = {name for name, one in fields.items() if one.is_required()}
+        known = {word: key for word, key in keys.items() if key is not None}
+        if asked and len(known) == len(asked) and required <= set(known.values()):
+            fitting.append((kind.kind not in asked, kind.kind, known))
+    if fitting:
+        _, row["kind"], known = min(fitting, key=lambda one: one[0])
+        for word, key_of_kind in known.items():
+            row[key_of_kind] = row.pop(word)
+        return True
     if "kind" in row:
         return True
-    asked = row.keys() - FeatureTable.model_fields.keys()
-    fitting = [
-        name
-        for name, kind in collected.kinds.items()
-        if asked
-        and asked <= kind.table.model_fields.keys()
-        and all(
-            not one.is_required() or word in asked for word, one in kind.table.model_fields.items()
-        )
-    ]
-    if fitting:
-        row["kind"] = fitting[0]
-        return True
-    named = [word for kind in collected.kinds.values() for word in kind.table.model_fields]
-    unknown = next((word for word in sorted(asked) if word not in named), None)
+    named = sorted({word for kind in kinds for word in (kind.kind, *kind.table.model_fields)})
+    unknown = next((word for word in asked if word not in named), None)
     hint = None if unknown is None else did_you_mean(unknown, named)
     collected.problems.append(
         document.problem(
             Fault(
                 "part-comment",
                 "this comment says no feature of any kind",
-                found=", ".join(sorted(asked)) or "a name alone, of no feature before it",
-                expected=one_of(sorted(set(named))),
+                found=", ".join(asked) or "a name alone, of no feature before it",
+                expected=one_of(named),
                 hint=hint or "where several kinds have a key, say which: kind circle",
             ),
             key,
         )
     )
     return False
+
+
+def _key_of(word: str, kind: type[Feature]) -> str | None:
+    """The key of a kind's table that a word of a comment is; None: it is none."""
+    fields = kind.table.model_fields
+    if word in fields:
+        return word
+    if word == kind.kind:
+        return next((key for key in ("nominal", "zone") if key in fields), None)
+    return None
 
 
 def _placed(

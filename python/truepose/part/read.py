@@ -40,7 +40,7 @@ class Part:
 
     `elements`: of all features and datums, each with its points; `features` in the order in which
     they are said; `datums`: the frame of alignment "datums", in its order; `alignment`: in which
-    coordinates the part is judged. `names` of the files, for people.
+    coordinates the part is judged. `program` and `file` of features, if there is one: as given.
     """
 
     elements: tuple[Element, ...]

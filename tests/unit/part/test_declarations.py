@@ -74,7 +74,7 @@ def read(delta: tp.Machine, tmp_path: Path) -> Read:
 
 
 def wall(place: str) -> str:
-    return f'[[feature]]\nname = "wall"\nkind = "straightness"\nstraightness = 0.02\n{place}\n'
+    return f'[[feature]]\nname = "wall"\nkind = "straightness"\nzone = 0.02\n{place}\n'
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ lines = 14
 [[feature]]
 name = "width"
 kind = "size"
-size = 40
+nominal = 40
 tolerance = "+-0.05"
 lines = ["13", "15"]
 datums = ["A"]
@@ -204,13 +204,13 @@ def test_the_working_plane_is_that_of_the_program_unless_the_file_says_it(read: 
 
 def test_units_are_those_of_the_machine_file_unless_the_file_has_its_own(read: Read) -> None:
     (feature,) = read(wall("lines = 13")).features
-    assert feature.row.straightness == 2e-5  # type: ignore[attr-defined]
+    assert feature.row.zone == 2e-5  # type: ignore[attr-defined]
     (feature,) = read('[units]\nlength = "um"\n' + wall("lines = 13")).features
-    assert feature.row.straightness == pytest.approx(2e-8)  # type: ignore[attr-defined]
+    assert feature.row.zone == pytest.approx(2e-8)  # type: ignore[attr-defined]
 
 
 def test_one_wall_may_have_features_of_several_kinds(read: Read) -> None:
-    width = '[[feature]]\nname = "w"\nkind = "size"\nsize = 40\ntolerance = "+-0.1"\n'
+    width = '[[feature]]\nname = "w"\nkind = "size"\nnominal = 40\ntolerance = "+-0.1"\n'
     width += 'lines = ["13", "15"]\n'
     part = read(width + wall("lines = 13") + '[[datum]]\nname = "A"\nlines = 13\n')
     first, straight = part.features[0].elements[0], part.features[1].elements[0]
@@ -230,7 +230,7 @@ lines = "12-x"
 [[feature]]
 name = "w"
 kind = "sise"
-size = 40
+nominal = 40
 lines = "13"
 [[feature]]
 name = "b"

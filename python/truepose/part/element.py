@@ -20,7 +20,8 @@ class Element:
     are several, such as "width, wall 2". `points` (n, 3): programmed tool points, m, in machine
     coordinates, in the order of the path; of a machine that moves in a plane z is 0. `place` (n,):
     number of each among the points of the part. `lines` (n,): of the program. `plane` (3,): unit
-    normal of the working plane (G17: z). `tool_radius`, m.
+    normal of the working plane (G17: z). `tool_radius`, m. `closed`: the path ends where it began,
+    and has no point there but the last.
     """
 
     name: str
@@ -29,3 +30,4 @@ class Element:
     lines: Indices
     plane: Floats
     tool_radius: float
+    closed: bool = False

@@ -136,7 +136,8 @@ def _built(
     part = said.part
 
     def element(row: Declared, number: int) -> Element:
-        points, lines, place = found[places.index(row.places[number])]
+        stretch = places.index(row.places[number])
+        points, lines, place = found[stretch]
         several = f", wall {number + 1}" if len(row.places) > 1 else ""
         radius = row.table.tool_radius
         return Element(
@@ -146,6 +147,7 @@ def _built(
             lines,
             _normal(part.plane, holds_at(int(lines[0]), said.text.planes)),
             part.tool_radius if radius is None else radius,
+            walk.is_closed(stretch),
         )
 
     datums = {row.name: element(row, 0) for row in said.datums}

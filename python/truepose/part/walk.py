@@ -110,14 +110,18 @@ class StretchExtent:
         straight = np.where(turned > 0.0, 0.0, size)
         self.needs += list(zip(straight[:room].tolist(), turned[:room].tolist(), strict=True))
 
-    def spacing(self, most: int, length: float) -> Spacing:
-        """For at most `most` points, of a machine of characteristic `length`, m."""
-        closed = (
+    def is_closed(self, length: float) -> bool:
+        """Whether it ends where it began, on a machine of characteristic `length`, m."""
+        return (
             self.runs == 1
             and self.begin is not None
             and self.end is not None
             and bool((np.abs(self.begin - self.end) <= CLOSED * length).all())
         )
+
+    def spacing(self, most: int, length: float) -> Spacing:
+        """For at most `most` points, of a machine of characteristic `length`, m."""
+        closed = self.is_closed(length)
         starts = 0 if closed else self.runs
         if self.moves + starts <= most // 2:
             straight, turned = np.array(self.needs).reshape(-1, 2).T
@@ -267,6 +271,11 @@ class ProgramWalk:
         ) or _refusals.of_long_move(self.machine, moves, self.program)
         if refusal is not None:
             raise refusal
+
+    def is_closed(self, stretch: int) -> bool:
+        """Whether a stretch ends where it began, and each of its moves has points."""
+        closed = self.extents[stretch].is_closed(self.machine.characteristic_length)
+        return closed and not self.spacings[stretch].sparse
 
     def elements(self) -> list[tuple[Floats, Indices, Indices]]:
         """Of each stretch its points (n, 3), their lines (n,), and their places (n,).

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 import scipy.optimize
@@ -240,3 +242,17 @@ def test_values_of_many_samples_are_those_of_each() -> None:
         alone = feature.values([one[sample : sample + 1] for one in points])
         np.testing.assert_allclose(alone[0], together[sample], rtol=0, atol=1e-16)
     assert value(feature, points, "roundness").shape == (700,)
+
+
+@pytest.mark.parametrize("method", ["iso", "least-squares"])
+def test_a_closed_path_has_no_end(method: str) -> None:
+    """A circle that turns about its centre is where it was; its first point is not there twice."""
+    once = dataclasses.replace(bore("bore", (0.1, 0.2), 0.02, 72), closed=True)
+    feature = build("profile", ZONE, [once], method=method)  # type: ignore[arg-type]
+    turn = 1e-4
+    centre = np.array([0.1, 0.2, 0.0])
+    points = (points_of(feature)[0] - centre) @ _rotation([0.0, 0.0, turn]).T + centre
+    assert feature.values([points])[0] == pytest.approx([0.02 * turn**2], rel=1e-3)
+    # Larger, it is off by as much everywhere, wherever it begins.
+    larger = (points_of(feature)[0] - centre) * 1.001 + centre
+    assert feature.values([larger])[0] == pytest.approx([2 * 0.02 * 0.001], rel=1e-9)

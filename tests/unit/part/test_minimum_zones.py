@@ -110,7 +110,10 @@ def _shapes(count: int) -> dict[str, tuple[FittedShape, Floats]]:
         "half circle": (CircleInPlane(np.zeros((count, 2))), circle[:46]),
         "closed circle": (CircleInPlane(np.zeros((count, 2))), circle[[*range(90), 0]]),
         "grid": (AnyPlane(many, 0.1), np.column_stack([grid, np.zeros(len(grid))])),
-        "contour": (Contour(oval, normals, 0.06, *still), np.column_stack([oval, 0 * angles])),
+        "contour": (
+            Contour(oval, normals, 0.06, np.eye(3), *still),
+            np.column_stack([oval, 0 * angles]),
+        ),
     }
 
 

@@ -21,7 +21,7 @@ from truepose.part.features._evaluated import EvaluatedFeature, ZoneTable
 from truepose.part.features.position import both_sides
 from truepose.part.first_order import FirstOrder
 from truepose.part.fits import Contour, associate
-from truepose.part.outlines import too_few
+from truepose.part.outlines import OFF, too_few
 from truepose.spatial import norm
 
 _CORNER = np.radians(20.0)
@@ -43,8 +43,8 @@ class ContourProfile(EvaluatedFeature):
         if count < 4:
             raise too_few(self.name, count, 4, "a contour that may be moved and turned")
         places, normals, first = [], [], 0
-        for points in self.programmed:
-            place, normal = _normals(points[:, :2])
+        for element, points in zip(self.elements, self.programmed, strict=True):
+            place, normal = _normals(points[:, :2], closed=element.closed)
             places.append(place + first)
             normals.append(normal)
             first += len(points)
@@ -84,9 +84,9 @@ class ContourProfile(EvaluatedFeature):
         if self.frame is not None:
             return [both_sides(order, self.places, normals)]
         contour = self._contour(1)
-        columns = contour.linearised(np.concatenate(self.programmed)[np.newaxis, self.places])[0]
-        rows = columns[:, 0].T
-        inverse = np.linalg.inv(rows.T @ rows)
+        rows = self._motions()
+        free = rows @ contour.free.T
+        inverse = contour.free.T @ np.linalg.inv(free.T @ free) @ contour.free
         fit = inverse @ rows.T
         across = order.seen_at(self.places, normals)
         kept = np.tensordot(np.eye(len(rows)) - rows @ fit, across, 1)
@@ -106,20 +106,42 @@ class ContourProfile(EvaluatedFeature):
         ]
 
     def _contour(self, count: int) -> Contour:
-        nominal = np.concatenate(self.programmed)[self.places, :2]
-        length = float(np.ptp(nominal, axis=0).max())
-        return Contour(nominal, self.normals, length, np.zeros((count, 1)), np.zeros((count, 2)))
+        sizes, motions = np.linalg.svd(self._motions(), full_matrices=False)[1:]
+        return Contour(
+            self._nominal(),
+            self.normals,
+            self._length(),
+            motions[sizes > OFF * sizes[0]],
+            np.zeros((count, 1)),
+            np.zeros((count, 2)),
+        )
+
+    def _nominal(self) -> Floats:
+        return np.concatenate(self.programmed)[self.places, :2]
+
+    def _length(self) -> float:
+        return float(np.ptp(self._nominal(), axis=0).max())
+
+    def _motions(self) -> Floats:
+        """(n, 3) what a motion along u, along v or by a turn is along the normals."""
+        u, v = self._nominal().T
+        turned = self.normals[:, 1] * u - self.normals[:, 0] * v
+        return np.column_stack([self.normals, turned / self._length()])
 
 
-def _normals(path: Floats) -> tuple[Indices, Floats]:
-    """Places of the points (n, 2) that count, and the normal of each: twice at a corner."""
-    steps = np.diff(path, axis=0)
+def _normals(path: Floats, *, closed: bool) -> tuple[Indices, Floats]:
+    """Places of the points (n, 2) that count, and the normal of each: twice at a corner.
+
+    `closed`: from the last point the path goes on to the first, if that is not there twice.
+    """
+    steps = np.diff(path, axis=0, append=path[:1])
     lengths = norm(steps)
-    moves = np.flatnonzero(lengths > 0.0)
+    still = 1e-9 * float(lengths.sum())
+    closed = closed or (len(path) > 3 and float(lengths[-1]) <= still)
+    moves = np.flatnonzero(lengths[: None if closed else -1] > still)
     directions = steps[moves] / lengths[moves, np.newaxis]
     if not len(moves):
         return np.zeros(0, np.intp), np.zeros((0, 2))
-    closed = len(path) > 3 and float(norm(path[-1] - path[0])) <= 1e-9 * float(lengths.sum())
     places: list[int] = []
     tangents: list[Floats] = []
     for place in range(len(path)):

@@ -47,7 +47,7 @@ def associate(
         some = slice(first, first + _SAMPLES)
         piece, residuals[some] = _associate(shape.of(some), points[some], least_squares)
         pieces.append(piece)
-    return shape.joined(pieces), residuals
+    return (shape.joined(pieces) if pieces else shape), residuals
 
 
 def _associate(shape: AnyShape, points: Floats, least_squares: bool) -> tuple[AnyShape, Floats]:

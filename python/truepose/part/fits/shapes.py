@@ -118,6 +118,8 @@ class CircleInPlane(FittedShape):
 class Contour(FittedShape):
     """Points (n, 2) with normals (n, 2), moved as one body in the working plane.
 
+    `free` (k, 3): which motions, along the axes and by the turn, change anything: a circle has a
+    turn that does not.
     `turn` (s, 1) and `origin` (s, 2): a point of the contour at y is seen at R y + origin. The
     residual is of each point from its own, along the normal there.
     """
@@ -125,6 +127,7 @@ class Contour(FittedShape):
     points: Floats
     normals: Floats
     length: float
+    free: Floats
     turn: Floats
     origin: Floats
     places: ClassVar[tuple[str, ...]] = ("turn", "origin")
@@ -137,11 +140,13 @@ class Contour(FittedShape):
         seen = np.stack([cosine * u + sine * v, cosine * v - sine * u], axis=-1)
         turned = self.normals[:, 1] * seen[..., 0] - self.normals[:, 0] * seen[..., 1]
         still = np.broadcast_to(self.normals.T[:, np.newaxis], (2, *turned.shape))
-        columns = np.concatenate([still, turned[np.newaxis] / self.length])
+        motions = np.concatenate([still, turned[np.newaxis] / self.length])
+        columns = np.tensordot(self.free, motions, 1)
         return columns, np.einsum("snc,nc->sn", seen - self.points, self.normals)
 
     def moved(self, x: Floats) -> Contour:
         """Moved along its own axes, then turned."""
+        x = x @ self.free
         cosine, sine = np.cos(self.turn[:, 0]), np.sin(self.turn[:, 0])
         shift = [cosine * x[:, 0] - sine * x[:, 1], sine * x[:, 0] + cosine * x[:, 1]]
         turn = self.turn + x[:, 2:] / self.length

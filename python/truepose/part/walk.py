@@ -41,7 +41,7 @@ MOST_POINTS = 360
 FEWEST_POINTS = 24
 """Intervals of an element that is not short of them for any other reason."""
 
-FINE = 1.0 / 512.0
+FINE = 1.0 / 1024.0
 """Distance of an element's points, in characteristic lengths, where `MOST_POINTS` allow it."""
 
 ANGLE = math.radians(1.0)

@@ -10,6 +10,7 @@ import pytest
 
 import truepose as tp
 from build_machine import MACHINES
+from truepose._kernel import GcodeReader
 from truepose.controllers.gcode.program import ProgramOptions
 from truepose.errors import RequestError
 from truepose.part.stretches import Interval, Stretches
@@ -245,3 +246,61 @@ def test_a_way_through_a_singularity_is_refused_where_the_correction_refuses_it(
     found, expected = refused.value.problems[0], of_correction.value.problems[0]
     assert (found.code, found.line) == ("gcode-singularity", expected.line)
     assert expected.code == "gcode-singularity"
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_points_of_any_program_are_on_its_moves_and_stand_for_all_of_it(
+    seed: int, planar: tp.Machine, tmp_path: Path
+) -> None:
+    """Lines, arcs of any angle, rapids and rests, some of them elements, against the moves read."""
+    rng = np.random.default_rng(seed)
+    text, x, y = HEAD + "G0 X300 Y200\n", 300.0, 200.0
+    for _ in range(60):
+        to = rng.uniform((270, 170), (330, 230)).round(3)
+        i, j = 0.5 * (to[0] - x), 0.5 * (to[1] - y)
+        text += str(
+            rng.choice(
+                [
+                    f"G1 X{to[0]} Y{to[1]}",
+                    f"G0 X{to[0]} Y{to[1]}",
+                    f"G{rng.integers(2, 4)} X{to[0]} Y{to[1]} I{i:.6f} J{j:.6f}",
+                    f"G1 X{to[0]} Y{to[1]}\nG4 P0.1\nG1 X{to[0]} Y{to[1]}",
+                ]
+            )
+        )
+        text += "\n"
+        x, y = to
+    chosen = [[(5, 9), (20, 22)], [(30, 60)]]
+    most = [90, 60]
+    try:
+        walk = walk_of(planar, tmp_path, text, chosen, most)
+        batches = list(walk.path())
+    except RequestError as refused:  # the half circles may leave the workspace
+        assert refused.problems[0].code in ("gcode-pose", "gcode-singularity")  # noqa: PT017
+        pytest.skip("this program leaves the workspace")
+    moves = GcodeReader(tmp_path / "part.ngc", axes="XY").read(1000)
+    feed = moves.kind != 0
+    assert together(batches, "weight").sum() == pytest.approx(
+        1e-3 * moves.length[feed].sum(), rel=1e-9
+    )
+    # Every end is a point, in order.
+    poses, position = together(batches, "poses"), 0
+    for end in moves.end[:, :2] / 1e3:
+        near = np.flatnonzero(np.abs(poses[position:] - end).max(axis=1) < 1e-12)
+        position += int(near[0])
+    # Every point of an element is on a move of its line, and the path has exactly those.
+    fine = np.linspace(0.0, 1.0, 20001)
+    element = together(batches, "element")
+    for number, (points, lines, place) in enumerate(walk.elements()):
+        assert 0 < len(points) <= most[number]
+        np.testing.assert_array_equal(together(batches, "points")[element >= 0][place], points)
+        for line in np.unique(lines):
+            assert any(first <= line <= last for first, last in chosen[number])
+            way = np.concatenate(
+                [
+                    moves.points(np.full(fine.size, move), fine)[:, :2]
+                    for move in np.flatnonzero(moves.line == line)
+                ]
+            )
+            for point in points[lines == line]:
+                assert np.abs(way / 1e3 - point[:2]).sum(axis=1).min() < 2e-5

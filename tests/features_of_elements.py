@@ -6,6 +6,7 @@ Points are in m; a row is validated as the features file's is.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -99,8 +100,11 @@ def value(feature: Feature, points: Sequence[Floats], quantity: str) -> Floats:
     return feature.values(points)[:, names.index(quantity)]
 
 
-def every_case(method: Method) -> dict[str, Feature]:
-    """A feature of each kind, with each kind of datum and of freedom."""
+def every_case(method: Method, rounded: float = 0.0) -> dict[str, Feature]:
+    """A feature of each kind, with each kind of datum and of freedom.
+
+    `rounded`: turned a little, and programmed to whole multiples of that, m.
+    """
     bottom, left = wall("A", (0, 0), (0.1, 0)), wall("B", (0, 0), (0, 0.06), 13)
     floor, hole = face("F", (0, 0), (0.1, 0.06)), bore("H", (0.08, 0.05), 0.005, 24)
     slot = [wall("w1", (0, 0.02), (0.1, 0.02)), wall("w2", (0.1, -0.02), (0.01, -0.02), 17)]
@@ -145,8 +149,18 @@ def every_case(method: Method) -> dict[str, Feature]:
         "contour": ("profile", zone, [contour], []),
         "contour to walls": ("profile", zone, [contour], [bottom, left]),
     }
+
+    def programmed(elements: Sequence[Element]) -> list[Element]:
+        if not rounded:
+            return list(elements)
+        turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+        return [
+            replace(one, points=np.round(one.points @ turn.T / rounded) * rounded)
+            for one in elements
+        ]
+
     return {
-        name: build(kind, row, elements, datums, method)
+        name: build(kind, row, programmed(elements), programmed(datums), method)
         for name, (kind, row, elements, datums) in cases.items()
     }
 

@@ -20,10 +20,8 @@ from truepose.files.tolerance import Band, read_within
 from truepose.files.units import QuantityError, UnitSystem, shown_value, type_phrase
 
 _NUMBER = r"[+-]?+(?:\d++\.?\d*+|\.\d++)"
-_UNIT = r"[A-Za-zµμ°'\"]*+"
-_TWO = re.compile(
-    rf"\s*+({_NUMBER})\s*+({_UNIT})(?:\s*+[/;,]\s*+|\s++|(?<=\s)|(?=[+-]))({_NUMBER})\s*+({_UNIT})\s*+"
-)
+_UNIT = r"(?:\s*+([A-Za-zµμ°'\"]++))?"
+_TWO = re.compile(rf"\s*+({_NUMBER}){_UNIT}(?:\s*+[/;,]\s*+|\s++|(?=[+-]))({_NUMBER}){_UNIT}\s*+")
 _CLASS = re.compile(r"\s*+(H|h|JS|js|J[sS])\s*+(\d{1,2}+)\s*+")
 _ANY_CLASS = re.compile(r"\s*+[A-Za-z]{1,2}+\s*+\d{1,2}+\s*+")
 
@@ -72,7 +70,7 @@ def read_size_limits(value: object, dimension: str, units: UnitSystem) -> SizeLi
             first, first_unit, second, second_unit = two.groups()
             unit_of_first, unit_of_second = first_unit or second_unit, second_unit or first_unit
             limits = [
-                units.read(f"{number} {unit}", dimension)
+                units.read(f"{number} {unit or ''}", dimension)
                 for number, unit in ((first, unit_of_first), (second, unit_of_second))
             ]
             return SizeLimits(Band(min(limits), max(limits)))

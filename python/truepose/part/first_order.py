@@ -187,6 +187,15 @@ class FirstOrder:
             self.level = not frame.tilts
             self._follow(frame, len(ideal))
 
+    @classmethod
+    def of_frame(cls, frame: DatumFrame) -> FirstOrder:
+        """Of a frame alone, by which a whole part is aligned: all points are its datums'.
+
+        `jac_motion` is that of least squares, in u v w of the frame's coordinates: a point y of the
+        drawing is seen at y + omega x y + shift. A minimum zone moves it besides, see `levers`.
+        """
+        return cls([], [], frame.coordinates, frame)
+
     def bent(self, points: Floats, directions: Floats, *, ranged: bool = False) -> float:
         """Of seen points (n, 3) along directions (n, 3) the second order at most, 1/m.
 

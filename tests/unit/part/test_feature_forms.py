@@ -64,6 +64,22 @@ def test_a_value_is_where_its_forms_say(name: str, method: str, kind: str) -> No
             assert np.all(more <= allowed + ROUNDING), (quantity.name, scale)
 
 
+@pytest.mark.parametrize("method", ["iso", "least-squares"])
+def test_a_program_rounds(method: str) -> None:
+    """To whole micrometres: the forms are those of the drawing, and know what it is off."""
+    rng = np.random.default_rng(8)
+    for name, feature in every_case(method, 1e-6).items():  # type: ignore[arg-type]
+        count = sum(points.shape[1] for points in points_of(feature))
+        for quantity, form in zip(feature.quantities, feature.forms(), strict=True):
+            for rho in (0.0, 1e-9, 1e-7, 1e-6, 0.9 * min(form.reach, 1e-4)):
+                errors = rng.standard_normal((20, count, 3))
+                errors *= rho / np.linalg.norm(errors, axis=-1).max(axis=1)[:, None, None]
+                actual = value(feature, perturbed(feature, errors), quantity.name)
+                said, allowed = followed(form, errors)
+                more = actual - said if form.rule == "spread" else np.abs(actual - said)
+                assert np.all(more <= allowed + ROUNDING), (name, quantity.name, rho)
+
+
 def test_every_kind_is_held_against_its_forms() -> None:
     assert {feature.kind for feature in every_case("iso").values()} == set(REGISTRY)
 

@@ -13,13 +13,14 @@ before, or of one that the file has without a place.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, cast
 
 from pydantic import BaseModel
 
+from truepose.arrays import Indices
 from truepose.errors import Fault, MachineFileError, PartError, Problem, in_order
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.document import Document, Key, read
@@ -39,6 +40,7 @@ from truepose.part.stretches import (
     not_there,
     overlap,
     read_text_of,
+    trimmed,
 )
 from truepose.part.tables import DatumTable, FeatureTable, PartTable
 
@@ -139,11 +141,17 @@ class _Collected:
 
 
 def declared(
-    machine: Machine, program: Path, opened: Path, features: Path | None, kinds: Kinds
+    machine: Machine,
+    program: Path,
+    opened: Path,
+    features: Path | None,
+    kinds: Kinds,
+    feed_lines: Callable[[], Indices],
 ) -> Declarations:
     """What the file `features` and the comments of the program say.
 
-    `opened`: the file that the program is read from. Raises `PartError` with every problem.
+    `opened`: the file that the program is read from; `feed_lines()`: its lines (n,), in order, that
+    move the machine at feed. Raises `PartError` with every problem.
     """
     collected = _Collected(kinds)
     document = _document(features)
@@ -158,7 +166,12 @@ def declared(
     if operations is not None:
         placed = [_counting(row, operations, collected) for row in placed]
     _check_names(placed, part, document, collected)
-    _check_shared(placed, collected)
+    if any(_overlapping(placed)):
+        lines = feed_lines()
+        for number, row in enumerate(placed):
+            trimmed_places = tuple(trimmed(place, lines) for place in row.places)
+            placed[number] = replace(row, places=trimmed_places)
+        _check_shared(placed, collected)
     if not (placed or collected.problems):
         raise PartError(_nothing(program, features))
     raise_all(collected.problems)
@@ -254,7 +267,7 @@ def _of_comments(
             continue
         identity = said.word, row["name"]
         again = identity in known
-        places.setdefault(identity, []).append(((said.line, said.until),))
+        places.setdefault(identity, []).append((said.place,))
         if again and len(row) == 1:
             continue
         known.add(identity)
@@ -397,7 +410,7 @@ def _placed(
             )
     if row.kind is None and len(places) > 1:  # a datum is one element
         places = [tuple(sorted(interval for place in places for interval in place))]
-    return Declared(row.table, row.kind, row.row, row.document, row.key, tuple(places))
+    return replace(row, places=tuple(places))
 
 
 def _operations(
@@ -431,7 +444,7 @@ def _counting(row: Declared, operations: Place, collected: _Collected) -> Declar
                 )
             )
         )
-    return Declared(row.table, row.kind, row.row, row.document, row.key, places)
+    return replace(row, places=places)
 
 
 def _check_names(
@@ -487,8 +500,8 @@ def _check_names(
         )
 
 
-def _check_shared(rows: Sequence[Declared], collected: _Collected) -> None:
-    """Refuse lines that two have in part, and a feature that is there twice.
+def _overlapping(rows: Sequence[Declared]) -> Iterator[tuple[Declared, Declared, Interval]]:
+    """Each row that shares lines with one before it, that one, and the lines.
 
     All the lines of an element may be another's as well: a wall is straight, and square to a datum.
     """
@@ -499,22 +512,26 @@ def _check_shared(rows: Sequence[Declared], collected: _Collected) -> None:
             if common is None:
                 continue
             twice = row.kind is other.kind and list(row.datums) == list(other.datums)
-            if place == others and not (twice or row is other):
-                continue
-            first, last = common
-            where = f"line {first}" if first == last else f"lines {first} to {last}"
-            collected.problems.append(
-                row.problem(
-                    Fault(
-                        "part-shared",
-                        f"{row.what} shares lines with {other.what}",
-                        found=f"{where} in both",
-                        expected="lines of its own, or all lines of the same element where one "
-                        "wall or bore has features of several kinds",
-                    )
+            if place != others or twice or row is other:
+                yield row, other, common
+                break
+
+
+def _check_shared(rows: Sequence[Declared], collected: _Collected) -> None:
+    """Refuse lines that two have in part, and a feature that is there twice."""
+    for row, other, (first, last) in _overlapping(rows):
+        where = f"line {first}" if first == last else f"lines {first} to {last}"
+        collected.problems.append(
+            row.problem(
+                Fault(
+                    "part-shared",
+                    f"{row.what} shares lines with {other.what}",
+                    found=f"{where} in both",
+                    expected="lines of its own, or all lines of the same element where one wall "
+                    "or bore has features of several kinds",
                 )
             )
-            break
+        )
 
 
 __all__ = ["Declarations", "Declared", "Kinds", "declared", "raise_all"]

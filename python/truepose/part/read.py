@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from truepose.arrays import Floats
+from truepose.arrays import Floats, Indices
 from truepose.controllers.gcode.program import PROGRAM, ProgramOptions
 from truepose.errors import Fault, Problem
 from truepose.files.text_file import on_disk, require_input
@@ -88,13 +88,18 @@ def read_part(
     path = Path(program)
     require_input(path, PROGRAM)
     file = None if features is None else Path(features)
+    options = ProgramOptions() if options is None else options
+
+    def feed_lines() -> Indices:
+        return ProgramWalk(machine, path, options, Stretches([])).feed_lines()
+
     with on_disk(path) as opened:
-        said = declared(machine, path, opened, file, kinds)
+        said = declared(machine, path, opened, file, kinds, feed_lines)
     places = list(dict.fromkeys(place for row in said.every for place in row.places))
     walk = ProgramWalk(
         machine,
         path,
-        ProgramOptions() if options is None else options,
+        options,
         Stretches(places),
         [_most_points(place, said.every) for place in places],
         condition,

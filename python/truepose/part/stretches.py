@@ -106,14 +106,14 @@ def _unreadable(text: str, expected: str) -> Fault:
 class Said:
     """A comment of the program that says something of the part.
 
-    `word`: "feature" or "datum", "" of one that ends it; `text` behind the colon.
+    `word`: "feature" or "datum", "" of one that ends it; `text` behind the colon; `place`: the
+    lines that it holds for, which are those of the comments directly with it.
     """
 
     line: int
     word: str
     text: str
-    until: int
-    """The last line that it holds for."""
+    place: Interval
 
 
 @dataclass(frozen=True)
@@ -171,6 +171,9 @@ class _Scan:
         self._addresses = addresses
         self._count = 0
         self._said: list[tuple[int, str, str]] = []
+        # Where a group of comments begins that have no words between them, and whether it is open.
+        self._groups: list[int] = []
+        self._together = False
         wanted = {address.numbers for address in addresses if address.numbers is not None}
         self._wanted = {number for interval in wanted for number in interval}
         self._numbers: dict[int, int] = {}
@@ -192,6 +195,8 @@ class _Scan:
             comments = [match[1] or match[2] or b"" for match in _COMMENT.finditer(line)]
             code = _COMMENT.sub(b"", line)
             self._comments(number, comments, alone=_BARE.fullmatch(code) is not None)
+        elif self._together:
+            self._together = not code.strip()
         for match in _MODAL.finditer(code):
             value = int(match[1])
             changes = self._modal[value >= UNITS[0]]
@@ -211,7 +216,11 @@ class _Scan:
         for text in texts:
             match = _SAYS.match(text)
             if match is not None:
-                self._said.append((number, (match[1] or "").lower(), text[match.end() :].strip()))
+                word = (match[1] or "").lower()
+                self._said.append((number, word, text[match.end() :].strip()))
+                self._groups.append(self._groups[-1] if word and self._together else number)
+                self._together = bool(word)
+        self._together = self._together and alone
         for wanted, stretch in self._texts.items():
             here = any(wanted.lower() in text.lower() for text in texts)
             if alone:
@@ -236,10 +245,11 @@ class _Scan:
         tools = self._loaded if self._changed else self._selected
         for stretch in (*self._texts.values(), *tools.values()):
             stretch.end(last)
-        bounds = [line - 1 for line, *_ in self._said[1:]] + [last]
+        begins = sorted(set(self._groups))
+        ends = dict(zip(begins, [*(line - 1 for line in begins[1:]), last], strict=False))
         said = tuple(
-            Said(line, word, text, until)
-            for (line, word, text), until in zip(self._said, bounds, strict=False)
+            Said(line, word, text, (first, ends[first]))
+            for (line, word, text), first in zip(self._said, self._groups, strict=True)
         )
         stretches = {address: self._stretch(address, tools) for address in self._addresses}
         planes, units = map(tuple, self._modal)
@@ -298,6 +308,23 @@ def _common(some: Sequence[Interval], others: Sequence[Interval]) -> Iterator[In
 def common_lines(some: Sequence[Interval], others: Sequence[Interval]) -> tuple[Interval, ...]:
     """The lines that both have."""
     return tuple(_common(some, others))
+
+
+def trimmed(place: Sequence[Interval], lines: Indices) -> tuple[Interval, ...]:
+    """The same as to `lines` (n,), which are in order: from one of them to another of them.
+
+    Two places that hold the same of these lines are one then. One that holds none is as it was.
+    """
+    kept: list[Interval] = []
+    for first, last in place:
+        begin, end = np.searchsorted(lines, first), np.searchsorted(lines, last, side="right")
+        if begin == end:
+            continue
+        if kept and kept[-1][1] == lines[begin - 1]:
+            kept[-1] = kept[-1][0], int(lines[end - 1])
+        else:
+            kept.append((int(lines[begin]), int(lines[end - 1])))
+    return tuple(kept) or tuple(place)
 
 
 class Stretches:
@@ -359,4 +386,5 @@ __all__ = [
     "overlap",
     "read_text_of",
     "tool_of",
+    "trimmed",
 ]

@@ -225,6 +225,11 @@ class ProgramWalk:
                     batch.end[rows[-1]],
                 )
 
+    def feed_lines(self) -> Indices:
+        """(n,) lines of the program, in order, that move the machine at feed."""
+        lines = [batch.moves.line[batch.index[~batch.rapid]] for batch in self._batches()]
+        return np.unique(np.concatenate([np.empty(0, np.int64), *lines]))
+
     def _batches(self) -> Iterator[_Batch]:
         """The program's moves in batches. Raises `RequestError`."""
         last_end, last_stretch = np.full_like(self._start, np.nan), -1

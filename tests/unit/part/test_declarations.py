@@ -355,3 +355,35 @@ def test_what_the_program_does_not_say_is_given(read: Read) -> None:
 def test_a_comment_of_another_meaning_says_nothing(read: Read) -> None:
     program = PROGRAM.replace("N110", "(features of datum wall) (datum surface)\nN110")
     assert len(read(wall("lines = 14"), program).features) == 1
+
+
+def test_comments_that_stand_together_hold_for_the_same_moves(read: Read) -> None:
+    program = PROGRAM.replace(
+        "N110",
+        "(datum: A)\n\n(the front)\n(feature: width, size 40 +-0.1)\nN110",
+    )
+    program = program.replace("N120", "(feature: right, straightness 0.1, datums A)\nN120")
+    program = program.replace("N130", "(feature: width)(feature: back, straightness 0.1)\nN130")
+    part = read(None, program.replace("N140", "(end feature)\nN140"))
+    width, right, back = (
+        next(feature for feature in part.features if feature.name == name)
+        for name in ("width", "right", "back")
+    )
+    np.testing.assert_array_equal(width.elements[0].place, right.datums[0].place)
+    np.testing.assert_array_equal(width.elements[1].place, back.elements[0].place)
+    assert set(right.elements[0].lines.tolist()) == {19}
+
+
+def test_places_are_one_that_hold_the_same_moves(read: Read) -> None:
+    """Of the file and of comments, with other lines about them that move nothing."""
+    program = PROGRAM.replace("N110", "(feature: w, size 40 +-0.1)\nN110")
+    program = program.replace("N120", "G4 P1\n(end feature)\nN120")
+    program = program.replace("N130", "(feature: w)\nN130").replace("N140", "(end feature)\nN140")
+    part = read(wall('lines = "14-15"') + '[[datum]]\nname = "A"\nn = "N110"\n', program)
+    width, straight = sorted(part.features, key=_name)
+    (datum,) = (element for element in part.elements if element.name == "A")
+    for element in (*straight.elements, *width.elements[:1]):
+        assert set(element.lines.tolist()) == {14}
+        np.testing.assert_array_equal(element.place, datum.place)
+    (problem,) = read.problems(wall('lines = "14-18"'), program)
+    assert (problem.code, problem.found) == ("part-shared", "line 14 in both")

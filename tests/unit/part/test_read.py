@@ -56,13 +56,16 @@ def test_the_comments_of_the_page_are_a_part(tmp_path: Path) -> None:
     program = tmp_path / "part.ngc"
     program.write_text(f"G21 G17 G90 G94 F900\nG0 X-50 Y-50 Z10\n{comments}M2\n")
     part = read_part(tp.load(MACHINES / "linear_delta.toml"), program)
-    assert [(feature.kind, feature.name) for feature in part.features] == [
-        ("size", "width"),
-        ("parallelism", "back"),
-        ("circle", "hole"),
-    ]
-    assert part.features[0].quantities[0].upper == pytest.approx(0.1001, rel=1e-12)
-    assert [datum.name for datum in part.features[1].datums] == ["A"]
+    found = {feature.name: feature for feature in part.features}
+    assert {name: feature.kind for name, feature in found.items()} == {
+        "depth": "size",
+        "width": "size",
+        "corner": "perpendicularity",
+        "hole": "circle",
+    }
+    assert found["width"].quantities[0].upper == pytest.approx(0.1001, rel=1e-12)
+    (datum,) = found["corner"].datums
+    np.testing.assert_array_equal(datum.place, found["depth"].elements[0].place)
 
 
 def test_the_page_has_every_key() -> None:

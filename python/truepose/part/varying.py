@@ -170,7 +170,8 @@ class Varying:
         slopes = effects[chosen].transpose(1, 0, 2)
         factors, matrices = self._product(rows, chosen, slopes)
         matrix = np.concatenate(matrices, axis=2)
-        errors = np.concatenate(factors, axis=1) @ matrix.reshape(-1, matrix.shape[2]).T
+        count, columns = slopes.shape[0] * slopes.shape[1], matrix.shape[2]
+        errors = np.concatenate(factors, axis=1) @ matrix.reshape(count, columns).T
         errors = errors.reshape(len(rows), *slopes.shape[:2])
         errors += value[chosen].T
         for number, law in zip(self._phased.tolist(), self._laws, strict=True):

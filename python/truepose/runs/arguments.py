@@ -201,6 +201,7 @@ KINDS: dict[str, Kind] = {
     "str | None": _or_none(_TEXT),
     "Criterion": _TEXT,
     "Literal['random', 'sobol']": _TEXT,
+    "Rule": _TEXT,
     "bool": _FLAG,
     "bool | None": _or_none(_FLAG),
     "int": _WHOLE,

@@ -101,7 +101,7 @@ class _Writing:
         self._machine, self._witness = machine, witness
         self._path, self._temporary = path, temporary
         self._causes_stay = causes_stay
-        self._text = MachineText(original, machine, _changed(original, machine))
+        self._text = MachineText(original, machine, file_changed(original, machine))
         # One machine has joint centres, which need not be those of any family.
         self._text.write_rows_for_family()
         self._edits = OneValues(self._text, machine, witness.by_source)
@@ -299,7 +299,8 @@ def _known(draft: Machine) -> dict[str, Floats]:
     return by_source
 
 
-def _changed(original: Path, machine: Machine) -> RequestError:
+def file_changed(original: Path, machine: Machine) -> RequestError:
+    """That the machine file is another one by now (machine-file-changed)."""
     return RequestError(
         Problem(
             "machine-file-changed",
@@ -325,4 +326,4 @@ def _not_written(path: Path, why: str) -> RequestError:
     )
 
 
-__all__ = ["write_witness"]
+__all__ = ["file_changed", "write_witness"]

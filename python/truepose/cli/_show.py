@@ -108,6 +108,18 @@ def show_answers(machine: Machine, answers: Sequence[Answer]) -> None:
         _print([lines, Text()])
 
 
+def show_lines(lines: Iterable[tuple[str, str, str]]) -> None:
+    """Print answers, each its word, the word's colour, and what it says."""
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    grid = RichTable.grid(padding=(0, 2))
+    for word, colour, text in lines:
+        grid.add_row(Text(word, f"bold {colour}"), Text(text))
+    if grid.row_count:
+        _print([grid, Text()])
+
+
 def _rich(table: Table) -> RichTable:
     from rich import box
     from rich.table import Table as RichTable

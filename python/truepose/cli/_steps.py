@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -265,8 +266,13 @@ def exit_code(request: Request, met: bool | None) -> int:
 
 def report_page() -> ModuleType:
     """The module that draws the page. Raises `RequestError` (extra-missing) without plotly."""
+    return with_report_packages("truepose.reporting.page")
+
+
+def with_report_packages(module: str) -> ModuleType:
+    """A module that draws. Raises `RequestError` (extra-missing) without plotly."""
     try:
-        from truepose.reporting import page
+        return import_module(module)
     except ImportError as failure:
         if failure.name is None or failure.name.startswith("truepose"):
             raise
@@ -279,7 +285,6 @@ def report_page() -> ModuleType:
                 hint="pip install 'truepose[report]'",
             )
         ) from failure
-    return page
 
 
 def note_written(*paths: Path | None) -> None:

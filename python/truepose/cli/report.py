@@ -40,6 +40,19 @@ from truepose.cli._verbose import verbose_option
         help="Measurements of the machine: the page then begins with a calibration, with the "
         "defaults of `truepose calibrate`.",
     ),
+    click.option(
+        "--part",
+        metavar="PART.ngc",
+        type=InputFile(".ngc"),
+        help="A program: the page also has what the machine makes of its part, with the defaults "
+        "of `truepose part`.",
+    ),
+    click.option(
+        "--features",
+        metavar="FILE.toml",
+        type=InputFile(".toml"),
+        help="Features of the part. Default: what comments of the program say.",
+    ),
     strict_option,
     accuracy_option,
     verbose_option,
@@ -64,19 +77,29 @@ def command(**options: Any) -> int:
         file = options["machine_file"]
         options["output"] = Path("report.html" if is_stdin(file) else file.stem + ".html")
     measurements: Path | None = options.pop("measurements")
+    program: Path | None = options.pop("part")
+    features: Path | None = options.pop("features")
+    if features is not None and program is None:
+        raise click.UsageError("--features goes with --part.")
     request = Request(**options)
     assert request.output is not None
     page = _steps.report_page()
-    if measurements is not None:
-        require_writable(request.output, [".html"], [request.machine_file, measurements])
+    beside = [path for path in (measurements, program, features) if path is not None]
+    if beside:
+        require_writable(request.output, [".html"], [request.machine_file, *beside])
     machine = _steps.read_machine(request, [".html"])
     study = _steps.with_time(_steps.study_of(request, machine))
     study = _uncertainty.with_how_sure(_steps.with_strain(request, study))
     study = _steps.with_calibration(study, measurements)
+    part = None
+    if program is not None:
+        from truepose.cli import _part
+
+        part = _part.shown_on_page(machine, program, features)
     text = _steps.machine_text(request)
     say_result(study.budget)
     with step(f"{request.output} written"):
-        page.write(study, request.output, text)
+        page.write(study, request.output, text, part)
     show_answers(machine, study.accuracy)
     shown = [
         tables.ranking(study),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 
@@ -15,6 +18,10 @@ from truepose.reporting.accuracy import gains, told, where_answered
 from truepose.reporting.figures import DrawnFigure, draw
 from truepose.reporting.figures._json import as_json
 from truepose.reporting.study import Study
+from truepose.reporting.table import Table
+
+if TYPE_CHECKING:
+    from truepose.reporting.part import Line
 
 LIMITS = (
     "These results hold for the sources found in the machine file and for the poses evaluated, "
@@ -39,20 +46,28 @@ def _folder_of_plotly() -> Path:
 
 # Looked for at once, so that a report without it is refused before it is worked out.
 PLOTLY = _folder_of_plotly()
+
+
+@dataclass(frozen=True)
+class PartShown:
+    """A part on a page: its program's name, what is told first, whose fault, figures, tables."""
+
+    program: str
+    lines: Sequence[Line]
+    blame: Sequence[Table]
+    figures: Sequence[DrawnFigure]
+    tables: Sequence[Table]
+    process: str
+
+
 FIGURE_SETTINGS = {"displaylogo": False, "responsive": True, "displayModeBar": "hover"}
 
 
-def render(study: Study, machine_text: str = "") -> str:
-    """The page as text. `machine_text` is the machine file, shown as it was read."""
-    environment = jinja2.Environment(
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        loader=jinja2.FunctionLoader(_resource),
-    )
-    environment.filters["capitalise"] = sentence
-    environment.filters["as_json"] = as_json
+def render(study: Study, machine_text: str = "", part: PartShown | None = None) -> str:
+    """The page as text. `machine_text` is the machine file, shown as it was read.
+
+    `part`: what the machine makes of a program, where one is given.
+    """
     results = [tables.ranking(study), tables.highest_absolute(study), tables.highest_percent(study)]
     if study.compensation is not None:
         results.append(tables.compensation(study))
@@ -63,7 +78,7 @@ def render(study: Study, machine_text: str = "") -> str:
     if left_out is not None:
         results.append(left_out)
     drawn = list(draw(study))
-    return environment.get_template("page.html.jinja").render(
+    return template("page.html.jinja").render(
         study=study,
         machine=study.machine,
         attrs=study.budget.attrs,
@@ -85,12 +100,34 @@ def render(study: Study, machine_text: str = "") -> str:
         ],
         parameters=inputs.parameters(study.machine),
         machine_text=machine_text,
+        part=part,
         limits=LIMITS,
-        css=_resource("page.css"),
-        plotly_js=_of_plotly("plotly.min.js"),
-        figure_template=_of_plotly("templates", "plotly_white.json"),
-        figure_settings=FIGURE_SETTINGS,
+        **page_parts(),
     )
+
+
+def template(name: str) -> jinja2.Template:
+    """A template of a page, with the filters that its figures need."""
+    environment = jinja2.Environment(
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        loader=jinja2.FunctionLoader(_resource),
+    )
+    environment.filters["capitalise"] = sentence
+    environment.filters["as_json"] = as_json
+    return environment.get_template(name)
+
+
+def page_parts() -> dict[str, Any]:
+    """What the head of every page has: style, plotly and its settings."""
+    return {
+        "css": _resource("page.css"),
+        "plotly_js": _of_plotly("plotly.min.js"),
+        "figure_template": _of_plotly("templates", "plotly_white.json"),
+        "figure_settings": FIGURE_SETTINGS,
+    }
 
 
 def _of_calibration(drawn: DrawnFigure) -> bool:
@@ -98,9 +135,9 @@ def _of_calibration(drawn: DrawnFigure) -> bool:
     return drawn.needs == "calibration"
 
 
-def write(study: Study, path: Path, machine_text: str = "") -> None:
+def write(study: Study, path: Path, machine_text: str = "", part: PartShown | None = None) -> None:
     """Write the page to `path`, whole or not at all."""
-    text = render(study, machine_text)
+    text = render(study, machine_text, part)
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

@@ -1,0 +1,295 @@
+"""Tables of a part, and its sheet as CSV: what every feature will be, against its limits."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from truepose.files.dimensions import BY_UNIT
+from truepose.machine import Machine
+from truepose.part.advice import Advice, advice, culprits
+from truepose.part.evaluation import (
+    MET,
+    NOT_MET,
+    UNDECIDED,
+    Answer,
+    Characteristic,
+    Evaluation,
+    StateAnswers,
+)
+from truepose.part.result import attributes
+from truepose.reporting.table import Table
+from truepose.sources import not_included_text
+from truepose.verdict.states import BEFORE
+
+PROCESS = (
+    "What the process adds (cutter, deflection of the tool, extrusion, clamping, wear) is not in "
+    "it."
+)
+"""Stands on every page about a part."""
+
+LEAST = 0.05
+"""Of the small unit: what is shown as 0.0 and not named."""
+
+NAMED = 3
+"""Sources that are named."""
+
+
+def tables(evaluation: Evaluation) -> Iterator[Table]:
+    """A table a state, then, but of one machine alone, who is to blame and what would mend it."""
+    for answers in evaluation.states:
+        yield _state(evaluation, answers)
+    if evaluation.of_bands:
+        yield _blame(evaluation)
+
+
+@dataclass(frozen=True)
+class Line:
+    """An answer in a line: its word, which colour that has (`met`, `missed`, `open`), its text."""
+
+    word: str
+    colour: str
+    text: str
+
+
+def summary(evaluation: Evaluation) -> list[Line]:
+    """What a person is told first: how many quantities are good, and which are not."""
+    lines = []
+    for answers in evaluation.states:
+        told = list(zip(evaluation.characteristics, answers.answers, strict=True))
+        missed = [of.label for of, answer in told if answer.verdict == NOT_MET]
+        unsure = [of.label for of, answer in told if answer.verdict == UNDECIDED]
+        word, colour = (
+            (NOT_MET, "missed") if missed else (UNDECIDED, "open") if unsure else (MET, "met")
+        )
+        text = f"{answers.state.name}: {len(told) - len(missed) - len(unsure)} of {len(told)} "
+        text += "quantities certainly within tolerance"
+        text += f"; NOT met: {', '.join(missed)}" if missed else ""
+        text += f"; undecided: {', '.join(unsure)}" if unsure else ""
+        of, answer = max(told, key=lambda one: one[1].out)
+        if answer.out > 0.0:
+            text += f". Most often out: {of.label}, of {100.0 * answer.out:.3g} % of the machines"
+        lines.append(Line(word, colour, text))
+    return lines
+
+
+def _state(evaluation: Evaluation, answers: StateAnswers) -> Table:
+    rows = tuple(
+        _row(evaluation.machine, of, answer)
+        for of, answer in zip(evaluation.characteristics, answers.answers, strict=True)
+    )
+    header = (
+        "feature",
+        "quantity",
+        "nominal",
+        "limits",
+        "in",
+        "known",
+        f"{100.0 * evaluation.probability:g} % interval",
+        "u",
+        "reached",
+        "no machine beyond",
+        "out",
+        "verdict",
+    )
+    walked = evaluation.walked
+    small = evaluation.machine.shown.small_length
+    note = (
+        f"{evaluation.samples:,} machines, seed {evaluation.seed}, each goes to every point; "
+        f"alignment: {evaluation.alignment.kind}. Deviations from nominal, of a form its value. "
+        f"Along the path the known error is at most {small.text(walked.largest)} "
+        f"(line {walked.largest_line}). {PROCESS}"
+    )
+    missing = not_included_text(evaluation.machine, evaluation.condition)
+    if missing:
+        note += f" Not included: {missing}."
+    return Table(
+        f"part {answers.state.name}", f"The part {answers.state.name}", header, rows, 2, note
+    )
+
+
+def _row(machine: Machine, of: Characteristic, answer: Answer) -> tuple[str, ...]:
+    quantity = of.quantity
+    large, small = machine.shown.of(quantity.si), machine.shown.small(quantity.si)
+
+    def off(value: float) -> str:
+        if not math.isfinite(value):
+            return "no limit" if math.isinf(value) else "none"
+        scaled = round((value - quantity.nominal) * small.per_si, 1) + 0.0
+        return f"{scaled:{'' if quantity.is_form else '+'}.1f}"
+
+    def ends(low: float, high: float) -> str:
+        return f"{off(high)}" if quantity.is_form else f"{off(low)} .. {off(high)}"
+
+    nominal = "" if quantity.is_form else f"{quantity.nominal * large.per_si:.10g} {large.label}"
+    above = ends(answer.above.lower, answer.above.upper)
+    return (
+        of.feature.name,
+        quantity.name,
+        nominal,
+        ends(quantity.lower, quantity.upper),
+        small.label,
+        off(answer.known),
+        ends(*answer.interval),
+        "not stated" if quantity.is_form else f"{answer.uncertainty * small.per_si:.1f}",
+        ends(answer.search.lower.value, answer.search.upper.value),
+        above if answer.above.proven else f"{above} (not proven)",
+        f"{100.0 * answer.out:.3g} %",
+        answer.verdict,
+    )
+
+
+def _blame(evaluation: Evaluation) -> Table:
+    rows = []
+    before = next(one for one in evaluation.states if one.state.name == BEFORE)
+    for at, of in enumerate(evaluation.characteristics):
+        small = evaluation.machine.shown.small(of.quantity.si)
+        named = [
+            f"{one.source} {_adds(one.known * small.per_si, one.half * small.per_si)}"
+            + (f" (most: {one.first})" if one.first else "")
+            for one in culprits(before, at)[:NAMED]
+            if (abs(one.known) + one.half) * small.per_si >= LEAST
+        ]
+        rows.append(
+            (
+                of.label,
+                f"{', '.join(named)} {small.label}".strip(),
+                _mends(evaluation, advice(evaluation, at)),
+            )
+        )
+    note = (
+        "Each source alone: what it is known to add as commanded, and half the 95 % interval of "
+        "what it leaves unknown, with the variable that does most of it."
+    )
+    return Table(
+        "blame",
+        "Who is to blame, and what would mend it",
+        ("characteristic", "sources", "what would mend it"),
+        tuple(rows),
+        3,
+        note,
+    )
+
+
+def _adds(known: float, half: float) -> str:
+    known = round(known, 1)
+    return f"{known:+.1f} ± {half:.1f}" if known else f"± {half:.1f}"
+
+
+def _mends(evaluation: Evaluation, found: Advice | None) -> str:
+    if found is None:
+        return "nothing to mend"
+    if found.compensation:
+        return "compensation: truepose gcode corrects the program"
+    if not found.source:
+        return "no source's bands alone: compensate, then tighten several, or ask for less"
+    also = "" if found.state == BEFORE else " and compensation"
+    return f"bands of {found.source} at {100.0 * found.narrowed:.3g} % of what they are{also}"
+
+
+SHEET = (
+    "number",
+    "feature",
+    "quantity",
+    "state",
+    "nominal",
+    "lower_limit",
+    "upper_limit",
+    "unit",
+    "known",
+    "standard_uncertainty",
+    "interval_lower",
+    "interval_upper",
+    "reached_lower",
+    "reached_upper",
+    "bound_lower",
+    "bound_upper",
+    "proven",
+    "probability_out",
+    "verdict",
+    "why",
+    "operator",
+    "filter",
+    "mend",
+)
+"""Columns of the sheet, as a first-article report has a row for each characteristic."""
+
+
+def sheet(evaluation: Evaluation) -> list[dict[str, Any]]:
+    """A row for each characteristic and state, in the units of the machine file."""
+    rows = []
+    for answers in evaluation.states:
+        for at, (of, answer) in enumerate(
+            zip(evaluation.characteristics, answers.answers, strict=True)
+        ):
+            rows.append(_sheet_row(evaluation, answers, at, of, answer))
+    return rows
+
+
+def _sheet_row(
+    evaluation: Evaluation, answers: StateAnswers, at: int, of: Characteristic, answer: Answer
+) -> dict[str, Any]:
+    quantity = of.quantity
+    unit = evaluation.machine.file_units[BY_UNIT[quantity.si]]
+
+    def told(value: float) -> float | None:
+        return float(unit.to_file(value)) if math.isfinite(value) else None
+
+    return {
+        "number": at + 1,
+        "feature": of.feature.name,
+        "quantity": quantity.name,
+        "state": answers.state.name,
+        "nominal": told(quantity.nominal),
+        "lower_limit": told(quantity.lower),
+        "upper_limit": told(quantity.upper),
+        "unit": unit.label,
+        "known": told(answer.known),
+        "standard_uncertainty": None if quantity.is_form else told(answer.uncertainty),
+        "interval_lower": told(answer.interval[0]),
+        "interval_upper": told(answer.interval[1]),
+        "reached_lower": told(answer.search.lower.value),
+        "reached_upper": told(answer.search.upper.value),
+        "bound_lower": told(answer.above.lower),
+        "bound_upper": told(answer.above.upper),
+        "proven": answer.above.proven,
+        "probability_out": answer.out,
+        "verdict": answer.verdict,
+        "why": answer.why,
+        "operator": quantity.operator,
+        "filter": quantity.filter,
+        "mend": _mends(evaluation, advice(evaluation, at)) if evaluation.of_bands else "",
+    }
+
+
+def csv_text(evaluation: Evaluation) -> str:
+    """The sheet as CSV; empty cells where there is no number."""
+    buffer = io.StringIO()
+    writer = csv.DictWriter(buffer, SHEET, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(sheet(evaluation))
+    return buffer.getvalue()
+
+
+def json_text(evaluation: Evaluation) -> str:
+    """The sheet and what it rests on as JSON."""
+    return json.dumps(
+        {
+            "command": "part",
+            "attributes": attributes(evaluation),
+            "process": PROCESS,
+            "characteristics": sheet(evaluation),
+        },
+        indent=1,
+        ensure_ascii=False,
+        allow_nan=False,
+        default=str,
+    )
+
+
+__all__ = ["PROCESS", "csv_text", "json_text", "sheet", "summary", "tables"]

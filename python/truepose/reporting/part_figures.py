@@ -1,0 +1,267 @@
+"""The pictures of a part: its path with the errors on it, and a strip for every quantity."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from truepose.arrays import Floats
+from truepose.machine import Machine
+from truepose.part.along import PathErrors
+from truepose.part.evaluation import Answer, Evaluation
+from truepose.reporting.figures import DrawnFigure
+from truepose.reporting.figures._plot import Keys, Plot, grid, trace
+from truepose.reporting.figures._style import (
+    AFTER,
+    AXIS,
+    BEFORE,
+    COLOUR_SCALE,
+    GRID,
+    INK,
+    finish,
+    small,
+)
+from truepose.reporting.figures._text import as_text
+
+MOST_POINTS = 6000
+"""Points of the path that are drawn; of a longer one every second is left out, again and again."""
+
+SHARE = 0.06
+"""Of the part's size: how long the largest error is drawn."""
+
+WIDTH = 1.25
+"""Of a tolerance zone: what a strip shows at least."""
+
+STRIP = 74
+"""Pixels of a strip."""
+
+
+@dataclass
+class DrawnPath:
+    """Points of the path to be drawn, gathered as it is walked: a `Sink`.
+
+    Memory is bounded: where there are too many, every second one goes.
+    """
+
+    machine: Machine
+    wants_half: bool = True
+    points: list[Floats] = field(default_factory=list)
+    _step: int = 1
+    _seen: int = 0
+    _kept: int = 0
+
+    def add(self, errors: PathErrors) -> None:
+        """The next points, of the feeds."""
+        assert errors.half is not None
+        numbers = self._seen + np.arange(len(errors.half))
+        self._seen += len(errors.half)
+        chosen = (numbers % self._step == 0) & errors.batch.is_feed
+        rows = np.column_stack(
+            [errors.points, errors.known, errors.half, errors.batch.line.astype(np.float64)]
+        )[chosen]
+        self.points.append(rows)
+        self._kept += len(rows)
+        while self._kept > MOST_POINTS:
+            self.points = [np.concatenate(self.points)[::2]]
+            self._kept = len(self.points[0])
+            self._step *= 2
+
+    @property
+    def rows(self) -> Floats:
+        """(k, 8): point, known error, half width, m, and the line."""
+        return np.concatenate(self.points) if self.points else np.empty((0, 8))
+
+
+def figures(evaluation: Evaluation, path: DrawnPath) -> list[DrawnFigure]:
+    """The path, then the strips."""
+    drawn = [DrawnFigure("strips", "Every quantity in its zone", _STRIPS, _strips(evaluation))]
+    if len(path.rows):
+        figure, caption = _path(evaluation, path.rows)
+        drawn.append(DrawnFigure("path", "The path and the errors on it", caption, figure))
+    return [DrawnFigure(one.name, one.title, one.caption, as_text(one.figure)) for one in drawn]
+
+
+_STRIPS = (
+    "Grey: the tolerance zone of the drawing. Red as commanded, green after compensation: the dot "
+    "is the known value, the thick bar the coverage interval, the thin line what machines inside "
+    "the bands reach, the ends of the dotted line what none goes beyond, where that is proven."
+)
+
+
+def _strips(evaluation: Evaluation) -> Plot:
+    characteristics = evaluation.characteristics
+    count = len(characteristics)
+    figure = grid(count, 1, vertical_spacing=0.42 / count)
+    for row, of in enumerate(characteristics, start=1):
+        small_unit = evaluation.machine.shown.small(of.quantity.si)
+        scale, nominal = small_unit.per_si, of.quantity.nominal
+        low, high = (
+            (end - nominal) * scale if math.isfinite(end) else None
+            for end in (of.quantity.lower, of.quantity.upper)
+        )
+        reach = [abs(end) for end in (low, high) if end is not None]
+        for place, answers in enumerate(evaluation.states):
+            answer = answers.answers[row - 1]
+            colour = (BEFORE, AFTER)[place]
+            for line in _marks(answer, nominal, scale, 0.28 - 0.56 * place, colour):
+                finite = [abs(x) for x in line["x"] if math.isfinite(x)]
+                reach += finite
+                figure.add_trace(
+                    trace(
+                        "scatter",
+                        showlegend=row == 1 and line.pop("leads"),
+                        name=answers.state.name,
+                        legendgroup=answers.state.name,
+                        hovertemplate=f"{of.label}: %{{x:.2f}} {small_unit.label}",
+                        **line,
+                    ),
+                    row,
+                    1,
+                )
+        most = WIDTH * max(reach, default=1.0) or 1.0
+        figure.add_vrect(
+            -most if low is None else low,
+            most if high is None else high,
+            row,
+            1,
+            fillcolor="#DDE3EC",
+            line={"width": 0},
+            layer="below",
+        )
+        least = -0.05 * most if of.quantity.is_form else -most
+        figure.update_xaxes(
+            row, 1, range=[least, most], title={"text": ""}, ticksuffix=f" {small_unit.label}"
+        )
+        figure.update_yaxes(
+            row,
+            1,
+            range=[-0.75, 0.75],
+            tickvals=[0.0],
+            ticktext=[f"{of.label}: {_words(evaluation, row - 1)}"],
+            showgrid=False,
+        )
+    # The last x axis says what is shown.
+    figure.update_xaxes(count, 1, title={"text": "deviation from nominal; of a form its value"})
+    return finish(figure, STRIP * count + 150, margin={"l": 330, "r": 30, "t": 50, "b": 60})
+
+
+def _words(evaluation: Evaluation, at: int) -> str:
+    words = [one.answers[at].verdict for one in evaluation.states]
+    return words[0] if len(set(words)) == 1 else " → ".join(words)
+
+
+def _marks(answer: Answer, nominal: float, scale: float, y: float, colour: str) -> list[Keys]:
+    """Lines and a dot of one state of a strip."""
+
+    def at(*values: float) -> list[float]:
+        return [(value - nominal) * scale for value in values]
+
+    marks: list[Keys] = []
+    if answer.above.proven:
+        marks.append(
+            {
+                "x": at(answer.above.lower, answer.above.upper),
+                "mode": "lines+markers",
+                "line": {"color": colour, "width": 1, "dash": "dot"},
+                "marker": {"color": colour, "size": 8, "symbol": "line-ns-open"},
+            }
+        )
+    marks += [
+        {
+            "x": at(answer.search.lower.value, answer.search.upper.value),
+            "mode": "lines",
+            "line": {"color": colour, "width": 2},
+        },
+        {"x": at(*answer.interval), "mode": "lines", "line": {"color": colour, "width": 7}},
+        {
+            "x": at(answer.known),
+            "mode": "markers",
+            "marker": {"color": "white", "size": 9, "line": {"color": colour, "width": 2}},
+        },
+    ]
+    return [
+        mark | {"y": [y] * len(mark["x"]), "leads": place == len(marks) - 2}
+        for place, mark in enumerate(marks)
+    ]
+
+
+def _path(evaluation: Evaluation, rows: Floats) -> tuple[Plot, str]:
+    machine = evaluation.machine
+    length, unit = machine.shown.length, machine.shown.small_length
+    points, known, half = rows[:, :3], rows[:, 3:6], rows[:, 6]
+    sizes = np.linalg.norm(known, axis=1)
+    part = float(np.ptp(points, axis=0).max()) or 1.0
+    most = float(sizes.max())
+    factor = _round(SHARE * part / most) if most > 0.0 else 1.0
+    moved = points + factor * known
+    planar = "z" not in machine.dof
+    figure = Plot()
+    text = [
+        f"line {line:.0f}<br>known {size:.2f} {unit.label}<br>95 % ± {wide:.2f} {unit.label}"
+        for line, size, wide in zip(
+            rows[:, 7], sizes * unit.per_si, half * unit.per_si, strict=True
+        )
+    ]
+    common = {"text": text, "hoverinfo": "text", "mode": "markers"}
+    bar = {"thickness": 14, "len": 0.75}
+    for place, line, name in (
+        (points, None, "programmed"),
+        (moved, (sizes, f"known error, {unit.label}"), f"actual, error × {factor:g}"),
+        (points, (half, f"95 % half width, {unit.label}"), "95 % half width"),
+    ):
+        marker: Keys = {"size": 3 if not planar else 4, "color": AXIS}
+        if line is not None:
+            marker |= {
+                "color": small(line[0] * unit.per_si),
+                "colorscale": COLOUR_SCALE,
+                "colorbar": bar | {"title": {"text": line[1], "side": "right"}},
+                "showscale": True,
+            }
+        figure.add_trace(
+            _spatial(planar, place * length.per_si, name=name, marker=marker, **common)
+        )
+    shown = {"visible": [True, True, False]}, {"visible": [True, False, True]}
+    figure.data[2]["visible"] = False
+    buttons = [
+        {"label": label, "method": "update", "args": [states]}
+        for label, states in zip(("known error", "95 % half width"), shown, strict=True)
+    ]
+    menu = {"buttons": buttons, "x": 0.0, "xanchor": "left", "y": 1.06, "yanchor": "bottom"}
+    caption = (
+        f"The programmed path in grey; beside it where the tool is known to go, the error drawn "
+        f"{factor:g} times as large, coloured by its size. The other view colours the path by half "
+        f"the 95 % interval of the position, to first order. {len(rows):,} of the path's points."
+    )
+    finish(figure, 640, margin={"l": 10, "r": 10, "t": 90, "b": 20}, updatemenus=[menu])
+    if planar:
+        figure.update_xaxes(title={"text": f"x, {length.label}"})
+        figure.update_yaxes(title={"text": f"y, {length.label}"}, scaleanchor="x", scaleratio=1)
+    else:
+        axis = {"gridcolor": GRID, "color": INK}
+        figure.update_layout(
+            scene={
+                "aspectmode": "data",
+                **{f"{a}axis": {"title": {"text": f"{a}, {length.label}"}, **axis} for a in "xyz"},
+                "camera": {"eye": {"x": 1.3, "y": -1.5, "z": 1.3}},
+            }
+        )
+    return figure, caption
+
+
+def _spatial(planar: bool, points: Floats, **look: Any) -> Keys:
+    x, y, z = small(points).T
+    if planar:
+        return trace("scatter", x=x, y=y, **look)
+    return trace("scatter3d", x=x, y=y, z=z, **look)
+
+
+def _round(value: float) -> float:
+    """One significant digit of 1, 2 or 5."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(step * power for step in (1.0, 2.0, 5.0) if step * power <= value)
+
+
+__all__ = ["DrawnPath", "figures"]

@@ -1,0 +1,36 @@
+"""The page of a part: one HTML file with everything in it, which opens without any network."""
+
+from __future__ import annotations
+
+from truepose.part.evaluation import Evaluation
+from truepose.part.result import attributes
+from truepose.reporting import part
+from truepose.reporting.page import PartShown, page_parts, template
+from truepose.reporting.part_figures import DrawnPath, figures
+
+
+def shown(evaluation: Evaluation, path: DrawnPath, program: str) -> PartShown:
+    """The part as any page shows it; `path` has looked on while the program was walked."""
+    tables = list(part.tables(evaluation))
+    count = len(evaluation.states)
+    return PartShown(
+        program,
+        part.summary(evaluation),
+        tables[count:],
+        figures(evaluation, path),
+        tables[:count],
+        part.PROCESS,
+    )
+
+
+def html(evaluation: Evaluation, path: DrawnPath, program: str) -> str:
+    """The page as text."""
+    return template("part_page.html.jinja").render(
+        part=shown(evaluation, path, program),
+        machine=evaluation.machine,
+        attrs=attributes(evaluation),
+        **page_parts(),
+    )
+
+
+__all__ = ["DrawnPath", "html", "shown"]

@@ -17,7 +17,7 @@ from truepose.cli._verbose import say, say_file
 from truepose.errors import Problem, RequestError
 from truepose.files.writing import replacing, require_writable, written_together
 from truepose.part.along_file import read_along
-from truepose.part.evaluation import NOT_MET, Evaluation
+from truepose.part.evaluation import NOT_MET, PartEvaluation
 from truepose.part.part import evaluate_part
 from truepose.part.points_file import PointsFile
 from truepose.part.read import read_part
@@ -143,7 +143,7 @@ def _page() -> Any:
     return with_report_packages("truepose.reporting.part_page")
 
 
-def _write(evaluation: Evaluation, output: Path) -> None:
+def _write(evaluation: PartEvaluation, output: Path) -> None:
     form = output.suffix.lower()
     with replacing(output) as temporary:
         if form == ".nc":
@@ -157,7 +157,7 @@ def _write(evaluation: Evaluation, output: Path) -> None:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _show(evaluation: Evaluation, form: str) -> None:
+def _show(evaluation: PartEvaluation, form: str) -> None:
     if form == "csv":
         sys.stdout.write(shown.csv_text(evaluation))
     elif form == "json":
@@ -168,7 +168,7 @@ def _show(evaluation: Evaluation, form: str) -> None:
         show_tables(shown.tables(evaluation))
 
 
-def _no_witness(evaluation: Evaluation) -> RequestError:
+def _no_witness(evaluation: PartEvaluation) -> RequestError:
     words = [
         f"{of.label}: {answer.verdict}"
         for of, answer in zip(evaluation.characteristics, evaluation.before().answers, strict=True)

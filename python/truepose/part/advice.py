@@ -1,6 +1,6 @@
 """Who is to blame for a quantity that is out of tolerance, and what would mend it.
 
-Blame is each source alone: what it is known to add as commanded, and how far its unknown part
+SourceAlone is each source alone: what it is known to add as commanded, and how far its unknown part
 spreads the quantity. What mends it is looked for in this order: compensation; the one source whose
 bands, made narrower, bring the quantity within its limits with the least relative change; else
 nothing of one source alone, and what the best would leave.
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.part.evaluation import MET, Answer, Evaluation, StateAnswers
+from truepose.part.evaluation import MET, PartEvaluation, QuantityAnswer, StateAnswers
 from truepose.part.worst import Interval, from_above
 from truepose.verdict.states import AFTER, BEFORE
 
@@ -52,14 +52,14 @@ class Advice:
 
 def culprits(answers: StateAnswers, at: int) -> list[Culprit]:
     """The sources of characteristic number `at`, the one that does most first."""
-    found = [
+    listed = [
         Culprit(one.source, float(one.known[at]), float(one.half[at]), one.first[at])
         for one in answers.blame
     ]
-    return sorted(found, key=lambda one: -(abs(one.known) + one.half))
+    return sorted(listed, key=lambda one: -(abs(one.known) + one.half))
 
 
-def advice(evaluation: Evaluation, at: int) -> Advice | None:
+def advice(evaluation: PartEvaluation, at: int) -> Advice | None:
     """What mends characteristic number `at`; None where it is met as commanded."""
     states = {one.state.name: one for one in evaluation.states}
     before, after = states[BEFORE].answers[at], states[AFTER].answers[at]
@@ -79,7 +79,9 @@ def advice(evaluation: Evaluation, at: int) -> Advice | None:
     return best
 
 
-def _narrowed(evaluation: Evaluation, answers: StateAnswers, at: int, culprit: Culprit) -> float:
+def _narrowed(
+    evaluation: PartEvaluation, answers: StateAnswers, at: int, culprit: Culprit
+) -> float:
     """The largest share of a source's bands that is within the limits; 0 where none is."""
     if evaluation.rule == "iso-14253":
         return _narrowed_interval(evaluation, answers.answers[at], at, culprit)
@@ -89,7 +91,7 @@ def _narrowed(evaluation: Evaluation, answers: StateAnswers, at: int, culprit: C
 
     def fits(share: float) -> bool:
         scale = np.where(own, share, 1.0)
-        found: Interval = from_above(
+        ends: Interval = from_above(
             state,
             answers.bounds,
             evaluation.alignment,
@@ -97,7 +99,7 @@ def _narrowed(evaluation: Evaluation, answers: StateAnswers, at: int, culprit: C
             of.members,
             scale,
         )
-        return not (of.breaks(found.lower) or of.breaks(found.upper))
+        return not (of.breaks(ends.lower) or of.breaks(ends.upper))
 
     if not fits(0.0):
         return 0.0
@@ -108,7 +110,9 @@ def _narrowed(evaluation: Evaluation, answers: StateAnswers, at: int, culprit: C
     return low
 
 
-def _narrowed_interval(evaluation: Evaluation, answer: Answer, at: int, culprit: Culprit) -> float:
+def _narrowed_interval(
+    evaluation: PartEvaluation, answer: QuantityAnswer, at: int, culprit: Culprit
+) -> float:
     """The same of the coverage interval, whose half widths of the sources add as squares."""
     quantity = evaluation.characteristics[at].quantity
     low, high = answer.interval

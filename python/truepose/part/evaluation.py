@@ -15,7 +15,7 @@ from truepose.machine import Condition, Machine
 from truepose.part.alignment import Alignment
 from truepose.part.along import Walked
 from truepose.part.features import Feature, Forms, Quantity
-from truepose.part.samples import Sampled, sampled
+from truepose.part.samples import SampledParts, sampled
 from truepose.part.states import PartState, in_space
 from truepose.part.worst import Climb, Interval, PointBounds, Search, from_above
 from truepose.runs.displacement import displacement
@@ -65,7 +65,7 @@ class Characteristic:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class QuantityAnswer:
     """What is said of one characteristic in one state; lengths m, angles rad.
 
     `known`: at the sources' shifts; `uncertainty`: standard, NaN where it is `is_form` or nothing
@@ -84,7 +84,7 @@ class Answer:
 
 
 @dataclass(frozen=True, eq=False)
-class Blame:
+class SourceAlone:
     """Of one source alone, in one state: `known` (c,) what it adds to each characteristic's value.
 
     `half` (c,): half the 95 % interval that its unknown part makes alone; `first` (c,): the name of
@@ -103,13 +103,13 @@ class StateAnswers:
 
     state: PartState
     bounds: PointBounds
-    answers: tuple[Answer, ...]
-    sampled: Sampled
-    blame: tuple[Blame, ...]
+    answers: tuple[QuantityAnswer, ...]
+    sampled: SampledParts
+    blame: tuple[SourceAlone, ...]
     programmed: Floats = field(default_factory=lambda: np.empty(0))
 
 
-class Evaluation:
+class PartEvaluation:
     """The part of one program on one machine."""
 
     def __init__(
@@ -172,7 +172,7 @@ class Evaluation:
         self._done += self.samples
         bounds = PointBounds(state)
         programmed = self.values(state.points[np.newaxis])[0]
-        known = self.values((state.points + state.known)[np.newaxis])[0]
+        known = self.values((state.points + state.known_error)[np.newaxis])[0]
         answers = tuple(
             self._answer(state, bounds, at, float(known[at]), drawn)
             for at in range(len(self.characteristics))
@@ -180,8 +180,8 @@ class Evaluation:
         return StateAnswers(state, bounds, answers, drawn, self._blame(state, known), programmed)
 
     def _answer(
-        self, state: PartState, bounds: PointBounds, at: int, known: float, drawn: Sampled
-    ) -> Answer:
+        self, state: PartState, bounds: PointBounds, at: int, known: float, drawn: SampledParts
+    ) -> QuantityAnswer:
         of = self.characteristics[at]
         values = drawn.values[:, at]
         interval = self._interval(values, one_sided=of.quantity.is_form)
@@ -197,7 +197,7 @@ class Evaluation:
         )
         search = Climb(state, self.alignment, of.feature, of.number, of.parts, varying).search()
         verdict, why = self._verdict(of, interval, above, search, drawn)
-        return Answer(
+        return QuantityAnswer(
             known,
             math.nan if of.quantity.is_form else spread,
             interval,
@@ -223,7 +223,7 @@ class Evaluation:
         interval: tuple[float, float],
         above: Interval,
         search: Search,
-        drawn: Sampled,
+        drawn: SampledParts,
     ) -> tuple[str, str]:
         quantity = of.quantity
         if self.rule == "iso-14253":
@@ -243,7 +243,7 @@ class Evaluation:
             return UNDECIDED, above.why
         return UNDECIDED, "no machine was found that breaks a limit, nor a proof that none does"
 
-    def _blame(self, state: PartState, known: Floats) -> tuple[Blame, ...]:
+    def _blame(self, state: PartState, known: Floats) -> tuple[SourceAlone, ...]:
         """Each source alone: what it is known to do as commanded, and how far it spreads."""
         varying = state.varying(self.seed)
         rows = np.asarray(varying.rows(0, SOURCE_SAMPLES))
@@ -270,7 +270,7 @@ class Evaluation:
                 half = self._alone(state, rows, chosen)
                 most = np.where(chosen[:, np.newaxis], single, -1.0).argmax(axis=0)
                 first = tuple(state.variables.names[at] for at in most.tolist())
-            blamed.append(Blame(source.name, added, half, first))
+            blamed.append(SourceAlone(source.name, added, half, first))
         return tuple(blamed)
 
     def _single(self, state: PartState) -> Floats:
@@ -281,21 +281,21 @@ class Evaluation:
         if not state.variables.names:
             return np.empty((0, len(self.characteristics)))
         around = np.concatenate([sign * state.effects for sign in (1.0, -1.0)], axis=2)
-        errors = state.known + np.moveaxis(around, 2, 0)
-        known = self.values((state.points + state.known)[np.newaxis])
+        errors = state.known_error + np.moveaxis(around, 2, 0)
+        known = self.values((state.points + state.known_error)[np.newaxis])
         off = np.abs(self.values(state.points + errors) - known)
         return np.asarray(off.reshape(2, -1, off.shape[1]).max(axis=0))
 
     def _alone(self, state: PartState, rows: Floats, chosen: Flags) -> Floats:
         """(c,) half the 95 % interval where only the chosen variables are unknown."""
         varying = state.varying(self.seed)
-        found = []
+        parts = []
         at_once = max(1, (1 << 21) // max(1, state.points.size))
         for first in range(0, len(rows), at_once):
             part = rows[first : first + at_once]
             errors = state.linear_of(varying, part, first, chosen)
-            found.append(self.values(state.points + errors))
-        values = np.concatenate(found)
+            parts.append(self.values(state.points + errors))
+        values = np.concatenate(parts)
         high, low = np.quantile(values, [0.975, 0.025], axis=0)
         return np.asarray(0.5 * (high - low))
 
@@ -305,6 +305,6 @@ def places(feature: Feature) -> tuple[Indices, ...]:
     return tuple(element.place for element in [*feature.elements, *feature.datums])
 
 
-def by_state(evaluation: Evaluation) -> Mapping[str, StateAnswers]:
+def by_state(evaluation: PartEvaluation) -> Mapping[str, StateAnswers]:
     """The answers by the name of their state."""
     return {one.state.name: one for one in evaluation.states}

@@ -18,7 +18,7 @@ from truepose.part.alignment import Alignment
 from truepose.part.along import Sink, unusable_point, walk
 from truepose.part.along_file import fixed
 from truepose.part.datum_frame import datum_alignment
-from truepose.part.evaluation import Evaluation, Rule
+from truepose.part.evaluation import PartEvaluation, Rule
 from truepose.part.read import Part, read_part
 from truepose.part.states import PartState, part_states
 from truepose.runs.arguments import checked
@@ -121,7 +121,7 @@ def evaluate_part(
     along: Callable[[PartState], Floats] | None = None,
     sinks: Sequence[Sink] = (),
     progress: Progress | None = None,
-) -> Evaluation:
+) -> PartEvaluation:
     """The same before it is a Dataset; `sinks` look at the whole path as it is walked.
 
     `along`: what every variable of the state as commanded is at every point (n, n_variable), of
@@ -139,7 +139,7 @@ def evaluate_part(
     if along is not None:
         states = (fixed(states[0], along(states[0])),)
     alignment = _alignment(asked, states[0].points)
-    return Evaluation(
+    return PartEvaluation(
         machine,
         condition,
         sources,

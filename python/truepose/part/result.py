@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.part.evaluation import Answer, Characteristic, Evaluation
+from truepose.part.evaluation import Characteristic, PartEvaluation, QuantityAnswer
 from truepose.runs.dataset import (
     Schema,
     Variable,
@@ -67,12 +67,12 @@ _LABELS: tuple[tuple[str, Callable[[Characteristic], str], str], ...] = (
 )
 
 
-def dataset(evaluation: Evaluation) -> xr.Dataset:
+def dataset(evaluation: PartEvaluation) -> xr.Dataset:
     """The answers as labelled data."""
     characteristics, states = evaluation.characteristics, evaluation.states
     quantities = [one.quantity for one in characteristics]
 
-    def each(value: Callable[[Answer], float]) -> Floats:
+    def each(value: Callable[[QuantityAnswer], float]) -> Floats:
         return np.array([[value(answer) for answer in one.answers] for one in states])
 
     values = {
@@ -113,7 +113,7 @@ def dataset(evaluation: Evaluation) -> xr.Dataset:
     return labelled_dataset(data, coords, attributes(evaluation))
 
 
-def attributes(evaluation: Evaluation) -> dict[str, Any]:
+def attributes(evaluation: PartEvaluation) -> dict[str, Any]:
     """What the answers rest on: the machine, the condition, how it was drawn, the whole path."""
     return provenance(evaluation.machine, evaluation.condition) | {
         "seed": evaluation.seed,

@@ -1,4 +1,4 @@
-"""Sampled parts: the values of all quantities of parts that machines drawn at random make.
+"""SampledParts parts: the values of all quantities of parts that machines drawn at random make.
 
 A sample is one machine, that goes to every point of the part. Errors are to first order where that
 is enough: some samples are solved exactly too, and where a quantity differs between the two by more
@@ -35,7 +35,7 @@ Account = Callable[[int], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class SampledParts:
     """`values` (s, n_quantity), NaN of a machine that could not be assembled; `failed` of them.
 
     `exact`: every sample is solved exactly. `off` (n_quantity,): the most that first order was off
@@ -55,7 +55,7 @@ def sampled(
     seed: int,
     exact: bool | None = None,
     account: Account | None = None,
-) -> Sampled:
+) -> SampledParts:
     """Draw `samples` machines. `exact` None: to first order where that is enough."""
     varying = state.varying(seed)
     points = state.points
@@ -66,36 +66,36 @@ def sampled(
             errors += points
             return values(errors), np.ones(count, np.bool_)
         errors, good = state.exact_errors(varying, first, count)
-        found = np.full((count, _width(values, points)), np.nan)
+        quantities = np.full((count, _width(values, points)), np.nan)
         if good.any():
-            found[good] = values(points + errors[good])
-        return found, good
+            quantities[good] = values(points + errors[good])
+        return quantities, good
 
     def every(exactly: bool) -> tuple[Floats, int]:
         at_once = max(1, NUMBERS // max(1, points.size))
         rows, failed = [], 0
         for first in range(0, samples, at_once):
             count = min(at_once, samples - first)
-            found, good = part(first, count, exactly)
-            rows.append(found)
+            quantities, good = part(first, count, exactly)
+            rows.append(quantities)
             failed += int((~good).sum())
             if account is not None:
                 account(first + count)
         return np.concatenate(rows), failed
 
     if exact:
-        found, failed = every(True)
-        return Sampled(found, failed, True, np.zeros(found.shape[1]))
-    found, failed = every(False)
+        quantities, failed = every(True)
+        return SampledParts(quantities, failed, True, np.zeros(quantities.shape[1]))
+    quantities, failed = every(False)
     count = min(CHECKED, samples)
     both, good = part(0, count, True)
-    off = np.abs(both - found[:count])[good].max(axis=0, initial=0.0)
-    spread = 0.5 * (np.quantile(found, 0.975, axis=0) - np.quantile(found, 0.025, axis=0))
+    off = np.abs(both - quantities[:count])[good].max(axis=0, initial=0.0)
+    spread = 0.5 * (np.quantile(quantities, 0.975, axis=0) - np.quantile(quantities, 0.025, axis=0))
     enough = good.all() and (off <= ENOUGH * spread + NOTHING).all()
     if exact is False or enough:
-        return Sampled(found, failed, False, off)
-    found, failed = every(True)
-    return Sampled(found, failed, True, off)
+        return SampledParts(quantities, failed, False, off)
+    quantities, failed = every(True)
+    return SampledParts(quantities, failed, True, off)
 
 
 def _width(values: Values, points: Floats) -> int:

@@ -52,7 +52,7 @@ class PartState:
         return value, effects
 
     @cached_property
-    def known(self) -> Floats:
+    def known_error(self) -> Floats:
         """(n, 3) exact error of the tool point where all variables are 0, m."""
         return in_space(self.machine, self.first_order[0])
 
@@ -77,7 +77,7 @@ class PartState:
         Variables that are not `chosen` (v,) are 0.
         """
         effects = self.effects if chosen.all() else np.where(chosen, self.effects, 0.0)
-        return varying.linear(rows, first, self.known, effects)
+        return varying.linear(rows, first, self.known_error, effects)
 
     def exact_errors(self, varying: Varying, first: int, count: int) -> tuple[Floats, Flags]:
         """The same exactly, (count, n, 3), and which of the samples could be assembled (count,)."""
@@ -92,14 +92,14 @@ class PartState:
         count, names = t.shape[-2], len(self.variables.names)
         chosen = np.arange(self.block.indices.size) if points is None else points
         if not names:
-            same = np.broadcast_to(self.known[chosen], (count, chosen.size, 3))
+            same = np.broadcast_to(self.known_error[chosen], (count, chosen.size, 3))
             return same, np.ones(count, np.bool_)
         errors = np.empty((count, chosen.size, 3))
         shared = Points(np.ascontiguousarray(t), names) if t.ndim == 2 else None
         for place, point in enumerate(chosen.tolist()):
             given = shared or Points(np.ascontiguousarray(t[point]), names)
-            found, _ = self.study.errors(point, given)
-            errors[:, place] = in_space(self.machine, np.asarray(found))
+            exact, _ = self.study.errors(point, given)
+            errors[:, place] = in_space(self.machine, np.asarray(exact))
         good = np.isfinite(errors).all(axis=(1, 2))
         return errors, np.asarray(good, np.bool_)
 

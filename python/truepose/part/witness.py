@@ -17,9 +17,9 @@ from truepose.errors import Problem, RequestError
 from truepose.files.writing import replacing, written_together
 from truepose.machine import Machine, load
 from truepose.part.along_file import fixed, text_of
-from truepose.part.evaluation import NOT_MET, Characteristic, Evaluation
+from truepose.part.evaluation import NOT_MET, Characteristic, PartEvaluation
 from truepose.part.states import PartState, part_states
-from truepose.part.worst import Reached
+from truepose.part.worst import ReachedValue
 from truepose.runs.poses import OK
 from truepose.runs.variables import Variables
 from truepose.sources import REGISTRY, acting
@@ -34,7 +34,7 @@ ROUNDING = 1e-12
 """m or rad: the same of a value that is nothing."""
 
 
-def first_broken(evaluation: Evaluation) -> int | None:
+def first_broken(evaluation: PartEvaluation) -> int | None:
     """Number of the characteristic that is NOT met as commanded and is broken the most; else None.
 
     In shares of its tolerance.
@@ -51,7 +51,7 @@ def first_broken(evaluation: Evaluation) -> int | None:
 
 
 def write_part_witness(
-    evaluation: Evaluation, at: int, path: Path, along: Path, original: Path
+    evaluation: PartEvaluation, at: int, path: Path, along: Path, original: Path
 ) -> tuple[Path, ...]:
     """Write the witness of characteristic number `at`; which files were written.
 
@@ -92,7 +92,7 @@ def write_part_witness(
     return (path, along)
 
 
-def _breaking(evaluation: Evaluation, at: int) -> Reached:
+def _breaking(evaluation: PartEvaluation, at: int) -> ReachedValue:
     """The end that is farther beyond its limit."""
     of, search = evaluation.characteristics[at], evaluation.before().answers[at].search
     return max((search.lower, search.upper), key=lambda one: _beyond(of, one.value))
@@ -146,16 +146,16 @@ def _everywhere(state: PartState, t: Floats) -> Floats:
 
 
 def _require_same(
-    evaluation: Evaluation, at: int, state: PartState, reached: Reached, path: Path
+    evaluation: PartEvaluation, at: int, state: PartState, reached: ReachedValue, path: Path
 ) -> None:
-    value = float(evaluation.values((state.points + state.known)[np.newaxis])[0, at])
+    value = float(evaluation.values((state.points + state.known_error)[np.newaxis])[0, at])
     if abs(value - reached.value) > SAME * abs(reached.value) + ROUNDING:
         raise _not_written(
             path, f"its value is {value:.12g} m or rad, the witness's {reached.value:.12g}"
         )
 
 
-def _head(evaluation: Evaluation, at: int, reached: Reached) -> str:
+def _head(evaluation: PartEvaluation, at: int, reached: ReachedValue) -> str:
     machine: Machine = evaluation.machine
     of = evaluation.characteristics[at]
     shown = machine.shown.small(of.quantity.si)

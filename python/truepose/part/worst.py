@@ -57,7 +57,7 @@ class Interval:
 
 
 @dataclass(frozen=True, eq=False)
-class Reached:
+class ReachedValue:
     """A value that one machine makes, exactly: its variables `t`, (v,) or of each point (n, v)."""
 
     value: float
@@ -68,8 +68,8 @@ class Reached:
 class Search:
     """The smallest and the largest value that were found, and of how many machines."""
 
-    lower: Reached
-    upper: Reached
+    lower: ReachedValue
+    upper: ReachedValue
     effort: int = field(default=0)
 
 
@@ -79,7 +79,7 @@ class PointBounds:
     def __init__(self, state: PartState) -> None:
         self._state = state
         self._columns = position_columns(state.machine)
-        self._found: dict[bytes, float] = {}
+        self._reaches: dict[bytes, float] = {}
         value, effects = state.first_order
         bounds = Remainder(state.machine).bound(state.block, state.variables, value, effects)
         self.remainder: Floats = bounds.norms[:, 0] if self._columns.size else np.zeros(len(value))
@@ -92,9 +92,9 @@ class PointBounds:
         of the one in their middle, which all have: where a shift of all of them does not count.
         """
         key = points.tobytes() + scale.tobytes() + bytes([together])
-        if key not in self._found:
-            self._found[key] = self._reach(points, scale, together=together)
-        return self._found[key]
+        if key not in self._reaches:
+            self._reaches[key] = self._reach(points, scale, together=together)
+        return self._reaches[key]
 
     def _reach(self, points: Indices, scale: Floats, *, together: bool) -> float:
         state = self._state
@@ -189,7 +189,7 @@ class _Over:
         weights, points, aligned = _of_part(alignment, forms, members)
         domain, effects = state.variables.domain, state.effects[points] * scale
         varies = state.variables.varies_along
-        base = forms.base + np.tensordot(weights, state.known[points], axes=([1, 2], [0, 1]))
+        base = forms.base + np.tensordot(weights, state.known_error[points], axes=([1, 2], [0, 1]))
         slopes = np.tensordot(weights, effects, axes=([1, 2], [0, 1]))
         loose = np.linalg.norm(weights, axis=2) @ np.nan_to_num(bounds.remainder[points])
         if varies.any():
@@ -277,12 +277,12 @@ class Climb:
             self._values = values_of(feature, own, alignment)
         self._points = points
         self._effects, self._start = state.effects[points], state.points[points]
-        self._known = self._start + state.known[points]
+        self._known = self._start + state.known_error[points]
         over = points if len(points) == weights.shape[1] else members
         self._slopes = np.tensordot(weights, state.effects[over], axes=([1, 2], [0, 1]))
         self._slopes[:, state.variables.varies_along] = 0.0
         self._base = self._forms.base + np.tensordot(
-            weights, state.known[over], axes=([1, 2], [0, 1])
+            weights, state.known_error[over], axes=([1, 2], [0, 1])
         )
         self.effort = 0
 
@@ -293,13 +293,13 @@ class Climb:
     def search(self) -> Search:
         """Tried to first order, climbed from there, and the ends solved exactly."""
         if not self._slopes.shape[1]:
-            only = Reached(float(self._value(self._known[np.newaxis])[0]), np.empty(0))
+            only = ReachedValue(float(self._value(self._known[np.newaxis])[0]), np.empty(0))
             return Search(only, only, 1)
         starts = self._starts()
-        found = self._linear(starts)
+        values = self._linear(starts)
         ends = []
         for sign in (-1.0, 1.0):
-            order = np.argsort(-sign * found, kind="stable")[:3]
+            order = np.argsort(-sign * values, kind="stable")[:3]
             ends += [starts[..., row, :] for row in order]
             ends += [self._climbed(starts[..., row, :], sign) for row in order[:2]]
         tried = np.stack(ends, axis=-2)
@@ -309,12 +309,12 @@ class Climb:
         if good.any():
             values[good] = self._value(self._start + exact[good])
         if not good.any():
-            none = Reached(math.nan, tried[..., 0, :])
+            none = ReachedValue(math.nan, tried[..., 0, :])
             return Search(none, none, self.effort)
         low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
         return Search(
-            Reached(float(values[low]), tried[..., low, :]),
-            Reached(float(values[high]), tried[..., high, :]),
+            ReachedValue(float(values[low]), tried[..., low, :]),
+            ReachedValue(float(values[high]), tried[..., high, :]),
             self.effort,
         )
 
@@ -388,7 +388,7 @@ def values_of(
 
     def values(points: Floats) -> Floats:
         aligned = alignment.apply(points)
-        found: Floats = feature.values([aligned[:, place] for place in parts])
-        return found
+        quantities: Floats = feature.values([aligned[:, place] for place in parts])
+        return quantities
 
     return values

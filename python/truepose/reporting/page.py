@@ -21,7 +21,7 @@ from truepose.reporting.study import Study
 from truepose.reporting.table import Table
 
 if TYPE_CHECKING:
-    from truepose.reporting.part import Line
+    from truepose.reporting.part import SummaryLine
 
 LIMITS = (
     "These results hold for the sources found in the machine file and for the poses evaluated, "
@@ -53,7 +53,7 @@ class PartShown:
     """A part on a page: its program's name, what is told first, whose fault, figures, tables."""
 
     program: str
-    lines: Sequence[Line]
+    lines: Sequence[SummaryLine]
     blame: Sequence[Table]
     figures: Sequence[DrawnFigure]
     tables: Sequence[Table]

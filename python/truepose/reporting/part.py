@@ -17,9 +17,9 @@ from truepose.part.evaluation import (
     MET,
     NOT_MET,
     UNDECIDED,
-    Answer,
     Characteristic,
-    Evaluation,
+    PartEvaluation,
+    QuantityAnswer,
     StateAnswers,
 )
 from truepose.part.result import attributes
@@ -40,7 +40,7 @@ NAMED = 3
 """Sources that are named."""
 
 
-def tables(evaluation: Evaluation) -> Iterator[Table]:
+def tables(evaluation: PartEvaluation) -> Iterator[Table]:
     """A table a state, then, but of one machine alone, who is to blame and what would mend it."""
     for answers in evaluation.states:
         yield _state(evaluation, answers)
@@ -49,7 +49,7 @@ def tables(evaluation: Evaluation) -> Iterator[Table]:
 
 
 @dataclass(frozen=True)
-class Line:
+class SummaryLine:
     """An answer in a line: its word, which colour that has (`met`, `missed`, `open`), its text."""
 
     word: str
@@ -57,7 +57,7 @@ class Line:
     text: str
 
 
-def summary(evaluation: Evaluation) -> list[Line]:
+def summary(evaluation: PartEvaluation) -> list[SummaryLine]:
     """What a person is told first: how many quantities are good, and which are not."""
     lines = []
     for answers in evaluation.states:
@@ -74,11 +74,11 @@ def summary(evaluation: Evaluation) -> list[Line]:
         of, answer = max(told, key=lambda one: one[1].out)
         if answer.out > 0.0:
             text += f". Most often out: {of.label}, of {100.0 * answer.out:.3g} % of the machines"
-        lines.append(Line(word, colour, text))
+        lines.append(SummaryLine(word, colour, text))
     return lines
 
 
-def _state(evaluation: Evaluation, answers: StateAnswers) -> Table:
+def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
     rows = tuple(
         _row(evaluation.machine, of, answer)
         for of, answer in zip(evaluation.characteristics, answers.answers, strict=True)
@@ -113,7 +113,7 @@ def _state(evaluation: Evaluation, answers: StateAnswers) -> Table:
     )
 
 
-def _row(machine: Machine, of: Characteristic, answer: Answer) -> tuple[str, ...]:
+def _row(machine: Machine, of: Characteristic, answer: QuantityAnswer) -> tuple[str, ...]:
     quantity = of.quantity
     large, small = machine.shown.of(quantity.si), machine.shown.small(quantity.si)
 
@@ -144,7 +144,7 @@ def _row(machine: Machine, of: Characteristic, answer: Answer) -> tuple[str, ...
     )
 
 
-def _blame(evaluation: Evaluation) -> Table:
+def _blame(evaluation: PartEvaluation) -> Table:
     rows = []
     before = next(one for one in evaluation.states if one.state.name == BEFORE)
     for at, of in enumerate(evaluation.characteristics):
@@ -181,7 +181,7 @@ def _adds(known: float, half: float) -> str:
     return f"{known:+.1f} ± {half:.1f}" if known else f"± {half:.1f}"
 
 
-def _mends(evaluation: Evaluation, found: Advice | None) -> str:
+def _mends(evaluation: PartEvaluation, found: Advice | None) -> str:
     if found is None:
         return "nothing to mend"
     if found.compensation:
@@ -220,7 +220,7 @@ SHEET = (
 """Columns of the sheet, as a first-article report has a row for each characteristic."""
 
 
-def sheet(evaluation: Evaluation) -> list[dict[str, Any]]:
+def sheet(evaluation: PartEvaluation) -> list[dict[str, Any]]:
     """A row for each characteristic and state, in the units of the machine file."""
     rows = []
     for answers in evaluation.states:
@@ -232,7 +232,11 @@ def sheet(evaluation: Evaluation) -> list[dict[str, Any]]:
 
 
 def _sheet_row(
-    evaluation: Evaluation, answers: StateAnswers, at: int, of: Characteristic, answer: Answer
+    evaluation: PartEvaluation,
+    answers: StateAnswers,
+    at: int,
+    of: Characteristic,
+    answer: QuantityAnswer,
 ) -> dict[str, Any]:
     quantity = of.quantity
     unit = evaluation.machine.file_units[BY_UNIT[quantity.si]]
@@ -267,7 +271,7 @@ def _sheet_row(
     }
 
 
-def csv_text(evaluation: Evaluation) -> str:
+def csv_text(evaluation: PartEvaluation) -> str:
     """The sheet as CSV; empty cells where there is no number."""
     buffer = io.StringIO()
     writer = csv.DictWriter(buffer, SHEET, lineterminator="\n")
@@ -276,7 +280,7 @@ def csv_text(evaluation: Evaluation) -> str:
     return buffer.getvalue()
 
 
-def json_text(evaluation: Evaluation) -> str:
+def json_text(evaluation: PartEvaluation) -> str:
     """The sheet and what it rests on as JSON."""
     return json.dumps(
         {

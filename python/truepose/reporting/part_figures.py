@@ -11,7 +11,7 @@ import numpy as np
 from truepose.arrays import Floats
 from truepose.machine import Machine
 from truepose.part.along import PathErrors
-from truepose.part.evaluation import Answer, Evaluation
+from truepose.part.evaluation import PartEvaluation, QuantityAnswer
 from truepose.reporting.figures import DrawnFigure
 from truepose.reporting.figures._plot import Keys, Plot, grid, trace
 from truepose.reporting.figures._style import (
@@ -75,7 +75,7 @@ class DrawnPath:
         return np.concatenate(self.points) if self.points else np.empty((0, 8))
 
 
-def figures(evaluation: Evaluation, path: DrawnPath) -> list[DrawnFigure]:
+def figures(evaluation: PartEvaluation, path: DrawnPath) -> list[DrawnFigure]:
     """The path, then the strips."""
     drawn = [DrawnFigure("strips", "Every quantity in its zone", _STRIPS, _strips(evaluation))]
     if len(path.rows):
@@ -91,7 +91,7 @@ _STRIPS = (
 )
 
 
-def _strips(evaluation: Evaluation) -> Plot:
+def _strips(evaluation: PartEvaluation) -> Plot:
     characteristics = evaluation.characteristics
     count = len(characteristics)
     figure = grid(count, 1, vertical_spacing=0.42 / count)
@@ -148,12 +148,14 @@ def _strips(evaluation: Evaluation) -> Plot:
     return finish(figure, STRIP * count + 150, margin={"l": 330, "r": 30, "t": 50, "b": 60})
 
 
-def _words(evaluation: Evaluation, at: int) -> str:
+def _words(evaluation: PartEvaluation, at: int) -> str:
     words = [one.answers[at].verdict for one in evaluation.states]
     return words[0] if len(set(words)) == 1 else " → ".join(words)
 
 
-def _marks(answer: Answer, nominal: float, scale: float, y: float, colour: str) -> list[Keys]:
+def _marks(
+    answer: QuantityAnswer, nominal: float, scale: float, y: float, colour: str
+) -> list[Keys]:
     """Lines and a dot of one state of a strip."""
 
     def at(*values: float) -> list[float]:
@@ -188,7 +190,7 @@ def _marks(answer: Answer, nominal: float, scale: float, y: float, colour: str) 
     ]
 
 
-def _path(evaluation: Evaluation, rows: Floats) -> tuple[Plot, str]:
+def _path(evaluation: PartEvaluation, rows: Floats) -> tuple[Plot, str]:
     machine = evaluation.machine
     length, unit = machine.shown.length, machine.shown.small_length
     points, known, half = rows[:, :3], rows[:, 3:6], rows[:, 6]

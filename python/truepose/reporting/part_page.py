@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from truepose.part.evaluation import Evaluation
+from truepose.part.evaluation import PartEvaluation
 from truepose.part.result import attributes
 from truepose.reporting import part
 from truepose.reporting.page import PartShown, page_parts, template
 from truepose.reporting.part_figures import DrawnPath, figures
 
 
-def shown(evaluation: Evaluation, path: DrawnPath, program: str) -> PartShown:
+def shown(evaluation: PartEvaluation, path: DrawnPath, program: str) -> PartShown:
     """The part as any page shows it; `path` has looked on while the program was walked."""
     tables = list(part.tables(evaluation))
     count = len(evaluation.states)
@@ -23,7 +23,7 @@ def shown(evaluation: Evaluation, path: DrawnPath, program: str) -> PartShown:
     )
 
 
-def html(evaluation: Evaluation, path: DrawnPath, program: str) -> str:
+def html(evaluation: PartEvaluation, path: DrawnPath, program: str) -> str:
     """The page as text."""
     return template("part_page.html.jinja").render(
         part=shown(evaluation, path, program),

@@ -29,6 +29,7 @@ COMPUTING: dict[str, tuple[str, ...]] = {
     "plan": ("plan", "m.toml", "--instrument", "position=10um", "--poses", "2"),
     "calibrate": ("calibrate", "m.toml", "measured.csv"),
     "compare": ("compare", "m.toml", "m.toml"),
+    "part": ("part", "m.toml", "part.ngc", "--features", "part.toml", "--samples", "50"),
     "gcode": ("gcode", "m.toml", "part.ngc", "--dry-run"),
     "export": ("export", "c", "m.toml"),
 }
@@ -49,6 +50,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("over.toml").write_text((PLANAR.parent / "overconstrained.toml").read_text())
     Path("measured.csv").write_text(readings("planar_two_slider"))
     Path("part.ngc").write_text(PROGRAM)
+    Path("part.toml").write_text(
+        '[[feature]]\nname = "front"\nkind = "straightness"\nlines = "3"\nzone = "0.1 mm"\n'
+    )
     return tmp_path
 
 

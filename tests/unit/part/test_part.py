@@ -14,7 +14,7 @@ import truepose as tp
 from command_line import MACHINES, PLANAR, Outcome, call
 from sweeps import sweep
 from truepose.machine import Machine
-from truepose.part.evaluation import MET, NOT_MET, UNDECIDED, Evaluation
+from truepose.part.evaluation import MET, NOT_MET, UNDECIDED, PartEvaluation
 from truepose.part.part import evaluate_part, part
 from truepose.part.read import read_part
 from truepose.part.samples import sampled
@@ -76,7 +76,7 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
     return program, features
 
 
-def evaluated(machine: Machine, files: tuple[Path, Path], **options: object) -> Evaluation:
+def evaluated(machine: Machine, files: tuple[Path, Path], **options: object) -> PartEvaluation:
     """Both states."""
     part = read_part(machine, *files)
     return evaluate_part(machine, part, machine.condition, **options)  # type: ignore[arg-type]

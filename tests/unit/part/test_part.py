@@ -1,4 +1,4 @@
-"""`truepose.part` and its command: the same numbers everywhere, and answers that follow from them."""
+"""`truepose.part` and its command: the same numbers everywhere, and answers that follow."""
 
 from __future__ import annotations
 

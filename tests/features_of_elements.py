@@ -147,6 +147,8 @@ def every_case(method: Method, rounded: float = 0.0) -> dict[str, Feature]:
         "face to face": ("position", zone, [face("top", (0, 0), (0.04, 0.05), 0.01)], [floor]),
         "wall in place": ("position", zone, [left], []),
         "contour": ("profile", zone, [contour], []),
+        "round contour": ("profile", zone, [replace(hole_1, closed=True)], []),
+        "straight contour": ("profile", zone, [slope], []),
         "contour to walls": ("profile", zone, [contour], [bottom, left]),
     }
 

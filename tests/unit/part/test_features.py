@@ -58,8 +58,8 @@ def test_a_part_moved_as_one_has_the_same_values(method: str) -> None:
     level = _rotation([0.0, 0.0, 3e-3])
     tilted = _rotation([2e-3, -1e-3, 3e-3])
     for name, feature in every_case(method).items():  # type: ignore[arg-type]
-        if "in place" in name or name == "arc":
-            continue
+        if "in place" in name or name in {"arc", "round contour"}:
+            continue  # they are seen in place, or (round) with no turn of their own
         count = sum(points.shape[1] for points in points_of(feature))
         off = perturbed(feature, 2e-5 * rng.standard_normal((4, count, 3)))
         before = feature.values(off)

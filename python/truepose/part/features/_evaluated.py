@@ -32,6 +32,10 @@ SIDE = (
 )
 
 
+_SAMPLES = 1000
+"""Samples at once, so that what is computed on the way needs little memory."""
+
+
 class ZoneTable(FileTable):
     """Keys of a feature that has a zone and nothing else."""
 
@@ -88,10 +92,15 @@ class EvaluatedFeature:
 
     def values(self, points: Sequence[Floats]) -> Floats:
         """(s, n_quantity) of parts whose tool points are there; see `Feature.values`."""
-        local = [self.coordinates.local(element) for element in points]
-        own, datums = local[: len(self.elements)], local[len(self.elements) :]
-        seen = own if self.frame is None else self.frame.seen(own, datums)
-        return np.stack(self.evaluate(own, seen), axis=-1)
+        count = len(points[0])
+        values = np.empty((count, len(self.quantities)))
+        for first in range(0, count, _SAMPLES):
+            some = slice(first, first + _SAMPLES)
+            local = [self.coordinates.local(element[some]) for element in points]
+            own, datums = local[: len(self.elements)], local[len(self.elements) :]
+            seen = own if self.frame is None else self.frame.seen(own, datums)
+            values[some] = np.stack(self.evaluate(own, seen), axis=-1)
+        return values
 
     def forms(self) -> tuple[Forms, ...]:
         """The linear forms of each quantity."""

@@ -4,11 +4,13 @@ The value is twice the largest distance of a point from its place on the drawing
 drawing's normal there: the width of the zone about the drawing that just holds the contour. A point
 at a corner counts along the normals of both sides. With datums the drawing is where their frame is;
 without it lies as it fits best, in the working plane: so that the value is least, or with
-"least-squares" by these.
+"least-squares" by these. A point that moved by t along a rounding of radius R counts as t^2 / (2 R)
+off; a round contour, which no fit can turn, does so wherever the part is turned.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -100,7 +102,8 @@ class ContourProfile(EvaluatedFeature):
             change = (turned + off / contour.length) * len(rows) * off
             moved = sums * bent + np.abs(inverse).sum(axis=1) * change
             curvature += 2.0 * float(np.abs(rows).max(axis=0) @ moved)
-            reach = min(reach, 0.1 * float((sums / moved).min()))
+            free = moved > 0.0
+            reach = min(reach, 0.1 * float((sums[free] / moved[free]).min(initial=math.inf)))
         return [
             order.forms("spread", np.concatenate([kept, -kept]), curvature=curvature, reach=reach)
         ]

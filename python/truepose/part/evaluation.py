@@ -28,7 +28,7 @@ Rule = Literal["worst-case", "iso-14253"]
 MET, NOT_MET, UNDECIDED = "met", "NOT met", "undecided"
 
 SOURCE_SAMPLES = 1000
-"""Samples of each source alone."""
+"""Samples of each source alone, at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,7 +246,7 @@ class PartEvaluation:
     def _blame(self, state: PartState, known: Floats) -> tuple[SourceAlone, ...]:
         """Each source alone: what it is known to do as commanded, and how far it spreads."""
         varying = state.varying(self.seed)
-        rows = np.asarray(varying.rows(0, SOURCE_SAMPLES))
+        rows = np.asarray(varying.rows(0, min(SOURCE_SAMPLES, self.samples)))
         of_variable = np.array(state.variables.sources, dtype=np.str_)
         programmed = self.values(state.points[np.newaxis])[0]
         single = self._single(state)

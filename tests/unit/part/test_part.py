@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import functools
 import io
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from truepose.machine import Machine
 from truepose.part.evaluation import MET, NOT_MET, UNDECIDED, PartEvaluation
 from truepose.part.part import evaluate_part, part
 from truepose.part.read import read_part
+from truepose.part.result import dataset as dataset_of
 from truepose.part.samples import sampled
 from truepose.verdict.states import AFTER, BEFORE
 
@@ -59,6 +62,9 @@ lines = "9"
 roundness = "0.02 mm"
 """
 
+WIDTH = FEATURES[FEATURES.index("[[feature]]") : FEATURES.index('[[feature]]\nname = "corner"')]
+"""The width alone."""
+
 ALONG = (
     "drive.d1.backlash={play='10 um'}",
     "drive.d2.actuator={periodic={amplitude='3 um',period='4 mm'}}",
@@ -74,6 +80,24 @@ def files(tmp_path: Path) -> tuple[Path, Path]:
     program.write_text(PROGRAM, encoding="utf-8")
     features.write_text(FEATURES, encoding="utf-8")
     return program, features
+
+
+Shared = Callable[..., PartEvaluation]
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Shared:
+    """The part as it is asked for above, of the machine with settings, evaluated once."""
+    folder = tmp_path_factory.mktemp("part")
+    files = folder / "part.ngc", folder / "part.toml"
+    files[0].write_text(PROGRAM, encoding="utf-8")
+    files[1].write_text(FEATURES, encoding="utf-8")
+
+    @functools.cache
+    def evaluation(*settings: str) -> PartEvaluation:
+        return evaluated(tp.load(PLANAR, settings=settings), files, samples=1000)
+
+    return evaluation
 
 
 def evaluated(machine: Machine, files: tuple[Path, Path], **options: object) -> PartEvaluation:
@@ -119,10 +143,10 @@ def test_an_unknown_name_of_a_rule(files: tuple[Path, Path]) -> None:
 
 @pytest.mark.parametrize("settings", [(), ALONG], ids=["constant", "along"])
 def test_what_is_reached_is_within_what_is_proven(
-    files: tuple[Path, Path], settings: tuple[str, ...]
+    shared: Shared, settings: tuple[str, ...]
 ) -> None:
     """So is every sample, and the known value."""
-    evaluation = evaluated(tp.load(PLANAR, settings=settings), files, samples=2000)
+    evaluation = shared(*settings)
     for answers in evaluation.states:
         for at, answer in enumerate(answers.answers):
             room = 1e-12
@@ -138,18 +162,18 @@ def test_what_is_reached_is_within_what_is_proven(
             assert values.max() <= answer.above.upper + room
 
 
-def test_compensation_makes_what_the_program_asks_for(files: tuple[Path, Path]) -> None:
+def test_compensation_makes_what_the_program_asks_for(shared: Shared) -> None:
     """Known values after it are those of the programmed path."""
-    dataset = part(tp.load(PLANAR), *files, samples=100)
+    dataset = dataset_of(shared())
     after = dataset["known"].sel(state=AFTER).values
     assert np.abs(after - dataset["programmed"].values).max() < 1e-12
     assert np.abs(dataset["known"].sel(state=BEFORE).values - after).max() > 1e-6
 
 
-def test_samples_are_those_of_monte_carlo(files: tuple[Path, Path]) -> None:
+def test_samples_are_those_of_monte_carlo(shared: Shared) -> None:
     """At a point of the part: the same machines, to the bit, as their mean and extremes say."""
     machine = tp.load(PLANAR)
-    evaluation = evaluated(machine, files, samples=100)
+    evaluation = shared()
     state = evaluation.states[0].state
     errors, good = state.exact_errors(state.varying(3), 0, 500)
     assert good.all()
@@ -162,11 +186,9 @@ def test_samples_are_those_of_monte_carlo(files: tuple[Path, Path]) -> None:
             assert float(of["maximum"][0]) == errors[:, point, axis].max()
 
 
-def test_chunks_make_no_difference(
-    files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_chunks_make_no_difference(shared: Shared, monkeypatch: pytest.MonkeyPatch) -> None:
     """However many samples are worked on at a time."""
-    evaluation = evaluated(tp.load(PLANAR, settings=ALONG), files, samples=50)
+    evaluation = shared(*ALONG)
     state, values = evaluation.states[0].state, evaluation.values
     whole = sampled(state, values, 60, 1, exact=False)
     monkeypatch.setattr("truepose.part.samples.NUMBERS", 7 * state.points.size)
@@ -174,9 +196,9 @@ def test_chunks_make_no_difference(
     assert np.abs(whole.values - pieces.values).max() < 1e-15
 
 
-def test_first_order_is_told_from_exact(files: tuple[Path, Path]) -> None:
+def test_first_order_is_told_from_exact(shared: Shared) -> None:
     """They differ by no more than is said of the samples that were solved both ways."""
-    evaluation = evaluated(tp.load(PLANAR), files, samples=100)
+    evaluation = shared()
     state, values = evaluation.states[0].state, evaluation.values
     linear = sampled(state, values, 100, 0, exact=False)
     exact = sampled(state, values, 100, 0, exact=True)
@@ -187,9 +209,9 @@ def test_first_order_is_told_from_exact(files: tuple[Path, Path]) -> None:
     assert (linear.off > 0.0).all()
 
 
-def test_each_point_from_its_own_machine_is_wider(files: tuple[Path, Path]) -> None:
+def test_each_point_from_its_own_machine_is_wider(shared: Shared) -> None:
     """The correlation is there: the width of one machine's part varies less."""
-    evaluation = evaluated(tp.load(PLANAR), files, samples=100)
+    evaluation = shared()
     state = evaluation.states[0].state
     together = state.linear_errors(state.varying(0), 0, 1000)
     apart = together.copy()
@@ -203,11 +225,12 @@ def test_each_point_from_its_own_machine_is_wider(files: tuple[Path, Path]) -> N
 def test_verdicts_follow_the_limits(files: tuple[Path, Path]) -> None:
     """Limits beyond the proof: met. Limits that a machine breaks: NOT met. Between: undecided."""
     machine = tp.load(PLANAR)
+    files[1].write_text(WIDTH, encoding="utf-8")
     answer = evaluated(machine, files, samples=100).states[0].answers[0]
     nominal = 0.06
 
     def verdict(half: float) -> str:
-        text = FEATURES.replace("±0.05 mm", f"±{1e3 * half:.9f} mm")
+        text = WIDTH.replace("±0.05 mm", f"±{1e3 * half:.9f} mm")
         files[1].write_text(text, encoding="utf-8")
         return evaluated(machine, files, samples=100).states[0].answers[0].verdict
 
@@ -221,7 +244,7 @@ def test_verdicts_follow_the_limits(files: tuple[Path, Path]) -> None:
 @pytest.mark.parametrize(("half", "word"), [("0.2", MET), ("0.05", UNDECIDED)])
 def test_the_rule_of_iso_14253(files: tuple[Path, Path], half: str, word: str) -> None:
     """The coverage interval, 60.029 ± 0.053 mm, within the limits; or a limit within it."""
-    text = FEATURES.replace("±0.05 mm", f"±{half} mm")
+    text = WIDTH.replace("±0.05 mm", f"±{half} mm")
     files[1].write_text(text, encoding="utf-8")
     evaluation = evaluated(tp.load(PLANAR), files, samples=1000, rule="iso-14253")
     assert evaluation.states[0].answers[0].verdict == word
@@ -229,7 +252,7 @@ def test_the_rule_of_iso_14253(files: tuple[Path, Path], half: str, word: str) -
 
 def test_outside_by_the_rule_of_iso_14253(files: tuple[Path, Path]) -> None:
     """The whole interval beyond a limit."""
-    files[1].write_text(FEATURES.replace("±0.05 mm", "-0.5 -0.1"), encoding="utf-8")
+    files[1].write_text(WIDTH.replace("±0.05 mm", "-0.5 -0.1"), encoding="utf-8")
     evaluation = evaluated(tp.load(PLANAR), files, samples=1000, rule="iso-14253")
     assert evaluation.states[0].answers[0].verdict == NOT_MET
 
@@ -343,9 +366,9 @@ def test_points_of_the_path(
         assert float(row["half_95 (mm)"]) > 0.0
 
 
-def test_blame_adds_up(files: tuple[Path, Path]) -> None:
+def test_blame_adds_up(shared: Shared) -> None:
     """To first order what sources are known to add sums up, and their half widths as squares."""
-    evaluation = evaluated(tp.load(PLANAR), files, samples=4000)
+    evaluation = shared()
     before = evaluation.before()
     known = sum(one.known for one in before.blame)
     for at in (0, 1):
@@ -356,17 +379,17 @@ def test_blame_adds_up(files: tuple[Path, Path]) -> None:
         assert half == pytest.approx(squares, rel=0.1)
 
 
-def test_what_would_mend_it_mends_it(files: tuple[Path, Path]) -> None:
+def test_what_would_mend_it_mends_it(shared: Shared) -> None:
     """With the bands so narrow it is met, by that state's proof; as they are it is not."""
     from truepose.part.advice import advice
 
-    found = advice(evaluated(tp.load(PLANAR), files, samples=200), 3)
+    found = advice(shared(), 3)
     assert found is not None
     assert found.source == "tolerance"
     for share, met in ((found.narrowed, True), (1.0, False)):
         band = 0.3 * share
         settings = [f"strut.{name}.length_tolerance=[-{band},{band}]" for name in "12"]
-        evaluation = evaluated(tp.load(PLANAR, settings=settings), files, samples=200)
+        evaluation = shared(*settings)
         states = {one.state.name: one for one in evaluation.states}
         assert (states[found.state].answers[3].verdict == MET) is met
 

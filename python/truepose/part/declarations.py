@@ -57,8 +57,6 @@ _WITH_LIMITS = re.compile(
 Kinds = Mapping[str, type[Feature]]
 Place = tuple[Interval, ...]
 
-PROPOSE = "--propose-features FILE.toml writes those that it finds, to be edited"
-
 
 @dataclass(frozen=True, eq=False)
 class Declared:
@@ -111,15 +109,17 @@ class Declarations:
 
 @dataclass
 class _Collected:
-    """Rows as they are found, and what is wrong."""
+    """Rows as they are found, and what is wrong; `names` also of rows that are no good."""
 
     kinds: Kinds
     rows: list[Declared] = field(default_factory=list)
+    names: dict[tuple[str, str], tuple[Document, Key]] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
 
     def row(self, document: Document, key: Key, units: UnitSystem) -> None:
         """Check one row of `document`."""
         value = document.value(key)
+        self._name(value.get("name"), document, key)
         validated = Validated(units)
         table = DatumTable if key[0] == "datum" else FeatureTable
         models: tuple[type[BaseModel], ...] = (table,)
@@ -138,6 +138,25 @@ class _Collected:
         row = None if kind is None else filled[kind.table]
         named = cast("FeatureTable | DatumTable", filled[table])
         self.rows.append(Declared(named, kind, row, document, key))
+
+    def _name(self, name: object, document: Document, key: Key) -> None:
+        """Note the name of a row, and refuse one that another has."""
+        word = str(key[0])
+        if not isinstance(name, str):
+            return
+        first, at = self.names.setdefault((word, name), (document, key))
+        if (first, at) != (document, key):
+            self.problems.append(
+                document.problem(
+                    Fault(
+                        "duplicate-name",
+                        f'there are two of the {word} "{name}"',
+                        found=f'"{name}" also in line {first.line(at)} of {first.file}',
+                        expected="a name of its own for each",
+                    ),
+                    (*key, "name"),
+                )
+            )
 
 
 def declared(
@@ -165,15 +184,13 @@ def declared(
     operations = _operations(part, document, text, str(program), collected)
     if operations is not None:
         placed = [_counting(row, operations, collected) for row in placed]
-    _check_names(placed, part, document, collected)
+    _check_datums(placed, part, document, collected)
     if any(_overlapping(placed)):
         lines = feed_lines()
         for number, row in enumerate(placed):
             trimmed_places = tuple(trimmed(place, lines) for place in row.places)
             placed[number] = replace(row, places=trimmed_places)
         _check_shared(placed, collected)
-    if not (placed or collected.problems):
-        raise PartError(_nothing(program, features))
     raise_all(collected.problems)
     return Declarations(
         part,
@@ -188,17 +205,6 @@ def raise_all(problems: Iterable[Problem]) -> None:
     every = in_order(problems)
     if every:
         raise PartError(*every)
-
-
-def _nothing(program: Path, features: Path | None) -> Problem:
-    return Problem(
-        "no-feature",
-        "no feature of the part is named",
-        str(features or program),
-        found="no feature, neither in a comment of the program nor in a features file",
-        expected="a comment such as (feature: bore, diameter 40 +0.025 0), or [[feature]]",
-        hint=PROPOSE,
-    )
 
 
 def _document(features: Path | None) -> Document:
@@ -256,7 +262,6 @@ def _of_comments(
 ) -> dict[tuple[str, str], list[Place]]:
     """Check what comments say; the places of features and datums by their names."""
     places: dict[tuple[str, str], list[Place]] = {}
-    known = {_identity(row) for row in collected.rows}
     document = Document(str(program), program.name, "", {table: [] for table in SEVERAL})
     document.several = SEVERAL
     for said in text.said:
@@ -266,16 +271,16 @@ def _of_comments(
         if row is None:
             continue
         identity = said.word, row["name"]
-        again = identity in known
+        again = identity in collected.names
         places.setdefault(identity, []).append((said.place,))
         if again and len(row) == 1:
             continue
-        known.add(identity)
         index = len(document.data[said.word])
         document.data[said.word].append(row)
         document.lines[said.word, index] = said.line
         key: Key = (said.word, index)
         if said.word == "feature" and not _find_kind(row, document, key, collected):
+            collected.names.setdefault(identity, (document, key))
             continue
         collected.row(document, key, _units_at(said.line, machine, text))
     return places
@@ -447,27 +452,11 @@ def _counting(row: Declared, operations: Place, collected: _Collected) -> Declar
     return replace(row, places=places)
 
 
-def _check_names(
+def _check_datums(
     rows: Sequence[Declared], part: PartTable, document: Document, collected: _Collected
 ) -> None:
-    """Refuse two of one name, and datums that there are not."""
-    before: dict[tuple[str, str], Declared] = {}
-    for row in rows:
-        first = before.setdefault(_identity(row), row)
-        if first is not row:
-            collected.problems.append(
-                row.problem(
-                    Fault(
-                        "duplicate-name",
-                        f"there are two of {row.what}",
-                        found=f'"{row.name}" also in line {first.document.line(first.key)} of '
-                        f"{first.document.file}",
-                        expected="a name of its own for each",
-                    ),
-                    "name",
-                )
-            )
-    named = [name for word, name in before if word == "datum"]
+    """Refuse datums that there are not."""
+    named = [name for word, name in collected.names if word == "datum"]
 
     def refuse(name: str, document: Document, key: Key) -> None:
         fault = Fault(

@@ -11,7 +11,7 @@ import numpy as np
 
 from truepose.arrays import Floats, Indices
 from truepose.controllers.gcode.program import PROGRAM, ProgramOptions
-from truepose.errors import Fault, Problem
+from truepose.errors import Fault, PartError, Problem
 from truepose.files.text_file import on_disk, require_input
 from truepose.machine import Condition, Machine
 from truepose.part.declarations import Declarations, Declared, Kinds, Place, declared, raise_all
@@ -105,7 +105,20 @@ def read_part(
         condition,
     )
     _require_motion(said, places, walk)
+    if not said.features:
+        raise PartError(_nothing(path, file))
     return _built(said, places, walk, file)
+
+
+def _nothing(program: Path, features: Path | None) -> Problem:
+    return Problem(
+        "no-feature",
+        "no feature of the part is named",
+        str(features or program),
+        found="no feature, neither in a comment of the program nor in a features file",
+        expected="a comment such as (feature: bore, diameter 40 +0.025 0), or [[feature]]",
+        hint="--propose-features FILE.toml writes those that it finds, to be edited",
+    )
 
 
 def _most_points(place: Place, rows: Sequence[Declared]) -> int:

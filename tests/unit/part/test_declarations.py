@@ -261,6 +261,7 @@ n = ["N1", "N2", "N3"]
         ("features.toml", 22, "wrong-type"),
         ("features.toml", 23, "unknown-key"),
         ("features.toml", 19, "part-address"),
+        ("features.toml", 20, "duplicate-name"),
         ("part.ngc", 13, "part-comment"),
         ("part.ngc", 15, "part-comment"),
     }
@@ -303,6 +304,7 @@ n = ["N1", "N2", "N3"]
         ("feature = 3\n", "wrong-type", 1, None),
         ("part = 3\n" + wall("lines = 13"), "wrong-type", 1, "3"),
         ("schema = 1\n", "no-feature", None, None),
+        ('[[datum]]\nname = "A"\nlines = 13\n', "no-feature", None, None),
         ("[[feature]\n", "not-toml", 1, None),
     ],
 )
@@ -335,6 +337,18 @@ def test_a_comment_that_says_nothing_good_is_refused(comment: str, code: str, re
     program = PROGRAM.replace("N110", f"{comment}\nN110").replace("N140", "(end feature)\nN140")
     problems = read.problems(wall("lines = 6"), program)
     assert [(p.code, p.line, Path(str(p.file)).name) for p in problems] == [(code, 13, "part.ngc")]
+
+
+def test_what_is_wrong_with_a_datum_is_not_said_of_what_refers_to_it(read: Read) -> None:
+    bad = '[[datum]]\nname = "A"\nlines = "x"\n'
+    assert [p.code for p in read.problems(bad + wall('lines = 13\ndatums = ["A"]'))] == [
+        "part-address"
+    ]
+    program = PROGRAM.replace("N110", "(feature: wall)\nN110").replace(
+        "N120", "(end feature)\nN120"
+    )
+    bad = wall("").replace("0.02", '"0.1 deg"')
+    assert [p.code for p in read.problems(bad, program)] == ["wrong-dimension"]
 
 
 def test_without_any_feature_it_says_how_to_find_some(read: Read) -> None:

@@ -17,11 +17,10 @@ from typing import Literal
 import numpy as np
 
 from truepose.arrays import Floats, Indices
+from truepose.part.features import Forms
+from truepose.part.first_order import FrameMotion
 
 Kind = Literal["clamped", "best-fit", "datums"]
-
-STEP = 1e-5
-"""Step of the differences, in the part's size: they err by its square, and by rounding over it."""
 
 Frame = Callable[[Floats], tuple[Floats, Floats]]
 """Rotations (s, 3, 3) and origins (s, 3) of points (s, m, 3)."""
@@ -31,13 +30,14 @@ Frame = Callable[[Floats], tuple[Floats, Floats]]
 class Alignment:
     """Of a part whose n programmed points are `nominal` (n, 3), m.
 
-    `frame` (of datums): of the points numbered `members` (m,).
+    `frame` (of datums): of the points numbered `members` (m,), and its `motion` to first order.
     """
 
     kind: Kind
     nominal: Floats
     members: Indices
     frame: Frame | None = None
+    motion: FrameMotion | None = None
 
     def apply(self, points: Floats) -> Floats:
         """(s, n, 3) the parts (s, n, 3) where they are looked at, m."""
@@ -107,32 +107,34 @@ class Alignment:
         if self.kind == "best-fit":
             inverse: Floats = np.linalg.pinv(motions.T, rcond=1e-12).astype(np.float64)
             return inverse.reshape(6, -1, 3)
-        return self._datums_response()
+        assert self.motion is not None
+        shift, turn = self.motion.response[:3], self.motion.response[3:]
+        away = self.nominal.mean(axis=0) - self.motion.about
+        shift = shift + np.cross(turn, away, axis=0)
+        return np.concatenate([shift, turn * self._size])
 
-    def _datums_response(self) -> Floats:
-        """By central differences of the frame, member by member."""
-        assert self.frame is not None
-        drawn = self.nominal[self.members]
-        step = STEP * self._size
-        response = np.empty((6, *drawn.shape))
-        (axes,), (home,) = self.frame(drawn[np.newaxis])
-        middle = self.nominal.mean(axis=0)
-        for point in range(len(drawn)):
-            moved = np.repeat(drawn[np.newaxis], 6, axis=0)
-            for axis in range(3):
-                moved[axis, point, axis] += step
-                moved[3 + axis, point, axis] -= step
-            frames, origins = self.frame(moved)
-            turned = (frames[:3] - frames[3:]) / (2.0 * step) @ axes.T
-            shift = (origins[:3] - origins[3:]) / (2.0 * step)
-            turn = 0.5 * np.stack(
-                [
-                    turned[:, 2, 1] - turned[:, 1, 2],
-                    turned[:, 0, 2] - turned[:, 2, 0],
-                    turned[:, 1, 0] - turned[:, 0, 1],
-                ],
-                axis=1,
-            )
-            response[3:, point] = turn.T * self._size
-            response[:3, point] = (shift + np.cross(turn, middle - home)).T
-        return response
+    def besides(self, weights: Floats) -> tuple[Forms, ...]:
+        """What the datums' own forms move linear forms (k, n, 3) by, the one that they move most.
+
+        Forms over `members`. A minimum zone lies elsewhere than the first order says, by those.
+        """
+        if self.motion is None:
+            return ()
+        along = np.tensordot(weights, self._motions(), axes=([1, 2], [1, 2]))
+        away = np.abs(self.nominal.mean(axis=0) - self.motion.about)
+        levers = self.motion.levers.copy()
+        levers[:3] += _crossed(levers[3:], away)
+        levers[3:] *= self._size
+        factors = (np.abs(along) @ levers).max(axis=0)
+        return tuple(
+            Forms("spread", residuals, np.zeros(len(residuals)), 0.0, factor=float(factor))
+            for residuals, factor in zip(self.motion.residuals, factors, strict=True)
+            if factor > 0.0
+        )
+
+
+def _crossed(turns: Floats, away: Floats) -> Floats:
+    """(3, d) the most that vector products of turns (3, d) and a vector (3,) can be, by sizes."""
+    x, y, z = away[:, np.newaxis]
+    a, b, c = turns
+    return np.stack([b * z + c * y, c * x + a * z, a * y + b * x])

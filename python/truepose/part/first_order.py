@@ -429,6 +429,34 @@ class FirstOrder:
         return limits
 
 
+@dataclass(frozen=True, eq=False)
+class FrameMotion:
+    """The motion with which a frame answers errors of its m datum points, to first order.
+
+    `response` (6, m, 3): of the place that the drawing has at `about` (3,), then its turn, both in
+    machine coordinates. Besides, minimum zones may move it: `levers` (6, number of datums) by how
+    much at most per range of that datum's `residuals`, forms (n, m, 3).
+    """
+
+    about: Floats
+    response: Floats
+    levers: Floats
+    residuals: tuple[Floats, ...]
+
+    @classmethod
+    def of(cls, frame: DatumFrame) -> FrameMotion:
+        """Of the datums of a whole part."""
+        order, axes = FirstOrder.of_frame(frame), frame.coordinates.axes
+        jac = order.jac_motion @ axes
+        parts = (slice(3, 6), slice(3))
+        return cls(
+            frame.coordinates.middle,
+            np.concatenate([np.tensordot(axes.T, jac[part], 1) for part in parts]),
+            np.concatenate([np.abs(axes.T) @ order.levers[part] for part in parts]),
+            tuple(residuals @ axes for residuals in order.residuals),
+        )
+
+
 _TURN = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 

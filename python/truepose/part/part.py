@@ -19,6 +19,7 @@ from truepose.part.along import Sink, unusable_point, walk
 from truepose.part.along_file import fixed
 from truepose.part.datum_frame import datum_alignment
 from truepose.part.evaluation import PartEvaluation, Rule
+from truepose.part.first_order import FrameMotion
 from truepose.part.read import Part, read_part
 from truepose.part.states import PartState, part_states
 from truepose.runs.arguments import checked
@@ -160,10 +161,16 @@ def _alignment(asked: Part, points: Floats) -> Alignment:
     """As the part asks for it, of its programmed `points` (n, 3)."""
     if asked.alignment != "datums":
         return Alignment(asked.alignment, points, np.arange(len(points)))
-    _, fit = datum_alignment(asked.datums, least_squares=False)
+    frame, fit = datum_alignment(asked.datums, least_squares=False)
     ends = np.cumsum([datum.place.size for datum in asked.datums])[:-1]
     members = np.concatenate([datum.place for datum in asked.datums])
-    return Alignment("datums", points, members, lambda moved: fit(np.split(moved, ends, axis=1)))
+    return Alignment(
+        "datums",
+        points,
+        members,
+        lambda moved: fit(np.split(moved, ends, axis=1)),
+        FrameMotion.of(frame),
+    )
 
 
 __all__ = ["SAMPLES", "evaluate_part", "part"]

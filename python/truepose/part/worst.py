@@ -138,6 +138,12 @@ def from_above(
         _spread(_Over.of(state, bounds, alignment, one, members, scale), one.factor)
         for one in forms.plus
     )
+    if over.aligned:
+        weights = _in_part(alignment, _centred(forms), members)
+        beside += sum(
+            _spread(_Over.of(state, bounds, alignment, one, alignment.members, scale), one.factor)
+            for one in alignment.besides(weights)
+        ) * _share_of_one(forms, len(weights))
     every = [forms, *forms.plus]
     far = bounds.reach(members, scale, together=all(_unmoved(_centred(one)) for one in every))
     proven, why = bool(np.isfinite(over.remainder).all()), ""
@@ -154,6 +160,13 @@ def from_above(
         return Interval(float(pick(low)) - room, float(pick(high)) + room, proven, why)
     most = _spread(over, forms.factor) if forms.rule == "spread" else _length(over, forms.factor)
     return Interval(0.0, most + room, proven, why)
+
+
+def _share_of_one(forms: Forms, count: int) -> float:
+    """By how much a value may change, where each of its `count` forms may by 1."""
+    if forms.rule == "length":
+        return forms.factor * math.sqrt(count)
+    return 2.0 * forms.factor if forms.rule == "spread" else 1.0
 
 
 def _unmoved(weights: Floats) -> bool:
@@ -239,13 +252,18 @@ def _of_part(alignment: Alignment, forms: Forms, members: Indices) -> tuple[Floa
     weights = _centred(forms)
     if not alignment.moves:
         return weights, members, False
-    count = len(alignment.nominal)
-    every = np.zeros((len(weights), count, 3))
-    for column, point in enumerate(members):
-        every[:, point] += weights[:, column]
+    every = _in_part(alignment, weights, members)
     if alignment.invariant(every):
         return weights, members, False
-    return alignment.linear(every), np.arange(count), True
+    return alignment.linear(every), np.arange(len(alignment.nominal)), True
+
+
+def _in_part(alignment: Alignment, weights: Floats, members: Indices) -> Floats:
+    """(k, n, 3) weights (k, m, 3) of `members` as weights of all points of the part."""
+    every = np.zeros((len(weights), len(alignment.nominal), 3))
+    for column, point in enumerate(members):
+        every[:, point] += weights[:, column]
+    return every
 
 
 class Climb:

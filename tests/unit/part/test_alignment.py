@@ -5,29 +5,40 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from features_of_elements import face, wall
 from truepose.arrays import Floats
 from truepose.part.alignment import Alignment
+from truepose.part.datum_frame import datum_alignment
+from truepose.part.first_order import FrameMotion
 from truepose.spatial import rotate_about
 
 RNG = np.random.default_rng(7)
 NOMINAL = RNG.uniform(-0.05, 0.05, (40, 3))
-NOMINAL[[3, 17, 29]] = [[-0.04, -0.04, 0.0], [0.04, -0.03, 0.01], [0.0, 0.05, -0.01]]
 AXIS = np.array([1.0, 2.0, -2.0]) / 3.0
 
 
-def of_three_points(points: Floats) -> tuple[Floats, Floats]:
-    """A frame: origin at the first, x towards the second, the third in the xy plane."""
-    origin = points[:, 0]
-    x = points[:, 1] - origin
-    z = np.cross(x, points[:, 2] - origin)
-    x = x / np.linalg.norm(x, axis=1, keepdims=True)
-    z = z / np.linalg.norm(z, axis=1, keepdims=True)
-    return np.stack([x, np.cross(z, x), z], axis=2), origin
+def of_datums(*, least_squares: bool) -> Alignment:
+    """A face and two walls."""
+    datums = [
+        face("F", (-0.05, -0.04), (0.1, 0.09), 0.01),
+        wall("A", (-0.04, -0.04, 0.01), (0.05, -0.04, 0.01), 20),
+        wall("B", (-0.05, -0.03, 0.01), (-0.05, 0.05, 0.01), 20),
+    ]
+    nominal = np.concatenate([one.points for one in datums])
+    ends = np.cumsum([len(one.points) for one in datums])[:-1]
+    frame, fit = datum_alignment(datums, least_squares=least_squares)
+    return Alignment(
+        "datums",
+        nominal,
+        np.arange(len(nominal)),
+        lambda points: fit(np.split(points, ends, axis=1)),
+        FrameMotion.of(frame),
+    )
 
 
 ALIGNMENTS = {
     "best-fit": Alignment("best-fit", NOMINAL, np.arange(40)),
-    "datums": Alignment("datums", NOMINAL, np.array([3, 17, 29]), of_three_points),
+    "datums": of_datums(least_squares=True),
 }
 
 
@@ -40,24 +51,60 @@ def moved(points: Floats) -> Floats:
 @pytest.mark.parametrize("name", ALIGNMENTS)
 def test_a_rigid_motion_is_taken_off(name: str) -> None:
     """However the part lies, it is looked at where the drawing has it."""
-    (aligned,) = ALIGNMENTS[name].apply(moved(NOMINAL)[np.newaxis])
-    assert np.abs(aligned - NOMINAL).max() < 1e-15 * 50
+    nominal = ALIGNMENTS[name].nominal
+    (aligned,) = ALIGNMENTS[name].apply(moved(nominal)[np.newaxis])
+    assert np.abs(aligned - nominal).max() < 1e-15 * 50
 
 
 @pytest.mark.parametrize("name", ALIGNMENTS)
 def test_linear_forms_follow_the_alignment(name: str) -> None:
     """To first order: halving the errors divides what is left over by four."""
     alignment = ALIGNMENTS[name]
-    weights = RNG.normal(size=(3, 40, 3))
-    errors = RNG.normal(size=(40, 3)) * 1e-5
+    weights = RNG.normal(size=(3, *alignment.nominal.shape))
+    errors = RNG.normal(size=alignment.nominal.shape) * 1e-5
     off = []
     for share in (1.0, 0.5):
-        (aligned,) = alignment.apply((NOMINAL + share * errors)[np.newaxis])
-        exact = np.tensordot(weights, aligned - NOMINAL, axes=([1, 2], [0, 1]))
-        linear = np.tensordot(alignment.linear(weights), share * errors, axes=([1, 2], [0, 1]))
+        exact, linear = exact_and_linear(alignment, weights, share * errors)
         off.append(np.abs(exact - linear).max())
     assert off[0] < 1e-3 * np.abs(errors).max() * np.abs(weights).sum()
     assert off[1] < 0.3 * off[0]
+
+
+def exact_and_linear(
+    alignment: Alignment, weights: Floats, errors: Floats
+) -> tuple[Floats, Floats]:
+    """(k,) forms (k, n, 3) of errors (n, 3) after the alignment, and to first order before it."""
+    (aligned,) = alignment.apply((alignment.nominal + errors)[np.newaxis])
+    exact = np.tensordot(weights, aligned - alignment.nominal, axes=([1, 2], [0, 1]))
+    linear = np.tensordot(alignment.linear(weights), errors, axes=([1, 2], [0, 1]))
+    return exact, linear
+
+
+def test_minimum_zones_lie_within_what_their_datums_allow() -> None:
+    """They have no derivative: they are off least squares by their datums' form at most."""
+    alignment = of_datums(least_squares=False)
+    far = 0.0
+    for _ in range(200):
+        weights = RNG.normal(size=(1, *alignment.nominal.shape))
+        errors = RNG.normal(size=alignment.nominal.shape) * 1e-7
+        exact, linear = exact_and_linear(alignment, weights, errors)
+        allowed = 0.0
+        for one in alignment.besides(weights):
+            values = np.tensordot(one.weights, errors, axes=([1, 2], [0, 1]))
+            # The residuals' forms are over the datum's own points, which are members in order.
+            allowed += one.factor * float(np.ptp(values))
+        assert np.abs(exact - linear).max() <= 1.001 * allowed
+        far = max(far, float(np.abs(exact - linear).max()) / allowed)
+    assert far > 0.05
+
+
+def test_a_part_that_is_shifted_is_shifted_back() -> None:
+    """By the linear response too: what all points share is taken off whole."""
+    for least_squares in (True, False):
+        alignment = of_datums(least_squares=least_squares)
+        weights = RNG.normal(size=(5, *alignment.nominal.shape))
+        left = alignment.linear(weights).sum(axis=1)
+        assert np.abs(left).max() < 1e-12 * np.abs(weights).sum()
 
 
 def test_best_fit_leaves_the_least() -> None:

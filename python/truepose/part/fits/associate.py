@@ -24,6 +24,10 @@ freedoms, as the shape's bend allows, whole steps would go to and fro."""
 _STILL = 1e-13
 """A step below this part of the size of the points is the last."""
 
+_ENOUGH = 1e-10
+"""Share of a minimum zone that the linear problem promises by another step, and that is the last:
+where a zone has many places, as between two walls alone, only its bend tells them apart."""
+
 _LEVEL = 2e-15
 """Of the size of the points: the rounding of some coordinates, to which a level is exact."""
 
@@ -52,6 +56,9 @@ def associate(
 
 def _associate(shape: AnyShape, points: Floats, least_squares: bool) -> tuple[AnyShape, Floats]:
     size = float(np.abs(points).max(initial=0.0)) or 1.0
+    fitted = {name: getattr(shape, name).copy() for name in shape.places}
+    residuals = np.empty(points.shape[:2])
+    whole, left = shape, np.arange(len(points))
     reference: Reference | None = None
     columns, values = shape.linearised(points)
     for _ in range(_MOST_STEPS):
@@ -66,6 +73,7 @@ def _associate(shape: AnyShape, points: Floats, least_squares: bool) -> tuple[An
             x = np.linalg.solve(square, right[..., np.newaxis])[:, :freedoms, 0]
             shape = shape.moved(x)
             columns, values = shape.linearised(points)
+            settled = np.zeros(len(left), np.bool_)
         else:
             if reference is None:
                 one = first_reference(columns[:, 0])
@@ -74,22 +82,41 @@ def _associate(shape: AnyShape, points: Floats, least_squares: bool) -> tuple[An
                 )
             x, reference = chebyshev(columns, values, reference, _LEVEL * size)
             x = x[:, :freedoms]
-            width = _width(shape, values) + _LEVEL * size
-            for _ in range(_MOST_HALVINGS):
-                moved = shape.moved(x)
-                columns, values = moved.linearised(points)
-                wider = _width(shape, values) > width
-                if not wider.any():
-                    break
-                x[wider] *= 0.5
-            else:
-                x[wider] = 0.0
-                moved = shape.moved(x)
-                columns, values = moved.linearised(points)
-            shape = moved
-        if np.abs(x).max(initial=0.0) <= _STILL * size:
+            width = _width(shape, values)
+            promised = _width(shape, values - np.einsum("ksn,sk->sn", columns[:freedoms], x))
+            settled = width - promised <= _ENOUGH * width + _LEVEL * size
+            columns, values = _narrower(shape, points, x, width + _LEVEL * size)
+            shape = shape.moved(x)
+        settled |= np.abs(x).max(axis=1, initial=0.0) <= _STILL * size
+        if settled.any():
+            for name, place in fitted.items():
+                place[left[settled]] = getattr(shape, name)[settled]
+            residuals[left[settled]] = values[settled]
+            on = np.flatnonzero(~settled)
+            if not on.size:
+                return whole.with_places(fitted), residuals
+            left, shape, points = left[on], shape.of(on), points[on]
+            columns, values = columns[:, on], values[on]
+            reference = None if reference is None else reference.of(on)
+    for name, place in fitted.items():
+        place[left] = getattr(shape, name)
+    residuals[left] = values
+    return whole.with_places(fitted), residuals
+
+
+def _narrower(
+    shape: FittedShape, points: Floats, x: Floats, width: Floats
+) -> tuple[Floats, Floats]:
+    """The shape moved by x (s, k), linearised; steps to what is wider than `width` are halved."""
+    columns, values = shape.moved(x).linearised(points)
+    wider = np.flatnonzero(_width(shape, values) > width)
+    for halving in range(_MOST_HALVINGS):
+        if not wider.size:
             break
-    return shape, values
+        x[wider] *= 0.5 if halving < _MOST_HALVINGS - 1 else 0.0
+        columns[:, wider], values[wider] = shape.of(wider).moved(x[wider]).linearised(points[wider])
+        wider = wider[_width(shape, values[wider]) > width[wider]]
+    return columns, values
 
 
 def _width(shape: FittedShape, values: Floats) -> Floats:

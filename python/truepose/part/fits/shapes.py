@@ -13,7 +13,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from truepose.arrays import Floats
+from truepose.arrays import Floats, Indices
 from truepose.spatial import cross, norm, rotate_about, tangents
 
 
@@ -35,20 +35,21 @@ class FittedShape:
         """The same shape, moved by x (s, k)."""
         raise NotImplementedError
 
-    def of(self, samples: slice) -> Self:
+    def of(self, samples: slice | Indices) -> Self:
         """That of some samples."""
-        return self._with({name: getattr(self, name)[samples] for name in self.places})
+        return self.with_places({name: getattr(self, name)[samples] for name in self.places})
 
     def joined(self, pieces: Sequence[Self]) -> Self:
         """Pieces of samples that follow each other as one."""
-        return self._with(
+        return self.with_places(
             {
                 name: np.concatenate([getattr(piece, name) for piece in pieces])
                 for name in self.places
             }
         )
 
-    def _with(self, values: dict[str, Floats]) -> Self:
+    def with_places(self, values: dict[str, Floats]) -> Self:
+        """The same shape with these fields."""
         return replace(self, **values)  # type: ignore[type-var]
 
 

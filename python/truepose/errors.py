@@ -210,6 +210,10 @@ CATALOGUE: dict[str, str] = {
     "no-feature": "a part of which no feature is named",
     "nothing-found": "features are to be proposed of a program that has none of those looked for",
     "unknown-datum": "a datum that the part does not have",
+    # tests of machines
+    "test-option": "an option of a test that is not what it can be, or is lacking",
+    "circle-out-of-reach": "a circle that the machine cannot drive",
+    "test-readings": "readings that are none of the test",
     # programs
     "gcode-not-text": "a byte that no program has outside of comments",
     "gcode-line-too-long": "a line of a program longer than a controller reads",

@@ -190,6 +190,7 @@ KINDS: dict[str, Kind] = {
     ),
     "Mapping[str, Sequence[float]] | None": _or_none(_INTERVALS),
     "Mapping[str, str] | Sequence[str]": _SETTINGS,
+    "Positions": _POSITIONS,
     "Positions | None": _or_none(_POSITIONS),
     "Mapping[str, Positions] | None": _or_none(_SYSTEMS),
     "Sequence[str]": _NAMES,

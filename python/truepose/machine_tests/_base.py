@@ -1,0 +1,55 @@
+"""What a test says of itself, and what it is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+    from truepose.runs.poses import Progress
+
+
+@dataclass(frozen=True)
+class TestOption:
+    """An option of a test on the command line: `--NAME`.
+
+    `doc`: a sentence; `dimension`: of a quantity, a key of `files.dimensions.DIMENSIONS`, or
+    "place" (coordinates by name), "word", "file"; `required`: whether the test cannot be without.
+    """
+
+    __test__ = False  # to pytest, which collects by name
+
+    doc: str
+    dimension: str
+    required: bool = False
+
+
+@dataclass(frozen=True)
+class MachineTest:
+    """A test: its `name`, one sentence of `doc`, the `standard` with its edition.
+
+    `options` by name. `run(machine, options, samples=, seed=, progress=)` takes those that were
+    given, quantities in SI, and returns the result.
+    """
+
+    name: str
+    doc: str
+    standard: str
+    options: Mapping[str, TestOption]
+    run: Callable[..., xr.Dataset]
+
+    def __call__(
+        self,
+        machine: Machine,
+        options: Mapping[str, object],
+        *,
+        samples: int,
+        seed: int,
+        progress: Progress | None = None,
+    ) -> xr.Dataset:
+        """The test of a machine."""
+        return self.run(machine, **options, samples=samples, seed=seed, progress=progress)

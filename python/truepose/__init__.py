@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from truepose.error_budget.over_time import over_time
     from truepose.error_budget.strain import strain
     from truepose.machine import Condition, Machine
+    from truepose.machine_tests.circular import circular_test
     from truepose.plausibility import oddities
     from truepose.uncertainty_analysis.bounds import bounds
     from truepose.uncertainty_analysis.functions.inputs import Input
@@ -48,6 +49,7 @@ _WHERE = {
     "bounds": "truepose.uncertainty_analysis.bounds",
     "budget": "truepose.error_budget.evaluate",
     "calibrate": "truepose.calibration.calibrate",
+    "circular_test": "truepose.machine_tests.circular",
     "compensate": "truepose.compensation.compensate",
     "correct_program": "truepose.controllers.gcode",
     "export": "truepose.controllers",
@@ -72,6 +74,7 @@ __all__ = [
     "bounds",
     "budget",
     "calibrate",
+    "circular_test",
     "compensate",
     "correct_program",
     "errors",

@@ -24,6 +24,9 @@ COARSEST, FINEST = math.radians(10.0), math.radians(0.02)
 
 MOST_OVERSHOOT = 4.0 * math.pi
 
+SHORTLY = 1e-3
+"""Of a step: how long before a point its drives are looked at, to see which way they come."""
+
 
 @dataclass(frozen=True, eq=False)
 class CirclePath:
@@ -88,28 +91,38 @@ def circle_path(
     count = 4 * math.ceil(0.5 * math.pi / step - 1e-9)
     angles = 2.0 * np.pi * np.arange(count) / count
     home = dict(zip(machine.commanded, machine.home, strict=True))
-    middle = [float(centre.get(name, home[name])) for name in machine.commanded]
-    poses = np.tile(np.array(middle), (count, 1))
-    for axis, along in zip(PLANES[plane], (np.cos(angles), np.sin(angles)), strict=True):
-        poses[:, machine.commanded.index(axis)] += radius * along
+    middle = np.array([float(centre.get(name, home[name])) for name in machine.commanded])
+
+    def on_circle(at: Floats) -> Floats:
+        there = np.tile(middle, (count, 1))
+        for axis, along in zip(PLANES[plane], (np.cos(at), np.sin(at)), strict=True):
+            there[:, machine.commanded.index(axis)] += radius * along
+        return there
+
+    poses = on_circle(angles)
     joints, placements, status = machine.kernel.place(poses)
     if (status != OK).any():
         raise out_of_reach(machine, angles, poses, np.array(STATUS)[status])
+    drives = joints.shape[1]
     first = round(start / (2.0 * np.pi) * count) % count
     before = math.ceil(overshoot / (2.0 * np.pi) * count - 1e-9)
     along = Travel(machine)
     # The way back begins where the overshoot of the way there has ended.
     there = first - before + np.arange(count + 2 * before + 1)
     back = first + before - np.arange(count + before)
-    travel = np.empty((2, count, joints.shape[1]))
+    travel = np.empty((2, count, drives))
     for way, steps in enumerate((there, back)):
+        # Just before each point too, so that a drive that turns in between has turned.
+        ahead = (1.0, -1.0)[way] * SHORTLY * 2.0 * np.pi / count
+        short, _, _ = machine.kernel.place(on_circle(angles - ahead))
         numbers = steps % count
+        passed = along.into(np.stack([short[numbers], joints[numbers]], axis=1).reshape(-1, drives))
         readings = slice(before, before + count)
-        travel[way][numbers[readings]] = along.into(joints[numbers])[readings]
+        travel[way][numbers[readings]] = passed[1::2][readings]
     point = placements[0, :3].copy()
     for axis, name in enumerate(POSITIONS):
         if name in machine.commanded:
-            point[axis] = middle[machine.commanded.index(name)]
+            point[axis] = float(middle[machine.commanded.index(name)])
     reached = before * 2.0 * np.pi / count
     return CirclePath(
         machine, plane, radius, point, angles, poses, joints, travel, first, reached

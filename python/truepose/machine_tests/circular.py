@@ -232,7 +232,8 @@ def _compared(
     if readings is not None:
         from truepose.calibration.measurements.write_csv import write_measurements
 
-        handed_on = measurements(test.path, read, uncertainty)
+        known = test.before.known
+        handed_on = measurements(test.path, read, uncertainty, known, test.condition)
         write_measurements(Path(readings), test.path.machine, handed_on)
     return Compared(test, read, uncertainty)
 

@@ -10,19 +10,21 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from truepose.arrays import Flags, Floats, Indices
+from truepose.arrays import Floats, Indices
+from truepose.calibration.instruments import Instrument
+from truepose.calibration.instruments._base import Frame
+from truepose.calibration.measurements import Measurements
+from truepose.calibration.measurements.arrays import measurements_of
 from truepose.errors import Fault, MachineFileError, Problem
 from truepose.files.data_file import Column, DataTable, cut_short, read_table
 from truepose.files.text_file import FileKind, read_text
+from truepose.machine import Condition
 from truepose.machine_tests.circle_path import PLANES, CirclePath
 from truepose.machine_tests.circular_quantities import DIRECTIONS
-
-if TYPE_CHECKING:
-    from truepose.calibration.measurements import Measurements
+from truepose.runs.quantities import POSITIONS
 
 WORDS = {
     "counter-clockwise": 0,
@@ -95,15 +97,15 @@ def read_readings(file: str | Path, nominal: float) -> Readings:
     read = read_table(str(path), path.name, text, COLUMNS)
     problems = list(read.problems)
     if read.table is None or problems:
-        raise MachineFileError(problems)
+        raise MachineFileError(*problems)
     table = read.table
     problems = cut_short(_row_problems(table, nominal))
     if problems:
-        raise MachineFileError(problems)
+        raise MachineFileError(*problems)
     paths = tuple(_paths(table))
     problems = [*_path_problems(table, paths)]
     if problems:
-        raise MachineFileError(problems)
+        raise MachineFileError(*problems)
     return Readings(str(path), paths)
 
 
@@ -174,34 +176,49 @@ def _path_problems(table: DataTable, paths: Iterable[Path2D]) -> Iterator[Proble
         )
 
 
-def measurements(path: CirclePath, readings: Readings, uncertainty: float) -> Measurements:
-    """The readings as those of a `distance` instrument in the middle of the circle, whose place in
-    the plane is unknown; `uncertainty`, m, of each.
+def measurements(
+    path: CirclePath,
+    readings: Readings,
+    uncertainty: float,
+    known: Floats,
+    condition: Condition,
+) -> Measurements:
+    """The readings as those of a `distance` instrument in the middle, whose place is unknown.
 
-    At reference temperature without a load on the tool, as a file of measurements has it.
+    That is, in the plane; `uncertainty`, m, of each, in `condition`. What of the `known` radial
+    deviation (2, n), m, is other one way than the other, as play is, is taken from them: rows of
+    measurements do not say from where their pose was reached.
     """
-    from truepose.calibration.instruments import Instrument
-    from truepose.calibration.instruments._base import Frame
-    from truepose.calibration.measurements.arrays import measurements_of
-
     machine = path.machine
-    angles = np.concatenate([each.angles for each in readings.paths])
-    radii = np.concatenate([each.radii for each in readings.paths])
+    apart = 0.5 * (known[0] - known[1])
+    period = 2.0 * np.pi
+    radii = [
+        each.radii
+        - (-1.0) ** each.direction * np.interp(each.angles, path.angles, apart, period=period)
+        for each in readings.paths
+    ]
+    every = np.concatenate([each.angles for each in readings.paths])
     chosen: Indices = np.unique(
-        np.linspace(0, len(angles) - 1, min(len(angles), MOST_ROWS)).round().astype(np.intp)
+        np.linspace(0, len(every) - 1, min(len(every), MOST_ROWS)).round().astype(np.intp)
     )
-    angles, radii = angles[chosen], radii[chosen]
+    angles = every[chosen]
     axes = PLANES[path.plane]
     poses = np.repeat(path.poses[:1], len(angles), axis=0)
     for axis, along in zip(axes, (np.cos(angles), np.sin(angles)), strict=True):
-        place = "xyz".index(axis)
+        place = POSITIONS.index(axis)
         poses[:, machine.commanded.index(axis)] = path.middle[place] + path.radius * along
-    unknown: Flags = np.array([axis in axes for axis in "xyz"] + [False] * 3)
+    unknown = tuple(axis in axes for axis in (*POSITIONS, "a", "b", "c"))
     x, y, z = path.middle.tolist()
     ball_bar = Instrument(
         "ball_bar",
         "distance",
-        Frame(origin=(x, y, z), unknown=tuple(unknown.tolist())),
+        Frame(origin=(x, y, z), unknown=unknown),
         uncertainty={"distance": uncertainty},
     )
-    return measurements_of(machine, ball_bar, poses=poses, values={"distance": radii})
+    return measurements_of(
+        machine,
+        ball_bar,
+        poses=poses,
+        values={"distance": np.concatenate(radii)[chosen]},
+        condition=condition,
+    )

@@ -2,7 +2,8 @@
 
 An error over time has one row for each moment and pose, with the temperatures of the moment; shares
 of the variance one for each pose and parameter, then one for each source; bounds over a region one
-for each component and magnitude, a calibration one for each unknown.
+for each component and magnitude, a calibration one for each unknown, a circular test one for each
+quantity and for each angle.
 
 Where there are sources, a further row of the source "overall" has what all do together. Poses
 that cannot be used have one row with their status and nothing else. What is not over poses (the
@@ -48,6 +49,11 @@ def text(result: Result) -> Iterator[str]:
         from truepose.reporting import calibration
 
         yield from calibration.csv_text(result)
+        return
+    if "turn" in sizes:
+        from truepose.reporting import circular_test
+
+        yield from circular_test.csv_text(result)
         return
     for dim, other_form in (("time", _over_time), ("parameter", _shares), ("commanded", _region)):
         if dim in sizes:

@@ -1,0 +1,35 @@
+"""The page of a circular test: one HTML file, which opens without any network."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from truepose.files.writing import replacing
+from truepose.reporting import circular_test
+from truepose.reporting.page import page_parts, template
+from truepose.reporting.polar_plot import figures
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from truepose.machine import Machine
+
+
+def html(machine: Machine, result: xr.Dataset) -> str:
+    """The page as text."""
+    return template("circular_page.html.jinja").render(
+        machine=machine,
+        attrs=result.attrs,
+        lines=circular_test.summary(machine, result),
+        tables=list(circular_test.tables(machine, result)),
+        figures=figures(machine, result),
+        **page_parts(),
+    )
+
+
+def write(machine: Machine, result: xr.Dataset, path: Path) -> None:
+    """Write the page to `path`, whole or not at all."""
+    text = html(machine, result)
+    with replacing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")

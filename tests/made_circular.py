@@ -36,7 +36,7 @@ class Truth:
     """A machine as it is: lengths off, m, and play, m, of each side; scales off."""
 
     lengths: tuple[float, float] = (0.0, 0.0)
-    play: float = 0.0
+    play: float | tuple[float, float] = 0.0
     scales: tuple[float, float] = (0.0, 0.0)
 
 
@@ -68,7 +68,7 @@ def driven(truth: Truth, angles: Floats, radius: float, way: int) -> Floats:
     """
     wanted = circle(angles, radius)
     ahead = way * slopes_at(angles - way * 1e-9, radius)
-    joints = joints_at(wanted) * (1.0 + np.array(truth.scales)) - 0.5 * truth.play * np.sign(ahead)
+    joints = joints_at(wanted) * (1.0 + np.array(truth.scales)) - 0.5 * np.array(truth.play) * np.sign(ahead)
     lengths = LENGTH + np.broadcast_to(truth.lengths, joints.shape)
     return tool(carriages(joints), lengths, wanted)
 

@@ -1,11 +1,18 @@
 """A measured circular test against the predicted one: within what the model says, and if not, why.
 
-    z = (measured F - mean of the machines) / sqrt(variance of the machines + u^2)
+    d = measured F - mean of the machines, each pair of paths about its own least-squares circle
 
-at every reading, about the centre of each its own least-squares circle. The largest |z| is within
-if it is not above what the share `probability` of the machines has themselves, read with the same
-noise at the same angles. That is one question for the whole test; readings within a step of where a
-drive turns round are left out of it, as a step cannot be told between two angles.
+    farthest   largest |d| / sqrt(variance of the machines + u^2) of a reading: where the machines
+               go, but not so far
+    distance   d' (covariance of the machines + u^2)^-1 d over the number of readings, its root
+               (Mahalanobis 1936): what no machine does, however little it is
+
+with u the noise of a reading. Either is counted in that of its own which (1 + probability) / 2 of
+the machines stay below, and the larger is within if it is not above what the share `probability` of
+machines have themselves, read with the same noise at the same angles. Mean and covariance are of
+half of the machines drawn, all limits of the other half. That is one question for the whole test.
+Readings within a step of where a drive turns round are left out, as a step cannot be told between
+two angles.
 """
 
 from __future__ import annotations
@@ -33,7 +40,10 @@ NAMED = 5
 """Causes of one pattern that are named; the others are counted."""
 
 NOISY = 500
-"""Machines whose quantities are taken with the noise of the readings."""
+"""Machines whose quantities, and distances, are taken with the noise of the readings."""
+
+MOST_MACHINES = 500
+"""Machines of which the covariance is taken."""
 
 STREAM = 0x5EED
 """Of the noise, beside that of the machines."""
@@ -154,48 +164,63 @@ class Compared:
         return self.at_readings(deviations[np.isfinite(deviations).all(axis=(1, 2))])
 
     @cached_property
-    def _scale(self) -> tuple[Floats, Floats]:
-        """Mean and standard deviation (m,) of a reading."""
-        machines = self._machines
-        variance = machines.var(axis=0, ddof=1) if len(machines) > 1 else 0.0
-        return machines.mean(axis=0), np.sqrt(variance + self.uncertainty**2)
+    def _model(self) -> tuple[Floats, Floats, Floats]:
+        """Mean (m,) of half the machines, how they differ from it (s, m), and a factor (s, s).
 
-    def farthest(self, deviations: Floats) -> Floats:
-        """(s,) the largest |z| of F (s, m)."""
-        mean, spread = self._scale
-        z = np.abs(deviations - mean) / spread
-        return np.asarray(z[:, self.counted].max(axis=1))
+        The factor is the inverse of (s - 1) u^2 + X X', so that with few machines and many readings
+        nothing of the size of the readings is solved (Woodbury 1950).
+        """
+        machines = self._machines[::2][:MOST_MACHINES][:, self.counted]
+        mean = machines.mean(axis=0)
+        apart = machines - mean
+        inner = apart @ apart.T
+        inner[np.diag_indices_from(inner)] += max(len(machines) - 1, 1) * self.uncertainty**2
+        return mean, apart, np.asarray(np.linalg.inv(inner))
+
+    def statistics(self, deviations: Floats) -> Floats:
+        """(2, s) farthest and distance of F (s, m), in standard uncertainties."""
+        mean, apart, inverse = self._model
+        d = deviations[:, self.counted] - mean
+        spread = np.square(apart).sum(axis=0) / max(len(apart) - 1, 1) + self.uncertainty**2
+        farthest = np.abs(d / np.sqrt(spread)).max(axis=1)
+        along = d @ apart.T
+        square = np.square(d).sum(axis=1) - ((along @ inverse) * along).sum(axis=1)
+        distance = np.sqrt(np.maximum(square, 0.0) / d.shape[1]) / self.uncertainty
+        return np.stack([farthest, distance])
 
     @cached_property
-    def largest(self) -> float:
-        """Of the readings."""
-        return float(self.farthest(self.deviations[np.newaxis])[0])
+    def measured_statistics(self) -> Floats:
+        """(2,) of the readings."""
+        return np.asarray(self.statistics(self.deviations[np.newaxis])[:, 0])
 
     @cached_property
     def _of_machines(self) -> Floats:
-        """(s,) the same of machines read with noise."""
-        machines = self._machines
-        if len(machines) == 1:
-            machines = np.repeat(machines, NOISY, axis=0)
+        """(2, s) of the other half of the machines, read with noise."""
+        machines = self._machines[1::2] if len(self._machines) > 1 else self._machines
+        if len(machines) < NOISY:
+            machines = np.tile(machines, (-(-NOISY // len(machines)), 1))
         noise = np.random.default_rng([STREAM, self.test.seed]).normal(
             scale=self.uncertainty, size=machines.shape
         )
-        return self.farthest(machines + noise)
+        return self.statistics(self._centred(machines + noise))
 
-    @property
-    def limit(self) -> float:
-        """The largest |z| that counts as within."""
-        return float(np.quantile(self._of_machines, self.test.probability))
+    @cached_property
+    def limits(self) -> Floats:
+        """(2,) what each may be, so that the share `probability` of machines keeps both."""
+        own = np.quantile(self._of_machines, 0.5 * (1.0 + self.test.probability), axis=1)
+        larger = (self._of_machines / own[:, np.newaxis]).max(axis=0)
+        return np.asarray(own * np.quantile(larger, self.test.probability))
 
     @property
     def share(self) -> float:
         """Share of the machines that are at least as far off."""
-        return float((self._of_machines >= self.largest).mean())
+        larger = (self._of_machines / self.limits[:, np.newaxis]).max(axis=0)
+        return float((larger >= (self.measured_statistics / self.limits).max()).mean())
 
     @property
     def within(self) -> bool:
         """Whether the readings are what the model says."""
-        return self.largest <= self.limit
+        return bool((self.measured_statistics <= self.limits).all())
 
     @cached_property
     def outside(self) -> float:

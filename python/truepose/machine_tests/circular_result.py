@@ -137,6 +137,7 @@ def _measured(
     compared: Compared,
 ) -> tuple[dict[str, Any], dict[str, xr.Variable], dict[str, Any]]:
     low, high = compared.intervals
+    farthest, distance = compared.measured_statistics
     explanations = compared.explanations
     values = {
         "measured": compared.values,
@@ -167,8 +168,10 @@ def _measured(
         "measured_readings": compared.readings.count,
         "reading_uncertainty": compared.uncertainty,
         "within": int(compared.within),
-        "largest": compared.largest,
-        "limit": compared.limit,
+        "farthest": float(farthest),
+        "farthest_limit": float(compared.limits[0]),
+        "distance": float(distance),
+        "distance_limit": float(compared.limits[1]),
         "share_as_far_off": compared.share,
         "share_outside": compared.outside,
         "explained_within_bands": compared.explained,

@@ -60,13 +60,21 @@ def summary(machine: Machine, result: xr.Dataset) -> list[tuple[str, str, str]]:
         _explained(machine, result, 0),
         100.0 * float(result["explained_share"].values[0]),
     )
+    far = attrs["farthest"] > attrs["farthest_limit"]
+    why = (
+        f"a reading is {attrs['farthest']:.3g} standard uncertainties from the mean of the "
+        f"machines, of which {percent} stay below {attrs['farthest_limit']:.3g}"
+        if far
+        else f"no machine of the model draws this: readings are {attrs['distance']:.3g} standard "
+        f"uncertainties off (rms), {percent} of the machines stay below "
+        f"{attrs['distance_limit']:.3g}"
+    )
     by_all = 100.0 * float(attrs["explained_within_bands"])
     return [
         (
             NOT_WITHIN,
             "missed",
-            f"{attrs['measured_file']}: a reading is {attrs['largest']:.3g} standard uncertainties "
-            f"from the mean of the machines, {percent} of them stay below {attrs['limit']:.3g}.",
+            f"{attrs['measured_file']}: {why}.",
         ),
         ("", "none", f"{first} off by {value} besides would explain {explained:.3g} %."),
         ("", "none", f"All that has a band explains {by_all:.3g} % while it stays plausible."),

@@ -154,11 +154,11 @@ def test_after_compensation_nothing_known_is_left(tmp_path: Path) -> None:
 def test_sampled_machines_are_those_by_hand(tmp_path: Path) -> None:
     """One uniform length: the interval's ends are those of machines at the same share of the band."""
     machine = load_text(tmp_path, with_keys(drive=OPEN))
-    result = tp.circular_test(machine, RADIUS, PLACE, samples=4000, seed=3)
+    result = tp.circular_test(machine, RADIUS, PLACE, samples=1500, seed=3)
     ends = [by_hand(Truth((share * 3e-4, 0.0), PLAY))["D"] for share in (-0.95, 0.95)]
     low, high = values(result, "lower")["D"], values(result, "upper")["D"]
-    assert [low, high] == pytest.approx(sorted(ends), rel=0.02)
-    same = tp.circular_test(machine, RADIUS, PLACE, samples=4000, seed=3)
+    assert [low, high] == pytest.approx(sorted(ends), rel=0.03)
+    same = tp.circular_test(machine, RADIUS, PLACE, samples=1500, seed=3)
     assert same.identical(result)
 
 

@@ -32,6 +32,7 @@ TOPICS: dict[str, str] = {
     "suspicions": "Suspicions about measurements",
     "reasons": "Reasons of a calibration's answer",
     "programs": "Programs of G-code",
+    "machine_tests": "Tests of a machine",
     "parts": "Features of a part",
 }
 """Name of a table beside this file -> its title, in the order of the page."""

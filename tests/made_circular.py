@@ -68,7 +68,9 @@ def driven(truth: Truth, angles: Floats, radius: float, way: int) -> Floats:
     """
     wanted = circle(angles, radius)
     ahead = way * slopes_at(angles - way * 1e-9, radius)
-    joints = joints_at(wanted) * (1.0 + np.array(truth.scales)) - 0.5 * np.array(truth.play) * np.sign(ahead)
+    joints = joints_at(wanted) * (1.0 + np.array(truth.scales)) - 0.5 * np.array(
+        truth.play
+    ) * np.sign(ahead)
     lengths = LENGTH + np.broadcast_to(truth.lengths, joints.shape)
     return tool(carriages(joints), lengths, wanted)
 
@@ -128,7 +130,7 @@ def readings_text(
     angles = np.radians(np.arange(0.0, 360.0, every))
     lines = ["angle (deg), radius (mm), run, direction"]
     points = np.stack([driven(truth, angles, radius, way) for way in (1, -1)])
-    middle = points.reshape(-1, 2).mean(axis=0) + [eccentric.real, eccentric.imag]
+    middle = points.reshape(-1, 2).mean(axis=0) + np.array([eccentric.real, eccentric.imag])
     radii = np.linalg.norm(points - middle, axis=2) + noise
     for row, word in zip(radii, ("counter-clockwise", "cw"), strict=True):
         degrees = np.degrees(angles)

@@ -89,6 +89,13 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     name: (getattr(tp, name), {"model": MACHINE, "poses": POSE, **FEW.get(name, {})})
     for name in ("monte_carlo", "shares", "uncertainty", "worst_case")
 } | {
+    "circular_test": (
+        tp.circular_test,
+        {
+            "machine": MACHINE, "radius": 0.05, "centre": {"x": 0.3, "y": 0.2}, "step": 0.1,
+            "samples": 100,
+        },
+    ),
     "calibrate": (tp.calibrate, {"machine": MACHINE, "data": "none.csv", "folds": 2}),
     "correct_program": (
         tp.correct_program, {"machine": MACHINE, "source": "none.ngc", "target": None},

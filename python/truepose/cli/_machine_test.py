@@ -126,7 +126,10 @@ def _deliver(
         formats.write(whole, output)
     if given["format"] == "table":
         show_lines(
-            [(word, COLOURS[colour], text) for word, colour, text in circular_test.summary(machine, result)]
+            [
+                (word, COLOURS[colour], text)
+                for word, colour, text in circular_test.summary(machine, result)
+            ]
         )
         show_tables(circular_test.tables(machine, result))
     else:
@@ -137,11 +140,12 @@ def _deliver(
 
 def _options(machine: Machine, test: MachineTest, given: dict[str, Any]) -> dict[str, Any]:
     """What was given, quantities in SI. Raises `RequestError` (test-option) with all problems."""
-    from truepose.errors import RequestError
+    from truepose.errors import Problem, RequestError
     from truepose.files.units import UnitSystem
     from truepose.machine_tests.circle_path import option_problem
 
-    units, problems, options = UnitSystem(machine.file_units), [], {}
+    units, problems = UnitSystem(machine.file_units), list[Problem]()
+    options: dict[str, Any] = {}
     for name in OPTIONS:
         value, own = given[name], NAMES.get(name, name)
         option = test.options.get(own)
@@ -152,9 +156,7 @@ def _options(machine: Machine, test: MachineTest, given: dict[str, Any]) -> dict
             continue
         if value is None:
             if option.required:
-                problems.append(
-                    option_problem(own, f"no {flag}", f"{flag} {option.doc}")
-                )
+                problems.append(option_problem(own, f"no {flag}", f"{flag} {option.doc}"))
             continue
         if option.dimension == "place":
             options[own] = _place(units, flag, str(value), problems)

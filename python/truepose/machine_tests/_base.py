@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import xarray as xr
 
-    from truepose.machine import Machine
-    from truepose.runs.poses import Progress
-
 
 @dataclass(frozen=True)
 class TestOption:
@@ -32,8 +29,8 @@ class TestOption:
 class MachineTest:
     """A test: its `name`, one sentence of `doc`, the `standard` with its edition.
 
-    `options` by name. `run(machine, options, samples=, seed=, progress=)` takes those that were
-    given, quantities in SI, and returns the result.
+    `options` by name. `run(machine, samples=, seed=, probability=, progress=, ...)` takes those
+    that were given, quantities in SI, and returns the result.
     """
 
     name: str
@@ -41,15 +38,3 @@ class MachineTest:
     standard: str
     options: Mapping[str, TestOption]
     run: Callable[..., xr.Dataset]
-
-    def __call__(
-        self,
-        machine: Machine,
-        options: Mapping[str, object],
-        *,
-        samples: int,
-        seed: int,
-        progress: Progress | None = None,
-    ) -> xr.Dataset:
-        """The test of a machine."""
-        return self.run(machine, **options, samples=samples, seed=seed, progress=progress)

@@ -124,9 +124,7 @@ def circle_path(
         if name in machine.commanded:
             point[axis] = float(middle[machine.commanded.index(name)])
     reached = before * 2.0 * np.pi / count
-    return CirclePath(
-        machine, plane, radius, point, angles, poses, joints, travel, first, reached
-    )
+    return CirclePath(machine, plane, radius, point, angles, poses, joints, travel, first, reached)
 
 
 def _check(
@@ -199,7 +197,9 @@ def out_of_reach(
         str(status[first])
     )
     where = pose_in_words(machine, poses[first])
-    share = f"{failed.size} of {len(angles)} angles, the first {math.degrees(angles[first]):.4g} deg"
+    share = (
+        f"{failed.size} of {len(angles)} angles, the first {math.degrees(angles[first]):.4g} deg"
+    )
     return RequestError(
         Problem(
             "circle-out-of-reach",

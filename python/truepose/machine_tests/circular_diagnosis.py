@@ -63,9 +63,9 @@ class Cause:
 
 @dataclass(frozen=True)
 class Step:
-    """A drive that turns round at `angle`, rad, on one of the paths, and what the radius does there.
+    """A drive that turns round at `angle`, rad, on one of the paths.
 
-    `size`, m, outwards; NaN where nobody knows on which flank of its play the drive lies.
+    `size`: what F does there by all that is known, m, outwards.
     """
 
     drive: str
@@ -116,9 +116,7 @@ def known_causes(seen: Seen, state: PartState, sources: Sequence[Source]) -> lis
     return sorted(causes, key=lambda cause: -abs(cause.share))
 
 
-def _groups(
-    state: PartState, source: str, parameters: Indices
-) -> Iterator[tuple[str, Indices]]:
+def _groups(state: PartState, source: str, parameters: Indices) -> Iterator[tuple[str, Indices]]:
     """Columns of a source's deviation by part and kind of parameter, and what they are called."""
     kinds: dict[str, list[int]] = {}
     for column, parameter in enumerate(parameters.tolist()):
@@ -187,9 +185,7 @@ def shape_of(angles: Floats, pattern: Floats) -> str:
     return "mixed"
 
 
-def steps_of(
-    path: CirclePath, state: PartState, sources: Sequence[Source]
-) -> list[Step]:
+def steps_of(path: CirclePath, state: PartState, sources: Sequence[Source]) -> list[Step]:
     """Where each drive turns round, either way, in the order of drives and angles.
 
     The step is what all sources' known deviation does when the drive's flank alone is changed from
@@ -217,12 +213,16 @@ def _turns(path: CirclePath, joint: int) -> Iterator[tuple[float, float]]:
     for number in np.flatnonzero((before * after < 0.0) & (np.abs(before) > still)):
         bent = before[number] - after[number]
         offset = 0.5 * (before[number] + after[number]) / bent
-        yield float((path.angles[number] + offset * width) % (2.0 * np.pi)), float(
-            np.sign(after[number])
+        yield (
+            float((path.angles[number] + offset * width) % (2.0 * np.pi)),
+            float(np.sign(after[number])),
         )
     # Two points alike on top: it turns between them.
     for number in np.flatnonzero(np.abs(after) <= still):
-        yield float((path.angles[number] + 0.5 * width) % (2.0 * np.pi)), float(-np.sign(before[number]))
+        yield (
+            float((path.angles[number] + 0.5 * width) % (2.0 * np.pi)),
+            float(-np.sign(before[number])),
+        )
 
 
 def _step(

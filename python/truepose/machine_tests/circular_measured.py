@@ -26,9 +26,8 @@ import numpy as np
 from truepose.arrays import Flags, Floats
 from truepose.machine_tests.circle import least_squares, ring_widths
 from truepose.machine_tests.circular import CircularTest
-from truepose.machine_tests.circular_diagnosis import kind_of
 from truepose.machine_tests.circular_quantities import QUANTITIES
-from truepose.machine_tests.circular_readings import Readings
+from truepose.machine_tests.circular_readings import Path2D, Readings
 from truepose.machine_tests.seen import centred
 from truepose.part.states import in_space
 from truepose.runs.variables import Variables
@@ -79,7 +78,7 @@ class Compared:
         return np.concatenate([path.angles for path in self._paths])
 
     @cached_property
-    def _paths(self) -> list:  # type: ignore[type-arg]
+    def _paths(self) -> list[Path2D]:
         return [path for pair in self.readings.pairs for path in pair]
 
     @cached_property
@@ -249,7 +248,8 @@ class Compared:
     @cached_property
     def difference(self) -> Floats:
         """(m,) measured F less that of the known errors, m."""
-        return self.deviations - self.at_readings(self.test.before.nominal.deviations)[0]
+        known = self.at_readings(self.test.before.nominal.deviations)[0]
+        return np.asarray(self.deviations - known)
 
     @cached_property
     def explained(self) -> float:
@@ -334,4 +334,4 @@ def _uncertainties(variables: Variables, count: int) -> Floats:
     return np.where(variance > 0.0, np.sqrt(variance), np.nan)
 
 
-__all__ = ["Compared", "Explanation", "kind_of"]
+__all__ = ["Compared", "Explanation"]

@@ -1,7 +1,7 @@
 """Readings of a ball bar: a file of them, checked, and as measurements for a calibration.
 
-    angle (deg), radius (mm), run, direction
-    0,           100.0021,    1,   counter-clockwise
+angle (deg), radius (mm), run, direction
+0,           100.0021,    1,   counter-clockwise
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A circular test for people and as CSV: quantities, causes, where drives turn, what is measured."""
+"""A circular test for people and as CSV: quantities, causes, where drives turn, readings."""
 
 from __future__ import annotations
 
@@ -162,7 +162,12 @@ def turns(machine: Machine, result: xr.Dataset) -> Table:
     return Table(
         "turns",
         "Where drives turn round, and what the radius does there",
-        ("drive", f"at, {turn.label}", f"counter-clockwise, {unit.label}", f"clockwise, {unit.label}"),
+        (
+            "drive",
+            f"at, {turn.label}",
+            f"counter-clockwise, {unit.label}",
+            f"clockwise, {unit.label}",
+        ),
         tuple(rows),
         note="The step of what is known, outwards positive: of play that friction leaves open, and "
         "of reversal in a table. Where a load presses the drive to one side there is none.",
@@ -188,7 +193,13 @@ def explanations(machine: Machine, result: xr.Dataset) -> Table:
     return Table(
         "explanations",
         "What would explain the difference from the known error",
-        ("parameter", "this test cannot tell it from", "explains, %", "off by", "std. uncertainties"),
+        (
+            "parameter",
+            "this test cannot tell it from",
+            "explains, %",
+            "off by",
+            "std. uncertainties",
+        ),
         tuple(rows),
         words=2,
         note="Each alone, by least squares. --readings FILE.csv writes the readings for "
@@ -203,7 +214,7 @@ def _explained(machine: Machine, result: xr.Dataset, at: int) -> str:
 
 
 def csv_text(result: Result) -> Iterator[str]:
-    """A row for each state and quantity, then for each state, direction and angle, then readings."""
+    """A row for each state and quantity; each state, direction and angle; each reading."""
     known, spread = result.values("known"), result.values("standard_uncertainty")
     low, high = result.values("lower"), result.values("upper")
     length = known.unit()

@@ -8,10 +8,9 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.reporting.figures import DrawnFigure
-from truepose.reporting.figures._plot import Plot, trace
+from truepose.reporting.figures._plot import Keys, Plot, trace
 from truepose.reporting.figures._style import AXIS, GRID, INK, SOURCE_COLOURS, finish, small
 from truepose.reporting.figures._text import as_text
-from truepose.verdict.states import BEFORE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,10 +47,11 @@ def figures(machine: Machine, result: xr.Dataset) -> list[DrawnFigure]:
 
 def _caption(machine: Machine, result: xr.Dataset, state: int) -> str:
     unit = machine.shown.small_length
+    ring, times = _ring(machine, result, state), _magnified(machine, result, state)
     text = (
-        f"Radial deviation F outwards from the nominal circle, a ring each {_ring(machine, result, state):g} "
-        f"{unit.label}: magnified {_magnified(machine, result, state):,.0f} times against a circle of "
-        f"radius {machine.shown.length.text(float(result.attrs['radius']), 6)}. About the centre "
+        f"Radial deviation F outwards from the nominal circle, a ring each {ring:g} {unit.label}: "
+        f"magnified {times:,.0f} times against a circle of radius "
+        f"{machine.shown.length.text(float(result.attrs['radius']), 6)}. About the centre "
         "of the least-squares circle, which is dashed. Bands hold "
         f"{100.0 * result.attrs['probability']:.3g} % of the machines at each angle."
     )
@@ -120,7 +120,7 @@ def _figure(machine: Machine, result: xr.Dataset, state: int) -> Plot:
     _least_squares(figure, machine, result, state, scale)
     _turns(figure, result, turn.per_si, turn.label)
     edge = MIDDLE + REACH + 0.2
-    hidden = {"visible": False, "range": [-edge, edge]}
+    hidden: Keys = {"visible": False, "range": [-edge, edge]}
     finish(figure, HEIGHT, margin={"l": 20, "r": 20, "t": 70, "b": 20}, hovermode="closest")
     figure.update_xaxes(**hidden, constrain="domain")
     figure.update_yaxes(**hidden, scaleanchor="x", scaleratio=1, constrain="domain")
@@ -214,7 +214,7 @@ def _rings(figure: Plot, machine: Machine, result: xr.Dataset, state: int, scale
             )
         )
         angle = machine.shown.angle
-        first, second = str(result.attrs["plane"])
+        first, second = list(str(result.attrs["plane"]))
         axis = {0: f" (+{first})", 90: f" (+{second})"}.get(degrees, "")
         notes.append(
             {
@@ -297,11 +297,11 @@ def _turns(figure: Plot, result: xr.Dataset, per_si: float, label: str) -> None:
             text=drives,
             textposition="top center",
             textfont={"size": 11},
-            customdata=[f"{drive} turns at {a * per_si:.4g} {label}" for drive, a in zip(drives, angles, strict=True)],
+            customdata=[
+                f"{drive} turns at {a * per_si:.4g} {label}"
+                for drive, a in zip(drives, angles, strict=True)
+            ],
             hovertemplate="%{customdata}<extra></extra>",
             name="a drive turns round",
         )
     )
-
-
-__all__ = ["BEFORE", "figures"]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import truepose as tp
+from machine_texts import load_text
 from made_circular import (
     CENTRE,
     PLAY,
@@ -15,10 +16,8 @@ from made_circular import (
     fitted,
     narrowest,
     read_by,
-    readings_text,
     with_keys,
 )
-from machine_texts import load_text
 from truepose.machine import Machine
 from truepose.machine_tests.circular_quantities import QUANTITIES
 
@@ -152,7 +151,7 @@ def test_after_compensation_nothing_known_is_left(tmp_path: Path) -> None:
 
 
 def test_sampled_machines_are_those_by_hand(tmp_path: Path) -> None:
-    """One uniform length: the interval's ends are those of machines at the same share of the band."""
+    """One uniform length: the ends are those of machines at this share of the band."""
     machine = load_text(tmp_path, with_keys(drive=OPEN))
     result = tp.circular_test(machine, RADIUS, PLACE, samples=1500, seed=3)
     ends = [by_hand(Truth((share * 3e-4, 0.0), PLAY))["D"] for share in (-0.95, 0.95)]
@@ -168,7 +167,9 @@ def test_causes_are_ranked_and_make_up_the_whole(tmp_path: Path) -> None:
     names = [str(name) for name in result["known_cause"].values]
     assert names[0] == "tolerance: strut 1, length"
     assert set(names[1:]) == {"backlash: drive d1, play", "backlash: drive d2, play"}
-    assert result["known_shape"].values[0] == "mixed" or "ellipse" in result["known_shape"].values[0]
+    assert (
+        result["known_shape"].values[0] == "mixed" or "ellipse" in result["known_shape"].values[0]
+    )
     assert result["known_share"].values.sum() == pytest.approx(1.0, abs=1e-3)
     assert result["uncertain_share"].values.sum() == pytest.approx(1.0, abs=1e-12)
     own = by_hand(Truth((3e-4, 0.0)))["G_b"]
@@ -176,10 +177,10 @@ def test_causes_are_ranked_and_make_up_the_whole(tmp_path: Path) -> None:
 
 
 def test_a_ripple_of_unknown_phase_makes_form(tmp_path: Path) -> None:
-    """Nothing is known, and every machine has a form: a band for all poses alike would have none."""
-    text = with_keys(
-        drive='actuator = { periodic = { amplitude = "5 um", period = 5 } }'
-    ).replace("length_tolerance = [-0.3, 0.3]\n", "")
+    """Nothing is known, and every machine has a form (a band alike at all poses has none)."""
+    text = with_keys(drive='actuator = { periodic = { amplitude = "5 um", period = 5 } }').replace(
+        "length_tolerance = [-0.3, 0.3]\n", ""
+    )
     result = tp.circular_test(load_text(tmp_path, text), RADIUS, PLACE, samples=200)
     assert values(result)["G_b"] == pytest.approx(0.0, abs=1e-12)
     assert values(result, "lower")["G_b"] > 10e-6

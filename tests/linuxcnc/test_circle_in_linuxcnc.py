@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from real_linuxcnc import required, run
 
 import truepose as tp
-from made_circular import CENTRE, PLAY, Truth, with_keys
 from machine_texts import load_text
+from made_circular import CENTRE, PLAY, Truth, with_keys
 from sweeps import sweep
 from two_slider import LENGTH, carriages, tool
 
@@ -62,7 +62,7 @@ def actual(joints: Floats, direction: Floats) -> Floats:
 
 def came(joints: Floats) -> Floats:
     """(n, 2) the last direction of motion, -1 or 1."""
-    steps = np.sign(np.diff(joints, axis=0, prepend=joints[:1]))
+    steps: Floats = np.sign(np.diff(joints, axis=0, prepend=joints[:1]))
     for at in range(1, len(steps)):
         steps[at] = np.where(steps[at] == 0.0, steps[at - 1], steps[at])
     return steps
@@ -73,7 +73,7 @@ def evenly(cycles: Floats, angles: Floats) -> Floats:
     order = np.argsort(angles)
     wanted = np.radians(0.1 * np.arange(3600))
     at = np.clip(np.searchsorted(angles[order], wanted), 0, len(order) - 1)
-    return cycles[order[np.unique(at)]]
+    return np.asarray(cycles[order[np.unique(at)]])
 
 
 @sweep

@@ -90,7 +90,7 @@ def circle_path(
     _check(machine, radius, centre, plane, start, overshoot, step)
     count = 4 * math.ceil(0.5 * math.pi / step - 1e-9)
     angles = 2.0 * np.pi * np.arange(count) / count
-    home = dict(zip(machine.commanded, machine.home, strict=True))
+    home = dict(zip(machine.dof, machine.home, strict=True))
     middle = np.array([float(centre.get(name, home[name])) for name in machine.commanded])
 
     def on_circle(at: Floats) -> Floats:

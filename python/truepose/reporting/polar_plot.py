@@ -119,7 +119,7 @@ def _figure(machine: Machine, result: xr.Dataset, state: int) -> Plot:
         _readings(figure, machine, result, scale)
     _least_squares(figure, machine, result, state, scale)
     _turns(figure, result, turn.per_si, turn.label)
-    edge = MIDDLE + REACH + 0.2
+    edge = MIDDLE + REACH + 0.26
     hidden: Keys = {"visible": False, "range": [-edge, edge]}
     finish(figure, HEIGHT, margin={"l": 20, "r": 20, "t": 70, "b": 20}, hovermode="closest")
     figure.update_xaxes(**hidden, constrain="domain")
@@ -218,8 +218,8 @@ def _rings(figure: Plot, machine: Machine, result: xr.Dataset, state: int, scale
         axis = {0: f" (+{first})", 90: f" (+{second})"}.get(degrees, "")
         notes.append(
             {
-                "x": float((edge + 0.08) * np.cos(way)),
-                "y": float((edge + 0.08) * np.sin(way)),
+                "x": float((edge + 0.13) * np.cos(way)),
+                "y": float((edge + 0.13) * np.sin(way)),
                 "text": f"{way * angle.per_si:.4g} {angle.label}{axis}".replace(" °", "°"),
                 "showarrow": False,
                 "font": {"size": 12, "color": INK},

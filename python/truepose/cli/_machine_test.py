@@ -93,7 +93,7 @@ def run(
     if output is not None and output.suffix.lower() == ".html":
         from truepose.cli._steps import with_report_packages
 
-        page = with_report_packages("truepose.reporting.circular_page")
+        page = with_report_packages(test.page)
     samples = {} if given["samples"] is None else {"samples": given["samples"]}
     with progress("test", "samples") as report:
         result = test.run(
@@ -104,20 +104,27 @@ def run(
             probability=given["probability"],
             progress=report,
         )
-    return _deliver(machine, result, page, output, given)
+    return _deliver(machine, test, result, page, output, given)
 
 
 def _deliver(
-    machine: Machine, result: Any, page: Any, output: Path | None, given: dict[str, Any]
+    machine: Machine,
+    test: MachineTest,
+    result: Any,
+    page: Any,
+    output: Path | None,
+    given: dict[str, Any],
 ) -> int:
     import sys
+    from importlib import import_module
 
     from truepose.cli._show import COLOURS, show_lines, show_tables
     from truepose.cli._steps import note_written
     from truepose.cli._verbose import say_result
-    from truepose.reporting import circular_test, formats
+    from truepose.reporting import formats
     from truepose.reporting.result import Result
 
+    shown = import_module(test.reporting)
     whole = Result("part", machine, result)
     say_result(result)
     if page is not None:
@@ -126,12 +133,9 @@ def _deliver(
         formats.write(whole, output)
     if given["format"] == "table":
         show_lines(
-            [
-                (word, COLOURS[colour], text)
-                for word, colour, text in circular_test.summary(machine, result)
-            ]
+            [(word, COLOURS[colour], text) for word, colour, text in shown.summary(machine, result)]
         )
-        show_tables(circular_test.tables(machine, result))
+        show_tables(shown.tables(machine, result))
     else:
         sys.stdout.writelines(formats.text(whole, f".{given['format']}"))
     note_written(output, given["readings"])

@@ -256,4 +256,6 @@ TEST = MachineTest(
         "readings": TestOption("file for `truepose calibrate` to write", "file"),
     },
     circular_test,
+    reporting="truepose.reporting.circular_test",
+    page="truepose.reporting.circular_page",
 )

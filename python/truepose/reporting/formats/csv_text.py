@@ -13,6 +13,7 @@ comparison of the sources) and quantiles at many levels are in the JSON and NetC
 from __future__ import annotations
 
 import csv
+import importlib
 import io
 import math
 from collections.abc import Iterator
@@ -50,10 +51,11 @@ def text(result: Result) -> Iterator[str]:
 
         yield from calibration.csv_text(result)
         return
-    if "turn" in sizes:
-        from truepose.reporting import circular_test
+    if "test" in result.dataset.attrs:
+        from truepose.machine_tests import test_named
 
-        yield from circular_test.csv_text(result)
+        test = test_named(str(result.dataset.attrs["test"]))
+        yield from importlib.import_module(test.reporting).csv_text(result)
         return
     for dim, other_form in (("time", _over_time), ("parameter", _shares), ("commanded", _region)):
         if dim in sizes:

@@ -68,19 +68,31 @@ NAMES = {"start_angle": "start", "reading_uncertainty": "uncertainty"}
 OPTIONS = ("plane", "radius", "centre", "start_angle", "overshoot", "step", "measured",
            "reading_uncertainty", "readings")  # fmt: skip
 
+SHARED = ("machine_file", "test", "samples", "probability", "seed", "settings", "format", "output",
+          "verbose")  # fmt: skip
+"""Options that a test and a part both take."""
+
 ENDINGS = (".json", ".csv", ".nc", ".html")
 
 
-def run(
-    machine_file: Path, program: Path | None, output: Path | None, given: dict[str, Any]
-) -> int:
+def check_options(*, test: bool) -> None:
+    """Refuse options of a part with a test, and of a test with a part."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        name = option.name or ""
+        said = context.get_parameter_source(name) == click.core.ParameterSource.COMMANDLINE
+        if said and name not in SHARED and (name in OPTIONS) != test:
+            flag = option.opts[0] if option.opts[0].startswith("-") else str(option.metavar)
+            word = f"--test takes no {flag}." if test else f"{flag} is of a --test."
+            raise click.UsageError(word)
+
+
+def run(machine_file: Path, output: Path | None, given: dict[str, Any]) -> int:
     """Make the test and show it -> exit code: 1 where what is measured is not within."""
     from truepose.cli._progress import progress
     from truepose.cli._steps import load_machine
     from truepose.files.writing import require_writable
 
-    if program is not None:
-        raise click.UsageError("--test takes no PART.ngc.")
     test = test_named(given["test"])
     inputs = [path for path in (machine_file, given["measured"]) if path is not None]
     if output is not None:

@@ -30,9 +30,9 @@ class MachineTest:
     """A test: its `name`, one sentence of `doc`, the `standard` with its edition.
 
     `options` by name. `run(machine, samples=, seed=, probability=, progress=, ...)` takes those
-    that were given, quantities in SI, and returns the result. `reporting`: the module that shows it,
-    with `summary` and `tables` (machine, result) and `csv_text` (result); `page`: the one of its HTML
-    page, with `write(machine, result, path)`.
+    that were given, quantities in SI, and returns the result. `reporting`: the module that shows
+    it, with `summary` and `tables` (machine, result) and `csv_text` (result); `page`: the one of
+    its HTML page, with `write(machine, result, path)`.
     """
 
     name: str

@@ -106,7 +106,20 @@ def test_what_cannot_be_is_refused(
     assert found in outcome.err
 
 
-def test_a_program_and_a_test_are_not_both(capsys: Capture) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("part", "m.toml", "part.ngc", *ASKED[2:]), "--test takes no PART.ngc"),
+        ((*ASKED, "--features", "f.toml"), "--test takes no --features"),
+        (("part", "m.toml", "part.ngc", "--radius", "5 mm"), "--radius is of a --test"),
+        (("part", "m.toml"), "PART.ngc"),
+    ],
+)
+def test_a_part_and_a_test_are_not_both(
+    arguments: tuple[str, ...], said: str, capsys: Capture
+) -> None:
     Path("part.ngc").write_text("M2\n")
-    assert call(capsys, "part", "m.toml", "part.ngc", *ASKED[2:]).code == 2
-    assert call(capsys, "part", "m.toml").code == 2
+    Path("f.toml").write_text("")
+    outcome = call(capsys, *arguments)
+    assert outcome.code == 2
+    assert said in outcome.err

@@ -191,7 +191,7 @@ def _place(units: Any, flag: str, text: str, problems: list[Any]) -> dict[str, f
     from truepose.machine_tests.circle_path import option_problem
 
     place: dict[str, float] = {}
-    for part in filter(None, (each.strip() for each in text.split(","))):
+    for part in filter(None, (text_part.strip() for text_part in text.split(","))):
         name, equals, value = part.partition("=")
         axis = name.strip().lower()
         if not equals or axis in place:

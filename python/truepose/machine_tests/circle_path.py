@@ -163,7 +163,7 @@ def _check(
     if not FINEST <= step <= COARSEST:
         wrong.append(("step", f"{math.degrees(step):g} deg", "0.02 to 10 deg", None))
     if wrong:
-        raise RequestError(*(option_problem(*each) for each in wrong))
+        raise RequestError(*(option_problem(*fault) for fault in wrong))
 
 
 def planes(machine: Machine) -> tuple[str, ...]:

@@ -46,7 +46,7 @@ LOBES = {2: "ellipse", 3: "three lobes", 4: "four lobes", 5: "five lobes", 6: "s
 
 
 @dataclass(frozen=True)
-class Cause:
+class RadialCause:
     """`form`: width of its ring alone, m; of a variable, rms standard uncertainty of F without D.
 
     `radius`: what it adds to D, m (standard uncertainty of it). `share` of the whole. `shape`: what
@@ -62,7 +62,7 @@ class Cause:
 
 
 @dataclass(frozen=True)
-class Step:
+class TurnStep:
     """A drive that turns round at `angle`, rad, on one of the paths.
 
     `size`: what F does there by all that is known, m, outwards.
@@ -84,9 +84,9 @@ def kind_of(parameter: str, source: str = "") -> tuple[str, str]:
     return f"{part} {name}", _OF_SOURCE.get((source, first), _KINDS.get(first, first))
 
 
-def known_causes(seen: Seen, state: PartState, sources: Sequence[Source]) -> list[Cause]:
+def known_causes(seen: Seen, state: PartState, sources: Sequence[Source]) -> list[RadialCause]:
     """What each known cause does alone, the largest share first."""
-    total = seen.known.reshape(-1)
+    total = seen.deviations.reshape(-1)
     size = float(total @ total)
     causes = []
     for source, moved in zip(sources, state.variables.alone, strict=True):
@@ -104,7 +104,7 @@ def known_causes(seen: Seen, state: PartState, sources: Sequence[Source]) -> lis
             pattern = alone.deviations[0]
             radius = seen.radius_of(alone)[0]
             causes.append(
-                Cause(
+                RadialCause(
                     f"{source.name}: {label}",
                     source.name,
                     float(seen.quantity(alone, "G_b")[0]),
@@ -126,7 +126,7 @@ def _groups(state: PartState, source: str, parameters: Indices) -> Iterator[tupl
         yield label, np.array(columns, np.intp)
 
 
-def uncertain_causes(seen: Seen, state: PartState, seed: int) -> list[Cause]:
+def uncertain_causes(seen: Seen, state: PartState, seed: int) -> list[RadialCause]:
     """What each variable contributes to the variance of F, the largest first."""
     variables = state.variables
     if not variables.names:
@@ -144,15 +144,15 @@ def uncertain_causes(seen: Seen, state: PartState, seed: int) -> list[Cause]:
         values = varying.along(varying.rows(0, DRAWN), 0)  # (s, 2 n, n_varying)
         for place, at in enumerate(varying.varying.tolist()):
             drawn = values[:, :, place, np.newaxis] * state.effects[:, :, at]
-            each = seen.patterns(np.moveaxis(drawn, 0, 2))
-            each = each - each.mean(axis=0)
-            means = each.mean(axis=1)
-            variance[at] = np.square(each).mean()
+            drawn_patterns = seen.patterns(np.moveaxis(drawn, 0, 2))
+            drawn_patterns = drawn_patterns - drawn_patterns.mean(axis=0)
+            means = drawn_patterns.mean(axis=1)
+            variance[at] = np.square(drawn_patterns).mean()
             radius[at] = np.sqrt(np.square(means).mean())
-            form[at] = np.sqrt(np.square(each - means[:, np.newaxis]).mean())
+            form[at] = np.sqrt(np.square(drawn_patterns - means[:, np.newaxis]).mean())
     total = float(variance.sum())
     causes = [
-        Cause(
+        RadialCause(
             name,
             variables.sources[at],
             float(form[at]),
@@ -185,7 +185,7 @@ def shape_of(angles: Floats, pattern: Floats) -> str:
     return "mixed"
 
 
-def steps_of(path: CirclePath, state: PartState, sources: Sequence[Source]) -> list[Step]:
+def steps_of(path: CirclePath, state: PartState, sources: Sequence[Source]) -> list[TurnStep]:
     """Where each drive turns round, either way, in the order of drives and angles.
 
     The step is what all sources' known deviation does when the drive's flank alone is changed from
@@ -197,7 +197,7 @@ def steps_of(path: CirclePath, state: PartState, sources: Sequence[Source]) -> l
             for way in range(len(DIRECTIONS)):
                 flank = direction_after if way == 0 else -direction_after
                 size = _step(path, state, sources, joint, angle, flank)
-                steps.append(Step(drive.name, way, angle, size))
+                steps.append(TurnStep(drive.name, way, angle, size))
     return steps
 
 

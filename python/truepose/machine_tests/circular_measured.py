@@ -25,9 +25,9 @@ import numpy as np
 
 from truepose.arrays import Flags, Floats
 from truepose.machine_tests.circle import least_squares, ring_widths
-from truepose.machine_tests.circular import CircularTest
+from truepose.machine_tests.circular_prediction import CircularTest
 from truepose.machine_tests.circular_quantities import QUANTITIES
-from truepose.machine_tests.circular_readings import Path2D, Readings
+from truepose.machine_tests.circular_readings import BallBarReadings, Path2D
 from truepose.machine_tests.seen import centred
 from truepose.part.states import in_space
 from truepose.runs.variables import Variables
@@ -49,7 +49,7 @@ STREAM = 0x5EED
 
 
 @dataclass(frozen=True)
-class Explanation:
+class Suspect:
     """A parameter, or several that this test cannot tell apart, that would explain the difference.
 
     `value`: by how much it would have to be off besides, in SI `unit`; `share` of the sum of
@@ -65,11 +65,11 @@ class Explanation:
 
 
 @dataclass(frozen=True, eq=False)
-class Compared:
-    """Readings against a test. `uncertainty`: standard, of one reading, m."""
+class ComparedReadings:
+    """BallBarReadings against a test. `uncertainty`: standard, of one reading, m."""
 
     test: CircularTest
-    readings: Readings
+    readings: BallBarReadings
     uncertainty: float
 
     @cached_property
@@ -89,13 +89,13 @@ class Compared:
     @cached_property
     def deviations(self) -> Floats:
         """(m,) measured F, m."""
-        found = []
+        deviations = []
         for there, back in self.readings.pairs:
             angles = np.concatenate([there.angles, back.angles])
             radii = np.concatenate([there.radii, back.radii])
             circle = least_squares(angles, radii[np.newaxis])
-            found.append(circle.deviations[0] + circle.radius[0] - self.test.path.radius)
-        return np.concatenate(found)
+            deviations.append(circle.deviations[0] + circle.radius[0] - self.test.path.radius)
+        return np.concatenate(deviations)
 
     @cached_property
     def values(self) -> Floats:
@@ -130,18 +130,18 @@ class Compared:
         low = np.floor(place).astype(np.intp)
         share = place - low
         ways = self.ways.astype(np.intp)
-        found = (1.0 - share) * patterns[:, ways, low % test.size]
-        found += share * patterns[:, ways, (low + 1) % test.size]
-        return self._centred(found)
+        between = (1.0 - share) * patterns[:, ways, low % test.size]
+        between += share * patterns[:, ways, (low + 1) % test.size]
+        return self._centred(between)
 
-    def _centred(self, found: Floats) -> Floats:
+    def _centred(self, radial: Floats) -> Floats:
         """Each pair of paths about a centre of its own, as it is measured."""
         first = 0
-        centre = np.empty_like(found)
+        centre = np.empty_like(radial)
         for there, back in self.readings.pairs:
             size = there.angles.size + back.angles.size
             part = slice(first, first + size)
-            centre[:, part] = centred(self.angles[part], found[:, part])
+            centre[:, part] = centred(self.angles[part], radial[:, part])
             first += size
         return centre
 
@@ -259,19 +259,19 @@ class Compared:
         if not sigmas.size:
             return 0.0
         effects = self.test.before.patterns(state.effects).reshape(len(sigmas), 2, -1)
-        each = self.at_readings(effects / sigmas[:, np.newaxis, np.newaxis])
+        uncertain = self.at_readings(effects / sigmas[:, np.newaxis, np.newaxis])
         covariance = np.eye(len(sigmas))
         if state.variables.correlation is not None:
             covariance = state.variables.correlation
-        normal = each @ each.T / self.uncertainty**2
+        normal = uncertain @ uncertain.T / self.uncertainty**2
         # (C^-1 + E E^T / u^2)^-1 E d / u^2, without the inverse of a C that has none.
-        right = covariance @ (each @ self.difference) / self.uncertainty**2
+        right = covariance @ (uncertain @ self.difference) / self.uncertainty**2
         t = np.linalg.solve(np.eye(len(sigmas)) + covariance @ normal, right)
-        rest = self.difference - t @ each
+        rest = self.difference - t @ uncertain
         return 1.0 - float(rest @ rest) / float(self.difference @ self.difference)
 
     @cached_property
-    def explanations(self) -> list[Explanation]:
+    def explanations(self) -> list[Suspect]:
         """Each parameter alone, what explains most first; alike ones together."""
         names, units, bands, patterns = zip(*self._candidates(), strict=True)
         table = self.at_readings(np.stack(patterns))
@@ -282,7 +282,7 @@ class Compared:
         share = np.where(there, np.square(along) / float(self.difference @ self.difference), 0.0)
         # Of those alike, one that has a band speaks for all.
         order = np.lexsort((np.isnan(bands), -share.round(6)))
-        found: list[Explanation] = []
+        ranked: list[Suspect] = []
         taken = ~there
         for at in order.tolist():
             if taken[at]:
@@ -291,8 +291,8 @@ class Compared:
             taken |= alike
             others = [number for number in order.tolist() if alike[number] and number != at]
             value = float(along[at] / size[at])
-            found.append(
-                Explanation(
+            ranked.append(
+                Suspect(
                     tuple(names[number] for number in [at, *others]),
                     value,
                     units[at],
@@ -300,7 +300,7 @@ class Compared:
                     abs(value) / bands[at],
                 )
             )
-        return found
+        return ranked
 
     def _candidates(self) -> Iterator[tuple[str, str, float, Floats]]:
         """Name, SI unit, standard uncertainty (NaN: no band) and pattern (2, n) of one unit."""
@@ -334,4 +334,4 @@ def _uncertainties(variables: Variables, count: int) -> Floats:
     return np.where(variance > 0.0, np.sqrt(variance), np.nan)
 
 
-__all__ = ["Compared", "Explanation"]
+__all__ = ["ComparedReadings", "Suspect"]

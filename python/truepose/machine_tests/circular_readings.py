@@ -1,4 +1,4 @@
-"""Readings of a ball bar: a file of them, checked, and as measurements for a calibration.
+"""BallBarReadings of a ball bar: a file of them, checked, and as measurements for a calibration.
 
 angle (deg), radius (mm), run, direction
 0,           100.0021,    1,   counter-clockwise
@@ -44,7 +44,7 @@ COLUMNS = (
 KIND = FileKind("readings of a circular test (CSV)", ".csv")
 
 LEAST = 16
-"""Readings of a path, so that a circle and its form can be told."""
+"""BallBarReadings of a path, so that a circle and its form can be told."""
 
 WIDEST_GAP = math.radians(30.0)
 """Between two readings of a path: a circle that is less covered has no form."""
@@ -53,7 +53,7 @@ FARTHEST = 0.05
 """Of the radius: a reading farther off is none of this circle."""
 
 MOST_ROWS = 360
-"""Readings that are handed on to a calibration, evenly spaced: more say the same again."""
+"""BallBarReadings that are handed on to a calibration, evenly spaced: more say the same again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class Path2D:
 
 
 @dataclass(frozen=True, eq=False)
-class Readings:
+class BallBarReadings:
     """The paths of a file, at least one in each direction."""
 
     file: str
@@ -87,7 +87,7 @@ class Readings:
         return sum(path.angles.size for path in self.paths)
 
 
-def read_readings(file: str | Path, nominal: float) -> Readings:
+def read_readings(file: str | Path, nominal: float) -> BallBarReadings:
     """The readings in a file, of a circle of the radius `nominal`, m.
 
     Raises `MachineFileError` with all that is wrong.
@@ -106,7 +106,7 @@ def read_readings(file: str | Path, nominal: float) -> Readings:
     problems = [*_path_problems(table, paths)]
     if problems:
         raise MachineFileError(*problems)
-    return Readings(str(path), paths)
+    return BallBarReadings(str(path), paths)
 
 
 def _row_problems(table: DataTable, nominal: float) -> list[Problem]:
@@ -164,21 +164,21 @@ def _path_problems(table: DataTable, paths: Iterable[Path2D]) -> Iterator[Proble
         name = f"run {path.run}, {DIRECTIONS[path.direction]}"
         gap = float(np.diff(path.angles, append=path.angles[0] + 2.0 * np.pi).max())
         if path.angles.size < LEAST:
-            found, expected = f"{path.angles.size} readings", f"{LEAST} or more"
+            said, expected = f"{path.angles.size} readings", f"{LEAST} or more"
         elif gap > WIDEST_GAP:
-            found = f"{math.degrees(gap):.3g} deg without a reading"
+            said = f"{math.degrees(gap):.3g} deg without a reading"
             expected = f"readings all round, at most {math.degrees(WIDEST_GAP):.0f} deg apart"
         else:
             continue
         yield table.problem(
-            Fault("test-readings", f"{name}: no circle", found=found, expected=expected),
+            Fault("test-readings", f"{name}: no circle", found=said, expected=expected),
             column="angle",
         )
 
 
 def measurements(
     path: CirclePath,
-    readings: Readings,
+    readings: BallBarReadings,
     uncertainty: float,
     known: Floats,
     condition: Condition,
@@ -193,11 +193,11 @@ def measurements(
     apart = 0.5 * (known[0] - known[1])
     period = 2.0 * np.pi
     radii = [
-        each.radii
-        - (-1.0) ** each.direction * np.interp(each.angles, path.angles, apart, period=period)
-        for each in readings.paths
+        one.radii
+        - (-1.0) ** one.direction * np.interp(one.angles, path.angles, apart, period=period)
+        for one in readings.paths
     ]
-    every = np.concatenate([each.angles for each in readings.paths])
+    every = np.concatenate([one.angles for one in readings.paths])
     chosen: Indices = np.unique(
         np.linspace(0, len(every) - 1, min(len(every), MOST_ROWS)).round().astype(np.intp)
     )

@@ -21,9 +21,9 @@ from truepose.verdict.states import STATES
 if TYPE_CHECKING:
     import xarray as xr
 
-    from truepose.machine_tests.circular import CircularTest
-    from truepose.machine_tests.circular_diagnosis import Cause
-    from truepose.machine_tests.circular_measured import Compared
+    from truepose.machine_tests.circular_diagnosis import RadialCause
+    from truepose.machine_tests.circular_measured import ComparedReadings
+    from truepose.machine_tests.circular_prediction import CircularTest
 
 _EACH = ("state", "quantity")
 _AT = ("state", "direction", "angle")
@@ -66,7 +66,7 @@ MEASURED: Schema = {
 }
 
 
-def dataset(test: CircularTest, compared: Compared | None) -> xr.Dataset:
+def dataset(test: CircularTest, compared: ComparedReadings | None) -> xr.Dataset:
     """The result of a test, with readings where there are."""
     path = test.path
     intervals = [test.interval(test.quantities(at)) for at in range(len(STATES))]
@@ -78,7 +78,7 @@ def dataset(test: CircularTest, compared: Compared | None) -> xr.Dataset:
         "standard_uncertainty": np.stack(spread),
         "lower": np.stack([low for low, _ in intervals]),
         "upper": np.stack([high for _, high in intervals]),
-        "radial_known": np.stack([seen.known for seen in test.seen]),
+        "radial_known": np.stack([seen.deviations for seen in test.seen]),
         "radial_lower": np.stack([low for low, _ in bands]),
         "radial_upper": np.stack([high for _, high in bands]),
         "eccentricity": np.stack([seen.state.known.mean(axis=0) for seen in test.seen]),
@@ -125,7 +125,7 @@ def dataset(test: CircularTest, compared: Compared | None) -> xr.Dataset:
     return labelled_dataset(data, labels, attrs)
 
 
-def _of_causes(kind: str, causes: list[Cause]) -> Mapping[str, Any]:
+def _of_causes(kind: str, causes: list[RadialCause]) -> Mapping[str, Any]:
     return {
         f"{kind}_form": np.array([one.form for one in causes]),
         f"{kind}_radius": np.array([one.radius for one in causes]),
@@ -134,7 +134,7 @@ def _of_causes(kind: str, causes: list[Cause]) -> Mapping[str, Any]:
 
 
 def _measured(
-    compared: Compared,
+    compared: ComparedReadings,
 ) -> tuple[dict[str, Any], dict[str, xr.Variable], dict[str, Any]]:
     low, high = compared.intervals
     farthest, distance = compared.measured_statistics

@@ -40,7 +40,7 @@ class Seen:
         return self.evaluated(self.state.known[np.newaxis])
 
     @property
-    def known(self) -> Floats:
+    def deviations(self) -> Floats:
         """(2, n) F of the known errors, m."""
         return np.asarray(self.nominal.deviations[0])
 

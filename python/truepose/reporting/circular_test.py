@@ -237,20 +237,20 @@ def csv_text(result: Result) -> Iterator[str]:
     states, names = result.labels("state"), result.labels("quantity")
     for state, word in enumerate(states):
         for at, name in enumerate(names):
-            values = [each.array[state, at] for each in (known, spread, low, high)]
+            values = [one.array[state, at] for one in (known, spread, low, high)]
             own = "" if read is None or state else read[at]
             rows.append(["quantity", word, name, "", *values, own])
     radial = [result.values(f"radial_{name}").array for name in ("known", "lower", "upper")]
     for state, word in enumerate(states):
         for way, name in enumerate(ways):
             for at, angle in enumerate(angles.array):
-                middle, *ends = (each[state, way, at] for each in radial)
+                middle, *ends = (values[state, way, at] for values in radial)
                 rows.append(["radial deviation", word, name, angle, middle, "", *ends, ""])
     if measured:
-        found = result.values("radial_measured").array
+        measured_radial = result.values("radial_measured").array
         there = result.values("reading_angle").array
         for name, angle, value in zip(
-            result.labels("reading_direction"), there, found, strict=True
+            result.labels("reading_direction"), there, measured_radial, strict=True
         ):
             rows.append(["reading", states[0], name, angle, "", "", "", "", value])
     text = io.StringIO()

@@ -92,7 +92,7 @@ def _figure(machine: Machine, result: xr.Dataset, state: int) -> Plot:
         low, high = (
             result[f"radial_{end}"].values[state, way] * unit.per_si for end in ("lower", "upper")
         )
-        outline = [np.append(each, each[0]) for each in (high, low)]
+        outline = [np.append(end, end[0]) for end in (high, low)]
         round_ = np.append(angles, angles[0])
         x, y = _at(
             np.concatenate([round_, round_[::-1]]),
@@ -255,7 +255,7 @@ def _readings(figure: Plot, machine: Machine, result: xr.Dataset, scale: float) 
     ways = np.array([str(name) for name in result["reading_direction"].values])
     angles = np.asarray(result["reading_angle"].values)
     values = np.asarray(result["radial_measured"].values) * unit.per_si
-    for way, name in enumerate(str(each) for each in result["direction"].values):
+    for way, name in enumerate(str(word) for word in result["direction"].values):
         chosen = ways == name
         x, y = _at(angles[chosen], values[chosen], scale)
         figure.add_trace(

@@ -15,8 +15,8 @@ from sweeps import sweep
 from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.errors import MachineFileError, RequestError
 from truepose.machine import Machine
-from truepose.machine_tests.circular import CircularTest, evaluate
-from truepose.machine_tests.circular_measured import Compared
+from truepose.machine_tests.circular_measured import ComparedReadings
+from truepose.machine_tests.circular_prediction import CircularTest, evaluate
 from truepose.machine_tests.circular_readings import read_readings
 
 RADIUS = 0.05
@@ -47,11 +47,11 @@ def noise(seed: int, size: int = 180) -> np.ndarray:
     return np.random.default_rng(seed).normal(scale=NOISE, size=(2, size))
 
 
-def compared(test: CircularTest, folder: Path, truth: Truth, seed: int = 1) -> Compared:
+def compared(test: CircularTest, folder: Path, truth: Truth, seed: int = 1) -> ComparedReadings:
     """Of readings of a machine, by a ball bar that is not in the middle."""
     file = folder / "readings.csv"
     file.write_text(readings_text(truth, RADIUS, noise(seed), eccentric=20e-6 - 35e-6j))
-    return Compared(test, read_readings(file, RADIUS), NOISE)
+    return ComparedReadings(test, read_readings(file, RADIUS), NOISE)
 
 
 def share_within(test: CircularTest, folder: Path, count: int) -> float:

@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from truepose.cli._machine_test import check_options, test_options
+from truepose.cli._machine_test import run as run_test
 from truepose.cli._options import (
     InputFile,
     OutputFile,
@@ -25,7 +27,7 @@ from truepose.cli._verbose import verbose_option
 @click.command("part")
 @takes(
     machine_argument,
-    click.argument("program", metavar="PART.ngc", type=InputFile(".ngc")),
+    click.argument("program", metavar="PART.ngc", type=InputFile(".ngc"), required=False),
     click.option(
         "--features",
         metavar="FILE.toml",
@@ -56,9 +58,8 @@ from truepose.cli._verbose import verbose_option
         "--samples",
         type=WholeNumber(),
         metavar="N",
-        default=10_000,
-        show_default=True,
-        help="Machines that are drawn; each makes the whole part.",
+        help="Machines that are drawn; each makes the whole part. By default 10000, of a test "
+        "2000.",
     ),
     click.option(
         "--probability",
@@ -94,22 +95,38 @@ from truepose.cli._verbose import verbose_option
         help="Of a witness: what varies along the way. The part of that one machine is told.",
     ),
     *program_options,
+    *test_options,
     set_option,
     format_option,
     output_option_of(".json, .csv, .nc (NetCDF, SI) or .html"),
     verbose_option,
 )
 def command(
-    machine_file: Path, program: Path, *, propose_features: bool, output: Path | None, **given: Any
+    machine_file: Path,
+    program: Path | None,
+    *,
+    propose_features: bool,
+    output: Path | None,
+    **given: Any,
 ) -> int:
     """Say whether the part of a program will be within its tolerances.
 
     A machine that is drawn makes the whole part: what all points share moves it and leaves its
     sizes as they are. Every toleranced quantity gets its known error, what remains after
     compensation, the 95 % interval, the worst case from below and from above, and a verdict.
-    Exit code 1 where a feature is NOT met. What the process adds is not in it.
+    Exit code 1 where a feature is NOT met. What the process adds is not in it. With --test there is
+    no program: an acceptance test of the machine is predicted, and compared with what was measured.
     """
+    check_options(test=given["test"] is not None)
+    if given["test"] is not None:
+        return run_test(machine_file, output, given)
+    if program is None:
+        raise click.UsageError("Missing argument 'PART.ngc', or --test.")
     from truepose.cli import _part
+    from truepose.part.part import SAMPLES
+
+    if given["samples"] is None:
+        given["samples"] = SAMPLES
 
     if propose_features:
         return _part.propose(machine_file, program, output, given)

@@ -25,7 +25,7 @@ from truepose.machine_tests.circular_diagnosis import (
 )
 from truepose.machine_tests.circular_quantities import QUANTITIES
 from truepose.machine_tests.seen import Seen
-from truepose.part.samples import Sampled, sampled
+from truepose.part.samples import SampledParts, sampled
 from truepose.part.states import part_states
 from truepose.runs.poses import OK, REASONS, Progress, required_sources
 from truepose.sources import Source
@@ -55,7 +55,7 @@ class CircularTest:
     sources: tuple[Source, ...]
     condition: Condition
     seen: tuple[Seen, ...]
-    sampled: tuple[Sampled, ...]
+    sampled: tuple[SampledParts, ...]
     """Of the quantities, and of F at every angle, counter-clockwise first."""
     probability: float
     seed: int
@@ -136,7 +136,9 @@ def evaluate(
     return CircularTest(path, sources, given, seen, drawn, share, number)
 
 
-def _sampled(seen: Seen, count: int, seed: int, progress: Progress | None, state: int) -> Sampled:
+def _sampled(
+    seen: Seen, count: int, seed: int, progress: Progress | None, state: int
+) -> SampledParts:
     def values(points: Floats) -> Floats:
         outcome = seen.evaluated(points - seen.state.points)
         return np.concatenate([outcome.values, outcome.deviations.reshape(len(points), -1)], axis=1)

@@ -81,7 +81,7 @@ def dataset(test: CircularTest, compared: ComparedReadings | None) -> xr.Dataset
         "radial_known": np.stack([seen.deviations for seen in test.seen]),
         "radial_lower": np.stack([low for low, _ in bands]),
         "radial_upper": np.stack([high for _, high in bands]),
-        "eccentricity": np.stack([seen.state.known.mean(axis=0) for seen in test.seen]),
+        "eccentricity": np.stack([seen.state.known_error.mean(axis=0) for seen in test.seen]),
         **_of_causes("known", known),
         **_of_causes("uncertain", uncertain),
         "turn_angle": np.array([step.angle for step in turns]),

@@ -37,7 +37,7 @@ class Seen:
     @cached_property
     def nominal(self) -> Evaluated:
         """Of the known errors."""
-        return self.evaluated(self.state.known[np.newaxis])
+        return self.evaluated(self.state.known_error[np.newaxis])
 
     @property
     def deviations(self) -> Floats:

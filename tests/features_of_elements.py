@@ -167,18 +167,20 @@ def every_case(method: Method, rounded: float = 0.0) -> dict[str, Feature]:
     }
 
 
-def followed(form: Forms, errors: Floats) -> tuple[Floats, Floats]:
+def followed(
+    form: Forms, errors: Floats, shift: Sequence[float] = (0.0, 0.0, 0.0)
+) -> tuple[Floats, Floats]:
     """(s,) what the linear forms say of errors (s, N, 3), and by how much the value may differ.
 
-    A value of rule "spread" may be less by any amount.
+    A value of rule "spread" may be less by any amount. `shift`, m: what all errors have in common.
     """
-    rho = np.linalg.norm(errors, axis=-1).max(axis=1)
+    rho = np.linalg.norm(errors - shift, axis=-1).max(axis=1)
     assert np.all(rho <= form.reach)
     values = form.base + np.einsum("kni,sni->sk", form.weights, errors)
     allowed = form.curvature * rho**2
     for besides in form.plus:
         assert besides.rule == "spread"
-        allowed = allowed + followed(besides, errors)[0]
+        allowed = allowed + followed(besides, errors, shift)[0]
     if form.rule == "length":
         return form.factor * np.linalg.norm(values, axis=1), allowed
     if form.rule == "spread":

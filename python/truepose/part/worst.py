@@ -39,9 +39,6 @@ DRAWN = 256
 STEPS = 12
 """Steps of a climb: corners are few."""
 
-ROUNDING = 1e-9
-"""Of the sum of a form's weights: what is none."""
-
 STEP = 1e-3
 """Of a variable's band, in the differences by which a climb finds its way."""
 
@@ -85,18 +82,18 @@ class PointBounds:
         self.remainder: Floats = bounds.norms[:, 0] if self._columns.size else np.zeros(len(value))
         """(n,) m; NaN where it is not proven."""
 
-    def reach(self, points: Indices, scale: Floats, *, together: bool) -> float:
-        """M: the largest error of the `points` (m,), for all machines of the state.
+    def reach(self, points: Indices, scale: Floats) -> float:
+        """M: how far `points` (m,) are off beside the error of the one in their middle, at most.
 
-        `scale` (v,): of the bands, 1 as they are. `together`: of what they are off beside the error
-        of the one in their middle, which all have: where a shift of all of them does not count.
+        For all machines of the state. `scale` (v,): of the bands, 1 as they are. What all have in
+        common adds nothing of second order, see `Forms`.
         """
-        key = points.tobytes() + scale.tobytes() + bytes([together])
+        key = points.tobytes() + scale.tobytes()
         if key not in self._reaches:
-            self._reaches[key] = self._reach(points, scale, together=together)
+            self._reaches[key] = self._reach(points, scale)
         return self._reaches[key]
 
-    def _reach(self, points: Indices, scale: Floats, *, together: bool) -> float:
+    def _reach(self, points: Indices, scale: Floats) -> float:
         state = self._state
         value, effects = (of[points] for of in state.first_order)
         effects = effects * scale
@@ -107,11 +104,10 @@ class PointBounds:
         # What varies along the path may be at any end, here and in the middle.
         loose = remainder + np.linalg.norm(np.abs(along) @ ends, axis=1)
         effects = np.where(varies, 0.0, effects)
-        if together:
-            away = state.points[points] - state.points[points].mean(axis=0)
-            middle = int(np.argmin(np.einsum("na,na->n", away, away)))
-            value, effects = value - value[middle], effects - effects[middle]
-            loose = loose + loose[middle]
+        away = state.points[points] - state.points[points].mean(axis=0)
+        middle = int(np.argmin(np.einsum("na,na->n", away, away)))
+        value, effects = value - value[middle], effects - effects[middle]
+        loose = loose + loose[middle]
         if not effects.shape[2]:
             sizes = np.linalg.norm(value[:, self._columns], axis=1)
         else:
@@ -144,8 +140,7 @@ def from_above(
             _spread(_Over.of(state, bounds, alignment, one, alignment.members, scale), one.factor)
             for one in alignment.besides(weights)
         ) * _share_of_one(forms, len(weights))
-    every = [forms, *forms.plus]
-    far = bounds.reach(members, scale, together=all(_unmoved(_centred(one)) for one in every))
+    far = bounds.reach(members, scale)
     proven, why = bool(np.isfinite(over.remainder).all()), ""
     if not proven:
         why = "the remainder beyond first order is not proven for this machine"
@@ -167,12 +162,6 @@ def _share_of_one(forms: Forms, count: int) -> float:
     if forms.rule == "length":
         return forms.factor * math.sqrt(count)
     return 2.0 * forms.factor if forms.rule == "spread" else 1.0
-
-
-def _unmoved(weights: Floats) -> bool:
-    """Whether a shift of all points together leaves the forms (k, m, 3) as they are."""
-    left = np.abs(weights.sum(axis=1)).max(initial=0.0)
-    return bool(left <= ROUNDING * np.abs(weights).sum(axis=(1, 2)).max(initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,6 +80,22 @@ def test_a_program_rounds(method: str) -> None:
                 assert np.all(more <= allowed + ROUNDING), (name, quantity.name, rho)
 
 
+@pytest.mark.parametrize("method", ["iso", "least-squares"])
+def test_a_common_shift_adds_nothing_of_second_order(method: str) -> None:
+    """However far all points are moved as one: the rest bounds what the forms leave out."""
+    rng, shift = np.random.default_rng(12), np.array([2e-3, -3e-3, 1e-3])
+    for name, feature in every_case(method).items():  # type: ignore[arg-type]
+        count = sum(points.shape[1] for points in points_of(feature))
+        for quantity, form in zip(feature.quantities, feature.forms(), strict=True):
+            for rho in (1e-9, 1e-6, 0.9 * min(form.reach, 1e-4)):
+                errors = rng.standard_normal((20, count, 3))
+                errors *= rho / np.linalg.norm(errors, axis=-1).max(axis=1)[:, None, None]
+                actual = value(feature, perturbed(feature, errors + shift), quantity.name)
+                said, allowed = followed(form, errors + shift, shift)
+                more = actual - said if form.rule == "spread" else np.abs(actual - said)
+                assert np.all(more <= allowed + 10.0 * ROUNDING), (name, quantity.name, rho)
+
+
 def test_every_kind_is_held_against_its_forms() -> None:
     assert {feature.kind for feature in every_case("iso").values()} == set(REGISTRY)
 

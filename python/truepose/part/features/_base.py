@@ -57,8 +57,9 @@ class Forms:
     or down, to first order too: a datum's own form, which moves what touches it. `curvature`, 1/m
     (rad/m^2 of an angle): by what the geometry bends, no more than `curvature` rho^2 is added or
     taken where no point is off by more than rho, and rho is at most `reach`, m; it holds what those
-    of `plus` bend. `base` (K,), SI. Where weights sum to nothing, over all points of each form, the
-    value is the same wherever all points are moved to as one, and rho may be taken about any shift.
+    of `plus` bend. `base` (K,), SI. A shift that all points share
+    adds nothing of second order, so that rho may be what is left of errors when any one is taken
+    off; where weights sum to nothing, over all points of each form, it changes nothing at all.
     """
 
     rule: Rule

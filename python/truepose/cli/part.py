@@ -109,7 +109,7 @@ def command(
     output: Path | None,
     **given: Any,
 ) -> int:
-    """Say whether the part of a program will be within its tolerances.
+    """Say whether a part will be within its tolerances.
 
     A machine that is drawn makes the whole part: what all points share moves it and leaves its
     sizes as they are. Every toleranced quantity gets its known error, what remains after

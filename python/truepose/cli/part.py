@@ -58,8 +58,7 @@ from truepose.cli._verbose import verbose_option
         "--samples",
         type=WholeNumber(),
         metavar="N",
-        help="Machines that are drawn; each makes the whole part. By default 10000, of a test "
-        "2000.",
+        help="Machines that are drawn; each makes the whole part. By default 4000, of a test 2000.",
     ),
     click.option(
         "--probability",

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -21,6 +22,12 @@ from truepose.part.features import Forms
 from truepose.part.first_order import FrameMotion
 
 Kind = Literal["clamped", "best-fit", "datums"]
+
+ROUNDING = 1e-9
+"""Of the sum of a form's weights: what is none."""
+
+ROUNDING = 1e-9
+"""Of the sum of a form's weights: what is none."""
 
 Frame = Callable[[Floats], tuple[Floats, Floats]]
 """Rotations (s, 3, 3) and origins (s, 3) of points (s, m, 3)."""
@@ -78,22 +85,24 @@ class Alignment:
         """
         if not self.moves:
             return weights
-        motions = self._motions()
+        motions = self._motions
         along = np.tensordot(weights, motions, axes=([1, 2], [1, 2]))
         moved = weights.copy()
         moved[:, self.members] -= np.tensordot(along, self._response(), axes=1)
         return moved
 
-    def invariant(self, weights: Floats) -> bool:
-        """Whether forms (k, n, 3) stay as they are when the part is moved."""
-        along = np.tensordot(weights, self._motions(), axes=([1, 2], [1, 2]))
+    def invariant(self, weights: Floats, points: Indices) -> bool:
+        """Whether forms (k, m, 3) over `points` (m,) stay as they are when the part is moved."""
+        along = np.tensordot(weights, self._motions[:, points], axes=([1, 2], [1, 2]))
         size = np.abs(weights).sum()
-        return bool(np.abs(along).max(initial=0.0) <= 1e-9 * max(size, 1e-300))
+        return bool(np.abs(along).max(initial=0.0) <= ROUNDING * size)
 
     @property
     def _size(self) -> float:
         return float(np.ptp(self.nominal, axis=0).max()) or 1.0
 
+    @cached_property
+    @cached_property
     def _motions(self) -> Floats:
         """(6, n, 3) of the points in the unit rigid motions: along, and about the middle."""
         away = (self.nominal - self.nominal.mean(axis=0)) / self._size
@@ -103,7 +112,7 @@ class Alignment:
 
     def _response(self) -> Floats:
         """(6, m, 3) the rigid motion with which an alignment answers errors of its members."""
-        motions = self._motions()[:, self.members].reshape(6, -1)
+        motions = self._motions[:, self.members].reshape(6, -1)
         if self.kind == "best-fit":
             inverse: Floats = np.linalg.pinv(motions.T, rcond=1e-12).astype(np.float64)
             return inverse.reshape(6, -1, 3)
@@ -120,7 +129,7 @@ class Alignment:
         """
         if self.motion is None:
             return ()
-        along = np.tensordot(weights, self._motions(), axes=([1, 2], [1, 2]))
+        along = np.tensordot(weights, self._motions, axes=([1, 2], [1, 2]))
         away = np.abs(self.nominal.mean(axis=0) - self.motion.about)
         levers = self.motion.levers.copy()
         levers[:3] += _crossed(levers[3:], away)

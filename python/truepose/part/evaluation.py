@@ -15,9 +15,10 @@ from truepose.machine import Condition, Machine
 from truepose.part.alignment import Alignment
 from truepose.part.along import Walked
 from truepose.part.features import Feature, Forms, Quantity
+from truepose.part.reached import FeatureSearch, FeatureValues, Search
 from truepose.part.samples import SampledParts, sampled
 from truepose.part.states import PartState, in_space
-from truepose.part.worst import Climb, Interval, PointBounds, Search, from_above
+from truepose.part.worst import Interval, PointBounds, from_above
 from truepose.runs.displacement import displacement
 from truepose.runs.poses import Progress
 from truepose.sources import Source
@@ -27,7 +28,7 @@ Rule = Literal["worst-case", "iso-14253"]
 
 MET, NOT_MET, UNDECIDED = "met", "NOT met", "undecided"
 
-SOURCE_SAMPLES = 1000
+SOURCE_SAMPLES = 500
 """Samples of each source alone, at most."""
 
 
@@ -139,15 +140,22 @@ class PartEvaluation:
             for feature in self.features
             for number in range(len(feature.quantities))
         )
+        self._values = [
+            FeatureValues(feature, places(feature), alignment, feature.forms())
+            for feature in self.features
+        ]
         self.states = tuple(self._answered(state) for state in states)
 
     def values(self, points: Floats) -> Floats:
         """(s, c) of all characteristics of parts whose points are (s, n, 3)."""
-        aligned = self.alignment.apply(points)
+        moved = any(values.moved for values in self._values)
+        aligned = self.alignment.apply(points) if moved else points
         return np.concatenate(
             [
-                feature.values([aligned[:, place] for place in places(feature)])
-                for feature in self.features
+                feature.values(
+                    [(aligned if values.moved else points)[:, place] for place in places(feature)]
+                )
+                for feature, values in zip(self.features, self._values, strict=True)
             ],
             axis=1,
         )
@@ -173,29 +181,35 @@ class PartEvaluation:
         bounds = PointBounds(state)
         programmed = self.values(state.points[np.newaxis])[0]
         known = self.values((state.points + state.known_error)[np.newaxis])[0]
+        varying = state.varying(self.seed)
+        searches = [
+            search
+            for feature in self.features
+            for search in FeatureSearch(
+                state, self.alignment, feature, places(feature), varying
+            ).search()
+        ]
         answers = tuple(
-            self._answer(state, bounds, at, float(known[at]), drawn)
-            for at in range(len(self.characteristics))
+            self._answer(state, bounds, at, float(known[at]), drawn, search)
+            for at, search in enumerate(searches)
         )
         return StateAnswers(state, bounds, answers, drawn, self._blame(state, known), programmed)
 
     def _answer(
-        self, state: PartState, bounds: PointBounds, at: int, known: float, drawn: SampledParts
+        self,
+        state: PartState,
+        bounds: PointBounds,
+        at: int,
+        known: float,
+        drawn: SampledParts,
+        search: Search,
     ) -> QuantityAnswer:
         of = self.characteristics[at]
         values = drawn.values[:, at]
         interval = self._interval(values, one_sided=of.quantity.is_form)
         spread = float(np.nanstd(values)) if np.isfinite(values).any() else math.nan
         outside = ~((values >= of.quantity.lower) & (values <= of.quantity.upper))
-        varying = state.varying(self.seed)
-        above = from_above(
-            state,
-            bounds,
-            self.alignment,
-            of.forms,
-            of.members,
-        )
-        search = Climb(state, self.alignment, of.feature, of.number, of.parts, varying).search()
+        above = from_above(state, bounds, self.alignment, of.forms, of.members)
         verdict, why = self._verdict(of, interval, above, search, drawn)
         return QuantityAnswer(
             known,

@@ -33,7 +33,7 @@ from truepose.uncertainty_analysis.arguments import (
 if TYPE_CHECKING:
     import xarray as xr
 
-SAMPLES = 10_000
+SAMPLES = 4000
 """Machines that are drawn by default: the ends of a 95 % interval are then good to some 2 %."""
 
 

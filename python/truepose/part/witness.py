@@ -18,8 +18,8 @@ from truepose.files.writing import replacing, written_together
 from truepose.machine import Machine, load
 from truepose.part.along_file import fixed, text_of
 from truepose.part.evaluation import NOT_MET, Characteristic, PartEvaluation
+from truepose.part.reached import ReachedValue
 from truepose.part.states import PartState, part_states
-from truepose.part.worst import ReachedValue
 from truepose.runs.poses import OK
 from truepose.runs.variables import Variables
 from truepose.sources import REGISTRY, acting

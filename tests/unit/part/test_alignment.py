@@ -136,8 +136,8 @@ def test_what_a_motion_does_not_change_is_known() -> None:
     distance[0, 1], distance[0, 0] = along, -along
     coordinate = np.zeros((1, 40, 3))
     coordinate[0, 5, 0] = 1.0
-    assert alignment.invariant(distance)
-    assert not alignment.invariant(coordinate)
+    assert alignment.invariant(distance, np.arange(40))
+    assert not alignment.invariant(coordinate, np.arange(40))
 
 
 def test_clamped_is_left_alone() -> None:

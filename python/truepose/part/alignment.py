@@ -102,7 +102,6 @@ class Alignment:
         return float(np.ptp(self.nominal, axis=0).max()) or 1.0
 
     @cached_property
-    @cached_property
     def _motions(self) -> Floats:
         """(6, n, 3) of the points in the unit rigid motions: along, and about the middle."""
         away = (self.nominal - self.nominal.mean(axis=0)) / self._size

@@ -180,8 +180,8 @@ def shape_of(angles: Floats, pattern: Floats) -> str:
         if len(angles) * (cos**2 + sin**2) > MOSTLY * total:
             if lobes > 2:
                 return name
-            along = np.degrees(0.5 * np.arctan2(sin, cos)) % 180.0
-            return f"{name}, long at {along:.0f} deg"
+            along = round(float(np.degrees(0.5 * np.arctan2(sin, cos)))) % 180
+            return f"{name}, long at {along} deg"
     return "mixed"
 
 

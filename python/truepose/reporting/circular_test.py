@@ -105,15 +105,15 @@ def quantities(machine: Machine, result: xr.Dataset) -> Table:
         ]
     names = [str(name) for name in result["quantity_name"].values]
     radius = machine.shown.length.text(float(result.attrs["radius"]), 6)
-    turn, steps = machine.shown.angle, float(result.attrs["step"])
+    step, overshoot = (_angle(machine, float(result.attrs[name])) for name in ("step", "overshoot"))
     return Table(
         "circular test",
         f"Circular test, {result.attrs['plane']}, radius {radius}, {unit.label}",
         tuple(header),
         tuple(zip(names, *shown, strict=True)),
         note=f"{result.attrs['standard']}. G by the narrowest ring (minimum zone), F about the "
-        f"least-squares centre of both paths; readings every {turn.text(steps)}, after an "
-        f"overshoot of {turn.text(float(result.attrs['overshoot']))}.\n"
+        f"least-squares centre of both paths; readings every {step}, after an "
+        f"overshoot of {overshoot}.\n"
         f"{counted(int(result.attrs['samples']), 'machine')}, seed {result.attrs['seed']}. A form "
         "is never negative, so that its interval can lie above what is known of it.",
     )
@@ -205,6 +205,10 @@ def explanations(machine: Machine, result: xr.Dataset) -> Table:
         note="Each alone, by least squares. --readings FILE.csv writes the readings for "
         "`truepose calibrate`, which finds parameters together.",
     )
+
+
+def _angle(machine: Machine, value: float) -> str:
+    return machine.shown.angle.text(value).replace(" °", "°")
 
 
 def _explained(machine: Machine, result: xr.Dataset, at: int) -> str:

@@ -12,8 +12,8 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.files.units import FileUnit, UnitSystem
-from truepose.part.element import Element
-from truepose.part.features import REGISTRY, Feature, Forms, Method
+from truepose.workpiece.element import Element
+from truepose.workpiece.features import REGISTRY, Feature, Forms, Method
 
 UNITS = UnitSystem({"length": FileUnit("mm", 1e-3), "angle": FileUnit("deg", np.pi / 180.0)})
 

@@ -11,8 +11,8 @@ from pydantic import BaseModel, Field
 from truepose.arrays import Floats
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import PositiveLength
-from truepose.part.element import Element
-from truepose.part.features._base import Feature, FeatureError, Forms, Method, Quantity
+from truepose.workpiece.element import Element
+from truepose.workpiece.features._base import Feature, FeatureError, Forms, Method, Quantity
 
 
 class Bore(FileTable):

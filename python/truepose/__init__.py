@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from truepose.uncertainty_analysis.uncertainty import uncertainty
     from truepose.uncertainty_analysis.worst_case import worst_case
     from truepose.verdict.accuracy import accuracy
+    from truepose.workpiece.evaluate import part
 
     __version__: str
 
@@ -57,6 +58,7 @@ _WHERE = {
     "monte_carlo": "truepose.uncertainty_analysis.monte_carlo",
     "oddities": "truepose.plausibility",
     "over_time": "truepose.error_budget.over_time",
+    "part": "truepose.workpiece.evaluate",
     "plan": "truepose.calibration.planning.plan",
     "shares": "truepose.uncertainty_analysis.shares",
     "strain": "truepose.error_budget.strain",
@@ -84,6 +86,7 @@ __all__ = [
     "monte_carlo",
     "oddities",
     "over_time",
+    "part",
     "plan",
     "shares",
     "strain",

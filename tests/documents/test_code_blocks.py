@@ -23,7 +23,7 @@ from document_blocks import INLINE, LANGUAGES, ROOT, Block, blocks_of, pages
 from truepose.calibration import read_measurements
 from truepose.cli import cli, run
 from truepose.machine.families import REGISTRY
-from truepose.part.read import read_part
+from truepose.workpiece.read import read_part
 
 CODE_PAGES = [page for page in pages() if any(block.is_code for block in blocks_of(page))]
 QUESTIONS = {"check", "calibrate", "compare"}

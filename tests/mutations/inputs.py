@@ -17,7 +17,7 @@ from truepose.controllers.klipper.read import KlipperReader
 from truepose.errors import MachineFileError
 from truepose.files.document import read
 from truepose.machine import Machine
-from truepose.part.read import read_part
+from truepose.workpiece.read import read_part
 
 ROOT = Path(__file__).parent.parent.parent
 PLANAR = ROOT / "machines" / "planar_two_slider.toml"

@@ -29,9 +29,9 @@ from part_simulator.errors import (
 from part_simulator.part_under_test import MACHINES, PartUnderTest, without_errors
 from part_simulator.questions import CLOSED, QUESTIONS
 from sweeps import thinned
-from truepose.part.features import REGISTRY
-from truepose.part.states import PartState
 from truepose.sources.variation import Ripple as SourceRipple
+from truepose.workpiece.features import REGISTRY
+from truepose.workpiece.states import PartState
 
 Floats = NDArray[np.float64]
 

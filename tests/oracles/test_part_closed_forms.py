@@ -19,9 +19,9 @@ from part_simulator.drawn_part import DrawnPart, Wall, drawn_part
 from part_simulator.errors import Play, written
 from part_simulator.part_under_test import MACHINES, PartUnderTest, without_errors
 from part_simulator.questions import QUESTIONS, features_file
-from truepose.part.evaluation import PartEvaluation
-from truepose.part.part import evaluate_part
-from truepose.part.read import read_part
+from truepose.workpiece.evaluate import evaluate_part
+from truepose.workpiece.evaluation import PartEvaluation
+from truepose.workpiece.read import read_part
 
 Floats = NDArray[np.float64]
 

@@ -22,11 +22,11 @@ from part_simulator.errors import Driven, Error, drawn
 from part_simulator.measured import Made
 from part_simulator.questions import Question, asked_of, features_file
 from truepose.machine import Machine
-from truepose.part.along import walk
-from truepose.part.features import Feature
-from truepose.part.read import Part, read_part
-from truepose.part.states import PartState, part_states
 from truepose.runs.poses import required_sources
+from truepose.workpiece.along import walk
+from truepose.workpiece.features import Feature
+from truepose.workpiece.read import Part, read_part
+from truepose.workpiece.states import PartState, part_states
 
 Floats = NDArray[np.float64]
 

@@ -16,20 +16,20 @@ from truepose.cli._steps import load_machine, note_written
 from truepose.cli._verbose import say, say_file
 from truepose.errors import Problem, RequestError
 from truepose.files.writing import replacing, require_writable, written_together
-from truepose.part.along_file import read_along
-from truepose.part.evaluation import NOT_MET, PartEvaluation
-from truepose.part.part import evaluate_part
-from truepose.part.points_file import PointsFile
-from truepose.part.read import read_part
-from truepose.part.witness import first_broken, write_part_witness
 from truepose.reporting import part as shown
 from truepose.uncertainty_analysis.arguments import required_probability, required_samples
 from truepose.verdict.states import AFTER, BEFORE
+from truepose.workpiece.along_file import read_along
+from truepose.workpiece.evaluate import evaluate_part
+from truepose.workpiece.evaluation import NOT_MET, PartEvaluation
+from truepose.workpiece.points_file import PointsFile
+from truepose.workpiece.read import read_part
+from truepose.workpiece.witness import first_broken, write_part_witness
 
 if TYPE_CHECKING:
     from truepose.machine import Machine
-    from truepose.part.along import Sink
-    from truepose.part.read import Part
+    from truepose.workpiece.along import Sink
+    from truepose.workpiece.read import Part
 
 ENDINGS = (".json", ".csv", ".nc", ".html")
 
@@ -112,7 +112,7 @@ def shown_on_page(machine: Machine, program: Path, features: Path | None) -> Any
 
 def propose(machine_file: Path, program: Path, output: Path | None, given: dict[str, Any]) -> int:
     """Write the features that are found in the program."""
-    from truepose.part.propose import propose_features
+    from truepose.workpiece.propose import propose_features
 
     if output is not None:
         require_writable(output, [".toml"], [machine_file, program])
@@ -147,9 +147,9 @@ def _write(evaluation: PartEvaluation, output: Path) -> None:
     form = output.suffix.lower()
     with replacing(output) as temporary:
         if form == ".nc":
-            from truepose.part.result import dataset
             from truepose.reporting.formats import netcdf
             from truepose.reporting.result import Result
+            from truepose.workpiece.result import dataset
 
             netcdf.write(Result("part", evaluation.machine, dataset(evaluation)), temporary)
             return

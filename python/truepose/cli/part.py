@@ -122,7 +122,7 @@ def command(
     if program is None:
         raise click.UsageError("Missing argument 'PART.ngc', or --test.")
     from truepose.cli import _part
-    from truepose.part.part import SAMPLES
+    from truepose.workpiece.evaluate import SAMPLES
 
     if given["samples"] is None:
         given["samples"] = SAMPLES

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.part.fits.associate import associate
-from truepose.part.fits.shapes import CircleInPlane
+from truepose.workpiece.fits.associate import associate
+from truepose.workpiece.fits.shapes import CircleInPlane
 
 
 @dataclass(frozen=True, eq=False)

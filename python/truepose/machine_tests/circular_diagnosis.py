@@ -18,9 +18,9 @@ from truepose.arrays import Floats, Indices
 from truepose.machine_tests.circle_path import CirclePath
 from truepose.machine_tests.circular_quantities import DIRECTIONS
 from truepose.machine_tests.seen import Seen
-from truepose.part.states import PartState, in_space
 from truepose.runs.displacement import displacement, sum_deviations
 from truepose.sources import PoseBlock, Source
+from truepose.workpiece.states import PartState, in_space
 
 DRAWN = 256
 """Machines from which the variance of a variable is taken that varies along the path."""

@@ -29,8 +29,8 @@ from truepose.machine_tests.circular_prediction import CircularTest
 from truepose.machine_tests.circular_quantities import QUANTITIES
 from truepose.machine_tests.circular_readings import BallBarReadings, Path2D
 from truepose.machine_tests.seen import centred
-from truepose.part.states import in_space
 from truepose.runs.variables import Variables
+from truepose.workpiece.states import in_space
 
 ALIKE = 0.999
 """Cosine between two patterns from which on a test cannot tell the causes apart."""

@@ -25,8 +25,6 @@ from truepose.machine_tests.circular_diagnosis import (
 )
 from truepose.machine_tests.circular_quantities import QUANTITIES
 from truepose.machine_tests.seen import Seen
-from truepose.part.samples import SampledParts, sampled
-from truepose.part.states import part_states
 from truepose.runs.poses import OK, REASONS, Progress, required_sources
 from truepose.sources import Source
 from truepose.uncertainty_analysis.arguments import (
@@ -35,6 +33,8 @@ from truepose.uncertainty_analysis.arguments import (
     required_seed,
 )
 from truepose.verdict.states import STATES
+from truepose.workpiece.samples import SampledParts, sampled
+from truepose.workpiece.states import part_states
 
 if TYPE_CHECKING:
     from truepose.controllers.gcode.work_offsets import Positions

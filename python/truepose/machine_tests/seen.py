@@ -10,7 +10,7 @@ import numpy as np
 from truepose.arrays import Floats
 from truepose.machine_tests.circle_path import CirclePath
 from truepose.machine_tests.circular_quantities import QUANTITIES, Evaluated, evaluated
-from truepose.part.states import PartState
+from truepose.workpiece.states import PartState
 
 
 @dataclass(frozen=True, eq=False)

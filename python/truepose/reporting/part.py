@@ -12,8 +12,11 @@ from typing import Any
 
 from truepose.files.dimensions import BY_UNIT
 from truepose.machine import Machine
-from truepose.part.advice import Advice, advice, culprits
-from truepose.part.evaluation import (
+from truepose.reporting.table import Table
+from truepose.sources import not_included_text
+from truepose.verdict.states import BEFORE
+from truepose.workpiece.advice import Advice, advice, culprits
+from truepose.workpiece.evaluation import (
     MET,
     NOT_MET,
     UNDECIDED,
@@ -22,10 +25,7 @@ from truepose.part.evaluation import (
     QuantityAnswer,
     StateAnswers,
 )
-from truepose.part.result import attributes
-from truepose.reporting.table import Table
-from truepose.sources import not_included_text
-from truepose.verdict.states import BEFORE
+from truepose.workpiece.result import attributes
 
 PROCESS = (
     "What the process adds (cutter, deflection of the tool, extrusion, clamping, wear) is not in "

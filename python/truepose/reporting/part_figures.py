@@ -10,8 +10,6 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.machine import Machine
-from truepose.part.along import PathErrors
-from truepose.part.evaluation import PartEvaluation, QuantityAnswer
 from truepose.reporting.figures import DrawnFigure
 from truepose.reporting.figures._plot import Keys, Plot, grid, trace
 from truepose.reporting.figures._style import (
@@ -25,6 +23,8 @@ from truepose.reporting.figures._style import (
     small,
 )
 from truepose.reporting.figures._text import as_text
+from truepose.workpiece.along import PathErrors
+from truepose.workpiece.evaluation import PartEvaluation, QuantityAnswer
 
 MOST_POINTS = 6000
 """Points of the path that are drawn; of a longer one every second is left out, again and again."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from truepose.part.evaluation import PartEvaluation
-from truepose.part.result import attributes
 from truepose.reporting import part
 from truepose.reporting.page import PartShown, page_parts, template
 from truepose.reporting.part_figures import DrawnPath, figures
+from truepose.workpiece.evaluation import PartEvaluation
+from truepose.workpiece.result import attributes
 
 
 def shown(evaluation: PartEvaluation, path: DrawnPath, program: str) -> PartShown:

@@ -1,6 +1,0 @@
-"""Shapes through points: the minimum zone, and least squares, of many sampled parts at once."""
-
-from truepose.part.fits.associate import associate
-from truepose.part.fits.shapes import AnyPlane, CircleInPlane, Contour, FittedShape, TurnedPlane
-
-__all__ = ["AnyPlane", "CircleInPlane", "Contour", "FittedShape", "TurnedPlane", "associate"]

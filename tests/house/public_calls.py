@@ -78,6 +78,12 @@ def compensate() -> None:
     expect(xr.Dataset, tp.compensate(small(), POSE))
 
 
+@use("circular_test")
+def circular_test() -> None:
+    centre = {"x": 0.3, "y": 0.2}
+    expect(xr.Dataset, tp.circular_test(small(), 0.02, centre, step=0.1, samples=20))
+
+
 @use("correct_program")
 def correct_program() -> None:
     with tempfile.TemporaryDirectory() as folder:
@@ -142,6 +148,18 @@ def plan() -> None:
 
     tracker = Instrument("tracker", "position", Frame(), uncertainty={"m": 1e-5})
     assert len(tp.plan(small(), tracker, 4).poses) == 4
+
+
+@use("part")
+def part() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        program, features = Path(folder) / "part.ngc", Path(folder) / "part.toml"
+        program.write_text("G21 G90 G94 F600\nG0 X300 Y200\nG1 X310\nM2\n", encoding="utf-8")
+        features.write_text(
+            '[[feature]]\nname = "edge"\nkind = "straightness"\nlines = "3"\nzone = "1 mm"\n',
+            encoding="utf-8",
+        )
+        expect(xr.Dataset, tp.part(small(), program, features, samples=20))
 
 
 @use("shares")

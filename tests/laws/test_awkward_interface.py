@@ -101,6 +101,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
         tp.correct_program, {"machine": MACHINE, "source": "none.ngc", "target": None},
     ),
     "export": (tp.export, {"machine": MACHINE, "name": "c"}),
+    "part": (tp.part, {"machine": MACHINE, "program": "none.ngc"}),
     "plan": (
         tp.plan, {"machine": MACHINE, "instrument": instrument(), "budget": 3, "starts": 1},
     ),

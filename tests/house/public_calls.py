@@ -81,7 +81,7 @@ def compensate() -> None:
 @use("circular_test")
 def circular_test() -> None:
     centre = {"x": 0.3, "y": 0.2}
-    expect(xr.Dataset, tp.circular_test(small(), 0.02, centre, step=0.1, samples=20))
+    expect(xr.Dataset, tp.circular_test(small(), 0.02, centre, step=0.1, samples=100))
 
 
 @use("correct_program")

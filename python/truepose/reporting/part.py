@@ -15,7 +15,7 @@ from truepose.machine import Machine
 from truepose.reporting.table import Table
 from truepose.sources import not_included_text
 from truepose.verdict.states import BEFORE
-from truepose.workpiece.advice import Advice, advice, culprits
+from truepose.workpiece.advice import advice, culprits
 from truepose.workpiece.evaluation import (
     MET,
     NOT_MET,
@@ -159,7 +159,7 @@ def _blame(evaluation: PartEvaluation) -> Table:
             (
                 of.label,
                 f"{', '.join(named)} {small.label}".strip(),
-                _mends(evaluation, advice(evaluation, at)),
+                _mends(evaluation, at),
             )
         )
     note = (
@@ -181,15 +181,24 @@ def _adds(known: float, half: float) -> str:
     return f"{known:+.1f} ± {half:.1f}" if known else f"± {half:.1f}"
 
 
-def _mends(evaluation: PartEvaluation, found: Advice | None) -> str:
-    if found is None:
+def _mends(evaluation: PartEvaluation, at: int) -> str:
+    suggested = advice(evaluation, at)
+    if suggested is None:
         return "nothing to mend"
-    if found.compensation:
+    if suggested.compensation:
         return "compensation: truepose gcode corrects the program"
-    if not found.source:
+    if suggested.aim:
+        of = evaluation.characteristics[at]
+        small = evaluation.machine.shown.small(of.quantity.si)
+        word = "larger" if suggested.aim > 0.0 else "smaller"
+        amount = f"{abs(suggested.aim) * small.per_si:.1f} {small.label}"
+        return f"compensation, and the middle of the limits: program it {amount} {word}"
+    if not suggested.source:
         return "no source's bands alone: compensate, then tighten several, or ask for less"
-    also = "" if found.state == BEFORE else " and compensation"
-    return f"bands of {found.source} at {100.0 * found.narrowed:.3g} % of what they are{also}"
+    also = "" if suggested.state == BEFORE else " and compensation"
+    return (
+        f"bands of {suggested.source} at {100.0 * suggested.narrowed:.3g} % of what they are{also}"
+    )
 
 
 SHEET = (
@@ -267,7 +276,7 @@ def _sheet_row(
         "why": answer.why,
         "operator": quantity.operator,
         "filter": quantity.filter,
-        "mend": _mends(evaluation, advice(evaluation, at)) if evaluation.of_bands else "",
+        "mend": _mends(evaluation, at) if evaluation.of_bands else "",
     }
 
 

@@ -40,14 +40,16 @@ class Culprit:
 class Advice:
     """What would mend one characteristic.
 
-    `compensation`: that does. Else `source` with its bands `narrowed` to this share, in the `state`
-    in which that is enough; no source where none is enough alone.
+    `compensation`: that does. Else `aim`, SI, by which the program should ask for more: it does
+    with compensation. Else `source` with its bands `narrowed` to this share, in the `state` in
+    which that is enough; no source where none is enough alone.
     """
 
     compensation: bool
     source: str
     narrowed: float
     state: str
+    aim: float = 0.0
 
 
 def culprits(answers: StateAnswers, at: int) -> list[Culprit]:
@@ -67,6 +69,9 @@ def advice(evaluation: PartEvaluation, at: int) -> Advice | None:
         return None
     if after.verdict == MET:
         return Advice(True, "", 1.0, AFTER)
+    aim = _aim(evaluation, after, at)
+    if aim != 0.0:
+        return Advice(False, "", 1.0, AFTER, aim)
     best = Advice(False, "", 0.0, AFTER)
     for answers in (states[BEFORE], states[AFTER]):
         for culprit in culprits(answers, at):
@@ -77,6 +82,21 @@ def advice(evaluation: PartEvaluation, at: int) -> Advice | None:
         if best.source:
             break
     return best
+
+
+def _aim(evaluation: PartEvaluation, after: QuantityAnswer, at: int) -> float:
+    """By how much a size should be programmed otherwise to be met after compensation; 0: it isn't.
+
+    The middle of the limits less the middle of what it may be, where that then fits between them.
+    """
+    quantity = evaluation.characteristics[at].quantity
+    if quantity.is_form or not np.isfinite([quantity.lower, quantity.upper]).all():
+        return 0.0
+    proven = evaluation.rule != "worst-case"
+    low, high = after.interval if proven else (after.above.lower, after.above.upper)
+    if high - low >= quantity.upper - quantity.lower or not (proven or after.above.proven):
+        return 0.0
+    return 0.5 * (quantity.lower + quantity.upper) - 0.5 * (low + high)
 
 
 def _narrowed(

@@ -394,6 +394,23 @@ def test_what_would_mend_it_mends_it(shared: Shared) -> None:
         assert (states[found.state].answers[3].verdict == MET) is met
 
 
+def test_a_program_that_aims_at_a_limit(files: tuple[Path, Path]) -> None:
+    """After compensation half of the parts are out; aimed at the middle, none is."""
+    from truepose.workpiece.advice import advice
+
+    machine = tp.load(PLANAR)
+    files[1].write_text(WIDTH.replace("±0.05 mm", "+0.2 0"), encoding="utf-8")
+    evaluation = evaluated(machine, files, samples=100)
+    for at in (0, 1):
+        suggested = advice(evaluation, at)
+        assert suggested is not None
+        assert suggested.aim == pytest.approx(1e-4, abs=5e-6)
+    wider = PROGRAM.replace("X170", "X169.9")
+    files[0].write_text(wider, encoding="utf-8")
+    (_, after) = evaluated(machine, files, samples=100).states
+    assert [answer.verdict for answer in after.answers] == [MET, MET]
+
+
 @sweep
 @pytest.mark.parametrize("alignment", ["clamped", "best-fit", "datums"])
 def test_alignment_moves_no_size(files: tuple[Path, Path], alignment: str) -> None:

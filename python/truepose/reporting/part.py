@@ -46,6 +46,7 @@ def tables(evaluation: PartEvaluation) -> Iterator[Table]:
         yield _state(evaluation, answers)
     if evaluation.of_bands:
         yield _blame(evaluation)
+    yield _operators(evaluation)
 
 
 @dataclass(frozen=True)
@@ -174,6 +175,14 @@ def _blame(evaluation: PartEvaluation) -> Table:
         3,
         note,
     )
+
+
+def _operators(evaluation: PartEvaluation) -> Table:
+    rows = tuple(
+        (of.label, of.quantity.operator, of.quantity.filter) for of in evaluation.characteristics
+    )
+    title, header = "How each is evaluated", ("characteristic", "operator", "filter")
+    return Table("operators", title, header, rows, 3)
 
 
 def _adds(known: float, half: float) -> str:

@@ -11,14 +11,14 @@ from truepose.workpiece.result import attributes
 
 def shown(evaluation: PartEvaluation, path: DrawnPath, program: str) -> PartShown:
     """The part as any page shows it; `path` has looked on while the program was walked."""
-    tables = list(part.tables(evaluation))
+    *tables, operators = part.tables(evaluation)
     count = len(evaluation.states)
     return PartShown(
         program,
         part.summary(evaluation),
         tables[count:],
         figures(evaluation, path),
-        tables[:count],
+        [*tables[:count], operators],
         part.PROCESS,
     )
 

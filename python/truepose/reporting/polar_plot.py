@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.files.shown_units import Shown
 from truepose.reporting.figures import DrawnFigure
 from truepose.reporting.figures._plot import Keys, Plot, trace
 from truepose.reporting.figures._style import AXIS, GRID, INK, SOURCE_COLOURS, finish, small
@@ -25,283 +27,256 @@ MIDDLE = 1.0
 REACH = 0.62
 """Share of that which the largest deviation takes."""
 
+RIM = MIDDLE + REACH * 1.05
+EDGE = MIDDLE + REACH + 0.26
+"""Where drives are marked, and where the picture ends."""
+
 STEPS = (1.0, 2.0, 5.0, 10.0)
 """Round numbers of a scale."""
 
+QUIET = "#5b6779"
 MEASURED = ("#B23A48", "#7A1F2B")
 BANDS = ("rgba(0, 114, 178, 0.16)", "rgba(213, 94, 0, 0.16)")
 
 
 def figures(machine: Machine, result: xr.Dataset) -> list[DrawnFigure]:
     """One for each state; readings are of the machine as commanded."""
-    return [
-        DrawnFigure(
-            f"polar-{at}",
-            f"Polar plot, {state}",
-            _caption(machine, result, at),
-            as_text(_figure(machine, result, at)),
-        )
-        for at, state in enumerate(str(name) for name in result["state"].values)
-    ]
-
-
-def _caption(machine: Machine, result: xr.Dataset, state: int) -> str:
-    unit = machine.shown.small_length
-    ring, times = _ring(machine, result, state), _magnified(machine, result, state)
-    text = (
-        f"Radial deviation F outwards from the nominal circle, a ring each {ring:g} {unit.label}: "
-        f"magnified {times:,.0f} times against a circle of radius "
-        f"{machine.shown.length.text(float(result.attrs['radius']), 6)}. About the centre "
-        "of the least-squares circle, which is dashed. Bands hold "
-        f"{100.0 * result.attrs['probability']:.3g} % of the machines at each angle."
-    )
-    if result.sizes["turn"]:
-        text += " Ticks at the rim: where a drive turns round."
-    return text
-
-
-def _ring(machine: Machine, result: xr.Dataset, state: int) -> float:
-    """Distance of the rings, in the unit for people: a round number, some four in the reach."""
-    aim = _reach(machine, result, state) / 4.0
-    power = 10.0 ** np.floor(np.log10(aim)) if aim > 0.0 else 1.0
-    return float(next(step * power for step in STEPS if step * power >= aim * 0.999))
-
-
-def _reach(machine: Machine, result: xr.Dataset, state: int) -> float:
-    """The largest deviation that is drawn, in the unit for people."""
-    drawn = [np.abs(result[f"radial_{name}"].values[state]) for name in ("lower", "upper", "known")]
-    if state == 0 and "reading" in result.sizes:
-        drawn.append(np.abs(result["radial_measured"].values))
-    finite = [values[np.isfinite(values)].max(initial=0.0) for values in drawn]
-    return max(float(max(finite)), 1e-9) * machine.shown.small_length.per_si
-
-
-def _magnified(machine: Machine, result: xr.Dataset, state: int) -> float:
-    reach = _reach(machine, result, state) / machine.shown.small_length.per_si
-    return float(result.attrs["radius"]) * REACH / reach
-
-
-def _figure(machine: Machine, result: xr.Dataset, state: int) -> Plot:
-    unit, turn = machine.shown.small_length, machine.shown.angle
-    scale = REACH / _reach(machine, result, state)
-    angles = np.asarray(result["angle"].values)
-    figure = Plot()
-    _rings(figure, machine, result, state, scale)
-    ways = [str(name) for name in result["direction"].values]
-    for way, name in enumerate(ways):
-        low, high = (
-            result[f"radial_{end}"].values[state, way] * unit.per_si for end in ("lower", "upper")
-        )
-        outline = [np.append(end, end[0]) for end in (high, low)]
-        round_ = np.append(angles, angles[0])
-        x, y = _at(
-            np.concatenate([round_, round_[::-1]]),
-            np.concatenate([outline[0], outline[1][::-1]]),
-            scale,
-        )
-        figure.add_trace(
-            trace(
-                "scatter",
-                x=small(x),
-                y=small(y),
-                mode="lines",
-                line={"width": 0},
-                fill="toself",
-                fillcolor=BANDS[way],
-                name=f"{name}, {100.0 * result.attrs['probability']:.3g} %",
-                hoverinfo="skip",
+    drawn = []
+    for at, state in enumerate(str(name) for name in result["state"].values):
+        polar = _Polar(machine, result, at)
+        drawn.append(
+            DrawnFigure(
+                f"polar-{at}", f"Polar plot, {state}", polar.caption(), as_text(polar.drawn())
             )
         )
-    for way, name in enumerate(ways):
-        known = np.asarray(result["radial_known"].values[state, way]) * unit.per_si
-        _line(figure, angles, known, scale, name, SOURCE_COLOURS[way], unit.label, turn)
-    if state == 0 and "reading" in result.sizes:
-        _readings(figure, machine, result, scale)
-    _least_squares(figure, machine, result, state, scale)
-    _turns(figure, result, turn.per_si, turn.label)
-    edge = MIDDLE + REACH + 0.26
-    hidden: Keys = {"visible": False, "range": [-edge, edge]}
-    finish(figure, HEIGHT, margin={"l": 20, "r": 20, "t": 70, "b": 20}, hovermode="closest")
-    figure.update_xaxes(**hidden, constrain="domain")
-    figure.update_yaxes(**hidden, scaleanchor="x", scaleratio=1, constrain="domain")
-    return figure
+    return drawn
 
 
-def _at(angles: Floats, deviations: Floats, scale: float) -> tuple[Floats, Floats]:
-    """Where a deviation, in the unit for people, is drawn."""
-    radius = MIDDLE + scale * deviations
-    return radius * np.cos(angles), radius * np.sin(angles)
+@dataclass
+class _Polar:
+    """The plot of one state, as it is drawn. Deviations are in the unit for people."""
 
+    machine: Machine
+    result: xr.Dataset
+    state: int
+    figure: Plot = field(default_factory=Plot)
 
-def _line(
-    figure: Plot,
-    angles: Floats,
-    values: Floats,
-    scale: float,
-    name: str,
-    colour: str,
-    unit: str,
-    turn: object,
-    **look: object,
-) -> None:
-    x, y = _at(np.append(angles, angles[0]), np.append(values, values[0]), scale)
-    degrees = np.append(angles, angles[0]) * getattr(turn, "per_si", 1.0)
-    told = [
-        f"{name}, {angle:.4g} {getattr(turn, 'label', '')}: {value:.3g} {unit}"
-        for angle, value in zip(degrees, np.append(values, values[0]), strict=True)
-    ]
-    figure.add_trace(
-        trace(
-            "scatter",
-            x=small(x),
-            y=small(y),
-            mode="lines",
-            line={"color": colour, "width": 2.0, **look},
-            name=name,
-            text=told,
-            hoverinfo="text",
+    @property
+    def unit(self) -> Shown:
+        return self.machine.shown.small_length
+
+    @property
+    def turn(self) -> Shown:
+        return self.machine.shown.angle
+
+    @property
+    def read(self) -> bool:
+        """Whether there are readings to draw."""
+        return self.state == 0 and "reading" in self.result.sizes
+
+    def of(self, name: str) -> Floats:
+        """(2, n) a variable of F in this state."""
+        return np.asarray(self.result[f"radial_{name}"].values[self.state] * self.unit.per_si)
+
+    @property
+    def readings(self) -> Floats:
+        """(m,) measured F."""
+        return np.asarray(self.result["radial_measured"].values * self.unit.per_si)
+
+    @property
+    def reach(self) -> float:
+        """The largest deviation that is drawn."""
+        all_ = [self.of(name) for name in ("lower", "upper", "known")]
+        if self.read:
+            all_.append(self.readings)
+        most = max(float(np.abs(one[np.isfinite(one)]).max(initial=0.0)) for one in all_)
+        return max(most, 1e-9 * self.unit.per_si)
+
+    @property
+    def ring(self) -> float:
+        """Distance of the rings: a round number, some four in the reach."""
+        aim = self.reach / 4.0
+        power = 10.0 ** np.floor(np.log10(aim))
+        return float(next(step * power for step in STEPS if step * power >= aim * 0.999))
+
+    @property
+    def percent(self) -> str:
+        return f"{100.0 * self.result.attrs['probability']:.3g} %"
+
+    def caption(self) -> str:
+        """How to read it."""
+        radius = float(self.result.attrs["radius"])
+        times = radius * self.unit.per_si * REACH / self.reach
+        text = (
+            f"Radial deviation F outwards from the nominal circle, a ring each {self.ring:g} "
+            f"{self.unit.label}: magnified {times:,.0f} times against a circle of radius "
+            f"{self.machine.shown.length.text(radius, 6)}. About the centre of the least-squares "
+            f"circle, which is dashed. Bands hold {self.percent} of the machines at each angle."
         )
-    )
+        marked = " Marks at the rim: where a drive turns round."
+        return text + marked if self.result.sizes["turn"] else text
 
+    def drawn(self) -> Plot:
+        """The figure."""
+        self._rings()
+        self._spokes()
+        self._bands()
+        self._known()
+        if self.read:
+            self._readings()
+        self._least_squares()
+        self._turns()
+        hidden: Keys = {"visible": False, "range": [-EDGE, EDGE], "constrain": "domain"}
+        margin = {"l": 20, "r": 20, "t": 70, "b": 20}
+        finish(self.figure, HEIGHT, margin=margin, hovermode="closest")
+        self.figure.update_xaxes(**hidden)
+        self.figure.update_yaxes(**hidden, scaleanchor="x", scaleratio=1)
+        return self.figure
 
-def _rings(figure: Plot, machine: Machine, result: xr.Dataset, state: int, scale: float) -> None:
-    """Rings of equal deviation with their numbers, and spokes."""
-    unit = machine.shown.small_length
-    ring = _ring(machine, result, state)
-    most = int(np.floor(_reach(machine, result, state) * 1.15 / ring + 1e-9)) or 1
-    turn = np.linspace(0.0, 2.0 * np.pi, 361)
-    notes = []
-    for number in range(-most, most + 1):
-        x, y = _at(turn, np.full(turn.size, number * ring), scale)
-        nominal = number == 0
-        figure.add_trace(
-            trace(
-                "scatter",
-                x=small(x),
-                y=small(y),
+    def _draw(self, angles: Floats, deviations: Floats, **keys: Any) -> None:
+        """A trace of deviations at angles."""
+        radius = MIDDLE + REACH / self.reach * deviations
+        self._place(radius * np.cos(angles), radius * np.sin(angles), **keys)
+
+    def _place(self, x: Floats, y: Floats, **keys: Any) -> None:
+        if "text" not in keys:
+            keys["hoverinfo"] = "skip"
+        self.figure.add_trace(trace("scatter", x=small(x), y=small(y), **keys))
+
+    def _note(self, angle: float, radius: float, text: str, **keys: Any) -> None:
+        x, y = float(radius * np.cos(angle)), float(radius * np.sin(angle))
+        notes = self.figure.layout.setdefault("annotations", [])
+        notes.append({"x": x, "y": y, "text": text, "showarrow": False, **keys})
+
+    def _told(self, name: str, angles: Floats, deviations: Floats) -> list[str]:
+        return [
+            f"{name}, {angle * self.turn.per_si:.4g} {self.turn.label}: {value:.3g} "
+            f"{self.unit.label}"
+            for angle, value in zip(angles, deviations, strict=True)
+        ]
+
+    def _rings(self) -> None:
+        """Rings of equal deviation, and their numbers."""
+        ring = self.ring
+        most = int(np.floor(self.reach * 1.15 / ring + 1e-9)) or 1
+        for number in range(-most, most + 1):
+            nominal = number == 0
+            self._draw(
+                _ROUND,
+                np.full(_ROUND.size, number * ring),
                 mode="lines",
                 line={"color": AXIS if nominal else GRID, "width": 1.6 if nominal else 1.0},
                 name="nominal circle" if nominal else None,
                 showlegend=nominal,
-                hoverinfo="skip",
             )
-        )
-        label = "0" if nominal else f"{number * ring:+g}".replace("-", "\N{MINUS SIGN}")
-        where = np.radians(11.0)
-        notes.append(
-            {
-                "x": float((MIDDLE + scale * number * ring) * np.cos(where)),
-                "y": float((MIDDLE + scale * number * ring) * np.sin(where)),
-                "text": f"{label} {unit.label}" if number == most else label,
-                "showarrow": False,
-                "font": {"size": 11, "color": "#5b6779"},
-                "bgcolor": "rgba(255, 255, 255, 0.75)",
-            }
-        )
-    edge = MIDDLE + REACH * 1.05
-    for degrees in range(0, 360, 45):
-        way = np.radians(degrees)
-        inner = MIDDLE - REACH
-        figure.add_trace(
-            trace(
-                "scatter",
-                x=small([inner * np.cos(way), edge * np.cos(way)]),
-                y=small([inner * np.sin(way), edge * np.sin(way)]),
+            label = "0" if nominal else f"{number * ring:+g}".replace("-", "\N{MINUS SIGN}")
+            self._note(
+                np.radians(11.0),
+                MIDDLE + REACH / self.reach * number * ring,
+                f"{label} {self.unit.label}" if number == most else label,
+                font={"size": 11, "color": QUIET},
+                bgcolor="rgba(255, 255, 255, 0.75)",
+            )
+
+    def _spokes(self) -> None:
+        first, second = list(str(self.result.attrs["plane"]))
+        for degrees in range(0, 360, 45):
+            way = np.radians(degrees)
+            ends = np.array([MIDDLE - REACH, RIM])
+            look = {"color": GRID, "width": 1.0}
+            x, y = ends * np.cos(way), ends * np.sin(way)
+            self._place(x, y, mode="lines", line=look, showlegend=False)
+            axis = {0: f" (+{first})", 90: f" (+{second})"}.get(degrees, "")
+            text = f"{way * self.turn.per_si:.4g} {self.turn.label}{axis}".replace(" °", "°")
+            self._note(way, RIM + 0.13, text, font={"size": 12, "color": INK})
+
+    @property
+    def _ways(self) -> list[str]:
+        return [str(name) for name in self.result["direction"].values]
+
+    @property
+    def _closed(self) -> Floats:
+        """Angles, the first again at the end."""
+        angles = np.asarray(self.result["angle"].values)
+        return np.append(angles, angles[0])
+
+    def _bands(self) -> None:
+        low, high = self.of("lower"), self.of("upper")
+        for way, name in enumerate(self._ways):
+            outer, inner = (np.append(end[way], end[way, 0]) for end in (high, low))
+            self._draw(
+                np.concatenate([self._closed, self._closed[::-1]]),
+                np.concatenate([outer, inner[::-1]]),
                 mode="lines",
-                line={"color": GRID, "width": 1.0},
-                showlegend=False,
-                hoverinfo="skip",
+                line={"width": 0},
+                fill="toself",
+                fillcolor=BANDS[way],
+                name=f"{name}, {self.percent}",
             )
-        )
-        angle = machine.shown.angle
-        first, second = list(str(result.attrs["plane"]))
-        axis = {0: f" (+{first})", 90: f" (+{second})"}.get(degrees, "")
-        notes.append(
-            {
-                "x": float((edge + 0.13) * np.cos(way)),
-                "y": float((edge + 0.13) * np.sin(way)),
-                "text": f"{way * angle.per_si:.4g} {angle.label}{axis}".replace(" °", "°"),
-                "showarrow": False,
-                "font": {"size": 12, "color": INK},
-            }
-        )
-    figure.update_layout(annotations=notes)
 
+    def _known(self) -> None:
+        for way, name in enumerate(self._ways):
+            values = np.append(self.of("known")[way], self.of("known")[way, 0])
+            self._draw(
+                self._closed,
+                values,
+                mode="lines",
+                line={"color": SOURCE_COLOURS[way], "width": 2.0},
+                name=name,
+                text=self._told(name, self._closed, values),
+                hoverinfo="text",
+            )
 
-def _least_squares(
-    figure: Plot, machine: Machine, result: xr.Dataset, state: int, scale: float
-) -> None:
-    """The least-squares circle of what is known, about its own centre."""
-    names = [str(name) for name in result["quantity"].values]
-    radius = float(result["known"].values[state, names.index("D")])
-    turn = np.linspace(0.0, 2.0 * np.pi, 361)
-    values = np.full(turn.size, radius * machine.shown.small_length.per_si)
-    x, y = _at(turn, values, scale)
-    figure.add_trace(
-        trace(
-            "scatter",
-            x=small(x),
-            y=small(y),
+    def _readings(self) -> None:
+        ways = np.array([str(name) for name in self.result["reading_direction"].values])
+        angles = np.asarray(self.result["reading_angle"].values)
+        for way, name in enumerate(self._ways):
+            chosen = ways == name
+            there, values = angles[chosen], self.readings[chosen]
+            symbol = ("circle", "x-thin-open")[way]
+            self._draw(
+                there,
+                values,
+                mode="markers",
+                marker={"color": MEASURED[way], "size": 4, "symbol": symbol},
+                name=f"measured, {name}",
+                text=self._told(f"measured {name}", there, values),
+                hoverinfo="text",
+            )
+
+    def _least_squares(self) -> None:
+        """The circle of what is known, about its own centre."""
+        radius = float(self.result["known"].sel(quantity="D").values[self.state])
+        self._draw(
+            _ROUND,
+            np.full(_ROUND.size, radius * self.unit.per_si),
             mode="lines",
             line={"color": INK, "width": 1.0, "dash": "dash"},
             name="least-squares circle",
-            hoverinfo="skip",
-        )
-    )
-
-
-def _readings(figure: Plot, machine: Machine, result: xr.Dataset, scale: float) -> None:
-    unit, turn = machine.shown.small_length, machine.shown.angle
-    ways = np.array([str(name) for name in result["reading_direction"].values])
-    angles = np.asarray(result["reading_angle"].values)
-    values = np.asarray(result["radial_measured"].values) * unit.per_si
-    for way, name in enumerate(str(word) for word in result["direction"].values):
-        chosen = ways == name
-        x, y = _at(angles[chosen], values[chosen], scale)
-        figure.add_trace(
-            trace(
-                "scatter",
-                x=small(x),
-                y=small(y),
-                mode="markers",
-                marker={
-                    "color": MEASURED[way],
-                    "size": 4,
-                    "symbol": "circle" if way == 0 else "x-thin-open",
-                },
-                name=f"measured, {name}",
-                text=[
-                    f"measured {name}, {angle * turn.per_si:.4g} {turn.label}: {value:.3g} "
-                    f"{unit.label}"
-                    for angle, value in zip(angles[chosen], values[chosen], strict=True)
-                ],
-                hoverinfo="text",
-            )
         )
 
-
-def _turns(figure: Plot, result: xr.Dataset, per_si: float, label: str) -> None:
-    """Ticks at the rim."""
-    angles = np.asarray(result["turn_angle"].values)[::2]
-    drives = [str(name) for name in result["turn_drive"].values][::2]
-    if not angles.size:
-        return
-    edge = MIDDLE + REACH * 1.05
-    figure.add_trace(
-        trace(
-            "scatter",
-            x=small(edge * np.cos(angles)),
-            y=small(edge * np.sin(angles)),
+    def _turns(self) -> None:
+        """Marks at the rim."""
+        angles = np.asarray(self.result["turn_angle"].values)[::2]
+        drives = [str(name) for name in self.result["turn_drive"].values][::2]
+        if not angles.size:
+            return
+        told = [
+            f"{drive} turns at {angle * self.turn.per_si:.4g} {self.turn.label}"
+            for drive, angle in zip(drives, angles, strict=True)
+        ]
+        self._place(
+            RIM * np.cos(angles),
+            RIM * np.sin(angles),
             mode="markers+text",
             marker={"color": INK, "size": 7, "symbol": "diamond"},
             text=drives,
             textposition="top center",
             textfont={"size": 11},
-            customdata=[
-                f"{drive} turns at {a * per_si:.4g} {label}"
-                for drive, a in zip(drives, angles, strict=True)
-            ],
+            customdata=told,
             hovertemplate="%{customdata}<extra></extra>",
             name="a drive turns round",
         )
-    )
+
+
+_ROUND = np.linspace(0.0, 2.0 * np.pi, 361)

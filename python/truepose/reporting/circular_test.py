@@ -46,13 +46,17 @@ def summary(machine: Machine, result: xr.Dataset) -> list[tuple[str, str, str]]:
     attrs = result.attrs
     percent = f"{100.0 * attrs['probability']:.3g} %"
     share = 100.0 * float(attrs["share_as_far_off"])
+    outside = (
+        f"{100.0 * float(attrs['share_outside']):.3g} % of the readings are outside the {percent} "
+        "band at their angle"
+    )
     if attrs["within"]:
         return [
             (
                 WITHIN,
                 "met",
                 f"{attrs['measured_file']}: as the model says; {share:.3g} % of its machines "
-                "are as far off, or farther.",
+                f"are as far off, or farther; {outside}.",
             )
         ]
     (first, *_), value, explained = (
@@ -74,7 +78,7 @@ def summary(machine: Machine, result: xr.Dataset) -> list[tuple[str, str, str]]:
         (
             NOT_WITHIN,
             "missed",
-            f"{attrs['measured_file']}: {why}.",
+            f"{attrs['measured_file']}: {why}; {outside}.",
         ),
         ("", "none", f"{first} off by {value} besides would explain {explained:.3g} %."),
         ("", "none", f"All that has a band explains {by_all:.3g} % while it stays plausible."),

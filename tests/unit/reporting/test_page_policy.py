@@ -1,4 +1,4 @@
-"""The page of a report says to the browser that it loads nothing from elsewhere."""
+"""The head of every page says to the browser that it loads nothing from elsewhere."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from importlib.resources import files
 
 
 def test_policy_stands_before_all_that_it_governs() -> None:
-    page = files("truepose.reporting").joinpath("page.html.jinja").read_text(encoding="utf-8")
+    page = files("truepose.reporting").joinpath("base.html.jinja").read_text(encoding="utf-8")
     policy = page.index("Content-Security-Policy")
     assert "default-src 'none'" in page[policy : page.index("<title>")]
     assert policy < min(page.index("<style>"), page.index("<script>"), page.index("<link"))

@@ -25,6 +25,7 @@ BENCHMARKS = (
     Benchmark("containment", cores=2),
     Benchmark("linuxcnc_module"),
     Benchmark("gcode", cores=2),
+    Benchmark("part"),
     Benchmark("calibration"),
     Benchmark("scaling", cores=2),
 )

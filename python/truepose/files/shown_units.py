@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -95,6 +95,17 @@ class ShownUnits:
         """Temperatures, K, any shape, on the scale of the file: °C or °F."""
         celsius = np.asarray(kelvin, np.float64) - ICE_POINT
         return celsius * 1.8 + 32.0 if self.fahrenheit else celsius
+
+    def declaring(self, units: Mapping[str, FileUnit]) -> ShownUnits:
+        """The same where another file declares other units of lengths and angles."""
+        other = shown_units(units)
+        of_length = {"length": other.length, "small_length": other.small_length}
+        of_angle = {"angle": other.angle, "small_angle": other.small_angle}
+        return replace(
+            self,
+            **(of_length if "length" in units else {}),
+            **(of_angle if "angle" in units else {}),
+        )
 
     @property
     def least_dimension(self) -> float:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from truepose.files.dimensions import BY_UNIT
-from truepose.machine import Machine
+from truepose.files.shown_units import ShownUnits
 from truepose.reporting.table import Table
 from truepose.sources import not_included_text
 from truepose.verdict.states import BEFORE
@@ -63,15 +63,15 @@ def summary(evaluation: PartEvaluation) -> list[SummaryLine]:
     lines = []
     for answers in evaluation.states:
         told = list(zip(evaluation.characteristics, answers.answers, strict=True))
-        missed = [of.label for of, answer in told if answer.verdict == NOT_MET]
-        unsure = [of.label for of, answer in told if answer.verdict == UNDECIDED]
+        missed = [of for of, answer in told if answer.verdict == NOT_MET]
+        unsure = [of for of, answer in told if answer.verdict == UNDECIDED]
         word, colour = (
             (NOT_MET, "missed") if missed else (UNDECIDED, "open") if unsure else (MET, "met")
         )
         text = f"{answers.state.name}: {len(told) - len(missed) - len(unsure)} of {len(told)} "
         text += "quantities certainly within tolerance"
-        text += f"; NOT met: {', '.join(missed)}" if missed else ""
-        text += f"; undecided: {', '.join(unsure)}" if unsure else ""
+        text += f"; NOT met: {_by_feature(missed)}" if missed else ""
+        text += f"; undecided: {_by_feature(unsure)}" if unsure else ""
         of, answer = max(told, key=lambda one: one[1].out)
         if answer.out > 0.0:
             text += f". Most often out: {of.label}, of {100.0 * answer.out:.3g} % of the machines"
@@ -79,9 +79,17 @@ def summary(evaluation: PartEvaluation) -> list[SummaryLine]:
     return lines
 
 
+def _by_feature(named: list[Characteristic]) -> str:
+    """Such as "width (size, smallest; size, largest), corner (perpendicularity)"."""
+    quantities: dict[str, list[str]] = {}
+    for of in named:
+        quantities.setdefault(of.feature.name, []).append(of.quantity.name)
+    return ", ".join(f"{name} ({'; '.join(each)})" for name, each in quantities.items())
+
+
 def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
     rows = tuple(
-        _row(evaluation.machine, of, answer)
+        _row(evaluation.shown, of, answer)
         for of, answer in zip(evaluation.characteristics, answers.answers, strict=True)
     )
     header = (
@@ -99,13 +107,17 @@ def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
         "verdict",
     )
     walked = evaluation.walked
-    small = evaluation.machine.shown.small_length
+    small = evaluation.shown.small_length
     note = (
         f"{evaluation.samples:,} machines, seed {evaluation.seed}, each goes to every point; "
         f"alignment: {evaluation.alignment.kind}. Deviations from nominal, of a form its value. "
-        f"Along the path the known error is at most {small.text(walked.largest)} "
-        f"(line {walked.largest_line}). {PROCESS}"
     )
+    if answers.state.name == BEFORE:
+        note += (
+            f"Along the path the known error of the tool's place is at most "
+            f"{small.text(walked.largest)} (line {walked.largest_line}). "
+        )
+    note += PROCESS
     missing = not_included_text(evaluation.machine, evaluation.condition)
     if missing:
         note += f" Not included: {missing}."
@@ -114,9 +126,9 @@ def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
     )
 
 
-def _row(machine: Machine, of: Characteristic, answer: QuantityAnswer) -> tuple[str, ...]:
+def _row(shown: ShownUnits, of: Characteristic, answer: QuantityAnswer) -> tuple[str, ...]:
     quantity = of.quantity
-    large, small = machine.shown.of(quantity.si), machine.shown.small(quantity.si)
+    large, small = shown.of(quantity.si), shown.small(quantity.si)
 
     def off(value: float) -> str:
         if not math.isfinite(value):
@@ -149,7 +161,7 @@ def _blame(evaluation: PartEvaluation) -> Table:
     rows = []
     before = next(one for one in evaluation.states if one.state.name == BEFORE)
     for at, of in enumerate(evaluation.characteristics):
-        small = evaluation.machine.shown.small(of.quantity.si)
+        small = evaluation.shown.small(of.quantity.si)
         named = [
             f"{one.source} {_adds(one.known * small.per_si, one.half * small.per_si)}"
             + (f" (most: {one.first})" if one.first else "")
@@ -159,7 +171,7 @@ def _blame(evaluation: PartEvaluation) -> Table:
         rows.append(
             (
                 of.label,
-                f"{', '.join(named)} {small.label}".strip(),
+                f"{', '.join(named)} {small.label}" if named else f"under {LEAST:g} {small.label}",
                 _mends(evaluation, at),
             )
         )
@@ -186,7 +198,9 @@ def _operators(evaluation: PartEvaluation) -> Table:
 
 
 def _adds(known: float, half: float) -> str:
-    known = round(known, 1)
+    known, half = round(known, 1), round(half, 1)
+    if not half:
+        return f"{known:+.1f}"
     return f"{known:+.1f} ± {half:.1f}" if known else f"± {half:.1f}"
 
 
@@ -197,17 +211,15 @@ def _mends(evaluation: PartEvaluation, at: int) -> str:
     if suggested.compensation:
         return "compensation: truepose gcode corrects the program"
     if suggested.aim:
-        of = evaluation.characteristics[at]
-        small = evaluation.machine.shown.small(of.quantity.si)
+        small = evaluation.shown.small(evaluation.characteristics[at].quantity.si)
         word = "larger" if suggested.aim > 0.0 else "smaller"
         amount = f"{abs(suggested.aim) * small.per_si:.1f} {small.label}"
         return f"compensation, and the middle of the limits: program it {amount} {word}"
     if not suggested.source:
         return "no source's bands alone: compensate, then tighten several, or ask for less"
     also = "" if suggested.state == BEFORE else " and compensation"
-    return (
-        f"bands of {suggested.source} at {100.0 * suggested.narrowed:.3g} % of what they are{also}"
-    )
+    narrowed = f"{100.0 * suggested.narrowed:.3g} %"
+    return f"bands of {suggested.source} at {narrowed} of what they are{also}"
 
 
 SHEET = (
@@ -239,7 +251,7 @@ SHEET = (
 
 
 def sheet(evaluation: PartEvaluation) -> list[dict[str, Any]]:
-    """A row for each characteristic and state, in the units of the machine file."""
+    """A row for each characteristic and state, in the units of features file, else machine."""
     rows = []
     for answers in evaluation.states:
         for at, (of, answer) in enumerate(
@@ -257,7 +269,7 @@ def _sheet_row(
     answer: QuantityAnswer,
 ) -> dict[str, Any]:
     quantity = of.quantity
-    unit = evaluation.machine.file_units[BY_UNIT[quantity.si]]
+    unit = evaluation.units[BY_UNIT[quantity.si]]
 
     def told(value: float) -> float | None:
         return float(unit.to_file(value)) if math.isfinite(value) else None

@@ -32,8 +32,11 @@ MOST_POINTS = 6000
 SHARE = 0.06
 """Of the part's size: how long the largest error is drawn."""
 
-WIDTH = 1.25
-"""Of a tolerance zone: what a strip shows at least."""
+MARGIN = 0.08
+"""Of what a strip shows: left free at its ends."""
+
+FLAT = 0.25
+"""Of the part's largest extent: what each axis in space shows at least, so that none is a line."""
 
 STRIP = 74
 """Pixels of a strip."""
@@ -96,19 +99,18 @@ def _strips(evaluation: PartEvaluation) -> Plot:
     count = len(characteristics)
     figure = grid(count, 1, vertical_spacing=0.42 / count)
     for row, of in enumerate(characteristics, start=1):
-        small_unit = evaluation.machine.shown.small(of.quantity.si)
+        small_unit = evaluation.shown.small(of.quantity.si)
         scale, nominal = small_unit.per_si, of.quantity.nominal
         low, high = (
             (end - nominal) * scale if math.isfinite(end) else None
-            for end in (of.quantity.lower, of.quantity.upper)
+            for end in (0.0 if of.quantity.is_form else of.quantity.lower, of.quantity.upper)
         )
-        reach = [abs(end) for end in (low, high) if end is not None]
+        ends = [0.0]
         for place, answers in enumerate(evaluation.states):
             answer = answers.answers[row - 1]
             colour = (BEFORE, AFTER)[place]
             for line in _marks(answer, nominal, scale, 0.28 - 0.56 * place, colour):
-                finite = [abs(x) for x in line["x"] if math.isfinite(x)]
-                reach += finite
+                ends += [x for x in line["x"] if math.isfinite(x)]
                 figure.add_trace(
                     trace(
                         "scatter",
@@ -121,9 +123,9 @@ def _strips(evaluation: PartEvaluation) -> Plot:
                     row,
                     1,
                 )
-        most = WIDTH * max(reach, default=1.0) or 1.0
+        least, most = _range(ends + [end for end in (low, high) if end is not None])
         figure.add_vrect(
-            -most if low is None else low,
+            least if low is None else low,
             most if high is None else high,
             row,
             1,
@@ -131,7 +133,6 @@ def _strips(evaluation: PartEvaluation) -> Plot:
             line={"width": 0},
             layer="below",
         )
-        least = -0.05 * most if of.quantity.is_form else -most
         figure.update_xaxes(
             row, 1, range=[least, most], title={"text": ""}, ticksuffix=f" {small_unit.label}"
         )
@@ -146,6 +147,13 @@ def _strips(evaluation: PartEvaluation) -> Plot:
     # The last x axis says what is shown.
     figure.update_xaxes(count, 1, title={"text": "deviation from nominal; of a form its value"})
     return finish(figure, STRIP * count + 150, margin={"l": 330, "r": 30, "t": 50, "b": 60})
+
+
+def _range(ends: list[float]) -> tuple[float, float]:
+    """What a strip shows: all of its `ends`, with a margin on both sides."""
+    least, most = min(ends), max(ends)
+    margin = MARGIN * (most - least) or 1.0
+    return least - margin, most + margin
 
 
 def _words(evaluation: PartEvaluation, at: int) -> str:
@@ -191,15 +199,14 @@ def _marks(
 
 
 def _path(evaluation: PartEvaluation, rows: Floats) -> tuple[Plot, str]:
-    machine = evaluation.machine
-    length, unit = machine.shown.length, machine.shown.small_length
+    length, unit = evaluation.shown.length, evaluation.shown.small_length
     points, known, half = rows[:, :3], rows[:, 3:6], rows[:, 6]
     sizes = np.linalg.norm(known, axis=1)
     part = float(np.ptp(points, axis=0).max()) or 1.0
     most = float(sizes.max())
     factor = _round(SHARE * part / most) if most > 0.0 else 1.0
     moved = points + factor * known
-    planar = "z" not in machine.dof
+    planar = "z" not in evaluation.machine.dof
     figure = Plot()
     text = [
         f"line {line:.0f}<br>known {size:.2f} {unit.label}<br>95 % ± {wide:.2f} {unit.label}"
@@ -243,11 +250,24 @@ def _path(evaluation: PartEvaluation, rows: Floats) -> tuple[Plot, str]:
         figure.update_yaxes(title={"text": f"y, {length.label}"}, scaleanchor="x", scaleratio=1)
     else:
         axis = {"gridcolor": GRID, "color": INK}
+        both = np.concatenate([points, moved]) * length.per_si
+        middles = 0.5 * (both.min(axis=0) + both.max(axis=0))
+        extents = np.ptp(both, axis=0) * (1.0 + MARGIN)
+        extents = np.maximum(extents, FLAT * extents.max())
         figure.update_layout(
             scene={
-                "aspectmode": "data",
-                **{f"{a}axis": {"title": {"text": f"{a}, {length.label}"}, **axis} for a in "xyz"},
-                "camera": {"eye": {"x": 1.3, "y": -1.5, "z": 1.3}},
+                "aspectmode": "manual",
+                "aspectratio": dict(zip("xyz", (extents / extents.max()).tolist(), strict=True)),
+                **{
+                    f"{name}axis": {
+                        "title": {"text": f"{name}, {length.label}"},
+                        "nticks": 4 if extent < 0.5 * extents.max() else 7,
+                        "range": [middle - 0.5 * extent, middle + 0.5 * extent],
+                        **axis,
+                    }
+                    for name, middle, extent in zip("xyz", middles, extents, strict=True)
+                },
+                "camera": {"eye": {"x": 0.75, "y": -1.1, "z": 1.0}, "center": {"z": -0.1}},
             }
         )
     return figure, caption

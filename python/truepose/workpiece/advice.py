@@ -62,16 +62,19 @@ def culprits(answers: StateAnswers, at: int) -> list[Culprit]:
 
 
 def advice(evaluation: PartEvaluation, at: int) -> Advice | None:
-    """What mends characteristic number `at`; None where it is met as commanded."""
+    """What mends characteristic number `at`; None where it is met, compensated or not.
+
+    What is met as commanded, but not after compensation, can only be aimed better.
+    """
     states = {one.state.name: one for one in evaluation.states}
     before, after = states[BEFORE].answers[at], states[AFTER].answers[at]
-    if before.verdict == MET:
-        return None
     if after.verdict == MET:
-        return Advice(True, "", 1.0, AFTER)
+        return None if before.verdict == MET else Advice(True, "", 1.0, AFTER)
     aim = _aim(evaluation, after, at)
     if aim != 0.0:
         return Advice(False, "", 1.0, AFTER, aim)
+    if before.verdict == MET:
+        return None
     best = Advice(False, "", 0.0, AFTER)
     for answers in (states[BEFORE], states[AFTER]):
         for culprit in culprits(answers, at):

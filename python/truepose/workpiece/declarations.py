@@ -25,7 +25,7 @@ from truepose.errors import Fault, MachineFileError, PartError, Problem, in_orde
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.document import Document, Key, read
 from truepose.files.text_file import FileKind
-from truepose.files.units import UnitSystem, unit_of
+from truepose.files.units import FileUnit, UnitSystem, unit_of
 from truepose.files.wording import did_you_mean, one_of
 from truepose.machine import Machine, validation
 from truepose.machine.validation import Validated
@@ -94,12 +94,16 @@ class Declared:
 
 @dataclass(frozen=True, eq=False)
 class Declarations:
-    """All that is said of a part; places are lines of operations that count."""
+    """All that is said of a part; places are lines of operations that count.
+
+    `units` of the features file, by dimension: those that it declares.
+    """
 
     part: PartTable
     features: tuple[Declared, ...]
     datums: tuple[Declared, ...]
     text: ProgramText
+    units: Mapping[str, FileUnit]
 
     @property
     def every(self) -> tuple[Declared, ...]:
@@ -115,6 +119,7 @@ class _Collected:
     rows: list[Declared] = field(default_factory=list)
     names: dict[tuple[str, str], tuple[Document, Key]] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
+    units: Mapping[str, FileUnit] = field(default_factory=dict)
 
     def row(self, document: Document, key: Key, units: UnitSystem) -> None:
         """Check one row of `document`."""
@@ -197,6 +202,7 @@ def declared(
         tuple(row for row in placed if row.kind is not None),
         tuple(row for row in placed if row.kind is None),
         text,
+        collected.units,
     )
 
 
@@ -237,7 +243,8 @@ def _of_file(machine: Machine, document: Document, collected: _Collected) -> Par
             )
         )
     declared_units = validation.read_units(document, problems)
-    units = UnitSystem({**machine.file_units, **declared_units.declared})
+    collected.units = declared_units.declared
+    units = UnitSystem({**machine.file_units, **collected.units})
     for table in SEVERAL:
         rows = data.get(table, [])
         if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):

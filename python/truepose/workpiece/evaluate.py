@@ -148,6 +148,7 @@ def evaluate_part(
         asked.features,
         alignment,
         walked,
+        asked.units,
         samples=samples,
         seed=seed,
         probability=probability,

@@ -11,6 +11,7 @@ from typing import Literal
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
+from truepose.files.units import FileUnit
 from truepose.machine import Condition, Machine
 from truepose.runs.displacement import displacement
 from truepose.runs.poses import Progress
@@ -111,7 +112,10 @@ class StateAnswers:
 
 
 class PartEvaluation:
-    """The part of one program on one machine."""
+    """The part of one program on one machine.
+
+    `units`, by dimension, and `shown`: in what it is told, as the drawing has it, else the machine.
+    """
 
     def __init__(
         self,
@@ -122,6 +126,7 @@ class PartEvaluation:
         features: Sequence[Feature],
         alignment: Alignment,
         walked: Walked,
+        units: Mapping[str, FileUnit],
         *,
         samples: int,
         seed: int,
@@ -134,6 +139,8 @@ class PartEvaluation:
         self.features, self.alignment, self.walked = tuple(features), alignment, walked
         self.samples, self.seed, self.probability, self.rule = samples, seed, probability, rule
         self._exact, self._progress = exact, progress
+        self.units = {**machine.file_units, **units}
+        self.shown = machine.shown.declaring(units)
         self._done = 0
         self.characteristics = tuple(
             Characteristic(feature, number, places(feature))

@@ -13,6 +13,7 @@ from truepose.arrays import Floats, Indices
 from truepose.controllers.gcode.program import PROGRAM, ProgramOptions
 from truepose.errors import Fault, PartError, Problem
 from truepose.files.text_file import on_disk, require_input
+from truepose.files.units import FileUnit
 from truepose.machine import Condition, Machine
 from truepose.workpiece.declarations import (
     Declarations,
@@ -48,6 +49,7 @@ class Part:
     `elements`: of all features and datums, each with its points; `features` in the order in which
     they are said; `datums`: the frame of alignment "datums", in its order; `alignment`: in which
     coordinates the part is judged. `program` and `file` of features, if there is one: as given.
+    `units` that the file of features declares, by dimension.
     """
 
     elements: tuple[Element, ...]
@@ -57,6 +59,7 @@ class Part:
     program: str
     file: str | None
     walk: ProgramWalk
+    units: Mapping[str, FileUnit]
 
     @property
     def n_point(self) -> int:
@@ -202,6 +205,7 @@ def _built(
         str(walk.program),
         None if file is None else str(file),
         walk,
+        said.units,
     )
 
 

@@ -158,7 +158,7 @@ def _require_same(
 def _head(evaluation: PartEvaluation, at: int, reached: ReachedValue) -> str:
     machine: Machine = evaluation.machine
     of = evaluation.characteristics[at]
-    shown = machine.shown.small(of.quantity.si)
+    shown = evaluation.shown.small(of.quantity.si)
     off = shown.text(reached.value - of.quantity.nominal, 6)
     lines = [
         "A witness: one machine inside the tolerances, for which a part is out of tolerance.",

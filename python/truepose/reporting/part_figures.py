@@ -221,7 +221,7 @@ def _path(evaluation: PartEvaluation, rows: Floats) -> tuple[Plot, str]:
         (moved, (sizes, f"known error, {unit.label}"), f"actual, error × {factor:g}"),
         (points, (half, f"95 % half width, {unit.label}"), "95 % half width"),
     ):
-        marker: Keys = {"size": 3 if not planar else 4, "color": AXIS}
+        marker: Keys = {"size": 4 if planar else 2, "color": AXIS}
         if line is not None:
             marker |= {
                 "color": small(line[0] * unit.per_si),

@@ -15,14 +15,12 @@ for name in answers["characteristic"].values:
     before, after = told["verdict"].values
     if before == after == "met":
         continue
-    if told["characteristic_units"] != "m":
-        continue
     # Sizes are told as what they are off from nominal; forms and zones have a nominal value of 0.
     known = 1e6 * (told["known"] - told["nominal"]).values
     out = 100 * told["probability_out"].values
     print(f"{name}: {before}, after compensation {after}")
     for state, off, share in zip(answers["state"].values, known, out, strict=True):
-        print(f"    {state}: {off:+.1f} µm, {share:.1f} % of the machines out of tolerance")
+        print(f"    {state}: {off.round(1) + 0.0:+.1f} µm, {share:.1f} % of the machines are out")
     of_source = 1e6 * told["source_known"].sel(state="before compensation")
     worst = abs(of_source).idxmax("source").item()
     print(f"    most is {worst}: {of_source.sel(source=worst).item():+.1f} µm")

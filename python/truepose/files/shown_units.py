@@ -99,12 +99,14 @@ class ShownUnits:
     def declaring(self, units: Mapping[str, FileUnit]) -> ShownUnits:
         """The same where another file declares other units of lengths and angles."""
         other = shown_units(units)
-        of_length = {"length": other.length, "small_length": other.small_length}
-        of_angle = {"angle": other.angle, "small_angle": other.small_angle}
+        lengths = other if "length" in units else self
+        angles = other if "angle" in units else self
         return replace(
             self,
-            **(of_length if "length" in units else {}),
-            **(of_angle if "angle" in units else {}),
+            length=lengths.length,
+            small_length=lengths.small_length,
+            angle=angles.angle,
+            small_angle=angles.small_angle,
         )
 
     @property

@@ -411,6 +411,36 @@ def test_a_program_that_aims_at_a_limit(files: tuple[Path, Path]) -> None:
     assert [answer.verdict for answer in after.answers] == [MET, MET]
 
 
+def test_what_compensation_takes_out_can_be_aimed_better(files: tuple[Path, Path]) -> None:
+    """Heat brings all parts within the limits, of which the program asks for the lower one."""
+    from truepose.workpiece.advice import advice
+
+    machine = tp.load(PLANAR, settings=["condition.temperature=80"])
+    files[1].write_text(WIDTH.replace("±0.05 mm", "+0.2 0"), encoding="utf-8")
+    evaluation = evaluated(machine, files, samples=100, rule="iso-14253")
+    before, after = (state.answers[0].verdict for state in evaluation.states)
+    assert (before, after) == (MET, UNDECIDED)
+    suggested = advice(evaluation, 0)
+    assert suggested is not None
+    assert suggested.aim == pytest.approx(1e-4, abs=5e-6)
+
+
+def test_a_part_is_told_in_the_units_of_its_drawing(
+    capsys: pytest.CaptureFixture[str], files: tuple[Path, Path]
+) -> None:
+    """The machine is in mm, the features file in inches: the same numbers, told in other units."""
+    options = ("part", PLANAR, files[0], "--features", files[1], "--samples", 100)
+    in_mm = sheet_of(call(capsys, *options, "--format", "csv"))
+    files[1].write_text('units = { length = "in" }\n' + FEATURES, encoding="utf-8")
+    in_inches = sheet_of(call(capsys, *options, "--format", "csv"))
+    for row, other in zip(in_mm, in_inches, strict=True):
+        assert (row["unit"], other["unit"]) == ("mm", "in")
+        assert float(row["known"]) == pytest.approx(25.4 * float(other["known"]), rel=1e-12)
+    table = call(capsys, *options).out
+    assert "2.362204724 in" in table
+    assert "µin" in table
+
+
 @sweep
 @pytest.mark.parametrize("alignment", ["clamped", "best-fit", "datums"])
 def test_alignment_moves_no_size(files: tuple[Path, Path], alignment: str) -> None:

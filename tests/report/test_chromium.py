@@ -222,6 +222,63 @@ def test_nothing_is_wider_than_the_page(report: Visit) -> None:
     assert widths[0] <= widths[1]
 
 
+PART = Path(__file__).parents[2] / "examples" / "part"
+PART_FIGURES = {
+    # The path is grey, and the ends of the scale are on it and in its colour bar.
+    "path": [_style.AXIS, _style.COLOUR_SCALE[0][1], _style.COLOUR_SCALE[-1][1]],
+    "strips": [_style.BEFORE, _style.AFTER, "#DDE3EC"],
+}
+
+
+@pytest.fixture(scope="module", params=["part", "report"])
+def part_page(
+    request: pytest.FixtureRequest, browser: Any, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Visit]:
+    """The delta's square: its own page, and the report that has it too."""
+    file = tmp_path_factory.mktemp("part") / "page.html"
+    machine = str(MACHINES / "linear_delta.toml")
+    program, features = str(PART / "square.ngc"), ["--features", str(PART / "square.toml")]
+    if request.param == "part":
+        command = ["part", machine, program, *features, "--samples", "200"]
+        assert run([*command, "--output", str(file)]) == 1  # a width is NOT met
+        figures = len(PART_FIGURES)
+    else:
+        assert run(["report", machine, "--part", program, *features, "--output", str(file)]) == 0
+        figures = len(FIGURE_NAMES) - len(ONLY_MEASURED | ONLY_OVERCONSTRAINED)
+    seen = visit(browser, file, figures)
+    seen.page.bring_to_front()
+    yield seen
+    seen.page.close()
+
+
+@pytest.mark.parametrize("name", PART_FIGURES)
+def test_a_figure_of_the_part_is_not_blank(name: str, part_page: Visit) -> None:
+    found = part_page.look(f"#figure-{name}", PART_FIGURES[name])
+    assert found["marked"] > 0.005, found
+    assert found["colours"] >= 12, found
+    assert all(count > 60 for count in found["near"]), found
+
+
+def test_the_path_shows_how_well_it_is_known(part_page: Visit) -> None:
+    """The menu over the path hides the known error and shows the half width, and back."""
+    place = part_page.page.locator("#figure-path")
+    shown = """element => (element.data ? element : element.querySelector(".js-plotly-plot"))
+        .data.map(trace => trace.visible !== false)"""
+    assert place.evaluate(shown) == [True, True, False]
+    for number, wanted in ((1, [True, False, True]), (0, [True, True, False])):
+        before = part_page.look("#figure-path", [])
+        place.locator(".updatemenu-header").click()
+        place.locator(".updatemenu-dropdown-button").nth(number).click()
+        part_page.page.wait_for_timeout(500)
+        assert place.evaluate(shown) == wanted
+        assert part_page.look("#figure-path", []) != before
+
+
+def test_the_page_of_a_part_needs_no_network(part_page: Visit) -> None:
+    assert part_page.outside == []
+    assert part_page.complaints == []
+
+
 def test_a_blank_figure_would_be_seen(browser: Any, tmp_path: Path) -> None:
     file = tmp_path / "blank.html"
     file.write_text(

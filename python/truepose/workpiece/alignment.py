@@ -26,9 +26,6 @@ Kind = Literal["clamped", "best-fit", "datums"]
 ROUNDING = 1e-9
 """Of the sum of a form's weights: what is none."""
 
-ROUNDING = 1e-9
-"""Of the sum of a form's weights: what is none."""
-
 Frame = Callable[[Floats], tuple[Floats, Floats]]
 """Rotations (s, 3, 3) and origins (s, 3) of points (s, m, 3)."""
 

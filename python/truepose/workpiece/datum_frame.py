@@ -251,9 +251,10 @@ def _fixings(names: Sequence[str], datums: Sequence[Datum]) -> list[Fixing]:
 
 
 def _no_frame(names: Sequence[str], what: str) -> FeatureError:
+    says = "does" if len(names) == 1 else "do"
     return FeatureError(
         "feature-datums",
-        f"the datums form no frame: {' and '.join(names)} do not say {what}",
+        f"the datums form no frame: {' and '.join(names)} {says} not say {what}",
         found=f"datums {', '.join(names)}",
         expected="such as a wall and a wall or a bore across it, in the order of the drawing",
     )

@@ -97,9 +97,11 @@ class Declarations:
     """All that is said of a part; places are lines of operations that count.
 
     `units` of the features file, by dimension: those that it declares.
+    `document`: the features file, empty where there is none.
     """
 
     part: PartTable
+    document: Document
     features: tuple[Declared, ...]
     datums: tuple[Declared, ...]
     text: ProgramText
@@ -199,6 +201,7 @@ def declared(
     raise_all(collected.problems)
     return Declarations(
         part,
+        document,
         tuple(row for row in placed if row.kind is not None),
         tuple(row for row in placed if row.kind is None),
         text,

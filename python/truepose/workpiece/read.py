@@ -15,6 +15,7 @@ from truepose.errors import Fault, PartError, Problem
 from truepose.files.text_file import on_disk, require_input
 from truepose.files.units import FileUnit
 from truepose.machine import Condition, Machine
+from truepose.workpiece.datum_frame import datum_alignment
 from truepose.workpiece.declarations import (
     Declarations,
     Declared,
@@ -196,11 +197,17 @@ def _built(
             )
         except FeatureError as error:
             problems.append(row.problem(error.fault))
+    frame = tuple(datums[name] for name in part.datums)
+    if part.alignment == "datums":
+        try:
+            datum_alignment(frame, least_squares=False)
+        except FeatureError as error:
+            problems.append(said.document.problem(error.fault, ("part", "datums")))
     raise_all(problems)
     return Part(
         tuple(elements),
         tuple(features),
-        tuple(datums[name] for name in part.datums),
+        frame,
         part.alignment,
         str(walk.program),
         None if file is None else str(file),

@@ -115,7 +115,7 @@ def test_one_wall_is_enough_for_what_it_fixes() -> None:
     zone = {"zone": 0.02}
     build("position", zone, [wall("w", (0, 0.02), (0.1, 0.02))], [BOTTOM])
     build("position", zone, [face("top", (0, 0), (0.05, 0.05), 0.02)], [FLOOR])
-    with pytest.raises(FeatureError, match="do not say where"):
+    with pytest.raises(FeatureError, match="does not say where"):
         build("position", zone, [OTHER], [BOTTOM])
     with pytest.raises(FeatureError, match="how high and how tilted"):
         build("position", zone, [face("top", (0, 0), (0.05, 0.05), 0.02)], [BOTTOM, LEFT])

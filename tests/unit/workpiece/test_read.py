@@ -10,11 +10,13 @@ import pytest
 
 import truepose as tp
 from build_machine import MACHINES
+from truepose.errors import PartError
 from truepose.workpiece.propose import propose_features
 from truepose.workpiece.read import read_part
 from truepose.workpiece.tables import DatumTable, FeatureTable, PartTable
 
 ROOT = Path(__file__).parent.parent.parent.parent
+SQUARE = ROOT / "examples" / "part" / "square.ngc"
 EXAMPLES = {"square": "linear_delta", "pocket": "hexapod"}
 PAGE = (ROOT / "docs" / "part_file.md").read_text("utf-8")
 
@@ -71,3 +73,22 @@ def test_the_page_has_every_key() -> None:
     tables = (PartTable, DatumTable, FeatureTable)
     keys = {name for table in tables for name in table.model_fields}
     assert sorted(key for key in keys if f"`{key}`" not in PAGE) == []
+
+
+@pytest.mark.parametrize(
+    ("order", "found"),
+    [('["A", "B"]', "B does not say anything"), ('["A"]', "A does not say where the part is")],
+)
+def test_datums_of_the_part_that_are_no_frame_are_refused_with_their_line(
+    tmp_path: Path, order: str, found: str
+) -> None:
+    file = tmp_path / "part.toml"
+    file.write_text(
+        f'schema = 1\n[part]\nalignment = "datums"\ndatums = {order}\n'
+        '[[datum]]\nname = "A"\nn = "N20"\n[[datum]]\nname = "B"\nn = "N40"\n'
+        '[[feature]]\nname = "a"\nkind = "straightness"\nn = "N30"\nzone = "0.1 mm"\n'
+    )
+    with pytest.raises(PartError, match=found) as refusal:
+        read_part(tp.load(MACHINES / "linear_delta.toml"), SQUARE, file)
+    (problem,) = refusal.value.problems
+    assert (problem.code, problem.file, problem.line) == ("feature-datums", str(file), 4)

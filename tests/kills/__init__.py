@@ -35,9 +35,11 @@ NEW = ("init", "import")
 """Commands that write new files only."""
 OTHERS = {
     **dict.fromkeys(NEW, ()),
+    "part": ("--set", "condition.temperature=27"),
     "calibrate": ("--set", 'accuracy.target="0.37 mm"', "--date", "2026-01-02"),
 }
-"""The same where that is no change: a new file is new, and measurements name their machine."""
+"""The same where that is no change: a new file is new, measurements name their machine, and a
+witness's `witness.csv` has no machine's name."""
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "init": ("init", "tripod", "-o", "new.toml"),
@@ -59,6 +61,11 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         "--program", "measure.ngc", "--template", "readings.csv",
     ),
     "gcode": ("gcode", str(PLANAR), "part.ngc", "-o", "corrected.ngc", "--force"),
+    "part": (
+        "part", str(PLANAR), "part.ngc", "--samples", "20", "-o", "out.json",
+        "--set", "drive.d1.backlash={play='10 um'}",
+        "--points", "points.csv", "--witness", "witness.toml",
+    ),
     "export linuxcnc": ("export", "linuxcnc", str(PLANAR), "-o", "export"),
     "export c": ("export", "c", str(HEXAPOD), "-o", "export"),
 }  # fmt: skip
@@ -68,7 +75,9 @@ PART = "part.ngc"
 PROGRAM = """\
 G21 G90 G94
 G0 X250 Y150
+(feature: wall, straightness 0.000001)
 G1 X350 F1500
+(end feature)
 G3 X370 Y170 J20
 """
 

@@ -208,6 +208,9 @@ def _mends(evaluation: PartEvaluation, at: int) -> str:
     suggested = advice(evaluation, at)
     if suggested is None:
         return "nothing to mend"
+    if suggested.why and not suggested.source:
+        also = "compensation: " if suggested.compensation else ""
+        return f"{also}nothing is found to be out, but there is no proof: {suggested.why}"
     if suggested.compensation:
         return "compensation: truepose gcode corrects the program"
     if suggested.aim:
@@ -217,9 +220,11 @@ def _mends(evaluation: PartEvaluation, at: int) -> str:
         return f"compensation, and the middle of the limits: program it {amount} {word}"
     if not suggested.source:
         return "no source's bands alone: compensate, then tighten several, or ask for less"
-    also = "" if suggested.state == BEFORE else " and compensation"
-    narrowed = f"{100.0 * suggested.narrowed:.3g} %"
-    return f"bands of {suggested.source} at {narrowed} of what they are{also}"
+    also = "" if suggested.state == BEFORE else "compensation, and "
+    # Rounded down: a little wider would be too wide.
+    share = math.floor(1000.0 * suggested.narrowed) / 10.0
+    unproven = f"; even then not proven: {suggested.why}" if suggested.why else ""
+    return f"{also}all bands of {suggested.source} narrowed to {share:g} % of their width{unproven}"
 
 
 SHEET = (

@@ -13,7 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.verdict.states import AFTER, BEFORE
-from truepose.workpiece.evaluation import MET, PartEvaluation, QuantityAnswer, StateAnswers
+from truepose.workpiece.evaluation import (
+    MET,
+    UNDECIDED,
+    PartEvaluation,
+    QuantityAnswer,
+    StateAnswers,
+)
 from truepose.workpiece.worst import Interval, from_above
 
 HALVINGS = 12
@@ -42,7 +48,8 @@ class Advice:
 
     `compensation`: that does. Else `aim`, SI, by which the program should ask for more: it does
     with compensation. Else `source` with its bands `narrowed` to this share, in the `state` in
-    which that is enough; no source where none is enough alone.
+    which that is enough; no source where none is enough alone. `why`: why even then there is no
+    proof; "" where there is one.
     """
 
     compensation: bool
@@ -50,6 +57,7 @@ class Advice:
     narrowed: float
     state: str
     aim: float = 0.0
+    why: str = ""
 
 
 def culprits(answers: StateAnswers, at: int) -> list[Culprit]:
@@ -70,21 +78,34 @@ def advice(evaluation: PartEvaluation, at: int) -> Advice | None:
     before, after = states[BEFORE].answers[at], states[AFTER].answers[at]
     if after.verdict == MET:
         return None if before.verdict == MET else Advice(True, "", 1.0, AFTER)
+    both = states[BEFORE], states[AFTER]
+    for answers in both if before.verdict != MET else ():
+        if _is_unproven(evaluation, answers.answers[at], at):
+            state, why = answers.state.name, answers.answers[at].above.why
+            return Advice(state == AFTER, "", 1.0, state, why=why)
     aim = _aim(evaluation, after, at)
     if aim != 0.0:
         return Advice(False, "", 1.0, AFTER, aim)
     if before.verdict == MET:
         return None
     best = Advice(False, "", 0.0, AFTER)
-    for answers in (states[BEFORE], states[AFTER]):
+    for answers in both:
+        why = answers.answers[at].above.why if evaluation.rule == "worst-case" else ""
         for culprit in culprits(answers, at):
             if culprit.half > 0.0:
                 share = _narrowed(evaluation, answers, at, culprit)
                 if share > max(LEAST, best.narrowed):
-                    best = Advice(False, culprit.source, share, answers.state.name)
+                    best = Advice(False, culprit.source, share, answers.state.name, why=why)
         if best.source:
             break
     return best
+
+
+def _is_unproven(evaluation: PartEvaluation, answer: QuantityAnswer, at: int) -> bool:
+    """Whether nothing but a proof is missing."""
+    of, above = evaluation.characteristics[at], answer.above
+    within = not (of.breaks(above.lower) or of.breaks(above.upper))
+    return answer.verdict == UNDECIDED and evaluation.rule == "worst-case" and within
 
 
 def _aim(evaluation: PartEvaluation, after: QuantityAnswer, at: int) -> float:

@@ -189,11 +189,12 @@ class PartEvaluation:
         programmed = self.values(state.points[np.newaxis])[0]
         known = self.values((state.points + state.known_error)[np.newaxis])[0]
         varying = state.varying(self.seed)
+        farthest = _farthest(drawn.values)
         searches = [
             search
             for feature in self.features
             for search in FeatureSearch(
-                state, self.alignment, feature, places(feature), varying
+                state, self.alignment, feature, places(feature), varying, farthest
             ).search()
         ]
         answers = tuple(
@@ -319,6 +320,13 @@ class PartEvaluation:
         values = np.concatenate(parts)
         high, low = np.quantile(values, [0.975, 0.025], axis=0)
         return np.asarray(0.5 * (high - low))
+
+
+def _farthest(values: Floats) -> list[int]:
+    """Numbers of the samples (s, c) with the least and the largest value of each quantity."""
+    lost = ~np.isfinite(values)
+    least = np.where(lost, np.inf, values).argmin(axis=0)
+    return [*least.tolist(), *np.where(lost, -np.inf, values).argmax(axis=0).tolist()]
 
 
 def places(feature: Feature) -> tuple[Indices, ...]:

@@ -1,8 +1,9 @@
 """The worst case of a feature from below: machines that do it, each solved exactly.
 
-Tried to first order are the machines at which the linear forms of its quantities are largest, and
-others drawn at random; from the best of them on the search climbs to where a quantity by its slopes
-is largest, while it grows. The ends are solved exactly. How many machines were tried is counted.
+Tried to first order are the machines at which the linear forms of its quantities are largest,
+others drawn at random, and those of all samples that are farthest off; from the best of them on the
+search climbs to where a quantity by its slopes is largest, while it grows. The ends are solved
+exactly. How many machines were tried is counted.
 """
 
 from __future__ import annotations
@@ -58,7 +59,10 @@ class Search:
 
 
 class FeatureSearch:
-    """The search for the extremes of all quantities of one feature, whose points are `parts`."""
+    """The search for the extremes of all quantities of one feature, whose points are `parts`.
+
+    `drawn`: numbers of machines of `varying` that are known to make them far off.
+    """
 
     def __init__(
         self,
@@ -67,8 +71,10 @@ class FeatureSearch:
         feature: Feature,
         parts: Sequence[Indices],
         varying: Varying,
+        drawn: Sequence[int] = (),
     ) -> None:
         self._state, self._varying = state, varying
+        self._drawn = sorted({number for number in drawn if number >= DRAWN})
         self._domain = state.variables.domain
         self._steady = np.flatnonzero(~state.variables.varies_along)
         members = np.concatenate(list(parts))
@@ -132,12 +138,13 @@ class FeatureSearch:
         for forms, (base, slopes) in zip(self._forms, self._slopes, strict=True):
             corners += self._corners(forms, base, slopes)
         listed = np.unique(np.concatenate(corners), axis=0)
-        drawn = self._varying.rows(0, DRAWN)
-        if self._varying.constant:
-            return np.concatenate([listed, self._inside(drawn)])
-        values = every_point(self._varying, drawn, 0)
+        varying, numbers = self._varying, [(0, DRAWN), *((number, 1) for number in self._drawn)]
+        drawn = [(varying.rows(first, count), first) for first, count in numbers]
+        if varying.constant:
+            return np.concatenate([listed, *(self._inside(rows) for rows, _ in drawn)])
+        values = np.concatenate([every_point(varying, *some) for some in drawn], axis=1)
         # Corners go with what others have on the way, again and again.
-        again = np.arange(len(listed)) % DRAWN
+        again = np.arange(len(listed)) % values.shape[1]
         starts = np.concatenate([values[:, again], values], axis=1)
         starts[:, : len(listed), self._steady] = listed[:, self._steady]
         return self._inside(starts)

@@ -473,3 +473,56 @@ def test_a_larger_machine(capsys: pytest.CaptureFixture[str], tmp_path: Path) ->
     text = page.read_text(encoding="utf-8")
     assert "What the process adds" in text
     assert "http" not in text.split("</script>")[-1]
+
+
+def test_no_sample_is_beyond_what_machines_reach(shared: Shared) -> None:
+    """The search has the samples too, also where what varies on the way has no corners."""
+    for settings in ((), ALONG):
+        for answers in shared(*settings).states:
+            values = answers.sampled.values
+            for at, answer in enumerate(answers.answers):
+                slack = answers.sampled.off[at] + 1e-3 * np.ptp(values[:, at]) + 1e-12
+                assert answer.search.lower.value <= values[:, at].min() + slack
+                assert answer.search.upper.value >= values[:, at].max() - slack
+
+
+def test_limits_on_one_side_ask_for_a_program_in_their_middle(
+    files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """Compensation brings a bore to its nominal value, where half of them are out: not advised."""
+    from truepose.workpiece.advice import advice
+
+    bore = '[[feature]]\nname = "bore"\nkind = "circle"\nlines = "9"\ndiameter = "40 mm"\n'
+    file = tmp_path / "bore.toml"
+    settings = [f"strut.{name}.length_tolerance=0.01" for name in "12"]
+    machine = tp.load(PLANAR, settings=settings)
+
+    def part(limits: str, program: str) -> PartEvaluation:
+        file.write_text(f"{bore}tolerance = {limits}\n", encoding="utf-8")
+        files[0].write_text(program, encoding="utf-8")
+        return evaluated(machine, (files[0], file), samples=200)
+
+    first = part('"+0.5 mm / 0 mm"', PROGRAM)
+    found = advice(first, 0)
+    assert found is not None
+    assert found.aim == pytest.approx(0.25e-3, rel=0.1)
+    assert first.states[1].answers[0].verdict == NOT_MET
+    wider = PROGRAM.replace("X220 Y310", "X220.125 Y310").replace("I-20", "I-20.125")
+    followed = part('"+0.5 mm / 0 mm"', wider)
+    states = {one.state.name: one for one in followed.states}
+    assert {answer.verdict for answer in states[found.state].answers} == {MET}
+
+
+def test_what_is_not_proven_is_not_told_to_be_mended(files: tuple[Path, Path]) -> None:
+    """What an alignment moves has no proof, however narrow the bands are."""
+    from truepose.workpiece.advice import advice
+
+    head = '[part]\nalignment = "best-fit"\n'
+    asked = '[[feature]]\nname = "place"\nkind = "position"\nlines = "9"\nzone = "5 mm"\n'
+    files[1].write_text(head + asked, encoding="utf-8")
+    evaluation = evaluated(tp.load(PLANAR), files, samples=200)
+    found = advice(evaluation, 0)
+    assert evaluation.before().answers[0].verdict == "undecided"
+    assert found is not None
+    assert not found.source
+    assert found.why == evaluation.before().answers[0].above.why

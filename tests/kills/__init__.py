@@ -35,11 +35,11 @@ NEW = ("init", "import")
 """Commands that write new files only."""
 OTHERS = {
     **dict.fromkeys(NEW, ()),
-    "part": ("--set", "condition.temperature=27"),
+    "part": ("--set", "condition.temperature=27", "--seed", "2"),
     "calibrate": ("--set", 'accuracy.target="0.37 mm"', "--date", "2026-01-02"),
 }
-"""The same where that is no change: a new file is new, measurements name their machine, and a
-witness's `witness.csv` has no machine's name."""
+"""The same where that is no change: a new file is new, measurements name their machine, and
+what varies along the way of a part's witness follows from the seed."""
 
 COMMANDS: dict[str, tuple[str, ...]] = {
     "init": ("init", "tripod", "-o", "new.toml"),
@@ -63,7 +63,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "gcode": ("gcode", str(PLANAR), "part.ngc", "-o", "corrected.ngc", "--force"),
     "part": (
         "part", str(PLANAR), "part.ngc", "--samples", "20", "-o", "out.json",
-        "--set", "drive.d1.backlash={play='10 um'}",
+        "--set", "drive.d2.actuator={periodic={amplitude='3 um',period='4 mm'}}",
         "--points", "points.csv", "--witness", "witness.toml",
     ),
     "export linuxcnc": ("export", "linuxcnc", str(PLANAR), "-o", "export"),

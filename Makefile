@@ -58,7 +58,7 @@ test-python: package tools ## run the package's tests, of each sweep a member or
 
 .PHONY: test-python-all
 test-python-all: package tools ## run all of the package's tests, and write what they found for the site
-	$(PYTEST) --results build/test-results.json
+	$(PYTEST) --results=build/test-results.json
 
 .PHONY: klipper
 klipper: $(KLIPPER) ## fetch and build Klipper's kinematics, with which tests compare, into build/klipper

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from truepose.files.dimensions import BY_UNIT
-from truepose.files.shown_units import ShownUnits
 from truepose.reporting.table import Table
 from truepose.sources import not_included_text
 from truepose.verdict.states import BEFORE
@@ -89,7 +88,7 @@ def _by_feature(named: list[Characteristic]) -> str:
 
 def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
     rows = tuple(
-        _row(evaluation.shown, of, answer)
+        _row(evaluation, of, answer)
         for of, answer in zip(evaluation.characteristics, answers.answers, strict=True)
     )
     header = (
@@ -126,8 +125,8 @@ def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
     )
 
 
-def _row(shown: ShownUnits, of: Characteristic, answer: QuantityAnswer) -> tuple[str, ...]:
-    quantity = of.quantity
+def _row(evaluation: PartEvaluation, of: Characteristic, answer: QuantityAnswer) -> tuple[str, ...]:
+    quantity, shown = of.quantity, evaluation.shown
     large, small = shown.of(quantity.si), shown.small(quantity.si)
 
     def off(value: float) -> str:
@@ -152,7 +151,7 @@ def _row(shown: ShownUnits, of: Characteristic, answer: QuantityAnswer) -> tuple
         "not stated" if quantity.is_form else f"{answer.uncertainty * small.per_si:.1f}",
         ends(answer.search.lower.value, answer.search.upper.value),
         above if answer.above.proven else f"{above} (not proven)",
-        f"{100.0 * answer.out:.3g} %",
+        _share_out(answer.out, evaluation.samples),
         answer.verdict,
     )
 
@@ -204,7 +203,19 @@ def _adds(known: float, half: float) -> str:
     return f"{known:+.1f} ± {half:.1f}" if known else f"± {half:.1f}"
 
 
+def _share_out(share: float, samples: int) -> str:
+    """In percent. Of none of n it is below 3 / n with 95 % confidence (the rule of three)."""
+    return f"{100.0 * share:.3g} %" if share > 0.0 else f"< {300.0 / samples:.2g} %"
+
+
 def _mends(evaluation: PartEvaluation, at: int) -> str:
+    of, programmed = evaluation.characteristics[at], evaluation.before().programmed[at]
+    if of.breaks(float(programmed)):
+        unit = evaluation.shown.of(of.quantity.si)
+        return (
+            f"the program itself asks for {unit.text(float(programmed), 7)}, out of tolerance: "
+            "look at the lines, at side and at tool_radius"
+        )
     suggested = advice(evaluation, at)
     if suggested is None:
         return "nothing to mend"

@@ -128,7 +128,7 @@ def _nothing(program: Path, features: Path | None) -> Problem:
         str(features or program),
         found="no feature, neither in a comment of the program nor in a features file",
         expected="a comment such as (feature: bore, diameter 40 +0.025 0), or [[feature]]",
-        hint="--propose-features FILE.toml writes those that it finds, to be edited",
+        hint="--propose-features writes those that it finds to --output FILE.toml, to be edited",
     )
 
 

@@ -441,6 +441,30 @@ def test_a_part_is_told_in_the_units_of_its_drawing(
     assert "µin" in table
 
 
+def test_another_size_than_the_program_has(
+    capsys: pytest.CaptureFixture[str], files: tuple[Path, Path]
+) -> None:
+    """The wrong walls, or a tool radius that is missing: nothing of the machine mends that."""
+    files[1].write_text(WIDTH.replace("60 mm", "54 mm"), encoding="utf-8")
+    outcome = call(
+        capsys, "part", PLANAR, files[0], "--features", files[1], "--samples", 100,
+    )  # fmt: skip
+    assert outcome.code == 1
+    told = " ".join(outcome.out.split())
+    assert "the program itself asks for 60 mm, out of tolerance" in told
+
+
+def test_none_of_the_samples_out_is_no_certainty(
+    capsys: pytest.CaptureFixture[str], files: tuple[Path, Path]
+) -> None:
+    """None of 100: below 3 %."""
+    files[1].write_text(WIDTH.replace("±0.05 mm", "±1 mm"), encoding="utf-8")
+    outcome = call(
+        capsys, "part", PLANAR, files[0], "--features", files[1], "--samples", 100,
+    )  # fmt: skip
+    assert "< 3 %" in outcome.out
+
+
 @sweep
 @pytest.mark.parametrize("alignment", ["clamped", "best-fit", "datums"])
 def test_alignment_moves_no_size(files: tuple[Path, Path], alignment: str) -> None:

@@ -24,6 +24,7 @@ from truepose.workpiece.evaluation import (
     QuantityAnswer,
     StateAnswers,
 )
+from truepose.workpiece.features import Quantity
 from truepose.workpiece.result import attributes
 
 PROCESS = (
@@ -34,6 +35,9 @@ PROCESS = (
 
 LEAST = 0.05
 """Of the small unit: what is shown as 0.0 and not named."""
+
+ROUNDING = 1e-9
+"""Of a programmed size, and m or rad: what is no difference from a limit."""
 
 NAMED = 3
 """Sources that are named."""
@@ -74,6 +78,8 @@ def summary(evaluation: PartEvaluation) -> list[SummaryLine]:
         of, answer = max(told, key=lambda one: one[1].out)
         if answer.out > 0.0:
             text += f". Most often out: {of.label}, of {100.0 * answer.out:.3g} % of the machines"
+        elif missed and evaluation.of_bands:
+            text += f". None of {evaluation.samples:,} machines drawn is out; one at its limits is"
         lines.append(SummaryLine(word, colour, text))
     return lines
 
@@ -94,6 +100,7 @@ def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
     header = (
         "feature",
         "quantity",
+        "verdict",
         "nominal",
         "limits",
         "in",
@@ -103,12 +110,12 @@ def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
         "reached",
         "no machine beyond",
         "out",
-        "verdict",
     )
     walked = evaluation.walked
     small = evaluation.shown.small_length
     note = (
-        f"{evaluation.samples:,} machines, seed {evaluation.seed}, each goes to every point; "
+        f"Verdict by the rule {evaluation.rule}. {evaluation.samples:,} machines that yours may "
+        f"be, seed {evaluation.seed}, each goes to every point; "
         f"alignment: {evaluation.alignment.kind}. Deviations from nominal, of a form its value. "
     )
     if answers.state.name == BEFORE:
@@ -121,7 +128,7 @@ def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
     if missing:
         note += f" Not included: {missing}."
     return Table(
-        f"part {answers.state.name}", f"The part {answers.state.name}", header, rows, 2, note
+        f"part {answers.state.name}", f"The part {answers.state.name}", header, rows, 3, note
     )
 
 
@@ -143,6 +150,7 @@ def _row(evaluation: PartEvaluation, of: Characteristic, answer: QuantityAnswer)
     return (
         of.feature.name,
         quantity.name,
+        answer.verdict,
         nominal,
         ends(quantity.lower, quantity.upper),
         small.label,
@@ -152,7 +160,6 @@ def _row(evaluation: PartEvaluation, of: Characteristic, answer: QuantityAnswer)
         ends(answer.search.lower.value, answer.search.upper.value),
         above if answer.above.proven else f"{above} (not proven)",
         _share_out(answer.out, evaluation.samples),
-        answer.verdict,
     )
 
 
@@ -176,7 +183,9 @@ def _blame(evaluation: PartEvaluation) -> Table:
         )
     note = (
         "Each source alone: what it is known to add as commanded, and half the 95 % interval of "
-        "what it leaves unknown, with the variable that does most of it."
+        "what it leaves unknown, with the variable that does most of it. What is known holds in "
+        "the condition of the machine file, its temperatures and forces: in another one compensation "
+        "would put the error in."
     )
     return Table(
         "blame",
@@ -203,6 +212,12 @@ def _adds(known: float, half: float) -> str:
     return f"{known:+.1f} ± {half:.1f}" if known else f"± {half:.1f}"
 
 
+def _beyond(quantity: Quantity, programmed: float) -> bool:
+    """Whether the program asks for what is out of tolerance: a limit itself is none."""
+    room = ROUNDING * abs(quantity.nominal) + ROUNDING
+    return not quantity.lower - room <= programmed <= quantity.upper + room
+
+
 def _share_out(share: float, samples: int) -> str:
     """In percent. Of none of n it is below 3 / n with 95 % confidence (the rule of three)."""
     return f"{100.0 * share:.3g} %" if share > 0.0 else f"< {300.0 / samples:.2g} %"
@@ -210,7 +225,7 @@ def _share_out(share: float, samples: int) -> str:
 
 def _mends(evaluation: PartEvaluation, at: int) -> str:
     of, programmed = evaluation.characteristics[at], evaluation.before().programmed[at]
-    if of.breaks(float(programmed)):
+    if _beyond(of.quantity, float(programmed)):
         unit = evaluation.shown.of(of.quantity.si)
         return (
             f"the program itself asks for {unit.text(float(programmed), 7)}, out of tolerance: "
@@ -228,14 +243,21 @@ def _mends(evaluation: PartEvaluation, at: int) -> str:
         small = evaluation.shown.small(evaluation.characteristics[at].quantity.si)
         word = "larger" if suggested.aim > 0.0 else "smaller"
         amount = f"{abs(suggested.aim) * small.per_si:.1f} {small.label}"
-        return f"compensation, and the middle of the limits: program it {amount} {word}"
+        half = f" ({abs(suggested.aim) * small.per_si / 2.0:.1f} on the radius)"
+        return (
+            f"compensation, and the middle of the limits: program it {amount} {word}"
+            f"{half if of.feature.kind == 'circle' else ''}"
+        )
     if not suggested.source:
         return "no source's bands alone: compensate, then tighten several, or ask for less"
     also = "" if suggested.state == BEFORE else "compensation, and "
     # Rounded down: a little wider would be too wide.
     share = math.floor(1000.0 * suggested.narrowed) / 10.0
     unproven = f"; even then not proven: {suggested.why}" if suggested.why else ""
-    return f"{also}all bands of {suggested.source} narrowed to {share:g} % of their width{unproven}"
+    return (
+        f"{also}all bands of the machine's {suggested.source} narrowed to {share:g} % of their "
+        f"width: better or measured parts{unproven}"
+    )
 
 
 SHEET = (

@@ -184,8 +184,8 @@ def _blame(evaluation: PartEvaluation) -> Table:
     note = (
         "Each source alone: what it is known to add as commanded, and half the 95 % interval of "
         "what it leaves unknown, with the variable that does most of it. What is known holds in "
-        "the condition of the machine file, its temperatures and forces: in another one compensation "
-        "would put the error in."
+        "the condition of the machine file, its temperatures and forces: in another one "
+        "compensation would put the error in."
     )
     return Table(
         "blame",

@@ -29,6 +29,7 @@ from truepose.sources import PoseBlock
 from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.functions import derivatives
 from truepose.uncertainty_analysis.functions.inputs import Correlation, Input, correlation_matrix
+from truepose.uncertainty_analysis.sampler import study_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,17 +98,7 @@ class SharedModel:
     @cached_property
     def study(self) -> Study:
         """The kernel's, of every pose."""
-        shifted, shift = self.variables.shift
-        return Study(
-            self.machine.kernel,
-            self.block.joints,
-            self.block.placements,
-            shifted,
-            np.ascontiguousarray(shift),
-            self.variables.columns,
-            self.variables.variable_of.tolist(),
-            np.ascontiguousarray(self.variables.half_width),
-        )
+        return study_of(self.machine, self.block, self.variables)
 
     def points(self, t: Floats) -> Points:
         """Those for the kernel; of an array that cannot be written, made once for all poses."""

@@ -51,7 +51,7 @@ from truepose.uncertainty_analysis.arguments import (
 from truepose.uncertainty_analysis.failed_samples import OfAll, lost_text
 from truepose.uncertainty_analysis.functions.dataset import function_dataset
 from truepose.uncertainty_analysis.model import FunctionModel, first_order_variances
-from truepose.uncertainty_analysis.sampler import Draws, Random, Sampler, sobol
+from truepose.uncertainty_analysis.sampler import Draws, Random, Sampler, sobol, study_of
 from truepose.uncertainty_analysis.stopping_rule import BATCH, Adaptive, FixedNumber, StoppingRule
 
 if TYPE_CHECKING:
@@ -335,18 +335,7 @@ class _MachineSampler(Sampler):
         self._unwhitened = (self._origins()[0], self._widths())
 
     def _studied(self, whitening: Floats | None) -> Study:
-        shifted, shift = self.variables.shift
-        return Study(
-            self.machine.kernel,
-            self.block.joints,
-            self.block.placements,
-            shifted,
-            np.ascontiguousarray(shift),
-            self.variables.columns,
-            self.variables.variable_of.tolist(),
-            np.ascontiguousarray(self.variables.half_width),
-            whitening,
-        )
+        return study_of(self.machine, self.block, self.variables, whitening)
 
     def _origins(self) -> tuple[Floats, int]:
         error = np.asarray(self._study.shift_error)

@@ -19,10 +19,33 @@ from truepose.sources.deviation import Distribution
 from truepose.uncertainty_analysis.stopping_rule import Adaptive, StoppingRule
 
 if TYPE_CHECKING:
-    from truepose._kernel import Tallies
+    from truepose._kernel import Study, Tallies
     from truepose._kernel import Variables as KernelVariables
+    from truepose.machine import Machine
+    from truepose.runs.variables import Variables
+    from truepose.sources import PoseBlock
 
 _STUDENT = "student-t"
+
+
+def study_of(
+    machine: Machine, block: PoseBlock, variables: Variables, whitening: Floats | None = None
+) -> Study:
+    """The kernel's study of the poses of a block, with what `variables` move there."""
+    from truepose._kernel import Study
+
+    shifted, shift = variables.shift
+    return Study(
+        machine.kernel,
+        block.joints,
+        block.placements,
+        shifted,
+        np.ascontiguousarray(shift),
+        variables.columns,
+        variables.variable_of.tolist(),
+        np.ascontiguousarray(variables.half_width),
+        whitening,
+    )
 
 
 class SampledVariables(Protocol):

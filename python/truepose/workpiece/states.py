@@ -24,6 +24,7 @@ from truepose.runs.poses import OK
 from truepose.runs.quantities import POSITIONS
 from truepose.runs.variables import Variables, variables_at
 from truepose.sources import PoseBlock, Source
+from truepose.uncertainty_analysis.sampler import study_of
 from truepose.verdict.states import AFTER, BEFORE
 from truepose.workpiece.varying import Varying
 
@@ -106,17 +107,7 @@ class PartState:
     @cached_property
     def study(self) -> Study:
         """The kernel's, of every point."""
-        shifted, shift = self.variables.shift
-        return Study(
-            self.machine.kernel,
-            self.block.joints,
-            self.block.placements,
-            shifted,
-            np.ascontiguousarray(shift),
-            self.variables.columns,
-            self.variables.variable_of.tolist(),
-            np.ascontiguousarray(self.variables.half_width),
-        )
+        return study_of(self.machine, self.block, self.variables)
 
 
 def position_columns(machine: Machine) -> Indices:

@@ -290,22 +290,23 @@ SHEET = (
 
 def sheet(evaluation: PartEvaluation) -> list[dict[str, Any]]:
     """A row for each characteristic and state, in the units of features file, else machine."""
-    rows = []
-    for answers in evaluation.states:
-        for at, (of, answer) in enumerate(
-            zip(evaluation.characteristics, answers.answers, strict=True)
-        ):
-            rows.append(_sheet_row(evaluation, answers, at, of, answer))
-    return rows
+    count = len(evaluation.characteristics)
+    # What would mend it is of both states together, and is searched for.
+    remedies = [_mends(evaluation, at) if evaluation.of_bands else "" for at in range(count)]
+    return [
+        _sheet_row(evaluation, answers, at, remedies[at])
+        for answers in evaluation.states
+        for at in range(count)
+    ]
 
 
 def _sheet_row(
     evaluation: PartEvaluation,
     answers: StateAnswers,
     at: int,
-    of: Characteristic,
-    answer: QuantityAnswer,
+    remedy: str,
 ) -> dict[str, Any]:
+    of, answer = evaluation.characteristics[at], answers.answers[at]
     quantity = of.quantity
     unit = evaluation.units[BY_UNIT[quantity.si]]
 
@@ -335,7 +336,7 @@ def _sheet_row(
         "why": answer.why,
         "operator": quantity.operator,
         "filter": quantity.filter,
-        "mend": _mends(evaluation, at) if evaluation.of_bands else "",
+        "mend": remedy,
     }
 
 

@@ -1,9 +1,9 @@
 """Who is to blame for a quantity that is out of tolerance, and what would mend it.
 
-SourceAlone is each source alone: what it is known to add as commanded, and how far its unknown part
-spreads the quantity. What mends it is looked for in this order: compensation; the one source whose
-bands, made narrower, bring the quantity within its limits with the least relative change; else
-nothing of one source alone, and what the best would leave.
+Blame is each source alone: what it is known to add as commanded, and how far its unknown part
+spreads the quantity. What mends it is looked for in this order: compensation; another size in the
+program, which aims at the middle of the limits; the one source whose bands, made narrower, bring
+the quantity within its limits with the least relative change; else nothing of one source alone.
 """
 
 from __future__ import annotations

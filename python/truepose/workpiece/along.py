@@ -18,7 +18,7 @@ from truepose.errors import Problem, RequestError
 from truepose.machine import Condition, Machine
 from truepose.runs.displacement import displacement
 from truepose.runs.first_order import effects_at
-from truepose.runs.poses import OK, Progress, Travel, pose_in_words, reason_text
+from truepose.runs.poses import OK, Travel, pose_in_words, reason_text
 from truepose.runs.variables import Variables, variables_at
 from truepose.sources import PoseBlock, Source
 from truepose.workpiece.states import in_space
@@ -113,7 +113,6 @@ def walk(
     batches: Iterable[PathBatch],
     program: str,
     sinks: Sequence[Sink] = (),
-    progress: Progress | None = None,
 ) -> Walked:
     """Drive the whole path of `program`. Raises `RequestError` (gcode-pose) where it cannot go."""
     way = Travel(machine)
@@ -151,8 +150,6 @@ def walk(
             assert block.travel is not None
             travels.append(block.travel[kept])
             lines.append(batch.line[kept])
-        if progress is not None:
-            progress(int(batch.line[-1]) if len(batch.line) else 0, 0)
     if poses:
         walked.poses, walked.travel = np.concatenate(poses), np.concatenate(travels)
         walked.lines = np.concatenate(lines)

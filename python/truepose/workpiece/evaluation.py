@@ -332,8 +332,3 @@ def _farthest(values: Floats) -> list[int]:
 def places(feature: Feature) -> tuple[Indices, ...]:
     """Points of the part, of each element and then each datum of a feature."""
     return tuple(element.place for element in [*feature.elements, *feature.datums])
-
-
-def by_state(evaluation: PartEvaluation) -> Mapping[str, StateAnswers]:
-    """The answers by the name of their state."""
-    return {one.state.name: one for one in evaluation.states}

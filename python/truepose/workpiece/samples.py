@@ -1,4 +1,4 @@
-"""SampledParts parts: the values of all quantities of parts that machines drawn at random make.
+"""Sampled parts: the values of all quantities of parts that machines drawn at random make.
 
 A sample is one machine, that goes to every point of the part. Errors are to first order where that
 is enough: some samples are solved exactly too, and where a quantity differs between the two by more

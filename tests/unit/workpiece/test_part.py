@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import functools
 import io
 import json
@@ -22,6 +23,7 @@ from truepose.workpiece.evaluation import MET, NOT_MET, UNDECIDED, PartEvaluatio
 from truepose.workpiece.read import read_part
 from truepose.workpiece.result import dataset as dataset_of
 from truepose.workpiece.samples import sampled
+from truepose.workpiece.worst import from_above
 
 PROGRAM = """\
 G21 G90
@@ -160,6 +162,22 @@ def test_what_is_reached_is_within_what_is_proven(
             values = answers.sampled.values[:, at]
             assert answer.above.lower - room <= values.min()
             assert values.max() <= answer.above.upper + room
+
+
+def test_what_the_geometry_bends_is_in_what_is_proven(shared: Shared) -> None:
+    """By curvature times the square of how far points are off, either way."""
+    evaluation = shared()
+    before, of = evaluation.before(), evaluation.characteristics[0]
+    bounds, scale = before.bounds, np.ones(len(before.state.variables.names))
+    far = bounds.reach(of.members, scale)
+    ends = []
+    for curvature in (0.0, 1000.0):
+        forms = dataclasses.replace(of.forms, curvature=curvature)
+        above = from_above(before.state, bounds, evaluation.alignment, forms, of.members)
+        ends.append((above.lower, above.upper))
+    assert far > 1e-5
+    assert ends[0][0] - ends[1][0] == pytest.approx(1000.0 * far**2, rel=1e-6)
+    assert ends[1][1] - ends[0][1] == pytest.approx(1000.0 * far**2, rel=1e-6)
 
 
 def test_compensation_makes_what_the_program_asks_for(shared: Shared) -> None:

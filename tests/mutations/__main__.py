@@ -19,7 +19,10 @@ from mutations.inputs import KINDS, Kind
 from truepose.errors import TrueposeError
 
 SECONDS = 5.0
-"""Of a processor that one file may take: what else the computer does counts for nothing."""
+"""Of a processor that reading one file may take: what else the computer does counts for nothing."""
+
+SECONDS_OF_A_COMMAND = 60.0
+"""Likewise with the start of Python and the answer, which is a search for the largest error."""
 
 MEMORY = 500_000_000
 """Bytes that the process may have in all, with what it needs for itself."""
@@ -76,7 +79,7 @@ def failures(
             begun = _processor(in_command)
             answer = _of_command(kind, folder) if in_command else _in_process(kind, folder)
             seconds = _processor(in_command) - begun
-            if answer.islower() and seconds > SECONDS:
+            if answer.islower() and seconds > (SECONDS_OF_A_COMMAND if in_command else SECONDS):
                 answer = f"Slow: {seconds:.1f} s"
             yield number, answer, seconds
 
@@ -113,10 +116,11 @@ def _of_command(kind: Kind, folder: Path) -> str:
     try:
         run = subprocess.run(
             [sys.executable, "-c", COMMAND, *words],
-            capture_output=True, text=True, timeout=60, check=False, preexec_fn=_with_little_memory,
+            capture_output=True, text=True, timeout=300, check=False,
+            preexec_fn=_with_little_memory,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return "Hangs: more than a minute"
+        return "Hangs: more than five minutes"
     if run.returncode in (0, 1) and "Traceback" not in run.stderr:
         return "read"
     if run.returncode == 2 and "Traceback" not in run.stderr:

@@ -150,6 +150,7 @@ CATALOGUE: dict[str, str] = {
     "machine-file-changed": "a machine file that is not the one that was read",
     "no-witness": "a witness is wanted where no machine exceeds the accuracy asked",
     "witness-not-written": "a witness that a machine file cannot say",
+    "unknown-language": "a language that the report is not written in",
     "unknown-kind": "a kind of machine that is not in the library",
     "no-family": "joint centres are to follow from a family, in a file without one",
     "unknown-code": "a code to be explained that nothing gives",

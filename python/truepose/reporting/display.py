@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats, Indices
 from truepose.files.shown_units import ShownUnits
+from truepose.language import marked
 
 POSITION = ("x", "y", "z")
 MISSING = "–"
@@ -49,7 +50,7 @@ def number(value: float, decimals: int) -> str:
     text = f"{value:.{decimals}f}"
     if float(text) == 0.0:
         text = text.lstrip("-")
-    return text.replace("-", "\N{MINUS SIGN}")
+    return marked(text.replace("-", "\N{MINUS SIGN}"))
 
 
 def column(values: ArrayLike, decimals: int | None = None) -> tuple[str, ...]:
@@ -66,7 +67,7 @@ def pose_text(pose: ArrayLike, coordinates: Sequence[str], units: ShownUnits) ->
         unit = units.pose(name)
         shown = value * unit.per_si if abs(value) > NOTHING else 0.0
         parts.append(f"{name} {shown:.6g} {unit.label}")
-    return ", ".join(parts).replace("-", "\N{MINUS SIGN}")
+    return ", ".join(marked(part) for part in parts).replace("-", "\N{MINUS SIGN}")
 
 
 def where_highest(sizes: ArrayLike) -> int:

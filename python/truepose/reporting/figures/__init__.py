@@ -1,6 +1,7 @@
 """The figures of the report: one figure is one file, `Study` in, `Plot` out.
 
-A figure's module has `TITLE`, `caption(study)` and `figure(study)`. To add one: write the module
+A figure's module has `TITLE`, `says(study)`, one sentence of what the figure shows with its number,
+`caption(study)`, how it is read, and `figure(study)`. To add one: write the module
 and name it in `FIGURES`, where the order is that of the report. A figure of a result that not every
 study has names it, `NEEDS = "compensation"`, and is left out where `study.compensation` is None.
 """
@@ -57,13 +58,17 @@ FIGURES: tuple[ModuleType, ...] = (
 
 @dataclass(frozen=True)
 class DrawnFigure:
-    """One figure with its name (the module's), its title, its caption and the result it needs."""
+    """One figure with its name (the module's), its title and the result it needs.
+
+    `says` is one sentence of what it shows, `caption` how it is read.
+    """
 
     name: str
     title: str
     caption: str
     figure: Plot
     needs: str | None = None
+    says: str = ""
 
 
 def _there(result: object) -> bool:
@@ -83,4 +88,5 @@ def draw(study: Study) -> Iterator[DrawnFigure]:
             caption=module.caption(study),
             figure=as_text(module.figure(study)),
             needs=needed,
+            says=module.says(study) if hasattr(module, "says") else "",
         )

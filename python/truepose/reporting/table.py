@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 class Table:
     """A table ready to be shown: every cell is text, `words` leading columns are words.
 
-    The other columns are numbers and stand to the right.
+    The other columns are numbers and stand to the right. `says`: one sentence of what it shows.
+    `largest`: row and column of the cells that are to stand out, the largest of what they compare.
     """
 
     name: str
@@ -18,6 +19,8 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
     words: int = 1
     note: str = ""
+    says: str = ""
+    largest: frozenset[tuple[int, int]] = frozenset()
 
 
 def with_not_included(table: Table, parts: str) -> Table:

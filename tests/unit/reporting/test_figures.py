@@ -204,14 +204,16 @@ def test_the_error_over_time_is_drawn_at_each_pose_and_over_the_temperatures(stu
     errors = study.time["error"].values * 1e6
     lines = [each for each in drawn.data if each.line.color == _style.source_colour(0)]
     assert len(lines) == errors.shape[1] * errors.shape[2]
-    assert np.allclose(lines[0].y, errors[:, 0, 0], rtol=1e-5)
-    assert np.allclose(lines[0].x, study.time["time"].values / 60.0)
+    assert np.allclose(lines[0].y, errors[:, 0, 0], atol=5e-5), (
+        "to what is drawn of ten micrometres"
+    )
+    assert np.allclose(lines[0].x, study.time["time"].values / 60.0, atol=5e-4)
     assert lines[0].line.dash != lines[-1].line.dash
     others = [each for each in drawn.data if each.line.color != _style.source_colour(0)]
     # Strut 2 and frame go by one temperature, the tool is not in the log.
     assert [each.name for each in others] == ["strut.1", "strut.2 and 1 more"]
     temperatures = study.time["temperature"].values[:, 0] - 273.15
-    assert np.allclose(others[0].y, temperatures, atol=1e-4)
+    assert np.allclose(others[0].y, temperatures, atol=5e-4)
     titles = {axis.title.text for axis in drawn.select_yaxes()}
     assert {"error in x, µm", "temperature, °C"} <= titles
     assert "time, min" in {axis.title.text for axis in drawn.select_xaxes()}

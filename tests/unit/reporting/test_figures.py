@@ -24,9 +24,7 @@ from truepose.reporting.figures import (
     how_far,
     internal_forces,
     machine_drawing,
-    overall_error,
     ranking,
-    source_errors,
     tornado,
     workspace_maps,
 )
@@ -78,23 +76,6 @@ def test_figures_of_results_that_not_every_study_has_need_one(study: Study) -> N
 
 def trace(figure: go.Figure, name: str, nth: int = 0) -> go.Scatter:
     return [each for each in figure.data if each.name == name][nth]
-
-
-def test_lines_are_the_errors_in_micrometres(study: Study) -> None:
-    for nth in range(len(study.components)):
-        upper = trace(checked(source_errors.figure(study)), "tolerance, all at upper ends", nth)
-        expected = study.budget["error_upper"].sel(source="tolerance").values[:, nth] * 1e6
-        np.testing.assert_allclose(upper.y, expected, rtol=1e-6)
-        lower = trace(checked(overall_error.figure(study)), "all at lower ends", nth)
-        expected = study.budget["overall_error_lower"].values[:, nth] * 1e6
-        np.testing.assert_allclose(lower.y, expected, rtol=1e-6)
-
-
-def test_poses_have_the_number_that_files_give_them() -> None:
-    study = planar_study()
-    fewer = Study(study.machine, study.budget.isel(pose=[2, 3, 7]))
-    for each in (checked(source_errors.figure(fewer)), checked(overall_error.figure(fewer))):
-        np.testing.assert_array_equal(each.data[0].x, fewer.budget["pose"].values)
 
 
 def test_bars_are_the_highest_with_the_largest_on_top(study: Study) -> None:
@@ -177,17 +158,6 @@ def test_the_drawing_of_a_body_has_its_platform_and_frame() -> None:
         turn = np.unwrap(np.arctan2(outline.y, outline.x))
         assert abs(turn[-1] - turn[0]) == pytest.approx(2 * np.pi), "once round, no crossing"
     assert figure.layout.scene.aspectmode == "data"
-
-
-def test_many_poses_are_thinned_and_the_largest_stays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_style, "MOST_DRAWN", 100)
-    study = planar_study(32)
-    worst = int(np.argmax(study.largest))
-    line = trace(checked(source_errors.figure(study)), "thermal")
-    assert len(line.x) <= 101
-    assert worst in line.x
-    assert "one in 11 of the 1,024 poses" in source_errors.caption(study)
-    assert "one in" not in source_errors.caption(planar_study())
 
 
 @sweep

@@ -2,59 +2,72 @@
 
 from __future__ import annotations
 
-from truepose.reporting.display import LOWER, UPPER
-from truepose.reporting.figures._over_poses import (
-    add_pose_labels,
-    finish_panels,
-    line_mode,
-    panels,
-    place,
-)
-from truepose.reporting.figures._plot import Plot, trace
-from truepose.reporting.figures._style import BEFORE, OVERALL, drawn_poses, small, thinning_note
+from truepose.language import say
+from truepose.reporting.display import decimals_for, number, pose_text, where_highest
+from truepose.reporting.figures._over_poses import Curve, how_drawn, largest_of, over_poses
+from truepose.reporting.figures._plot import Plot
+from truepose.reporting.figures._style import BLUE, OVERALL, VERMILION
 from truepose.reporting.study import Study
 
 TITLE = "Overall error at each pose"
 
-LINES = (
-    ("overall_error_upper", UPPER, BEFORE, "solid"),
-    ("overall_error", "known error", OVERALL, "dot"),
-    ("overall_error_lower", LOWER, "#0072B2", "dash"),
-)
+LOOKS = {
+    "overall_error_upper": (VERMILION, "solid", "circle"),
+    "overall_error": (OVERALL, "dot", "cross"),
+    "overall_error_lower": (BLUE, "dash", "square-open"),
+}
+
+
+def says(study: Study) -> str:
+    """The axis of the largest error drawn, its size, and where it is."""
+    found = []
+    for variable in LOOKS:
+        errors = study.values(variable)
+        pose, component = largest_of(study, errors)
+        found.append((abs(float(errors[pose, component])), pose, component))
+    size, pose, component = found[where_highest([size for size, *_ in found])]
+    unit = study.units.error(study.components[component])
+    return say(
+        "With all sources at once the largest error is {size} {unit} in {axis}, at {pose}.",
+        size=number(size * unit.per_si, decimals_for(size * unit.per_si, 4)),
+        unit=unit.label,
+        axis=study.components[component],
+        pose=pose_text(study.poses[pose], study.machine.commanded, study.units),
+    )
 
 
 def caption(study: Study) -> str:
     """What the lines are."""
-    drawn = drawn_poses(study.largest)
-    return (
-        "Exact error with all sources acting together: every source at its shift (the known "
-        "error), and toleranced lengths all at the lower and all at the upper ends of their "
-        "bands. That is not the worst case: lengths at unlike ends may do more."
-        + thinning_note(len(drawn), study.n_pose)
+    return " ".join(
+        [
+            say(
+                "Exact error with all sources acting together: every source at its shift (the "
+                "known error), and toleranced lengths all at the lower and all at the upper ends "
+                "of their bands. That is not the worst case: lengths at unlike ends may do more."
+            ),
+            how_drawn(study),
+        ]
     )
 
 
 def figure(study: Study) -> Plot:
-    """One panel for each component: all at lower ends, known error, all at upper ends."""
-    drawn = drawn_poses(study.largest)
-    figure = panels(study)
-    for variable, name, colour, dash in LINES:
-        errors = study.shown(study.values(variable)[drawn])
-        for component in range(len(study.components)):
-            figure.add_trace(
-                trace(
-                    "scatter",
-                    x=study.numbers[drawn],
-                    y=small(errors[:, component]),
-                    name=name,
-                    legendgroup=variable,
-                    showlegend=component == 0,
-                    mode=line_mode(drawn),
-                    line={"color": colour, "dash": dash, "width": 1.8},
-                    marker={"size": 4},
-                    hovertemplate="%{y:.3f}",
-                ),
-                **place(study, component),
+    """A panel for each component: all at lower ends, known error, all at upper ends."""
+    names = {
+        "overall_error_upper": say("all at upper ends"),
+        "overall_error": say("known error"),
+        "overall_error_lower": say("all at lower ends"),
+    }
+    return over_poses(
+        study,
+        [
+            Curve(
+                names[variable],
+                (study.values(variable),),
+                {
+                    "line": {"color": colour, "dash": dash, "width": 1.8},
+                    "marker": {"symbol": symbol},
+                },
             )
-    add_pose_labels(figure, study, drawn)
-    return finish_panels(figure, study)
+            for variable, (colour, dash, symbol) in LOOKS.items()
+        ],
+    )

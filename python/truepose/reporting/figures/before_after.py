@@ -40,8 +40,8 @@ NEEDS = "compensation"
 
 
 @dataclass(frozen=True)
-class Band:
-    """Band (n_pose, n_component), SI, at the ends of the bands and of what is known."""
+class ErrorBand:
+    """Errors (n_pose, n_component), SI, at the ends of the bands and of what is known."""
 
     lower: Floats
     upper: Floats
@@ -109,17 +109,17 @@ def figure(study: Study) -> Plot:
     return finish_panels(figure, flow)
 
 
-def _states(study: Study) -> tuple[Band, Band]:
+def _states(study: Study) -> tuple[ErrorBand, ErrorBand]:
     before = [study.values(f"overall_error{edge}") for edge in ("_lower", "_upper", "")]
     after = [study.compensated(f"residual{edge}") for edge in ("_lower", "_upper", "_middle")]
-    return Band(*before), Band(*after)
+    return ErrorBand(*before), ErrorBand(*after)
 
 
 def _add_sorted(
     figure: Plot,
     study: Study,
     flow: Flow,
-    state: Band,
+    state: ErrorBand,
     name: str,
     line: Keys,
     fill: str | None = None,
@@ -153,7 +153,7 @@ def _add_bands(
     figure: Plot,
     study: Study,
     flow: Flow,
-    state: Band,
+    state: ErrorBand,
     name: str,
     line: Keys,
     fill: str | None = None,

@@ -44,10 +44,10 @@ def figure_data(figure: Plot) -> str:
     `value` is what a colour says, `plus` and `minus` how far an error bar goes; lines, bands and
     notes that are drawn over the traces follow with their corners.
     """
-    drawn: dict[str, Any] = json.loads(as_json({"data": figure.data, "layout": figure.layout}))
-    rows = [row for each in drawn["data"] for row in _of_trace(each, drawn["layout"])]
-    rows += _of_shapes(drawn["layout"])
-    rows += _of_notes(drawn["layout"])
+    page: dict[str, Any] = json.loads(as_json({"data": figure.data, "layout": figure.layout}))
+    rows = [row for one in page["data"] for row in _of_trace(one, page["layout"])]
+    rows += _of_shapes(page["layout"])
+    rows += _of_notes(page["layout"])
     hovers = max((sum(name.startswith("hover_") for name in row) for row in rows), default=0)
     names = [*COLUMNS, *(f"hover_{number}" for number in range(1, hovers + 1))]
     shown = [name for name in names if any(row.get(name) for row in rows)]
@@ -68,28 +68,28 @@ def _quoted(cell: str) -> str:
     return '"' + cell.replace('"', '""') + '"' if re.search('[",\r\n]', cell) else cell
 
 
-def _of_trace(each: Keys, layout: Keys) -> Iterator[Row]:
-    spatial = each["type"].endswith("3d")
+def _of_trace(drawn: Keys, layout: Keys) -> Iterator[Row]:
+    spatial = drawn["type"].endswith("3d")
     if spatial:
-        number = each.get("scene", "scene")[5:] or "1"
-        panel: Keys = layout.get(each.get("scene", "scene"), {})
+        number = drawn.get("scene", "scene")[5:] or "1"
+        panel: Keys = layout.get(drawn.get("scene", "scene"), {})
         axes = {name: panel.get(f"{name}axis", {}) for name in "xyz"}
         domain = panel.get("domain", {})
         ends = domain.get("x"), domain.get("y")
     else:
-        number = each.get("xaxis", "x")[1:] or "1"
-        axes = {name: _axis(layout, each.get(f"{name}axis", name)) for name in "xy"}
+        number = drawn.get("xaxis", "x")[1:] or "1"
+        axes = {name: _axis(layout, drawn.get(f"{name}axis", name)) for name in "xy"}
         ends = axes["x"].get("domain"), axes["y"].get("domain")
     common: Row = {
         "panel": number,
         "panel_title": _panel_title(layout, *ends),
-        "trace": _line(each.get("name")) or each["type"],
+        "trace": _line(drawn.get("name")) or drawn["type"],
         **{f"{name}_axis": _title(axis) for name, axis in axes.items()},
     }
-    marker: Keys = each.get("marker", {})
-    columns: dict[str, Cells | str | None] = {name: _cells(each.get(name)) for name in "xyz"}
-    values, bar = columns["z"], each
-    if spatial or each["type"] not in _MATRIX:
+    marker: Keys = drawn.get("marker", {})
+    columns: dict[str, Cells | str | None] = {name: _cells(drawn.get(name)) for name in "xyz"}
+    values, bar = columns["z"], drawn
+    if spatial or drawn["type"] not in _MATRIX:
         values, bar = _numbers(marker.get("color")), marker
     if values is not None:
         shared = layout.get(bar.get("coloraxis", ""), {})
@@ -97,17 +97,17 @@ def _of_trace(each: Keys, layout: Keys) -> Iterator[Row]:
     columns |= {
         "value": values,
         "size": _numbers(marker.get("size")),
-        "base": _numbers(each.get("base")),
-        "width": _numbers(each.get("width")),
-        "text": _cells(each["text"] if "text" in each else each.get("hovertext")),
+        "base": _numbers(drawn.get("base")),
+        "width": _numbers(drawn.get("width")),
+        "text": _cells(drawn["text"] if "text" in drawn else drawn.get("hovertext")),
     }
     for name in "xyz":
-        error: Keys = each.get(f"error_{name}", {})
+        error: Keys = drawn.get(f"error_{name}", {})
         columns[f"{name}_plus"] = _cells(error.get("array"))
         columns[f"{name}_minus"] = _cells(error.get("arrayminus"))
-    matrix = each["type"] in _MATRIX
+    matrix = drawn["type"] in _MATRIX
     count = max(len(columns[name] or ()) for name in ("z" if matrix else "xyz"))
-    columns |= _hovers(_cells(each.get("customdata")), count)
+    columns |= _hovers(_cells(drawn.get("customdata")), count)
     if matrix:
         yield from _of_matrix(common, columns, axes)
         return

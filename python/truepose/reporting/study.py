@@ -78,6 +78,15 @@ class Study:
         return self.over_time
 
     @cached_property
+    def drawn(self) -> tuple[Answer, ...]:
+        """Those of `sampled` that have the machines that were drawn, of which any has an error."""
+        return tuple(
+            answer
+            for answer in self.sampled
+            if answer.coverage is not None and np.isfinite(answer.coverage.sizes[:1]).any()
+        )
+
+    @cached_property
     def components(self) -> tuple[str, ...]:
         """Names of the error components: x y z (m), rx ry rz (rad), those the platform has."""
         return tuple(str(name) for name in self.budget["component"].values)

@@ -68,7 +68,8 @@ class CoverageAnswer(Represented):
     there are too few draws for an end.
     `answer` to the `target`, None where there is none. `draws`, `failed` at that pose: machines
     drawn, and those of them that cannot be assembled. `sampled` poses of the `within` that may be
-    the worst, of `poses` in all.
+    the worst, of `poses` in all. `sizes` (draws,): the lengths of the draws at that pose, m or rad,
+    in ascending order, infinite where a machine cannot be assembled.
     """
 
     quantity: str
@@ -85,6 +86,11 @@ class CoverageAnswer(Represented):
     sampled: int
     within: int
     poses: int
+    sizes: Floats = field(default_factory=lambda: np.empty(0), compare=False)
+
+    def share_within(self, size: float) -> float:
+        """The share of the machines drawn that are no farther off than `size`, m or rad."""
+        return float(np.searchsorted(self.sizes, size, side="right")) / self.draws
 
     @property
     def rests_on(self) -> str:
@@ -155,6 +161,7 @@ def coverage(
         len(screened.poses),
         screened.within,
         screened.every,
+        sampled.sizes_at(worst),
     )
 
 
@@ -172,6 +179,7 @@ class _Sampled:
     upper: Floats = field(init=False)
     draws: Indices = field(init=False)
     failed: Indices = field(init=False)
+    _kept: tuple[int, Floats] = field(init=False, default=(-1, np.empty(0)))
 
     def __post_init__(self) -> None:
         count = len(self.poses)
@@ -226,16 +234,32 @@ class _Sampled:
 
     def _draw(self, batch: Indices, count: int, risk: float) -> None:
         """Machines number 0 to `count` at poses of one part, which have the same variables."""
+        sizes = self._sizes(batch, count)
+        of = ranks(count, self.probability, risk)
+        self.estimate[batch], self.lower[batch], self.upper[batch] = of.of(sizes)
+        self.draws[batch] = count
+        self.failed[batch] = np.isinf(sizes).sum(axis=1)
+        row = np.flatnonzero(batch == self.worst)
+        if row.size:
+            self._kept = (self.worst, sizes[int(row[0])].copy())
+
+    def _sizes(self, batch: Indices, count: int) -> Floats:
+        """(n, count) lengths of the errors of machines number 0 to `count` at these poses."""
         sizes = np.empty((len(batch), count))
         draws = self.poses[int(batch[0])].draws
         for first in range(0, count, DRAWS):
             t = draws.rows(first, min(DRAWS, count - first))
             for row, at in enumerate(batch):
                 sizes[row, first : first + len(t)] = self.poses[int(at)].sizes(t)
-        of = ranks(count, self.probability, risk)
-        self.estimate[batch], self.lower[batch], self.upper[batch] = of.of(sizes)
-        self.draws[batch] = count
-        self.failed[batch] = np.isinf(sizes).sum(axis=1)
+        return sizes
+
+    def sizes_at(self, pose: int) -> Floats:
+        """(draws,) all lengths at a pose, ascending; of the worst so far they are kept."""
+        kept, sizes = self._kept
+        if kept != pose or sizes.size != self.draws[pose]:
+            # Another pose turned out to be the worst when one that was had more draws.
+            (sizes,) = self._sizes(np.array([pose]), int(self.draws[pose]))
+        return np.sort(sizes)
 
 
 def _looks(most: int) -> list[int]:

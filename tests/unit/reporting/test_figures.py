@@ -12,7 +12,7 @@ from checked_figures import checked
 from made_how_sure import shares, sure_study
 from made_study import hexapod_study, planar_study
 from sweeps import sweep
-from truepose.reporting import figures, variance_shares
+from truepose.reporting import figures, variance_shares, within
 from truepose.reporting import how_far as numbers
 from truepose.reporting.figures import (
     FIGURES,
@@ -199,41 +199,54 @@ def test_many_times_are_thinned_and_the_last_is_kept(monkeypatch: pytest.MonkeyP
     assert "of 361 times" in error_over_time.caption(study)
 
 
-def test_the_histogram_has_the_shares_that_the_quantiles_say() -> None:
-    levels = np.linspace(0.0, 1.0, 101)
-    edges, share = distribution.histogram(levels, levels**2, bars=10)
-    np.testing.assert_allclose(np.cumsum(share), np.sqrt(edges[1:]), atol=0.01)
-    # Three values of probability 1/4, 1/2 and 1/4: bars at the ends and in the middle only.
-    steps = np.select([levels <= 0.25, levels <= 0.75], [-1.0, 0.0], 1.0)
-    edges, share = distribution.histogram(levels, steps, bars=5)
-    assert share[[0, 2, 4]] == pytest.approx([0.25, 0.5, 0.25], abs=0.02)
-    assert share.sum() == pytest.approx(1.0)
-    # A fifth that has no error, half of it below and half above, is in no bar.
-    within = (levels >= 0.1 - 1e-9) & (levels <= 0.9 + 1e-9)
-    edges, share = distribution.histogram(levels[within], levels[within], bars=8)
-    assert np.allclose(edges, np.linspace(0.1, 0.9, 9))
-    assert np.allclose(share, 0.1)
-    edges, share = distribution.histogram(levels, np.full(101, 3.0))
-    assert (edges[0], edges[-1], share.sum()) == (3.0, 3.0, 1.0)
+def test_the_distribution_is_of_the_machines_that_were_drawn(study: Study) -> None:
+    figure = checked(distribution.figure(study))
+    kinds = ["position", "orientation"][: 2 if study.rotations else 1]
+    for nth, kind in enumerate(kinds):
+        before, after = (each for each in study.sampled if each.quantity == kind)
+        bars = trace(figure, "after compensation", nth)
+        assert np.sum(bars.y) == pytest.approx(100.0)
+        # Of squares that are uniform the share up to an edge is its square.
+        upper = np.asarray(bars.x) + 0.5 * bars.width
+        share = 0.95 * (upper / (after.linear.value * 1e6)) ** 2
+        np.testing.assert_allclose(np.cumsum(bars.y) / 100.0, np.minimum(share, 1.0), atol=1e-3)
+        outline = trace(figure, "before compensation", nth)
+        edges, heights = np.asarray(outline.x)[1:-1:2], np.asarray(outline.y)[1:-1:2]
+        assert np.sum(heights) == pytest.approx(100.0)
+        assert len(edges) == len(heights) == distribution.BARS
+        marks = [each.x[0] for each in figure.data if len(each.x) == 1]
+        wanted = [before.linear.value * 1e6, after.linear.value * 1e6]
+        assert marks[2 * nth : 2 * nth + 2] == pytest.approx(wanted, rel=1e-6)
 
 
-def test_the_distribution_is_dark_inside_its_coverage_interval(study: Study) -> None:
-    found = study.monte_carlo
-    assert found is not None
-    pose = int(found["magnitude_upper"].values[:, 0].argmax())
-    drawn = checked(distribution.figure(study))
-    bars = [each for each in drawn.data if isinstance(each, go.Bar) and len(each.x) > 1]
-    assert len(bars) == len(study.components) + (2 if study.rotations else 1)
-    first = bars[0]
-    ends = [float(found[end].values[pose, 0]) * 1e6 for end in ("lower", "upper")]
-    inside = [
-        x for x, c in zip(first.x, first.marker.color, strict=True) if c == distribution.WITHIN
-    ]
-    assert ends[0] <= min(inside)
-    assert max(inside) <= ends[1]
-    dark = [y for y, c in zip(first.y, first.marker.color, strict=True) if c == distribution.WITHIN]
-    assert sum(dark) == pytest.approx(95.0, abs=4.0)
-    assert "4,000 samples" in distribution.caption(study)
+def test_how_many_keep_what_is_asked_is_one_number(study: Study) -> None:
+    before, after = within.shares_within(study)
+    for found, answer in zip(
+        (before, after), study.sampled[:: len(study.sampled) // 2], strict=True
+    ):
+        exact = min(0.95 * (found.asked / answer.linear.value) ** 2, 1.0)
+        assert found.share == pytest.approx(exact, abs=1.0 / found.draws)
+        assert found.text in distribution.says(study)
+        assert found.text in within.within_note(study)
+    (line,) = checked(distribution.figure(study)).layout.shapes or [None]
+    (note,) = distribution.figure(study).layout["annotations"]
+    assert f"kept by {before.short} before, {after.short} after" in note["text"]
+    if line is not None:
+        assert line.x0 == pytest.approx(500.0)
+
+
+@pytest.mark.parametrize(
+    ("share", "text", "short"),
+    [
+        (1.0, "more than 99.92 %", "> 99.92 %"),
+        (0.99975, "99.97 %", "99.97 %"),
+        (0.98996, "98.9 %", "98.9 %"),
+        (0.0, "0.0 %", "0.0 %"),
+    ],
+)
+def test_a_share_is_never_rounded_up(share: float, text: str, short: str) -> None:
+    found = within.Within("position", "before compensation", 5e-4, share, 4000)
+    assert (found.text, found.short) == (text, short)
 
 
 def test_how_far_off_has_a_bar_for_each_number_and_state(study: Study) -> None:

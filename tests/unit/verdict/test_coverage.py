@@ -80,6 +80,20 @@ def test_one_uniform_variable(tmp_path: Path, p: float) -> None:
     assert (found.failed, found.pose, found.poses, found.answer) == (0, 0, 1, None)
 
 
+def test_the_share_within_a_size_is_that_of_the_draws(tmp_path: Path) -> None:
+    found = number(on_tool(tmp_path, '"tool.x" = 0.4'))
+    assert found.sizes.size == found.draws
+    assert found.share_within(0.1 * MM) == pytest.approx(0.25, abs=0.01)
+    assert (found.share_within(0.0), found.share_within(0.4 * MM)) == (0.0, 1.0)
+    # Of poses of which some are looked at again, those of the one whose number is told.
+    machine = tp.load(MACHINES / "planar_two_slider.toml")
+    for target in (None, 5.5e-4, 5.6e-4):
+        found = coverage(machine, states(machine), "position", P, target)
+        assert found.sizes.size == found.draws
+        assert found.sizes[math.ceil(P * found.draws * (1.0 - 1e-12)) - 1] == found.estimate
+        assert found.share_within(found.estimate) >= P
+
+
 @pytest.mark.parametrize("p", [0.5, 0.9, 0.95, 0.997])
 def test_two_independent_normal_ones_are_rayleigh(tmp_path: Path, p: float) -> None:
     machine = on_tool(

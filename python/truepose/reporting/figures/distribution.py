@@ -1,186 +1,250 @@
-"""How the sampled error is distributed at the worst pose, with its coverage interval."""
+"""How far off all machines are at the worst pose, against what is asked."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from truepose.arrays import Flags, Floats
-from truepose.reporting.display import MISSING, ROUNDING, number
+from truepose.arrays import Floats
+from truepose.language import grouped, say
+from truepose.reporting.accuracy import AFTER, BEFORE
+from truepose.reporting.display import MISSING, number, pose_text
+from truepose.reporting.figures import _style
 from truepose.reporting.figures._plot import Plot, grid, trace
-from truepose.reporting.figures._style import GRID, INK, OVERALL, finish, small, source_colour
-from truepose.reporting.reading import at_text, percent_text, quantities, worst_pose
+from truepose.reporting.figures._style import INK, TARGET, finish, small
 from truepose.reporting.study import Study
+from truepose.reporting.within import shares_within
 from truepose.runs.poses import not_assembled_text
+from truepose.verdict.answer import Answer
 
 TITLE = "How the error is distributed"
-NEEDS = "monte_carlo"
+NEEDS = "drawn"
 
-BARS = 40
-PANEL_HEIGHT = 215
-WITHIN, OUTSIDE = source_colour(0), "#B9CCDD"
-ASKED = "#B23A48"
+BARS = 48
+PANEL_HEIGHT = 280
+FARTHEST = 2.5
+"""Times the largest error: what is asked and lies farther out is named only."""
+
+
+def says(study: Study) -> str:
+    """How many machines keep what is asked; what 95 of 100 keep where nothing is."""
+    shares = shares_within(study)
+    if shares:
+        quantity = shares[0].quantity
+        share = {kept.state: kept.text for kept in shares if kept.quantity == quantity}
+        asked = study.machine.accuracy.said(quantity)
+        if AFTER not in share:
+            return say(
+                "At its worst pose {share} of all machines keep the {asked} asked.",
+                share=share[BEFORE],
+                asked=asked,
+            )
+        return say(
+            "At its worst pose {before} of all machines keep the {asked} asked before "
+            "compensation, and {after} after it.",
+            before=share[BEFORE],
+            after=share[AFTER],
+            asked=asked,
+        )
+    size = {answer.state: _size(study, answer) for answer in _of(study, _quantities(study)[0])}
+    if AFTER not in size:
+        return say(
+            "At its worst pose 95 % of all machines are at most {size} off.", size=size[BEFORE]
+        )
+    return say(
+        "At its worst pose 95 % of all machines are at most {before} off before compensation, and "
+        "{after} after it.",
+        before=size[BEFORE],
+        after=size[AFTER],
+    )
 
 
 def caption(study: Study) -> str:
-    """Which pose, how many samples, and what the colours are."""
-    result = study.monte_carlo
-    assert result is not None
-    pose = worst_pose(result, "magnitude_upper")
-    percent = percent_text(float(result.attrs["probability"]))
-    failed = int(result["failed"].values[pose])
-    count = int(result["samples"].values[pose])
-    lost = (
-        f" {not_assembled_text(failed, count + failed)}: they are in no bar and no interval, "
-        "and the bars add up to the rest."
-        if failed
-        else ""
-    )
-    return (
-        f"Exact error of {count:,} samples of all bands at "
-        f"{at_text(study.machine, result, pose)}, the pose of those sampled where the position is "
-        f"farthest off. Dark: the {percent} coverage interval; the line is the mean. Of a "
-        f"magnitude, {percent} lie below the end of the dark part." + lost
-    )
+    """What is drawn how, where, and of how many machines."""
+    parts = [
+        say(
+            "Exact error of machines drawn from all bands together, how many in 100 are how far "
+            "off: the dashed outline before compensation, the filled bars after it. The triangles "
+            "are what 95 % stay below, the dashed upright line is what is asked."
+        )
+    ]
+    for name in _quantities(study):
+        answers = _of(study, name)
+        at = [
+            pose_text(answer.linear.pose, study.machine.commanded, study.units)
+            for answer in answers
+        ]
+        drawn = grouped(
+            max(answer.coverage.draws for answer in answers if answer.coverage is not None)
+        )
+        if name == "position":
+            text = say("Position: {draws} machines at {poses}.", draws=drawn, poses=_listed(at))
+        else:
+            text = say("Orientation: {draws} machines at {poses}.", draws=drawn, poses=_listed(at))
+        parts.append(text)
+        for of in (answer.coverage for answer in answers):
+            if of is not None and of.failed:
+                lost = not_assembled_text(of.failed, of.draws)
+                parts.append(say("{lost}: they are in no bar.", lost=lost))
+    return " ".join(parts)
 
 
 def figure(study: Study) -> Plot:
-    """One panel for each component and magnitude: share of the samples, % a bar."""
-    result = study.monte_carlo
-    assert result is not None
-    pose = worst_pose(result, "magnitude_upper")
-    rows = _rows(study)
-    columns = max(map(len, rows))
-    figure = grid(
-        rows=len(rows),
-        cols=columns,
-        spans={
-            (row, at): 1 for row, names in enumerate(rows, 1) for at in range(1, len(names) + 1)
-        },
-        vertical_spacing=0.22 if len(rows) > 1 else 0.0,
-        horizontal_spacing=0.07,
-    )
-    levels = np.asarray(result["level"].values, np.float64)
-    for row, names in enumerate(rows, start=1):
-        for at, name in enumerate(names, start=1):
-            panel = {"row": row, "col": at}
-            values, interval, mean = _of(study, name, pose)
-            unit = study.units.error(name)
-            per_si = unit.per_si
-            _draw(figure, levels, values * per_si, interval * per_si, mean * per_si, panel)
-            title = f"|{name}|" if name in quantities(result) else f"error in {name}"
-            figure.update_xaxes(title={"text": f"{title}, {unit.label}"}, zeroline=False, **panel)
-            if at == 1:
-                figure.update_yaxes(title={"text": "samples, %"}, **panel)
-    _add_legend(figure, percent_text(float(result.attrs["probability"])))
-    finish(
-        figure,
-        90 + (PANEL_HEIGHT + 30) * len(rows),
-        margin={"l": 70, "r": 20, "t": 45, "b": 55},
-        bargap=0.0,
-        barmode="overlay",
-    )
-    figure.update_yaxes(rangemode="tozero", gridcolor=GRID)
+    """A panel for each quantity: machines, % a bar, in either state."""
+    names = _quantities(study)
+    figure = grid(len(names), 1, vertical_spacing=0.3 if len(names) > 1 else 0.0)
+    for row, name in enumerate(names, start=1):
+        _draw(figure, study, name, row)
+    height = 110 + PANEL_HEIGHT * len(names)
+    finish(figure, height, margin={"l": 60, "r": 15, "t": 95, "b": 50}, bargap=0.0)
+    figure.update_yaxes(rangemode="tozero", title={"text": say("machines, %")})
     return figure
 
 
-def _rows(study: Study) -> list[list[str]]:
-    """Names of the panels: lengths and their magnitude, below them angles and theirs."""
-    assert study.monte_carlo is not None
-    sizes = quantities(study.monte_carlo)
-    rows = []
-    for indices, size in ((study.positions, "position"), (study.rotations, "orientation")):
-        if indices:
-            names = [study.components[at] for at in indices]
-            # The magnitude of a single component is the component without its sign.
-            rows.append([*names, size] if len(names) > 1 and size in sizes else names)
-    return rows
+def _listed(poses: list[str]) -> str:
+    """The pose of both states, or those of answer."""
+    if len(set(poses)) == 1:
+        return poses[0]
+    return say("{before}, after compensation at {after}", before=poses[0], after=poses[1])
 
 
-def _of(study: Study, name: str, pose: int) -> tuple[Floats, Floats, float]:
-    """Quantiles (n_level,), both ends of the coverage interval and the mean, m or rad."""
-    result = study.monte_carlo
-    assert result is not None
-    sizes = quantities(result)
-    if name in sizes:
-        at = sizes.index(name)
-        values = np.asarray(result["magnitude_quantile"].values)[pose, at]
-        upper = result["magnitude_upper"].values[pose, at]
-        return values, np.array([-np.inf, upper]), float(result["magnitude_mean"].values[pose, at])
-    at = study.components.index(name)
-    ends = [result[end].values[pose, at] for end in ("lower", "upper")]
-    values = np.asarray(result["quantile"].values)[pose, at]
-    return values, np.array(ends), float(result["mean"].values[pose, at])
+def _quantities(study: Study) -> list[str]:
+    """Names of those that were sampled, in their order."""
+    return list(dict.fromkeys(answer.quantity for answer in study.drawn))
 
 
-def histogram(levels: Floats, quantiles: Floats, bars: int = BARS) -> tuple[Floats, Floats]:
-    """Edges (bars + 1,) and share of the samples (bars,) from quantiles (n_level,) at `levels`.
-
-    Where the lowest level is not 0 or the highest not 1, the rest has no error and is in no bar.
-    The distribution function between two quantiles is taken as a straight line; where quantiles
-    are equal, as of a discrete distribution, it steps.
-    """
-    edges = np.linspace(quantiles[0], quantiles[-1], bars + 1)
-    # A step at an edge counts below it.
-    just_above = edges + ROUNDING * (edges[-1] - edges[0])
-    below = np.interp(just_above, quantiles, levels)
-    below[0], below[-1] = levels[0], levels[-1]
-    return edges, np.diff(below)
+def _of(study: Study, quantity: str) -> list[Answer]:
+    return [answer for answer in study.drawn if answer.quantity == quantity]
 
 
-def _draw(
-    figure: Plot,
-    levels: Floats,
-    quantiles: Floats,
-    interval: Floats,
-    mean: float,
-    panel: dict[str, int],
+def _size(study: Study, answer: Answer) -> str:
+    """What 95 % stay below, for people, as the table of how far off says it."""
+    unit, size = study.units.error(answer.quantity), answer.linear.value
+    return f"{number(size * unit.per_si, 1)} {unit.label}" if np.isfinite(size) else MISSING
+
+
+def _draw(figure: Plot, study: Study, name: str, row: int) -> None:
+    unit, answers = study.units.error(name), _of(study, name)
+    sizes = {answer.state: _finite(answer) * unit.per_si for answer in answers}
+    largest = max(float(values[-1]) for values in sizes.values())
+    asked = next((kept.asked for kept in shares_within(study) if kept.quantity == name), None)
+    limit = None if asked is None else asked * unit.per_si
+    top = largest if limit is None or limit > FARTHEST * largest else max(largest, limit)
+    edges = np.linspace(0.0, 1.02 * top or 1.0, BARS + 1)
+    first = row == 1
+    for answer in answers:
+        assert answer.coverage is not None
+        count, _ = np.histogram(sizes[answer.state], edges)
+        share = 100.0 * count / answer.coverage.draws
+        _histogram(figure, edges, share, answer.state, first, row)
+        _mark(figure, answer, unit.per_si, first, row)
+    title = say("position error, {unit}", unit=unit.label)
+    if name != "position":
+        title = say("orientation error, {unit}", unit=unit.label)
+    figure.update_xaxes(row, 1, title={"text": title}, range=[0.0, float(edges[-1])])
+    if limit is not None:
+        _asked(figure, study, name, limit, float(edges[-1]), row)
+
+
+def _finite(answer: Answer) -> Floats:
+    assert answer.coverage is not None
+    sizes = answer.coverage.sizes
+    return sizes[np.isfinite(sizes)]
+
+
+def _histogram(
+    figure: Plot, edges: Floats, share: Floats, state: str, legend: bool, row: int
 ) -> None:
-    finite = np.isfinite(quantiles)
-    if finite.sum() < 2:
-        figure.add_annotation(text=MISSING, x=0.5, y=0.5, showarrow=False, **panel)
+    """After as filled bars, before as the outline of some."""
+    if state == AFTER:
+        figure.add_trace(
+            trace(
+                "bar",
+                x=small(0.5 * (edges[1:] + edges[:-1])),
+                y=small(share),
+                width=float(edges[1] - edges[0]),
+                name=say("after compensation"),
+                legendgroup=state,
+                showlegend=legend,
+                marker={"color": _style.AFTER_FILL, "line": {"width": 0}},
+                hovertemplate="%{x:.4r}: %{y:.2f} %<extra></extra>",
+            ),
+            row,
+            1,
+        )
         return
-    edges, share = histogram(levels[finite], quantiles[finite])
-    if not edges[-1] > edges[0]:
-        # Nothing spreads this one: a single line at its value.
-        edges, share = np.array([mean - 0.5, mean + 0.5]), np.array([1.0])
-    middle = (edges[1:] + edges[:-1]) / 2
-    figure.add_trace(
-        trace(
-            "bar",
-            x=small(middle),
-            y=small(100.0 * share),
-            width=small(np.diff(edges)),
-            marker={"color": _colours(middle, interval), "line": {"width": 0}},
-            customdata=small(np.stack([edges[:-1], edges[1:]], axis=-1)),
-            hovertemplate="%{customdata[0]:.3f} to %{customdata[1]:.3f}: %{y:.2f} %<extra></extra>",
-            showlegend=False,
-        ),
-        **panel,
-    )
     figure.add_trace(
         trace(
             "scatter",
-            x=small([mean, mean]),
-            y=small([0.0, 100.0 * share.max()]),
+            x=small(np.repeat(edges, 2)),
+            y=small(np.concatenate([[0.0], np.repeat(share, 2), [0.0]])),
             mode="lines",
-            line={"color": OVERALL, "width": 2},
-            hovertemplate=f"mean {number(mean, 3)}<extra></extra>",
-            showlegend=False,
+            name=say("before compensation"),
+            legendgroup=state,
+            showlegend=legend,
+            line={"color": _style.BEFORE, "width": 2, "dash": "6px,2px"},
+            hovertemplate="%{x:.4r}: %{y:.2f} %<extra></extra>",
         ),
-        **panel,
+        row,
+        1,
     )
-    for end in interval[np.isfinite(interval)]:
-        figure.add_vline(x=end, line={"color": INK, "width": 1, "dash": "dot"}, **panel)
 
 
-def _colours(middle: Floats, interval: Floats) -> list[str]:
-    inside: Flags = (middle >= interval[0]) & (middle <= interval[1])
-    return [WITHIN if is_inside else OUTSIDE for is_inside in inside]
-
-
-def _add_legend(figure: Plot, percent: str) -> None:
-    for name, colour in ((f"{percent} coverage interval", WITHIN), ("outside of it", OUTSIDE)):
-        figure.add_trace(trace("bar", x=[None], y=[None], name=name, marker={"color": colour}))
+def _mark(figure: Plot, answer: Answer, per_si: float, legend: bool, row: int) -> None:
+    """What 95 % stay below, on the axis."""
+    size = answer.linear.value * per_si
+    if not np.isfinite(size):
+        return
+    before = answer.state == BEFORE
     figure.add_trace(
-        trace("scatter", x=[None], y=[None], name="mean", mode="lines", line={"color": OVERALL})
+        trace(
+            "scatter",
+            x=small([size]),
+            y=small([0.0]),
+            mode="markers",
+            name=say("95 % before") if before else say("95 % after"),
+            showlegend=legend,
+            cliponaxis=False,
+            marker={
+                "symbol": "triangle-up-open" if before else "triangle-up",
+                "size": 12,
+                "color": _style.BEFORE if before else _style.AFTER,
+                "line": {"width": 2, "color": _style.BEFORE if before else _style.AFTER},
+            },
+            hovertemplate="%{x:.4r}<extra></extra>",
+        ),
+        row,
+        1,
+    )
+
+
+def _asked(figure: Plot, study: Study, name: str, limit: float, top: float, row: int) -> None:
+    """The line of what is asked, and above it how many keep it."""
+    said = study.machine.accuracy.said(name)
+    share = {kept.state: kept.short for kept in shares_within(study) if kept.quantity == name}
+    text = say("asked: {asked}", asked=said)
+    if BEFORE in share and AFTER in share:
+        text += "\n" + say(
+            "kept by {before} before, {after} after", before=share[BEFORE], after=share[AFTER]
+        )
+    elif BEFORE in share:
+        text += "\n" + say("kept by {share}", share=share[BEFORE])
+    here = min(limit, top)
+    if limit <= top:
+        line = {"color": TARGET, "width": 2, "dash": "dash"}
+        figure.add_vline(limit, row, 1, name=say("asked"), line=line)
+    else:
+        text = "→ " + text
+    middle = here / top
+    figure.add_annotation(
+        row,
+        1,
+        x=here,
+        y=1.0,
+        yref=f"y{row if row > 1 else ''} domain",
+        yanchor="bottom",
+        xanchor="left" if middle < 0.35 else "right" if middle > 0.65 else "center",
+        text=text,
+        showarrow=False,
+        align="left" if middle < 0.35 else "right" if middle > 0.65 else "center",
+        font={"size": 12, "color": INK},
     )

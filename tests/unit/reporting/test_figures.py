@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 import plotly.graph_objects as go
@@ -282,14 +283,20 @@ def test_a_number_that_there_is_not_has_no_bar(study: Study) -> None:
 def test_the_tornado_has_the_largest_on_top(study: Study) -> None:
     assert study.shares is not None
     who = variance_shares.blame(study.shares, variance_shares.spread_pose(study.shares))
+    large = [at for at, share in enumerate(who.kinds["total"]) if share >= 0.01]
     drawn = checked(tornado.figure(study))
+    names = [name.partition(" + ")[0] for name in trace(drawn, "total").y]
+    assert names == [who.names[at] for at in large if who.names[at] in names][::-1]
     for kind, name in (("first", "first order"), ("total", "total"), ("linear", "linear")):
         bars = trace(drawn, name)
-        assert list(bars.y) == list(who.names)[::-1]
-        np.testing.assert_allclose(bars.x, 100 * who.kinds[kind][::-1], rtol=1e-6)
+        groups = [text.split(", ") for text in trace(drawn, "total").text]
+        assert sorted(chain(*groups)) == sorted(who.names[at] for at in large)
+        share = dict(zip(who.names, who.kinds[kind], strict=True))
+        wanted = [100 * np.mean([share[each] for each in group]) for group in groups]
+        np.testing.assert_allclose(bars.x, wanted, rtol=1e-6)
     correlated = replace(study, shares=shares(study.machine, study.poses[:1], correlated=True))
-    names = {each.name for each in checked(tornado.figure(correlated)).data}
-    assert names == {"Shapley", "linear"}
+    kinds = {each.name for each in checked(tornado.figure(correlated)).data}
+    assert kinds == {"Shapley", "linear"}
     assert "Shapley shares do" in tornado.caption(correlated)
 
 
@@ -311,7 +318,13 @@ def test_an_ellipse_holds_what_it_says(study: Study) -> None:
 def test_ellipses_do_not_touch_and_are_to_one_scale(study: Study) -> None:
     drawn = checked(coverage_ellipses.figure(study))
     outlines = [each for each in drawn.data if each.legendgroup == "ellipse"]
+    circles = [each for each in drawn.data if each.legendgroup == "asked"]
     assert study.ellipses is not None
+    assert len(circles) == len(outlines), "what is asked about every pose"
+    times = coverage_ellipses.magnified(study)
+    assert np.ptp(circles[0].x) == pytest.approx(2 * 0.5 * times, rel=1e-5), "0.5 mm"
+    sizes = study.ellipses["magnitude_upper"].values[:, 0]
+    assert f"at {(sizes <= 5e-4).sum()} of {len(sizes)} poses" in coverage_ellipses.says(study)
     spatial = study.ellipses.sizes["axis"] == 3
     assert len(outlines) == (27 if spatial else study.ellipses.sizes["pose"])
     first, second = outlines[0], outlines[min(1, len(outlines) - 1)]

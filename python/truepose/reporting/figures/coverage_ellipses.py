@@ -10,10 +10,19 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.files.shown_units import ShownUnits
-from truepose.reporting.display import is_position
+from truepose.language import grouped, say
+from truepose.reporting.display import is_position, where_highest
 from truepose.reporting.figures._plot import Plot, grid, trace
-from truepose.reporting.figures._style import INK, finish, small, source_colour
-from truepose.reporting.reading import percent_text
+from truepose.reporting.figures._style import (
+    BLUE,
+    BLUE_FILL,
+    INK,
+    TARGET,
+    VERMILION,
+    finish,
+    small,
+)
+from truepose.reporting.reading import at_text, percent_text
 from truepose.reporting.study import Study
 
 if TYPE_CHECKING:
@@ -23,11 +32,12 @@ TITLE = "Coverage ellipses over the workspace"
 NEEDS = "ellipses"
 
 POINTS = 49
-FILL = "rgba(0,114,178,0.18)"
 HEIGHT = {1: 520, 3: 400}
 SAME_PLACE = 0.02
 """Places nearer than this, in the width of the panel, are one."""
 STEPS = (8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0)
+LARGEST = 4.0
+"""Times the reach of the largest ellipse: a larger circle of what is asked is not drawn."""
 FILLED = 0.5
 """Part of the distance between two places that the largest ellipse and its offset may take."""
 
@@ -44,34 +54,80 @@ class Panel:
     places: Floats
 
 
+def says(study: Study) -> str:
+    """At how many poses 95 of 100 machines keep what is asked, and where the longest ellipse is."""
+    result = study.ellipses
+    assert result is not None
+    drawn = [(panel, pose) for panel in _panels(study) for pose in panel.poses]
+    halves = [_half_length(result, pose, panel.axes) for panel, pose in drawn]
+    longest = where_highest(halves)
+    size = study.units.small_length.text(halves[longest], 3)
+    at = at_text(study.machine, result, drawn[longest][1])
+    asked = study.machine.accuracy.target
+    if asked is None:
+        return say(
+            "The longest ellipse, at {pose}, reaches {size} from its middle.", pose=at, size=size
+        )
+    return say(
+        "Before compensation {percent} of all machines keep the {asked} asked at {good} of {every} "
+        "poses; the longest ellipse, at {pose}, reaches {size} from its middle.",
+        percent=percent_text(float(result.attrs["probability"])),
+        asked=study.machine.accuracy.said("position"),
+        good=int((result["magnitude_upper"].values[:, 0] <= asked).sum()),
+        every=result.sizes["pose"],
+        pose=at,
+        size=size,
+    )
+
+
 def caption(study: Study) -> str:
     """What an ellipse holds, and how much larger it is drawn."""
     result = study.ellipses
     assert result is not None
     percent = percent_text(float(result.attrs["probability"]))
-    spatial = result.sizes["axis"] > 2
-    shadow = (
-        f" Each is the shadow of an ellipsoid that holds {percent} of the samples, and so holds "
-        "somewhat more; the panels show poses of the middle planes."
-        if spatial
-        else ""
-    )
-    return (
-        f"Where the tool really is: the ellipse holds {percent} of the samples of the position "
-        f"error, drawn {_magnified(study):,.0f} times as large as the workspace; the line leads "
-        "from the commanded place to the mean. A long ellipse is a direction in which the machine "
-        f"is unsure. {int((result['samples'] + result['failed']).values[0]):,} samples a pose."
-        + shadow
-        + _lost(result)
-    )
-
-
-def _lost(result: xr.Dataset) -> str:
-    """How many samples could not be assembled, where any could not."""
+    parts = [
+        say(
+            "Where the tool really is before compensation: the ellipse holds {percent} of all "
+            "machines, drawn {times} times as large as the workspace; the line leads from the "
+            "commanded place to the mean. A long ellipse is a direction in which the machine is "
+            "unsure. {samples} samples a pose.",
+            percent=percent,
+            times=grouped(round(magnified(study))),
+            samples=grouped(int((result["samples"] + result["failed"]).values[0])),
+        )
+    ]
+    if _has_circle(study):
+        parts.append(
+            say(
+                "The dashed circle is what is asked, as many times as large: what is inside keeps "
+                "it."
+            )
+        )
+    elif study.machine.accuracy.target is not None:
+        parts.append(
+            say(
+                "The circle of what is asked, {asked}, would be so much larger that it is not "
+                "drawn.",
+                asked=study.machine.accuracy.said("position"),
+            )
+        )
+    if result.sizes["axis"] > 2:
+        parts.append(
+            say(
+                "Each is the shadow of an ellipsoid that holds {percent} of the samples, and so "
+                "holds somewhat more; the panels show poses of the middle planes.",
+                percent=percent,
+            )
+        )
     lost = str(result.attrs.get("not_assembled", "none"))
-    if lost == "none":
-        return ""
-    return f" Of all samples {lost}; where too many failed, no ellipse is drawn."
+    if lost != "none":
+        parts.append(
+            say(
+                "Of all samples {lost}; where too many failed, no ellipse is drawn.",
+                lost=lost,
+            )
+        )
+    return " ".join(parts)
 
 
 def figure(study: Study) -> Plot:
@@ -80,7 +136,7 @@ def figure(study: Study) -> Plot:
     assert result is not None
     names = [str(name) for name in result["axis"].values]
     panels = _panels(study)
-    times = _magnified(study)
+    times = magnified(study)
     figure = grid(rows=1, cols=len(panels), horizontal_spacing=0.09)
     for at, panel in enumerate(panels, start=1):
         drawn = [panel.places]
@@ -88,7 +144,9 @@ def figure(study: Study) -> Plot:
             centre, outline = ellipse(result, pose, panel.axes)
             place = panel.places[nth]
             first = at == 1 and nth == 0
-            _draw(figure, place, centre, outline, times, at, study.units, first=first)
+            if _has_circle(study):
+                drawn.append(_draw_asked(figure, study, place, times, at, first=first))
+            _draw(figure, study, pose, panel, nth, times, at, first=first)
             drawn.append(place + times * (centre + outline))
         ranges = _ranges(np.concatenate(drawn), study.units)
         where = {"row": 1, "col": at}
@@ -172,23 +230,45 @@ def _panel(pair: tuple[int, ...], places: Floats, hidden: list[Floats]) -> Panel
     return Panel((pair[0], pair[1]), chosen, places[chosen])
 
 
-def _magnified(study: Study) -> float:
-    """How many times larger than the workspace ellipses are drawn, a round number.
+def _half_length(result: xr.Dataset, pose: int, axes: tuple[int, int]) -> float:
+    """Half the length of an ellipse, m."""
+    return float(np.linalg.norm(ellipse(result, pose, axes)[1], axis=1).max())
 
-    As large as they can be without touching their neighbours.
-    """
+
+def _farthest(result: xr.Dataset, pose: int, axes: tuple[int, int]) -> float:
+    """How far the farthest point of an ellipse is from the commanded place, m."""
+    centre, outline = ellipse(result, pose, axes)
+    return float(np.linalg.norm(centre + outline, axis=1).max())
+
+
+def _reach(study: Study, panel: Panel) -> float:
+    """Half of the room that the largest ellipse and its offset take, m."""
     result = study.ellipses
     assert result is not None
+    halves = [_half_length(result, pose, panel.axes) for pose in panel.poses]
+    farthest = [_farthest(result, pose, panel.axes) / 2 for pose in panel.poses]
+    return max(*halves, *farthest)
+
+
+def _has_circle(study: Study) -> bool:
+    """Whether what is asked is drawn: where it is so large that ellipses were dots, it is not."""
+    asked = study.machine.accuracy.target
+    if asked is None:
+        return False
+    return asked <= LARGEST * max(_reach(study, panel) for panel in _panels(study))
+
+
+def magnified(study: Study) -> float:
+    """How many times larger than the workspace ellipses are drawn, a round number.
+
+    As large as they can be without touching their neighbours, nor the circles of what is asked.
+    """
+    asked = study.machine.accuracy.target if _has_circle(study) else None
     most = np.inf
     for panel in _panels(study):
-        reach = 0.0
-        for pose in panel.poses:
-            centre, outline = ellipse(result, pose, panel.axes)
-            reach = max(reach, float(np.linalg.norm(outline, axis=1).max()))
-            reach = max(reach, float(np.linalg.norm(centre + outline, axis=1).max()) / 2)
-        gap = _gap(panel.places)
+        reach = max(_reach(study, panel), asked or 0.0)
         if reach > 0:
-            most = min(most, FILLED * gap / reach)
+            most = min(most, FILLED * _gap(panel.places) / reach)
     if not np.isfinite(most):
         return 1.0
     power = 10.0 ** np.floor(np.log10(most))
@@ -203,24 +283,52 @@ def _gap(places: Floats) -> float:
     return float(apart[~np.eye(len(places), dtype=bool)].min())
 
 
+def _draw_asked(
+    figure: Plot, study: Study, place: Floats, times: float, column: int, *, first: bool
+) -> Floats:
+    """The circle of what is asked about a commanded place; returns its points (n, 2), m."""
+    asked = study.machine.accuracy.target
+    assert asked is not None
+    turn = np.linspace(0.0, 2.0 * np.pi, POINTS)
+    points = place + times * asked * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    shown = points * study.units.length.per_si
+    figure.add_trace(
+        trace(
+            "scatter",
+            x=small(shown[:, 0]),
+            y=small(shown[:, 1]),
+            mode="lines",
+            line={"color": TARGET, "width": 1, "dash": "4px,3px"},
+            name=say("asked: {asked}", asked=study.machine.accuracy.said("position")),
+            legendgroup="asked",
+            showlegend=first,
+            hoverinfo="skip",
+        ),
+        row=1,
+        col=column,
+    )
+    return points
+
+
 def _draw(
     figure: Plot,
-    place: Floats,
-    centre: Floats,
-    outline: Floats,
+    study: Study,
+    pose: int,
+    panel: Panel,
+    nth: int,
     times: float,
     column: int,
-    units: ShownUnits,
     *,
     first: bool,
 ) -> None:
     """One ellipse about its centre, and the line to it from the commanded place."""
-    panel = {"row": 1, "col": column}
+    result, units, place = study.ellipses, study.units, panel.places[nth]
+    assert result is not None
+    centre, outline = ellipse(result, pose, panel.axes)
     mean = place + times * centre
     coarse, fine = units.length.per_si, units.small_length
     around = (mean + times * outline) * coarse
-    size = np.linalg.norm(outline, axis=1).max() * fine.per_si
-    off = np.linalg.norm(centre) * fine.per_si
+    percent = percent_text(float(result.attrs["probability"]))
     figure.add_trace(
         trace(
             "scatter",
@@ -228,16 +336,25 @@ def _draw(
             y=small(around[:, 1]),
             mode="lines",
             fill="toself",
-            fillcolor=FILL,
-            line={"color": source_colour(0), "width": 1.5},
-            name="coverage ellipse",
+            fillcolor=BLUE_FILL,
+            line={"color": BLUE, "width": 1.5},
+            name=say(
+                "{percent} of machines, {times} ×",
+                percent=percent,
+                times=grouped(round(times)),
+            ),
             legendgroup="ellipse",
             showlegend=first,
             hoveron="fills",
-            text=f"half length {size:.3g} {fine.label}, centre {off:.3g} {fine.label} off",
+            text=say(
+                "reaches {size} from its middle, which is {off} off",
+                size=fine.text(_half_length(result, pose, panel.axes), 3),
+                off=fine.text(float(np.linalg.norm(centre)), 3),
+            ),
             hoverinfo="text",
         ),
-        **panel,
+        row=1,
+        col=column,
     )
     figure.add_trace(
         trace(
@@ -245,12 +362,13 @@ def _draw(
             x=small(np.array([place[0], mean[0]]) * coarse),
             y=small(np.array([place[1], mean[1]]) * coarse),
             mode="lines+markers",
-            line={"color": source_colour(1), "width": 1.5},
-            marker={"color": [INK, source_colour(1)], "size": [6, 4]},
-            name="from the commanded place to the mean",
+            line={"color": VERMILION, "width": 1.5},
+            marker={"color": [INK, VERMILION], "size": [6, 4]},
+            name=say("from the commanded place to the mean"),
             legendgroup="mean",
             showlegend=first,
             hoverinfo="skip",
         ),
-        **panel,
+        row=1,
+        col=column,
     )

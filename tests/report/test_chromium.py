@@ -122,12 +122,8 @@ def visit(browser: Any, file: Path, figures: int) -> Visit:
     seen = Visit(page=page)
     seen.listen(page)
     page.goto(file.as_uri(), wait_until="load")
-    # Plotly draws in steps; a finished plot has its axes or its canvas.
-    page.wait_for_function(
-        "n => document.querySelectorAll('.plotly-graph-div .main-svg').length >= n",
-        arg=figures,
-    )
-    page.wait_for_timeout(1500)
+    page.wait_for_selector("html[data-ready]")
+    assert page.locator(".plotly-graph-div .main-svg").count() >= figures
     return seen
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from truepose.files.writing import replacing
+from truepose.language import say
 from truepose.reporting import circular_test
-from truepose.reporting.page import page_parts, template
 from truepose.reporting.polar_plot import figures
+from truepose.reporting.shell import page_parts, template
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +25,7 @@ def html(machine: Machine, result: xr.Dataset) -> str:
         lines=circular_test.summary(machine, result),
         tables=list(circular_test.tables(machine, result)),
         figures=figures(machine, result),
-        **page_parts(),
+        **page_parts(say("{machine} · circular test", machine=machine.name)),
     )
 
 

@@ -4,48 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.resources import files
-from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import jinja2
-
-from truepose.calibration.acceptance.sentences import sentence
 from truepose.files.writing import replacing
+from truepose.language import grouped, say, say_counted
 from truepose.reporting import calibration, how_far, inputs, tables, uncertainty_tables
 from truepose.reporting.accuracy import gains, told, where_answered
 from truepose.reporting.figures import DrawnFigure, draw
-from truepose.reporting.figures._json import as_json
+from truepose.reporting.shell import page_parts, template
 from truepose.reporting.study import Study
 from truepose.reporting.table import Table
 
 if TYPE_CHECKING:
     from truepose.reporting.part import SummaryLine
 
-LIMITS = (
-    "These results hold for the sources found in the machine file and for the poses evaluated, "
-    "nothing else. Sources that the file does not name (backlash, joint clearance, wear, control "
-    "and measuring errors, bending of frame, platform and guides) are not in them. A linear "
-    "maximum is of first order; a witness is one machine, solved exactly; a proven bound says so, "
-    "and holds at the poses that it names. Loads and temperatures act on the nominal machine at "
-    "the commanded pose."
-)
 
-
-def _folder_of_plotly() -> Path:
-    """Where the package plotly keeps its files, of which no module is run: that takes long.
-
-    Raises `ImportError` where the package is not there.
-    """
-    found = find_spec("plotly")
-    if found is None or not found.submodule_search_locations:
-        raise ImportError("no plotly", name="plotly")
-    return Path(found.submodule_search_locations[0], "package_data")
-
-
-# Looked for at once, so that a report without it is refused before it is worked out.
-PLOTLY = _folder_of_plotly()
+def limits() -> str:
+    """What a report does not say."""
+    return say(
+        "These results hold for the sources found in the machine file and for the poses evaluated, "
+        "nothing else. Sources that the file does not name (backlash, joint clearance, wear, "
+        "control and measuring errors, bending of frame, platform and guides) are not in them. A "
+        "linear maximum is of first order; a witness is one machine, solved exactly; a proven "
+        "bound says so, and holds at the poses that it names. Loads and temperatures act on the "
+        "nominal machine at the commanded pose."
+    )
 
 
 @dataclass(frozen=True)
@@ -58,9 +42,6 @@ class PartShown:
     figures: Sequence[DrawnFigure]
     tables: Sequence[Table]
     process: str
-
-
-FIGURE_SETTINGS = {"displaylogo": False, "responsive": True, "displayModeBar": "hover"}
 
 
 def render(study: Study, machine_text: str = "", part: PartShown | None = None) -> str:
@@ -78,10 +59,9 @@ def render(study: Study, machine_text: str = "", part: PartShown | None = None) 
     if left_out is not None:
         results.append(left_out)
     drawn = list(draw(study))
+    parameters = inputs.parameters(study.machine)
     return template("page.html.jinja").render(
-        study=study,
         machine=study.machine,
-        attrs=study.budget.attrs,
         answers=told(study.machine, study.accuracy),
         gains=gains(study.accuracy),
         where_answered=where_answered(study.accuracy) if study.accuracy else "",
@@ -98,36 +78,65 @@ def render(study: Study, machine_text: str = "", part: PartShown | None = None) 
             table(study.machine)
             for table in (inputs.machine, inputs.condition, inputs.sources, inputs.deviations)
         ],
-        parameters=inputs.parameters(study.machine),
+        parameters=parameters,
         machine_text=machine_text,
         part=part,
-        limits=LIMITS,
-        **page_parts(),
+        limits=limits(),
+        said=_said(study, len(parameters.rows), part),
+        hashes=_hashes(study),
+        **page_parts(say("{machine} · positioning error", machine=study.machine.name)),
     )
 
 
-def template(name: str) -> jinja2.Template:
-    """A template of a page, with the filters that its figures need."""
-    environment = jinja2.Environment(
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        loader=jinja2.FunctionLoader(_resource),
-    )
-    environment.filters["capitalise"] = sentence
-    environment.filters["as_json"] = as_json
-    return environment.get_template(name)
-
-
-def page_parts() -> dict[str, Any]:
-    """What the head of every page has: style, plotly and its settings."""
+def _said(study: Study, parameters: int, part: PartShown | None) -> dict[str, str]:
+    """Headings and lines of the page around its content."""
+    machine, attrs = study.machine, study.budget.attrs
+    calibrated = study.calibration is not None
+    meta = [say_counted("{count} pose evaluated", "{count} poses evaluated", study.n_pose)]
+    if attrs["poses_left_out"]:
+        meta.append(say("{count} left out", count=grouped(attrs["poses_left_out"])))
+    meta.append(say_counted("{count} error source", "{count} error sources", len(study.sources)))
+    seeded = attrs if study.monte_carlo is None else study.monte_carlo.attrs
     return {
-        "css": _resource("page.css"),
-        "plotly_js": _of_plotly("plotly.min.js"),
-        "figure_template": _of_plotly("templates", "plotly_white.json"),
-        "figure_settings": FIGURE_SETTINGS,
+        "kind": say("Calibration and positioning error report")
+        if calibrated
+        else say("Positioning error report"),
+        "meta": " · ".join([*meta, f"truepose {attrs['truepose_version']}"]),
+        "summary": say("The machine as filed") if calibrated else say("Summary"),
+        "calibration": say("Calibration"),
+        "may_be_used": say("May the calibrated machine be used?"),
+        "yes": say("Yes"),
+        "no": say("No"),
+        "part": "" if part is None else say("The part: {program}", program=part.program),
+        "figures": say("Figures"),
+        "tables": say("Tables"),
+        "inputs": say("Inputs"),
+        "parameters": say("Parameters ({count})", count=grouped(parameters)),
+        "machine_file": say("Machine file {file}", file=machine.file),
+        "limits": say("What this report does not say"),
+        "units": say(
+            "truepose {version} · seed {seed} · lengths in {length}, errors in {small} and "
+            "{angle}, base frame, R = Rz(c) Ry(b) Rx(a)",
+            version=attrs["truepose_version"],
+            seed=seeded["seed"],
+            length=study.units.length.label,
+            small=study.units.small_length.label,
+            angle=study.units.small_angle.label,
+        ),
     }
+
+
+def _hashes(study: Study) -> list[tuple[str, str]]:
+    """Every file that the report is of, and its SHA-256."""
+    machine = study.machine
+    hashes = [(say("Machine file {file}", file=machine.file), machine.file_hash)]
+    if study.calibration is not None:
+        attrs = study.calibration.attrs
+        name = say("Measurements {file}", file=attrs["measurements"])
+        hashes.append((name, attrs["measurements_hash"]))
+    return hashes + [
+        (say("Data file {file}", file=name), digest) for name, digest in machine.data_files.items()
+    ]
 
 
 def _of_calibration(drawn: DrawnFigure) -> bool:
@@ -140,11 +149,3 @@ def write(study: Study, path: Path, machine_text: str = "", part: PartShown | No
     text = render(study, machine_text, part)
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
-
-
-def _resource(name: str) -> str:
-    return files("truepose.reporting").joinpath(name).read_text(encoding="utf-8")
-
-
-def _of_plotly(*path: str) -> str:
-    return PLOTLY.joinpath(*path).read_text(encoding="utf-8")

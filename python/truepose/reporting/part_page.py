@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from truepose.language import say
 from truepose.reporting import part
-from truepose.reporting.page import PartShown, page_parts, template
+from truepose.reporting.page import PartShown
 from truepose.reporting.part_figures import DrawnPath, figures
+from truepose.reporting.shell import page_parts, template
 from truepose.workpiece.evaluation import PartEvaluation
 from truepose.workpiece.result import attributes
 
@@ -29,7 +31,7 @@ def html(evaluation: PartEvaluation, path: DrawnPath, program: str) -> str:
         part=shown(evaluation, path, program),
         machine=evaluation.machine,
         attrs=attributes(evaluation),
-        **page_parts(),
+        **page_parts(say("{program} · the part", program=program)),
     )
 
 

@@ -9,4 +9,4 @@ def test_policy_stands_before_all_that_it_governs() -> None:
     page = files("truepose.reporting").joinpath("base.html.jinja").read_text(encoding="utf-8")
     policy = page.index("Content-Security-Policy")
     assert "default-src 'none'" in page[policy : page.index("<title>")]
-    assert policy < min(page.index("<style>"), page.index("<script>"), page.index("<link"))
+    assert policy < min(page.index(tag) for tag in ("<style>", "<script", "<link"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from contextlib import AbstractContextManager
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -24,13 +24,13 @@ from truepose.files.document import MACHINE_FILE
 from truepose.files.text_file import read_text
 from truepose.files.wording import counted
 from truepose.files.writing import replacing, require_writable, written_together
-from truepose.reporting import formats
-from truepose.reporting.display import nearest_middle, pose_text, where_highest
+from truepose.reporting import assembly, formats
+from truepose.reporting.display import pose_text
 from truepose.reporting.result import Result
 from truepose.reporting.study import Study
 from truepose.reporting.table import Table
-from truepose.runs.poses import faults_text, reason_text
-from truepose.verdict.answer import BEFORE, NOT_MET, STATES
+from truepose.runs.poses import Progress, faults_text, reason_text
+from truepose.verdict.answer import BEFORE, NOT_MET
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,21 +90,39 @@ def machine_text(request: Request) -> str:
     return text
 
 
+class Watching(assembly.Watcher):
+    """Shows on stderr how far it is and what is warned of, and refuses what `--strict` does."""
+
+    def __init__(self, request: Request) -> None:
+        self.request = request
+
+    def progress(self, what: str, unit: str = "poses") -> AbstractContextManager[Progress | None]:
+        """A bar, where someone looks."""
+        return progress(what, unit)
+
+    def waiting(self, what: str) -> AbstractContextManager[None]:
+        """A clock, where someone looks."""
+        return waiting(what)
+
+    def evaluated(self, machine: Machine, result: Evaluation) -> None:
+        """Refuse left out poses if asked; what it warns of goes to stderr."""
+        indices, status = result.run.left_out.sorted()
+        refuse_left_out(self.request, machine, indices, result.run.poses[indices], status)
+        show_warnings(result.warnings)
+
+    def computed(self, machine: Machine, result: xr.Dataset) -> None:
+        """Refuse left out poses if asked."""
+        refuse_left_out_of(self.request, machine, result)
+
+
 def evaluate(request: Request, machine: Machine) -> xr.Dataset:
     """The error budget over the file's workspace; what it warns of goes to stderr."""
-    return evaluation(request, machine).dataset()
+    return assembly.evaluation(machine, Watching(request)).dataset()
 
 
 def evaluation(request: Request, machine: Machine) -> Evaluation:
     """The same before it is a Dataset, which takes longer to import than to evaluate."""
-    from truepose.error_budget.evaluate import evaluate
-
-    with progress("error budget") as report:
-        result = evaluate(machine, progress=report)
-    indices, status = result.run.left_out.sorted()
-    refuse_left_out(request, machine, indices, result.run.poses[indices], status)
-    show_warnings(result.warnings)
-    return result
+    return assembly.evaluation(machine, Watching(request))
 
 
 def show_warnings(warnings: Iterable[Mapping[str, str]]) -> None:
@@ -113,22 +131,9 @@ def show_warnings(warnings: Iterable[Mapping[str, str]]) -> None:
         click.echo(f"warning[{warning['code']}]: {warning['sentence']}", err=True)
 
 
-def correct(request: Request, machine: Machine) -> xr.Dataset:
-    """The compensation over the file's workspace, of any file: who commands asks for more."""
-    from truepose.compensation.compensate import against_nominal
-
-    with progress("compensation") as report:
-        result = against_nominal(machine, progress=report)
-    refuse_left_out_of(request, machine, result)
-    return result
-
-
 def strain(request: Request, machine: Machine) -> xr.Dataset:
     """The internal forces over the file's workspace."""
-    with progress("internal forces") as report:
-        result = truepose.strain(machine, progress=report)
-    refuse_left_out_of(request, machine, result)
-    return result
+    return assembly.internal_forces(machine, Watching(request))
 
 
 def over_time(request: Request, machine: Machine) -> xr.Dataset:
@@ -139,47 +144,14 @@ def over_time(request: Request, machine: Machine) -> xr.Dataset:
     return result
 
 
-def answers_of(machine: Machine, *states: str) -> tuple[Answer, ...]:
+def answers_of(request: Request, machine: Machine, *states: str) -> tuple[Answer, ...]:
     """The verdict over the file's workspace in the states asked, by default both."""
-    with progress("accuracy") as report:
-        return truepose.accuracy(machine, states=states or STATES, progress=report)
+    return assembly.answers(machine, Watching(request), *states)
 
 
-def study_of(request: Request, machine: Machine) -> Study:
+def compared(request: Request, machine: Machine) -> Study:
     """The machine with both results, and the verdict on both."""
-    evaluated, corrected = evaluate(request, machine), correct(request, machine)
-    odd = truepose.oddities(machine)
-    return Study(machine, evaluated, corrected, answers_of(machine), oddities=odd)
-
-
-def with_time(study: Study) -> Study:
-    """The study with the error over time, where the file has a temperature log.
-
-    At two poses: the one nearest the middle, and the one where the logged temperatures do most.
-    """
-    machine = study.machine
-    if machine.condition.temperature_log is None:
-        return study
-    middle = int(nearest_middle(study.poses)[0])
-    thermal = study.position_norm(study.values("error")[:, study.sources.index("thermal")])
-    chosen = list(dict.fromkeys([middle, where_highest(thermal)]))
-    return replace(study, over_time=truepose.over_time(machine, study.poses[chosen]))
-
-
-def with_calibration(study: Study, measurements: Path | None) -> Study:
-    """The study with a calibration by the defaults, where there are measurements."""
-    if measurements is None:
-        return study
-    with waiting("calibration"):
-        result = truepose.calibrate(study.machine, measurements)
-    return replace(study, calibration=result.dataset)
-
-
-def with_strain(request: Request, study: Study) -> Study:
-    """The study with the internal forces, where the machine is over-constrained."""
-    if not study.machine.kernel.overconstrained:
-        return study
-    return replace(study, strain=strain(request, study.machine))
+    return assembly.compared(machine, Watching(request))
 
 
 def deliver(

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -17,34 +14,14 @@ from truepose.errors import Problem, ReadingError, RequestError
 from truepose.files.units import UnitSystem
 from truepose.files.wording import counted
 from truepose.reporting import reading, uncertainty_tables
-from truepose.reporting.display import is_position, nearest_middle, where_highest
+from truepose.reporting.display import is_position
 from truepose.reporting.formats import netcdf
-from truepose.reporting.study import Study
 from truepose.runs.poses import broken
-from truepose.runs.quantities import quantities
-from truepose.verdict.accuracy import at_coverage
-from truepose.verdict.states import STATES, Population
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from truepose.machine import Machine
-    from truepose.verdict.answer import Answer
-
-SAMPLES = 100_000
-"""Samples at each of the report's two poses: two digits of a standard deviation."""
-ELLIPSE_SAMPLES = 10_000
-"""Samples at each of the poses of which the report draws an ellipse."""
-SEED = 0
-"""Of the report, so that the same file gives the same page."""
-
-COVERAGE = 0.95
-"""At which the report says how far off the tool is over the workspace."""
-MOST_POSES, MOST_DRAWS = 3, 10_000
-"""For that: it is a number, no answer; `[accuracy] at` takes all poses and as many as decide."""
-
-UNITS = {"monte_carlo": "samples", "ellipses": "samples"}
-"""What is counted in the progress of a result, where not poses."""
 
 SYNTAX = "x=200:400,y=100:300"
 
@@ -157,87 +134,3 @@ def keeps_accuracy(machine: Machine, result: xr.Dataset) -> bool:
     return all(
         limit is None or bool((sizes[..., at] <= limit).all()) for at, limit in enumerate(limits)
     )
-
-
-def with_how_sure(study: Study) -> Study:
-    """The study with samples, worst case, bounds and shares, where anything is not known.
-
-    At two poses, so that a report stays quick: the one nearest the middle, and the one where the
-    linear worst case is highest; coverage ellipses at up to 25. What is refused is left out, with
-    the reason.
-    """
-    if not any(study.has_band):
-        return study
-    machine = study.machine
-    middle = int(nearest_middle(study.poses)[0])
-    two = list(dict.fromkeys([middle, where_highest(study.largest)]))
-    poses = study.poses[two]
-    sampling = partial(truepose.monte_carlo, machine, seed=SEED)
-    work: dict[str, Callable[..., Any]] = {
-        "worst_case": partial(truepose.worst_case, machine, poses),
-        "monte_carlo": partial(sampling, poses, samples=SAMPLES),
-        "bounds": partial(truepose.bounds, machine, poses),
-        "shares": partial(truepose.shares, machine, poses, seed=SEED),
-    }
-    if len(study.positions) > 1:
-        axes = [at for at, name in enumerate(machine.commanded) if is_position(name)]
-        chosen = study.poses[uncertainty_tables.spread_over(study.poses, axes)]
-        work["ellipses"] = partial(sampling, chosen, samples=ELLIPSE_SAMPLES)
-    results: dict[str, xr.Dataset] = {}
-    missing: dict[str, str] = {}
-    for name, of in work.items():
-        try:
-            with progress(name.replace("_", " "), UNITS.get(name, "poses")) as report:
-                results[name] = of(progress=report)
-        except RequestError as refusal:
-            missing[name] = _why(refusal)
-        else:
-            if results[name].attrs.get("interrupted"):
-                raise KeyboardInterrupt  # of a report nothing is wanted then
-    if "ellipses" in results:
-        there = results["ellipses"]["ellipse"].notnull().all(("axis", "other_axis")).values
-        results["ellipses"] = results["ellipses"].isel(pose=there)
-        if not there.any():
-            missing["ellipses"] = f"{results.pop('ellipses').attrs['not_assembled']}."
-    return replace(
-        study,
-        sampled=_at_95(study),
-        worst_case=results.get("worst_case"),
-        monte_carlo=results.get("monte_carlo"),
-        ellipses=results.get("ellipses"),
-        bounds=results.get("bounds"),
-        shares=results.get("shares"),
-        missing=missing,
-    )
-
-
-def _at_95(study: Study) -> tuple[Answer, ...]:
-    """The errors that 95 % of all machines stay below, at the worst poses of the workspace.
-
-    The verdict's, where it is at that coverage.
-    """
-    machine = study.machine
-    if machine.accuracy.at == COVERAGE:
-        return study.accuracy
-    with progress("coverage") as report:
-        population = Population(machine, progress=report)
-        return tuple(
-            at_coverage(
-                population,
-                state,
-                kind,
-                COVERAGE,
-                None,
-                most_poses=MOST_POSES,
-                most_draws=MOST_DRAWS,
-            )
-            for state in STATES
-            for kind in quantities(machine.components)
-        )
-
-
-def _why(refusal: RequestError) -> str:
-    """The first problem as one sentence."""
-    problem = refusal.problems[0]
-    detail = f" ({problem.found})" if problem.found else ""
-    return f"{problem.message}{detail}."

@@ -89,7 +89,7 @@ def command(
         _steps.deliver(request, result, tables)
         return INTERRUPTED
     if region is None and truncate is None:
-        answers = _steps.answers_of(machine, BEFORE)
+        answers = _steps.answers_of(request, machine, BEFORE)
         _steps.deliver(request, result, tables, answers)
         return _steps.exit_code(request, met(answers, BEFORE))
     # Another set of machines or of poses than the verdict is on: what is proven of that.

@@ -48,7 +48,7 @@ def command(**options: Any) -> int:
     request = Request(**options)
     machine = _steps.read_machine(request)
     study = Study(machine, _steps.evaluate(request, machine))
-    answers = _steps.answers_of(machine, BEFORE)
+    answers = _steps.answers_of(request, machine, BEFORE)
     _steps.deliver(
         request,
         Result("budget", machine, study.budget),

@@ -282,6 +282,6 @@ def _write_page(request: Request, machine: Machine, dataset: Any, page: Path) ->
 
     from truepose.cli import _steps
 
-    study = replace(_steps.study_of(request, machine), calibration=dataset)
+    study = replace(_steps.compared(request, machine), calibration=dataset)
     text = _steps.machine_text(request)
     _steps.report_page().write(study, page, text)

@@ -126,7 +126,7 @@ def _answers(
     asked = machine.accuracy.target is not None or machine.accuracy.angle_target is not None
     if not (asked or any(inputs.acting(machine))):
         return (), []
-    answers = _steps.answers_of(machine)
+    answers = _steps.answers_of(request, machine)
     try:
         return answers, _steps.evaluation(request, machine).warnings
     except RequestError as error:

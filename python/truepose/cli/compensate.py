@@ -49,7 +49,7 @@ def command(**options: Any) -> int:
     request = Request(**options)
     machine = _steps.read_machine(request)
     require_known_controller(machine)
-    study = _steps.study_of(request, machine)
+    study = _steps.compared(request, machine)
     assert study.compensation is not None
     _steps.show_warnings(warnings_of(study.compensation))
     answers = study.accuracy

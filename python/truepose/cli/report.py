@@ -65,12 +65,12 @@ def command(**options: Any) -> int:
     --require-accuracy the exit code is 1 when it is not certain that the accuracy asked is kept
     after compensation.
     """
-    from truepose.cli import _steps, _uncertainty
+    from truepose.cli import _steps
     from truepose.cli._show import show_answers, show_tables
     from truepose.cli._verbose import say_result, step
     from truepose.files.one_run import is_stdin
     from truepose.files.writing import require_writable
-    from truepose.reporting import how_far, tables, uncertainty_tables
+    from truepose.reporting import assembly, how_far, tables, uncertainty_tables
     from truepose.verdict.answer import AFTER, met
 
     if options["output"] is None:
@@ -88,9 +88,7 @@ def command(**options: Any) -> int:
     if beside:
         require_writable(request.output, [".html"], [request.machine_file, *beside])
     machine = _steps.read_machine(request, [".html"])
-    study = _steps.with_time(_steps.study_of(request, machine))
-    study = _uncertainty.with_how_sure(_steps.with_strain(request, study))
-    study = _steps.with_calibration(study, measurements)
+    study = assembly.study(machine, measurements, _steps.Watching(request))
     part = None
     if program is not None:
         from truepose.cli import _part

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ import truepose
 from command_line import MACHINES, PLANAR, call
 from truepose.cli import _uncertainty
 from truepose.errors import Problem, RequestError
+from truepose.reporting import assembly
 
 HEXAPOD = MACHINES / "hexapod.toml"  # in inches
 
@@ -35,6 +37,13 @@ class Asked:
         return self.result(machine, machine.poses()[:3] if poses is None else poses)
 
 
+def stand_in_for(monkeypatch: pytest.MonkeyPatch, name: str, function: Any) -> None:
+    """Put another function in the place of a public one, where the report takes it from too."""
+    monkeypatch.setattr(truepose, name, function, raising=False)
+    module = import_module(f"truepose.uncertainty_analysis.{name}")
+    monkeypatch.setattr(module, name, function)
+
+
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Asked]:
     stand_ins = {
@@ -43,7 +52,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> dict[str, Asked]:
         "shares": Asked(made.shares),
     }
     for name, each in stand_ins.items():
-        monkeypatch.setattr(truepose, name, each, raising=False)
+        stand_in_for(monkeypatch, name, each)
     return stand_ins
 
 
@@ -354,14 +363,14 @@ def test_the_report_asks_at_the_middle_and_the_worst_pose(
         poses.append(at)
         raise RequestError(Problem("bad-region", "strut.1.length has no ends", found="normal"))
 
-    monkeypatch.setattr(truepose, "bounds", Asked(bounds), raising=False)
+    stand_in_for(monkeypatch, "bounds", Asked(bounds))
     page = tmp_path / "page.html"
     outcome = call(capsys, "report", PLANAR, "--output", page)
     assert outcome.code == 0
     (two,) = poses
     np.testing.assert_allclose(two[0], [0.3, 0.2])
     assert len(two) == 2
-    assert asked["monte_carlo"].settings["samples"] == _uncertainty.ELLIPSE_SAMPLES
+    assert asked["monte_carlo"].settings["samples"] == assembly.ELLIPSE_SAMPLES
     assert "How far off can the tool be?" in outcome.out
     text = page.read_text("utf-8")
     assert "<td>proven bound</td><td>strut.1.length has no ends (normal).</td>" in text
@@ -378,7 +387,7 @@ def test_ctrl_c_ends_the_report_too(
     def interrupted(machine: Any, poses: Any) -> xr.Dataset:
         return made.monte_carlo(machine, poses, interrupted=1)
 
-    monkeypatch.setattr(truepose, "monte_carlo", Asked(interrupted), raising=False)
+    stand_in_for(monkeypatch, "monte_carlo", Asked(interrupted))
     outcome = call(capsys, "report", PLANAR, "--output", tmp_path / "page.html")
     assert outcome.code == 130
     assert list(tmp_path.iterdir()) == []
@@ -388,7 +397,7 @@ def test_a_machine_that_is_known_exactly_has_a_report_without_them(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     for name in ("monte_carlo", "bounds", "shares", "worst_case"):
-        monkeypatch.setattr(truepose, name, None, raising=False)
+        stand_in_for(monkeypatch, name, None)
     page = tmp_path / "page.html"
     exact = ["--set", "strut.*.length_tolerance=[0, 0]"]
     assert call(capsys, "report", PLANAR, *exact, "--output", page).code == 0

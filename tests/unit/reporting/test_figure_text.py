@@ -9,8 +9,7 @@ import pytest
 
 import truepose
 from build_machine import MACHINES
-from truepose.cli import _steps, _uncertainty
-from truepose.cli._options import Request
+from truepose.reporting import assembly
 from truepose.reporting.figures import draw
 from truepose.reporting.figures._plot import Plot, trace
 from truepose.reporting.figures._text import NO_BOX, as_text
@@ -26,8 +25,7 @@ def texts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     assert named != text
     file = tmp_path_factory.mktemp("machine") / "machine.toml"
     file.write_text(named)
-    request = Request(machine_file=file)
-    study = _uncertainty.with_how_sure(_steps.study_of(request, truepose.load(file)))
+    study = assembly.study(truepose.load(file))
     return {drawn.name: texts_of([drawn.figure.data, drawn.figure.layout]) for drawn in draw(study)}
 
 

@@ -116,7 +116,7 @@ def outliers(result: xr.Dataset) -> Table | None:
         for row in every[:MOST_LISTED]
     ]
     note = "They count less in the fit, unless the robust loss is switched off."
-    if not _odd(result).any():
+    if not odd_readings(result).any():
         note = (
             f"{len(every)} of {result.attrs['observations']} readings: these are no odd ones, the "
             "data or the model are wrong as a whole."
@@ -301,7 +301,7 @@ def residuals(result: xr.Dataset, shown_in: ShownUnits) -> Table:
     units = result["observation_units"].values
     names = result["observation_what"].values
     sigma = result["uncertainty"].values
-    named = _odd(result)
+    named = odd_readings(result)
     rows = []
     for name, unit in dict.fromkeys(zip(instrument.tolist(), units.tolist(), strict=True)):
         mine = (instrument == name) & (units == unit)
@@ -351,7 +351,7 @@ def residuals(result: xr.Dataset, shown_in: ShownUnits) -> Table:
     )  # fmt: skip
 
 
-def _odd(result: xr.Dataset) -> np.ndarray:
+def odd_readings(result: xr.Dataset) -> np.ndarray:
     """(n_observation,) readings that do not fit, where they are few: none where many do not."""
     sizes = result["standardised"].values
     flags: np.ndarray = np.abs(sizes) >= OUTLIER

@@ -11,7 +11,20 @@ from truepose.arrays import Floats
 from truepose.files.shown_units import Shown
 from truepose.reporting.figures import DrawnFigure
 from truepose.reporting.figures._plot import Keys, Plot, trace
-from truepose.reporting.figures._style import AXIS, GRID, INK, SOURCE_COLOURS, finish, small
+from truepose.reporting.figures._style import (
+    AXIS,
+    BEFORE_FILL,
+    BLUE_FILL,
+    BROWN,
+    GRID,
+    INK,
+    PAPER,
+    PURPLE,
+    QUIET,
+    SOURCE_COLOURS,
+    finish,
+    small,
+)
 from truepose.reporting.figures._text import as_text
 
 if TYPE_CHECKING:
@@ -34,9 +47,8 @@ EDGE = MIDDLE + REACH + 0.26
 STEPS = (1.0, 2.0, 5.0, 10.0)
 """Round numbers of a scale."""
 
-QUIET = "#5b6779"
-MEASURED = ("#B23A48", "#7A1F2B")
-BANDS = ("rgba(0, 114, 178, 0.16)", "rgba(213, 94, 0, 0.16)")
+MEASURED = (PURPLE, BROWN)
+BANDS = (BLUE_FILL, BEFORE_FILL)
 
 
 def figures(machine: Machine, result: xr.Dataset) -> list[DrawnFigure]:
@@ -175,7 +187,7 @@ class _Polar:
                 MIDDLE + REACH / self.reach * number * ring,
                 f"{label} {self.unit.label}" if number == most else label,
                 font={"size": 11, "color": QUIET},
-                bgcolor="rgba(255, 255, 255, 0.75)",
+                bgcolor=PAPER,
             )
 
     def _spokes(self) -> None:

@@ -251,8 +251,26 @@ def test_changes_are_in_half_bands(study: Study) -> None:
 
 
 def test_the_strongest_correlation_is_named(study: Study) -> None:
-    said = calibration_correlation.caption(study)
-    assert "length of strut 1 with length of strut 2, \N{MINUS SIGN}0.970" in said
+    said = calibration_correlation.says(study)
+    assert (
+        "length of strut 1 and length of strut 2: their correlation is \N{MINUS SIGN}0.970" in said
+    )
+
+
+def test_figures_say_what_the_tables_say(study: Study) -> None:
+    found = study.calibrated
+    (name, what, _, stated, before, after, *_), *_ = told.residuals(found, MADE_UNITS).rows
+    said = calibration_residuals.says(study)
+    assert f"residuals of {name} fall from {before} to {after}" in said
+    assert f"stated were {stated} {what.rpartition(', ')[2]}" in said
+    worst = told.tool(found, MADE_UNITS).rows[0]
+    assert f"at most {worst[2]}" in calibration_tool.says(study)
+    assert f"up to {worst[1]}" in calibration_tool.says(study)
+    assert "Of 4 unknowns 2 come mostly from the measurements" in calibration_unknowns.says(study)
+    shown = calibration_map.says(study)
+    normalised = found["normalised_after"].values.reshape(-1, 2)
+    largest = np.sqrt(np.nanmean(normalised**2, axis=1)).max()
+    assert f"{largest:.2f} times their stated" in shown
 
 
 def test_the_page_begins_with_it(study: Study) -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.language import say
+from truepose.reporting.display import number
 from truepose.reporting.figures._plot import Keys, Plot, trace
-from truepose.reporting.figures._style import finish, small
+from truepose.reporting.figures._style import BLUE, PAPER, VERMILION, finish, small
 from truepose.reporting.study import Study
 
 TITLE = "Correlation"
@@ -13,25 +15,41 @@ NEEDS = "calibration"
 MOST_DRAWN = 120
 MOST_NAMED = 60
 STRONG = 0.9
-SCALE = [[0.0, "#0072B2"], [0.5, "#FFFFFF"], [1.0, "#D55E00"]]
-"""Blue and vermilion of Okabe and Ito, told apart by colour-blind readers too."""
+SCALE = [[0.0, BLUE], [0.5, PAPER], [1.0, VERMILION]]
+"""Told apart by colour-blind readers too."""
+
+
+def says(study: Study) -> str:
+    """The strongest pair."""
+    pair = _strongest(study)
+    if pair is None:
+        return say("No two unknowns are correlated by {strong} or more.", strong=number(STRONG, 1))
+    first, second, value = pair
+    return say(
+        "Told apart worst are {first} and {second}: their correlation is {value}.",
+        first=first,
+        second=second,
+        value=f"+{number(value, 3)}" if value > 0 else number(value, 3),
+    )
 
 
 def caption(study: Study) -> str:
-    """What the colours mean, and the strongest pair."""
-    text = (
-        "Correlation of the values found. Near +1 or −1 two unknowns are known well together "
-        "(their difference, or their sum) and badly by themselves: what such values are worth "
-        "shows at the tool only."
-    )
-    pair = _strongest(study)
-    if pair is not None:
-        first, second, value = pair
-        sign = "+" if value > 0 else "\N{MINUS SIGN}"
-        text += f" The strongest: {first} with {second}, {sign}{abs(value):.3f}."
+    """What the colours mean."""
+    parts = [
+        say(
+            "Correlation of the values found. Near +1 or −1 two unknowns are known well together "
+            "(their difference, or their sum) and badly by themselves: what such values are worth "
+            "shows at the tool only."
+        )
+    ]
     if study.calibrated.sizes["unknown"] > MOST_DRAWN:
-        text += f" Drawn: the first {MOST_DRAWN} unknowns; files for programs have all."
-    return text
+        parts.append(
+            say(
+                "Drawn: the first {count} unknowns; files for programs have all.",
+                count=MOST_DRAWN,
+            )
+        )
+    return " ".join(parts)
 
 
 def figure(study: Study) -> Plot:

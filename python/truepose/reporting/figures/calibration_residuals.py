@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from truepose.arrays import Floats
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.files.shown_units import Shown
+from truepose.language import say
+from truepose.reporting.calibration import odd_readings, rms
+from truepose.reporting.display import decimals_for, number
 from truepose.reporting.figures._plot import Keys, Plot, grid, trace
-from truepose.reporting.figures._style import AFTER, BEFORE, OVERALL, finish, small
+from truepose.reporting.figures._style import (
+    AFTER,
+    BEFORE,
+    OVERALL,
+    SHADE,
+    finish,
+    small,
+)
 from truepose.reporting.study import Study
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 TITLE = "Residuals"
 NEEDS = "calibration"
@@ -19,21 +34,47 @@ COVERAGE = 2.0
 """Standard uncertainties within which 95 of 100 readings should be."""
 
 
+def says(study: Study) -> str:
+    """How much smaller the residuals are after calibration, of the first kind of readings."""
+    result = study.calibrated
+    kinds = zip(
+        result["row_instrument"].values[result["observation_row"].values].tolist(),
+        result["observation_units"].values.tolist(),
+        strict=True,
+    )
+    instrument, unit = next(kinds)
+    before, after, stated = residual_sizes(result, instrument, unit)
+    scale = _scale(study, unit)
+    places = decimals_for([size * scale.per_si for size in (before, after)], 4)
+    return say(
+        "The residuals of {instrument} fall from {before} to {after} {unit} (root mean square); "
+        "stated were {stated} {unit}.",
+        instrument=instrument,
+        before=number(before * scale.per_si, places),
+        after=number(after * scale.per_si, places),
+        stated=number(stated * scale.per_si, places),
+        unit=scale.label,
+    )
+
+
 def caption(study: Study) -> str:
     """What the points are, and where they should be."""
-    text = (
-        "Predicted minus measured. Left: the machine as filed, its instruments placed as fits it "
-        "best, against the calibrated one. Right: the calibrated machine alone, where 95 in 100 "
-        "points should lie in the grey band of twice the stated uncertainty, and show no pattern."
-    )
+    parts = [
+        say(
+            "Predicted minus measured. Left, on one scale: the machine as filed (hollow), its "
+            "instruments placed as fits it best, against the calibrated one (filled). Right: the "
+            "calibrated machine alone, where 95 in 100 points should lie in the grey band of twice "
+            "the stated uncertainty, and show no pattern."
+        )
+    ]
     if _named(study).any():
-        text += " Readings that do not fit are further out than it shows."
+        parts.append(say("Readings that do not fit are further out than it shows."))
     kind = study.calibrated.attrs["validation"]
     if kind == "folds":
-        text += " Open circles: rows predicted by a fit that did not use them."
+        parts.append(say("Crosses: rows predicted by a fit that did not use them."))
     if kind == "stated set":
-        text += " Open circles: rows that the file keeps from the fit."
-    return text
+        parts.append(say("Crosses: rows that the file keeps from the fit."))
+    return " ".join(parts)
 
 
 def figure(study: Study) -> Plot:
@@ -45,7 +86,7 @@ def figure(study: Study) -> Plot:
         cols=2,
         horizontal_spacing=0.09,
         vertical_spacing=0.25 / len(units),
-        column_titles=["before and after", "after, enlarged"],
+        column_titles=[say("before and after"), say("after, enlarged")],
     )
     rows = result["observation_row"].values
     lines = result["row_line"].values
@@ -53,9 +94,9 @@ def figure(study: Study) -> Plot:
     where = (lines if in_file else result["row"].values)[rows]
     labels = _labels(study)
     sigma = result["uncertainty"].values
-    for number, unit in enumerate(units):
+    for nth, unit in enumerate(units):
         mine = result["observation_units"].values == unit
-        scale = Shown("1", 1.0) if unit == "1" else study.units.small(unit)
+        scale = _scale(study, unit)
         factor, shown = scale.per_si, scale.label
         sets = {
             name: (result[name].values * (sigma if normalised else 1.0))[mine] * factor
@@ -66,39 +107,73 @@ def figure(study: Study) -> Plot:
             )
         }
         at, text = where[mine], labels[mine]
-        first = number == 0
+        first = nth == 0
         for column in (1, 2):
-            place = {"row": number + 1, "col": column}
+            place = {"row": nth + 1, "col": column}
             if column == 1:
                 figure.add_trace(
-                    _points(at, sets["residual_before"], text, "before", BEFORE, first), **place
+                    _points(
+                        at,
+                        sets["residual_before"],
+                        text,
+                        say("before"),
+                        BEFORE,
+                        first,
+                        "circle-open",
+                    ),
+                    **place,
                 )
             else:
                 for edge in _band(at, sigma[mine] * factor):
                     figure.add_trace(edge, **place)
             figure.add_trace(
-                _points(at, sets["residual_after"], text, "after", AFTER, first and column == 1),
+                _points(
+                    at, sets["residual_after"], text, say("after"), AFTER, first and column == 1
+                ),
                 **place,
             )
             if column == 2 and np.isfinite(sets["held_out_after"]).any():
                 figure.add_trace(
                     _points(
-                        at, sets["held_out_after"], text, "not used for the fit", OVERALL, first,
-                        "circle-open",
+                        at,
+                        sets["held_out_after"],
+                        text,
+                        say("not used for the fit"),
+                        OVERALL,
+                        first,
+                        "x-thin-open",
                     ),
                     **place,
-                )  # fmt: skip
-        figure.update_yaxes(title={"text": f"residual, {shown}"}, row=number + 1, col=1)
+                )
+        figure.update_yaxes(title={"text": say("residual, {unit}", unit=shown)}, row=nth + 1, col=1)
         fit = mine & ~_named(study)
         after = (result["normalised_after"].values * sigma)[fit] * factor
         held_out = (result["held_out_after"].values * sigma)[fit] * factor
         reach = np.abs(np.concatenate([after, held_out, 2.5 * sigma[mine] * factor]))
         most = 1.08 * float(np.nanmax(reach))
-        figure.update_yaxes(range=[-most, most], row=number + 1, col=2)
+        figure.update_yaxes(range=[-most, most], row=nth + 1, col=2)
     finish(figure, 110 + PANEL_HEIGHT * len(units), margin={"l": 75, "r": 20, "t": 70, "b": 55})
-    name = "line of the file" if in_file else "row"
+    name = say("line of the file") if in_file else say("row")
     figure.update_xaxes(title={"text": name}, row=len(units))
     return figure
+
+
+def residual_sizes(result: xr.Dataset, instrument: str, unit: str) -> tuple[float, float, float]:
+    """Root mean squares before, after and as stated of an instrument's readings in a unit, SI.
+
+    The same readings as in the table of residuals: those that are odd are left out.
+    """
+    of_reading = result["row_instrument"].values[result["observation_row"].values]
+    mine = (of_reading == instrument) & (result["observation_units"].values == unit)
+    mine &= ~odd_readings(result)
+    names = ("residual_before", "residual_after", "uncertainty")
+    before, after, stated = (rms(result[name].values[mine]) for name in names)
+    return before, after, stated
+
+
+def _scale(study: Study, unit: str) -> Shown:
+    """The unit in which residuals are shown."""
+    return Shown("1", 1.0) if unit == "1" else study.units.small(unit)
 
 
 def _named(study: Study) -> np.ndarray:
@@ -154,5 +229,5 @@ def _band(at: np.ndarray, sigma: Floats) -> list[Keys]:
               "hoverinfo": "skip"}  # fmt: skip
     return [
         trace("scatter", y=small(-half), **common),
-        trace("scatter", y=small(half), fill="tonexty", fillcolor="rgba(27,42,65,0.10)", **common),
+        trace("scatter", y=small(half), fill="tonexty", fillcolor=SHADE, **common),
     ]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from truepose.language import say
+from truepose.reporting.display import decimals_for, number, pose_text, where_highest
 from truepose.reporting.figures._maps import label_map_axes, map_trace, places_of
 from truepose.reporting.figures._plot import Plot, grid
 from truepose.reporting.figures._style import COLOUR_SCALE, finish
@@ -18,22 +20,57 @@ _MARGINS = {True: {"l": 5, "r": 5, "t": 40, "b": 5}, False: {"l": 65, "r": 60, "
 """Pixels about the maps, by whether they are spatial."""
 
 
+def says(study: Study) -> str:
+    """The largest uncertainty after calibration, where it is, and what it was before."""
+    before, after = _sizes(study, "before"), _sizes(study, "after")
+    unit = study.units.error(_quantity(study)).label
+    if not np.isfinite(after).all():
+        return say(
+            "At {count} of {every} poses nothing limits the uncertainty of the tool.",
+            count=int((~np.isfinite(after)).sum()),
+            every=after.size,
+        )
+    worst = where_highest(after)
+    names = study.machine.commanded
+    pose = [study.calibrated[f"pose_{name}"].values[worst] for name in names]
+    is_known = bool(np.isfinite(before).all())
+    places = decimals_for([after[worst], before.max() if is_known else 0.0], 4)
+    said = {
+        "after": f"{number(float(after[worst]), places)} {unit}",
+        "pose": pose_text(pose, names, study.units),
+    }
+    if not is_known:
+        return say(
+            "After calibration the tool's standard uncertainty is at most {after}, at {pose}.",
+            **said,
+        )
+    return say(
+        "After calibration the tool's standard uncertainty is at most {after}, at {pose}; before "
+        "it was up to {before}.",
+        before=f"{number(float(before.max()), places)} {unit}",
+        **said,
+    )
+
+
 def caption(study: Study) -> str:
     """What the colour is, and what is not in it."""
     result = study.calibrated
-    what = _quantity(study)
-    text = (
-        f"Standard uncertainty of the tool's {what} over the workspace. Before: from the "
-        "tolerances. After: from the measurements, and the tolerances where they were used. "
-        "The two scales differ."
-    )
+    parts = [
+        say(
+            "Standard uncertainty of where the tool is, over the workspace. Before: from the "
+            "tolerances. After: from the measurements, and the tolerances where they were used. "
+            "The two scales differ."
+        )
+    ]
     if result.attrs["relative"]:
-        text += " Where the machine as a whole stands in the instrument's frame is not in it."
+        parts.append(
+            say("Where the machine as a whole stands in the instrument's frame is not in it.")
+        )
     if not np.isfinite(_sizes(study, "before")).any():
-        text += " Not every unknown has a tolerance, so there is no before."
+        parts.append(say("Not every unknown has a tolerance, so there is no before."))
     if np.isinf(_sizes(study, "after")).any():
-        text += " Poses without a point: nothing limits the uncertainty there."
-    return text
+        parts.append(say("Poses without a point: nothing limits the uncertainty there."))
+    return " ".join(parts)
 
 
 def figure(study: Study) -> Plot:
@@ -48,19 +85,19 @@ def figure(study: Study) -> Plot:
     figure = grid(
         rows=1,
         cols=2,
-        titles=kinds,
+        titles=[say("before") if when == "before" else say("after") for when in kinds],
         spatial=spatial,
         horizontal_spacing=GAP,
     )
     finish(figure, HEIGHT, margin=_MARGINS[spatial])
     unit = study.units.error(_quantity(study)).label
-    for number, when in enumerate(kinds):
+    for nth, when in enumerate(kinds):
         sizes = np.full(len(places.points), np.nan)
         at_poses = _sizes(study, when)
         np.fmax.at(sizes, places.of_pose, np.where(np.isfinite(at_poses), at_poses, np.nan))
         drawn = np.flatnonzero(np.isfinite(sizes))
-        axis = "coloraxis" if number == 0 else "coloraxis2"
-        figure.add_trace(map_trace(places, drawn, sizes, unit, axis), row=1, col=number + 1)
+        axis = "coloraxis" if nth == 0 else "coloraxis2"
+        figure.add_trace(map_trace(places, drawn, sizes, unit, axis), row=1, col=nth + 1)
         figure.update_layout(
             **{
                 axis: {
@@ -71,7 +108,7 @@ def figure(study: Study) -> Plot:
                         "title": {"text": unit},
                         "thickness": 14,
                         "len": 0.85,
-                        "x": (1.0 - GAP) / 2 + 0.005 if number == 0 else 1.005,
+                        "x": (1.0 - GAP) / 2 + 0.005 if nth == 0 else 1.005,
                     },
                 }
             }

@@ -4,34 +4,69 @@ from __future__ import annotations
 
 import numpy as np
 
-from truepose.reporting.calibration import signed
+from truepose.language import grouped, say
+from truepose.reporting.calibration import RESTS, signed
+from truepose.reporting.display import number
 from truepose.reporting.figures._plot import Plot, grid, trace
-from truepose.reporting.figures._style import AFTER, AXIS, SOURCE_COLOURS, finish, small
+from truepose.reporting.figures._style import (
+    AFTER,
+    AXIS,
+    BLUE,
+    PALE,
+    SHADE,
+    finish,
+    small,
+)
 from truepose.reporting.study import Study
 
 TITLE = "What was found"
 NEEDS = "calibration"
-DATA, PRIOR = SOURCE_COLOURS[0], "#D5DBE5"
+DATA, PRIOR = BLUE, PALE
 MOST_DRAWN = 60
 ROW_HEIGHT = 19
 FURTHEST = 3.0
 """Half bands that the axis shows at most: what is further off stands at its edge."""
 
 
+def says(study: Study) -> str:
+    """How many values come from the measurements, and how many from what was known before."""
+    share = np.nan_to_num(study.calibrated["data_share"].values)
+    return say(
+        "Of {every} unknowns {data} come mostly from the measurements, and {prior} mostly from "
+        "what was known before, their tolerances.",
+        every=share.size,
+        data=int((share >= RESTS).sum()),
+        prior=int((share < RESTS).sum()),
+    )
+
+
 def caption(study: Study) -> str:
     """How the two halves are read."""
-    text = (
-        "Left: how much of each value comes from the measurements; the rest is the tolerance, "
-        "which the value then only repeats. Right: the change found, in half bands of its "
-        "tolerance, with twice its standard uncertainty either side. The grey band is the "
-        "tolerance."
-    )
+    parts = [
+        say(
+            "Left: how much of each value comes from the measurements; the rest is the tolerance, "
+            "which the value then only repeats. Right: the change found, in half bands of its "
+            "tolerance, with twice its standard uncertainty either side. The grey band is the "
+            "tolerance."
+        )
+    ]
     count = study.calibrated.sizes["unknown"]
     if count > MOST_DRAWN:
-        text += f" Drawn: the {MOST_DRAWN} of {count} unknowns of which the measurements say most."
+        parts.append(
+            say(
+                "Drawn: the {drawn} of {count} unknowns of which the measurements say most.",
+                drawn=MOST_DRAWN,
+                count=grouped(count),
+            )
+        )
     if _beyond(study).any():
-        text += f" What is further off than {FURTHEST:g} half bands stands at the edge."
-    return text
+        parts.append(
+            say(
+                "What is further off than {most} half bands stands at the edge.",
+                most=number(FURTHEST, 0),
+            )
+        )
+    return " ".join(parts)
 
 
 def figure(study: Study) -> Plot:
@@ -42,8 +77,8 @@ def figure(study: Study) -> Plot:
     share = np.nan_to_num(result["data_share"].values[drawn])
     figure = grid(rows=1, cols=2, shared_yaxes=True, horizontal_spacing=0.04)
     for values, name, colour in (
-        (share, "from the measurements", DATA),
-        (1.0 - share, "from the tolerance", PRIOR),
+        (share, say("from the measurements"), DATA),
+        (1.0 - share, say("from the tolerance"), PRIOR),
     ):
         figure.add_trace(
             trace(
@@ -73,7 +108,7 @@ def figure(study: Study) -> Plot:
                 )
                 for at in drawn
             ],
-            name="change found",
+            name=say("change found"),
             mode="markers",
             marker={"color": AFTER, "size": 7},
             hovertemplate="%{y}: %{text}<extra></extra>",
@@ -81,7 +116,7 @@ def figure(study: Study) -> Plot:
         row=1,
         col=2,
     )  # fmt: skip
-    figure.add_vrect(-1, 1, fillcolor="rgba(27,42,65,0.08)", line={"width": 0}, row=1, col=2)
+    figure.add_vrect(-1, 1, fillcolor=SHADE, line={"width": 0}, row=1, col=2, name=say("tolerance"))
     finish(
         figure,
         130 + ROW_HEIGHT * len(drawn),
@@ -91,9 +126,9 @@ def figure(study: Study) -> Plot:
         margin={"l": 190, "r": 20, "t": 45, "b": 55},
     )
     figure.update_yaxes(range=[len(drawn) - 0.5, -0.5], ticks="", showgrid=False, dtick=1)
-    figure.update_xaxes(title={"text": "share of the value, %"}, range=[0, 100], row=1, col=1)
+    figure.update_xaxes(title={"text": say("share of the value, %")}, range=[0, 100], row=1, col=1)
     figure.update_xaxes(
-        title={"text": "change, half bands"}, range=_range(change, spread), zeroline=True,
+        title={"text": say("change, half bands")}, range=_range(change, spread), zeroline=True,
         zerolinecolor=AXIS, row=1, col=2,
     )  # fmt: skip
     return figure

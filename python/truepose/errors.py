@@ -150,6 +150,8 @@ CATALOGUE: dict[str, str] = {
     "machine-file-changed": "a machine file that is not the one that was read",
     "no-witness": "a witness is wanted where no machine exceeds the accuracy asked",
     "witness-not-written": "a witness that a machine file cannot say",
+    "no-browser": "a PDF is wanted where no browser is installed that prints it",
+    "browser-failed": "the browser that prints a PDF did not start, or did not print",
     "unknown-language": "a language that the report is not written in",
     "unknown-kind": "a kind of machine that is not in the library",
     "no-family": "joint centres are to follow from a family, in a file without one",

@@ -19,6 +19,8 @@ from truepose.cli._options import (
 )
 from truepose.cli._verbose import verbose_option
 
+ENDINGS = (".html", ".pdf")
+
 
 @click.command("report")
 @takes(
@@ -28,10 +30,16 @@ from truepose.cli._verbose import verbose_option
         "--output",
         "-o",
         "output",
-        metavar="FILE.html",
-        type=OutputFile(".html"),
-        help="Where the page goes; by default beside you, named after the machine file (of "
+        metavar="FILE",
+        type=OutputFile(".html", ".pdf"),
+        help="Where the page goes; its ending chooses the form: .html, or .pdf where a browser is "
+        "installed that prints it. By default beside you, named after the machine file (of "
         "standard input, report.html).",
+    ),
+    click.option(
+        "--paper",
+        type=click.Choice(["A4", "Letter"], case_sensitive=False),
+        help="The paper of a .pdf. Default: A4.",
     ),
     click.option(
         "--measurements",
@@ -61,7 +69,7 @@ def command(**options: Any) -> int:
     """Do all of it, and write one HTML page.
 
     Evaluates, compares and compensates, samples, bounds and shares out the error at two poses,
-    prints the tables, and writes the page, which opens from disk without a network. With
+    prints the tables, and writes the page, which opens from disk without a network, or prints it. With
     --require-accuracy the exit code is 1 when it is not certain that the accuracy asked is kept
     after compensation.
     """
@@ -81,13 +89,17 @@ def command(**options: Any) -> int:
     features: Path | None = options.pop("features")
     if features is not None and program is None:
         raise click.UsageError("--features goes with --part.")
+    paper: str | None = options.pop("paper")
+    if paper is not None and options["output"].suffix.lower() != ".pdf":
+        raise click.UsageError("--paper goes with --output FILE.pdf.")
     request = Request(**options)
     assert request.output is not None
     page = _steps.report_page()
     beside = [path for path in (measurements, program, features) if path is not None]
     if beside:
-        require_writable(request.output, [".html"], [request.machine_file, *beside])
-    machine = _steps.read_machine(request, [".html"])
+        require_writable(request.output, ENDINGS, [request.machine_file, *beside])
+    machine = _steps.read_machine(request, ENDINGS)
+    browser = _browser() if request.output.suffix.lower() == ".pdf" else None
     study = assembly.study(machine, measurements, _steps.Watching(request))
     part = None
     if program is not None:
@@ -96,8 +108,11 @@ def command(**options: Any) -> int:
         part = _part.shown_on_page(machine, program, features)
     text = _steps.machine_text(request)
     say_result(study.budget)
-    with step(f"{request.output} written"):
-        page.write(study, request.output, text, part)
+    if browser is None:
+        with step(f"{request.output} written"):
+            page.write(study, request.output, text, part)
+    else:
+        _print(page.render(study, text, part), request.output, paper or "A4", browser)
     show_answers(machine, study.accuracy)
     shown = [
         tables.ranking(study),
@@ -113,3 +128,22 @@ def command(**options: Any) -> int:
     show_tables(table for table in shown if table is not None)
     _steps.note_written(request.output)
     return _steps.exit_code(request, met(study.accuracy, AFTER))
+
+
+def _browser() -> str:
+    """The browser that prints. Raises `RequestError` (no-browser) before any work is done."""
+    from truepose.reporting import pdf
+
+    browser = pdf.installed_browser()
+    if pdf.unprotected():
+        click.echo(f"as root {browser} runs without its sandbox (--no-sandbox)", err=True)
+    return browser
+
+
+def _print(page: str, output: Path, paper: str, browser: str) -> None:
+    """Print a page, its HTML, to a PDF file."""
+    from truepose.cli._progress import waiting
+    from truepose.reporting import pdf
+
+    with waiting(f"{output} printed by {browser}"):
+        pdf.write(page, output, paper, browser)

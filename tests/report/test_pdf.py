@@ -146,6 +146,9 @@ def test_no_browser_is_told_before_any_work(
     assert outcome.code == 2
     assert "error[no-browser]" in outcome.err
     assert "apt-get install chromium" in outcome.err
+    with pytest.raises(RequestError) as caught:
+        pdf.installed_browser({pdf.BROWSER: "no-such-browser"})
+    assert [problem.code for problem in caught.value.problems] == ["no-browser"]
 
 
 def script(folder: Path, body: str) -> str:

@@ -69,9 +69,9 @@ def command(**options: Any) -> int:
     """Do all of it, and write one HTML page.
 
     Evaluates, compares and compensates, samples, bounds and shares out the error at two poses,
-    prints the tables, and writes the page, which opens from disk without a network, or prints it. With
-    --require-accuracy the exit code is 1 when it is not certain that the accuracy asked is kept
-    after compensation.
+    prints the tables, and writes the page, which opens from disk without a network, or prints it.
+    With --require-accuracy the exit code is 1 when it is not certain that the accuracy asked is
+    kept after compensation.
     """
     from truepose.cli import _steps
     from truepose.cli._show import show_answers, show_tables

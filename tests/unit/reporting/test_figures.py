@@ -27,7 +27,6 @@ from truepose.reporting.figures import (
     machine_drawing,
     ranking,
     tornado,
-    workspace_maps,
 )
 from truepose.reporting.study import Study
 from truepose.verdict.answer import Answer
@@ -101,39 +100,6 @@ def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: St
         expected = study.strained["overall_force"].sel(closure=closure).values
         np.testing.assert_allclose(line.y, expected, rtol=1e-6)
     assert "more closures than freedoms" in internal_forces.caption(study)
-
-
-def test_maps_share_one_colour_scale(study: Study) -> None:
-    figure = checked(workspace_maps.figure(study))
-    sizes = [study.largest, study.values("largest")[:, :, 0]]
-    assert figure.layout.coloraxis.cmin == 0
-    assert figure.layout.coloraxis.cmax == pytest.approx(max(map(np.max, sizes)) * 1e6)
-    for each in figure.data:
-        colours = each.coloraxis if each.type == "heatmap" else each.marker.coloraxis
-        assert colours == "coloraxis"
-    titles = [note.text for note in figure.layout.annotations]
-    assert titles == ["all sources", "after compensation", "tolerance", "thermal", "elastic"]
-
-
-def test_a_heat_map_has_each_value_at_its_place() -> None:
-    study = planar_study()
-    first = checked(workspace_maps.figure(study)).data[0]
-    size = study.largest * 1e6
-    for pose, expected in zip(study.poses, size, strict=True):
-        column = int(np.argmin(np.abs(first.x - pose[0] * 1e3)))
-        row = int(np.argmin(np.abs(first.y - pose[1] * 1e3)))
-        assert first.z[row, column] == pytest.approx(expected, rel=1e-6)
-
-
-def test_poses_that_differ_in_what_is_not_shown_give_the_largest() -> None:
-    study = hexapod_study(3)
-    twice = Study(study.machine, study.budget.isel(pose=np.repeat(np.arange(27), 2)))
-    turned = twice.budget["pose_a"].values.copy()
-    turned[1::2] = 0.1
-    twice.budget["pose_a"] = ("pose", turned)
-    figure = checked(workspace_maps.figure(twice))
-    assert len(figure.data[0].x) == 27
-    assert "Over a the largest is shown." in workspace_maps.caption(twice)
 
 
 def test_the_drawing_joins_carriages_and_tool() -> None:

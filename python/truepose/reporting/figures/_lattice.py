@@ -35,8 +35,8 @@ class Lattice:
     def slice_through(self, pose: int, coordinate: int) -> Indices:
         """Poses that differ from a pose in one coordinate only, in the order of it."""
         others = np.delete(self.steps, coordinate, axis=1)
-        found = np.flatnonzero((others == others[pose]).all(axis=1))
-        return found[np.argsort(self.steps[found, coordinate], kind="stable")]
+        line = np.flatnonzero((others == others[pose]).all(axis=1))
+        return line[np.argsort(self.steps[line, coordinate], kind="stable")]
 
 
 def lattice(poses: Floats) -> Lattice | None:
@@ -47,7 +47,7 @@ def lattice(poses: Floats) -> Lattice | None:
     if len(poses) == 0:
         return None
     steps, values = zip(*(_steps(column) for column in poses.T), strict=True)
-    places = np.prod([len(each) for each in values], dtype=float)
+    places = np.prod([len(along) for along in values], dtype=float)
     if SPARSE * len(poses) <= places:
         return None
     return Lattice(np.stack(steps, axis=1), values)

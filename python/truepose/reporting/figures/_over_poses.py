@@ -31,6 +31,9 @@ MOST_SORTED = 200
 LEAST_IN_SLICE = 3
 """A slice of fewer poses says nothing."""
 
+MOST_TICKS = 7
+"""Of pose numbers, which are whole."""
+
 MARKS = 6
 """Of a sorted curve, which tell the lines apart without their colours."""
 
@@ -62,8 +65,8 @@ def slices(study: Study) -> dict[int, Indices]:
     grid: Lattice | None = lattice(study.poses)
     if grid is None:
         return {}
-    found = {at: grid.slice_through(worst_pose(study), at) for at in grid.varying}
-    return {at: poses for at, poses in found.items() if len(poses) >= LEAST_IN_SLICE}
+    lines = {at: grid.slice_through(worst_pose(study), at) for at in grid.varying}
+    return {at: poses for at, poses in lines.items() if len(poses) >= LEAST_IN_SLICE}
 
 
 def how_drawn(study: Study, sliced: bool = True) -> str:
@@ -160,7 +163,8 @@ def label_numbers(figure: Plot, study: Study, flow: Flow) -> None:
         title={"text": say("pose number")},
         range=[first - margin, last + margin],
         zeroline=False,
-        nticks=6,
+        tick0=0,
+        dtick=next((step for step in (1, 2, 5, 10) if last - first < MOST_TICKS * step), None),
     )
     for component in range(1, count):
         figure.update_xaxes(matches="x", **flow.place(component))

@@ -115,6 +115,11 @@ class Plot:
         placed = {"xref": place["xaxis"], "yref": place["yaxis"], **keys}
         self.layout.setdefault("annotations", []).append(placed)
 
+    def panel_axis(self, row: int, col: int) -> str:
+        """The name of the horizontal axis of a panel, as other axes refer to it."""
+        name: str = self._panels[row, col].place["xaxis"]
+        return name
+
     def _update_axes(self, axis: str, row: int | None, col: int | None, keys: Keys) -> None:
         suffixes = [
             panel.suffix

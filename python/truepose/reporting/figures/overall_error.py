@@ -20,12 +20,12 @@ LOOKS = {
 
 def says(study: Study) -> str:
     """The axis of the largest error drawn, its size, and where it is."""
-    found = []
+    largest = []
     for variable in LOOKS:
         errors = study.values(variable)
         pose, component = largest_of(study, errors)
-        found.append((abs(float(errors[pose, component])), pose, component))
-    size, pose, component = found[where_highest([size for size, *_ in found])]
+        largest.append((abs(float(errors[pose, component])), pose, component))
+    size, pose, component = largest[where_highest([size for size, *_ in largest])]
     unit = study.units.error(study.components[component])
     return say(
         "With all sources at once the largest error is {size} {unit} in {axis}, at {pose}.",

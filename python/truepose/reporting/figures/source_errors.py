@@ -16,13 +16,13 @@ TITLE = "Error of each source at each pose"
 
 def says(study: Study) -> str:
     """The source and the axis of the largest error drawn, and where it is."""
-    found = []
+    largest = []
     for source in range(len(study.sources)):
         for name in ("error_lower", "error_upper"):
             errors = study.values(name)[:, source]
             pose, component = largest_of(study, errors)
-            found.append((abs(float(errors[pose, component])), source, pose, component))
-    size, source, pose, component = found[where_highest([size for size, *_ in found])]
+            largest.append((abs(float(errors[pose, component])), source, pose, component))
+    size, source, pose, component = largest[where_highest([size for size, *_ in largest])]
     unit = study.units.error(study.components[component])
     return say(
         "Of single sources {source} makes the largest error: {size} {unit} in {axis}, at {pose}.",

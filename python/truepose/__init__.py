@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from truepose.machine import Condition, Machine
     from truepose.machine_tests.circular import circular_test
     from truepose.plausibility import oddities
+    from truepose.reporting.check import check
+    from truepose.reporting.compare import compare
     from truepose.uncertainty_analysis.bounds import bounds
     from truepose.uncertainty_analysis.functions.inputs import Input
     from truepose.uncertainty_analysis.monte_carlo import monte_carlo
@@ -50,7 +52,9 @@ _WHERE = {
     "bounds": "truepose.uncertainty_analysis.bounds",
     "budget": "truepose.error_budget.evaluate",
     "calibrate": "truepose.calibration.calibrate",
+    "check": "truepose.reporting.check",
     "circular_test": "truepose.machine_tests.circular",
+    "compare": "truepose.reporting.compare",
     "compensate": "truepose.compensation.compensate",
     "correct_program": "truepose.controllers.gcode",
     "export": "truepose.controllers",
@@ -76,7 +80,9 @@ __all__ = [
     "bounds",
     "budget",
     "calibrate",
+    "check",
     "circular_test",
+    "compare",
     "compensate",
     "correct_program",
     "errors",

@@ -73,6 +73,16 @@ def calibrate() -> None:
     expect(xr.Dataset, calibration.dataset)
 
 
+@use("check")
+def check() -> None:
+    assert tp.check(small()).met is True
+
+
+@use("compare")
+def compare() -> None:
+    assert not tp.compare(small(), small()).changed
+
+
 @use("compensate")
 def compensate() -> None:
     expect(xr.Dataset, tp.compensate(small(), POSE))

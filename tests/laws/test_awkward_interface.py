@@ -96,6 +96,8 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
             "samples": 100,
         },
     ),
+    "check": (tp.check, {"machine": MACHINE}),
+    "compare": (tp.compare, {"old": MACHINE, "new": MACHINE, "poses": POSE}),
     "calibrate": (tp.calibrate, {"machine": MACHINE, "data": "none.csv", "folds": 2}),
     "correct_program": (
         tp.correct_program, {"machine": MACHINE, "source": "none.ngc", "target": None},

@@ -130,7 +130,7 @@ def _deliver(
     import sys
     from importlib import import_module
 
-    from truepose.cli._show import COLOURS, show_lines, show_tables
+    from truepose.cli._show import show_lines, show_tables
     from truepose.cli._steps import note_written
     from truepose.cli._verbose import say_result
     from truepose.reporting import formats
@@ -144,9 +144,7 @@ def _deliver(
     elif output is not None:
         formats.write(whole, output)
     if given["format"] == "table":
-        show_lines(
-            [(word, COLOURS[colour], text) for word, colour, text in shown.summary(machine, result)]
-        )
+        show_lines(shown.summary(machine, result))
         show_tables(shown.tables(machine, result))
     else:
         sys.stdout.writelines(formats.text(whole, f".{given['format']}"))

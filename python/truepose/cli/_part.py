@@ -11,7 +11,7 @@ import click
 
 from truepose.cli._program import Quantities
 from truepose.cli._progress import progress
-from truepose.cli._show import COLOURS, show_lines, show_tables
+from truepose.cli._show import show_lines, show_tables
 from truepose.cli._steps import load_machine, note_written
 from truepose.cli._verbose import say, say_file
 from truepose.errors import Problem, RequestError
@@ -164,7 +164,7 @@ def _show(evaluation: PartEvaluation, form: str) -> None:
         click.echo(shown.json_text(evaluation))
     else:
         lines = shown.summary(evaluation)
-        show_lines([(line.word, COLOURS[line.colour], line.text) for line in lines])
+        show_lines([(line.word, line.colour, line.text) for line in lines])
         show_tables(shown.tables(evaluation))
 
 

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
     from truepose.error_budget.evaluate import Evaluation
     from truepose.machine import Machine
+    from truepose.plausibility import Oddity
+    from truepose.reporting.workspace_check import WorkspaceCheck
     from truepose.verdict.answer import Answer
 
 ASK = 'try it with --set accuracy.target="0.5 mm"'
@@ -95,6 +97,7 @@ class Watching(assembly.Watcher):
 
     def __init__(self, request: Request) -> None:
         self.request = request
+        self.odd: tuple[Oddity, ...] = ()
 
     def progress(self, what: str, unit: str = "poses") -> AbstractContextManager[Progress | None]:
         """A bar, where someone looks."""
@@ -103,6 +106,15 @@ class Watching(assembly.Watcher):
     def waiting(self, what: str) -> AbstractContextManager[None]:
         """A clock, where someone looks."""
         return waiting(what)
+
+    def looked_at(
+        self, machine: Machine, workspace: WorkspaceCheck, odd: tuple[Oddity, ...]
+    ) -> None:
+        """Keep what looks odd, and refuse left out poses if asked."""
+        self.odd = odd
+        out = ~workspace.usable
+        poses, status = workspace.poses[out], workspace.status[out]
+        refuse_left_out(self.request, machine, out.nonzero()[0], poses, status)
 
     def evaluated(self, machine: Machine, result: Evaluation) -> None:
         """Refuse left out poses if asked; what it warns of goes to stderr."""
@@ -118,11 +130,6 @@ class Watching(assembly.Watcher):
 def evaluate(request: Request, machine: Machine) -> xr.Dataset:
     """The error budget over the file's workspace; what it warns of goes to stderr."""
     return assembly.evaluation(machine, Watching(request)).dataset()
-
-
-def evaluation(request: Request, machine: Machine) -> Evaluation:
-    """The same before it is a Dataset, which takes longer to import than to evaluate."""
-    return assembly.evaluation(machine, Watching(request))
 
 
 def show_warnings(warnings: Iterable[Mapping[str, str]]) -> None:

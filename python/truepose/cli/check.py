@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -17,13 +17,6 @@ from truepose.cli._options import (
     witness_option,
 )
 from truepose.cli._verbose import verbose_option
-
-if TYPE_CHECKING:
-    from truepose.machine import Machine
-    from truepose.plausibility import Oddity
-    from truepose.reporting.table import Table
-    from truepose.reporting.workspace_check import WorkspaceCheck
-    from truepose.verdict.answer import Answer
 
 
 @click.command("check")
@@ -76,64 +69,35 @@ def _check(request: Request) -> int:
     from truepose.cli._show import show_answers, show_oddities, show_tables
     from truepose.errors import TrueposeError
     from truepose.files.writing import replacing, written_together
-    from truepose.plausibility import oddities_where_checked
-    from truepose.reporting.workspace_check import check_workspace
-    from truepose.verdict.answer import AFTER, BEFORE, met
+    from truepose.reporting.check import check_watched, text
+    from truepose.verdict.answer import AFTER, BEFORE
 
     machine = _steps.read_machine(request, [".json", ".csv"])
-    check = check_workspace(machine)
-    odd = oddities_where_checked(machine, check.codes)
+    watching = _steps.Watching(request)
     try:
-        answers, warnings = _answers(request, machine, check)
+        found = check_watched(machine, watching)
     except TrueposeError:
         # It may be why there is no answer.
-        show_oddities(odd, err=True)
+        show_oddities(watching.odd, err=True)
         raise
-    kept = met(answers, BEFORE) is not False
+    kept = found.met is not False
+    state = AFTER if kept else BEFORE
     with written_together():
-        written = _steps.write_witness(request, answers, AFTER if kept else BEFORE)
+        written = _steps.write_witness(request, found.answers, state)
         if request.output is not None:
             form = request.output.suffix.lower().removeprefix(".")
             with replacing(request.output) as temporary:
-                text = _text(form, machine, check, odd, answers, warnings)
-                temporary.write_text(text + "\n", encoding="utf-8")
+                temporary.write_text(text(found, form) + "\n", encoding="utf-8")
     if request.format == "table":
-        show_oddities(odd)
-        show_answers(machine, answers)
-        show_tables(_tables(machine, check, answers))
+        show_oddities(found.oddities)
+        show_answers(machine, found.answers)
+        show_tables(found.tables)
     else:
-        click.echo(_text(request.format, machine, check, odd, answers, warnings))
+        click.echo(text(found, request.format))
     _steps.note_written(request.output, request.witness if written else None)
     if not written:
-        raise _steps.no_witness(answers, AFTER if kept else BEFORE)
+        raise _steps.no_witness(found.answers, state)
     return int(not kept)
-
-
-def _answers(
-    request: Request, machine: Machine, check: WorkspaceCheck
-) -> tuple[tuple[Answer, ...], list[dict[str, str]]]:
-    """The answers, and what the budget warns of.
-
-    Raises `RequestError` (unusable-pose, no-pose-left), and `TrueposeError` of an error source.
-    """
-    from truepose.cli import _steps
-    from truepose.errors import RequestError
-    from truepose.reporting import inputs
-
-    out = ~check.usable
-    _steps.refuse_left_out(request, machine, out.nonzero()[0], check.poses[out], check.status[out])
-    # Without a source the file may still be asked about its workspace, unless it asks for more.
-    asked = machine.accuracy.target is not None or machine.accuracy.angle_target is not None
-    if not (asked or any(inputs.acting(machine))):
-        return (), []
-    answers = _steps.answers_of(request, machine)
-    try:
-        return answers, _steps.evaluation(request, machine).warnings
-    except RequestError as error:
-        # There are poses, as there are answers; only no budget of what bands leave of them.
-        if [problem.code for problem in error.problems] != ["no-pose-left"]:
-            raise
-        return answers, []
 
 
 def _expand(request: Request) -> int:
@@ -151,81 +115,3 @@ def _expand(request: Request) -> int:
         temporary.write_text(text, encoding="utf-8")
     _steps.note_written(request.output)
     return 0
-
-
-def _tables(machine: Machine, check: WorkspaceCheck, answers: tuple[Answer, ...]) -> list[Table]:
-    from truepose.reporting import calibrated_files, inputs, tables, workspace_check
-    from truepose.reporting.table import with_not_included
-    from truepose.sources import not_included_text
-
-    left_out = not_included_text(machine, machine.condition)
-    made = calibrated_files.calibration(machine)
-    shown = [
-        inputs.machine(machine),
-        *([] if made is None else [made]),
-        inputs.condition(machine),
-        with_not_included(inputs.sources(machine), left_out),
-        inputs.deviations(machine),
-        workspace_check.table(machine, check),
-    ]
-    return [*shown, tables.answers(machine, answers)] if answers else shown
-
-
-def _text(
-    form: str,
-    machine: Machine,
-    check: WorkspaceCheck,
-    odd: tuple[Oddity, ...],
-    answers: tuple[Answer, ...],
-    warnings: list[dict[str, str]],
-) -> str:
-    """The answers as JSON, or as CSV one row an answer. File units, named."""
-    import csv
-    import io
-    import json
-
-    from truepose.reporting import inputs, workspace_check
-    from truepose.reporting.accuracy import as_data
-    from truepose.reporting.result import in_file_units, pose_si
-    from truepose.sources import NO_MATERIAL, not_included, not_included_text
-
-    rows = [as_data(machine, answer) for answer in answers]
-    if form == "csv":
-        buffer = io.StringIO()
-        where = [
-            f"pose_{name} [{in_file_units(machine, 0.0, pose_si(name))[1]}]"
-            for name in machine.commanded
-        ]
-        columns = ["quantity", "state", "highest", "asked", "units", "met", "not_included"]
-        columns += ["pose", "not_assembled", "answer", "witness", "linear", "bound", "rests_on"]
-        left_out = not_included_text(machine, machine.condition)
-        writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerow([*columns, *where])
-        for row in rows:
-            told = row | {"not_included": left_out}
-            writer.writerow([*(told[column] for column in columns), *row["at"].values()])
-        return buffer.getvalue().rstrip("\n")
-    return json.dumps(
-        {
-            "command": "check",
-            "machine": inputs.machine_data(machine),
-            "calibration": None
-            if machine.calibration is None
-            else machine.calibration.model_dump(),
-            "sources": inputs.source_data(machine),
-            "not_included": [
-                {"part": part, "why": NO_MATERIAL}
-                for part in not_included(machine, machine.condition)
-            ],
-            "oddities": [
-                {"code": oddity.code, "sentence": oddity.sentence, "parts": list(oddity.parts)}
-                for oddity in odd
-            ],
-            "workspace": workspace_check.as_data(machine, check),
-            "answers": rows,
-            "warnings": warnings,
-        },
-        indent=1,
-        ensure_ascii=False,
-        allow_nan=False,
-    )

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from truepose.cli._options import InputFile, format_option, output_option_of, takes
 from truepose.cli._verbose import verbose_option
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from truepose.reporting.result import Result
 
 _FILE = InputFile(".toml")
 
@@ -31,37 +26,27 @@ def command(old_file: Path, new_file: Path, **options: Any) -> int:
     most 5 % of cases, and in far fewer where both rest on the same tolerances: then small changes
     are missed.
     """
-    from truepose.calibration.result.compare import compare
     from truepose.cli import _steps
     from truepose.cli._verbose import step
     from truepose.files.writing import replacing, require_writable
-    from truepose.reporting.result import Result
+    from truepose.reporting.compare import compare, text
 
     form, output = options["format"], options["output"]
     if output is not None:
         require_writable(output, [".json", ".csv"], [old_file, new_file])
     old, new = _steps.load_machine(old_file), _steps.load_machine(new_file)
     with step("comparison"):
-        result = Result("compare", old, compare(old, new))
+        found = compare(old, new)
     if form == "table":
         from truepose.cli._show import show_tables
-        from truepose.reporting import calibrated_files
 
-        show_tables(calibrated_files.tables(result.dataset, old.shown))
-        click.echo(result.dataset.attrs["verdict"])
+        show_tables(found.tables)
+        click.echo(found.verdict)
     else:
-        click.echo("".join(_text(result, form)), nl=False)
+        click.echo("".join(text(found, form)), nl=False)
     if output is not None:
         with replacing(output) as temporary:
             ending = output.suffix.lower().removeprefix(".")
-            temporary.write_text("".join(_text(result, ending)), encoding="utf-8")
+            temporary.write_text("".join(text(found, ending)), encoding="utf-8")
         _steps.note_written(output)
-    return int(result.dataset.attrs["changed"])
-
-
-def _text(result: Result, form: str) -> Iterator[str]:
-    """The result as JSON, or its parameters as CSV."""
-    from truepose.reporting import calibrated_files
-    from truepose.reporting.formats import json_text
-
-    return json_text.text(result) if form == "json" else calibrated_files.csv_text(result)
+    return int(found.changed)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from truepose.calibration.measurements import Measurements
     from truepose.error_budget.evaluate import Evaluation
     from truepose.machine import Machine
+    from truepose.plausibility import Oddity
+    from truepose.reporting.workspace_check import WorkspaceCheck
     from truepose.verdict.answer import Answer
 
 SAMPLES = 100_000
@@ -54,6 +56,11 @@ class Watcher:
     def waiting(self, what: str) -> AbstractContextManager[None]:
         """A step of which nobody knows how long it takes."""
         return nullcontext()
+
+    def looked_at(
+        self, machine: Machine, workspace: WorkspaceCheck, odd: tuple[Oddity, ...]
+    ) -> None:
+        """It is known which poses the machine can use, and what looks odd, before any answer."""
 
     def evaluated(self, machine: Machine, result: Evaluation) -> None:
         """There is an error budget over the workspace: to refuse it, or to say what it warns of."""

@@ -75,28 +75,28 @@ def _check(request: Request) -> int:
     machine = _steps.read_machine(request, [".json", ".csv"])
     watching = _steps.Watching(request)
     try:
-        found = check_watched(machine, watching)
+        result = check_watched(machine, watching)
     except TrueposeError:
         # It may be why there is no answer.
         show_oddities(watching.odd, err=True)
         raise
-    kept = found.met is not False
+    kept = result.met is not False
     state = AFTER if kept else BEFORE
     with written_together():
-        written = _steps.write_witness(request, found.answers, state)
+        written = _steps.write_witness(request, result.answers, state)
         if request.output is not None:
             form = request.output.suffix.lower().removeprefix(".")
             with replacing(request.output) as temporary:
-                temporary.write_text(text(found, form) + "\n", encoding="utf-8")
+                temporary.write_text(text(result, form) + "\n", encoding="utf-8")
     if request.format == "table":
-        show_oddities(found.oddities)
-        show_answers(machine, found.answers)
-        show_tables(found.tables)
+        show_oddities(result.oddities)
+        show_answers(machine, result.answers)
+        show_tables(result.tables)
     else:
-        click.echo(text(found, request.format))
+        click.echo(text(result, request.format))
     _steps.note_written(request.output, request.witness if written else None)
     if not written:
-        raise _steps.no_witness(found.answers, state)
+        raise _steps.no_witness(result.answers, state)
     return int(not kept)
 
 

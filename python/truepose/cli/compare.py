@@ -36,17 +36,17 @@ def command(old_file: Path, new_file: Path, **options: Any) -> int:
         require_writable(output, [".json", ".csv"], [old_file, new_file])
     old, new = _steps.load_machine(old_file), _steps.load_machine(new_file)
     with step("comparison"):
-        found = compare(old, new)
+        comparison = compare(old, new)
     if form == "table":
         from truepose.cli._show import show_tables
 
-        show_tables(found.tables)
-        click.echo(found.verdict)
+        show_tables(comparison.tables)
+        click.echo(comparison.verdict)
     else:
-        click.echo("".join(text(found, form)), nl=False)
+        click.echo("".join(text(comparison, form)), nl=False)
     if output is not None:
         with replacing(output) as temporary:
             ending = output.suffix.lower().removeprefix(".")
-            temporary.write_text("".join(text(found, ending)), encoding="utf-8")
+            temporary.write_text("".join(text(comparison, ending)), encoding="utf-8")
         _steps.note_written(output)
-    return int(found.changed)
+    return int(comparison.changed)

@@ -138,16 +138,16 @@ def _answers(
         return answers, ()
 
 
-def text(found: MachineCheck, form: str) -> str:
+def text(result: MachineCheck, form: str) -> str:
     """A check as JSON, or as CSV one row an answer."""
     if form == "csv":
-        return _csv(found)
+        return _csv(result)
     import json
 
-    return json.dumps(found.as_data(), indent=1, ensure_ascii=False, allow_nan=False)
+    return json.dumps(result.as_data(), indent=1, ensure_ascii=False, allow_nan=False)
 
 
-def _csv(found: MachineCheck) -> str:
+def _csv(result: MachineCheck) -> str:
     import csv
     import io
 
@@ -155,7 +155,7 @@ def _csv(found: MachineCheck) -> str:
     from truepose.reporting.result import in_file_units, pose_si
     from truepose.sources import not_included_text
 
-    machine = found.machine
+    machine = result.machine
     buffer = io.StringIO()
     where = [
         f"pose_{name} [{in_file_units(machine, 0.0, pose_si(name))[1]}]"
@@ -166,7 +166,7 @@ def _csv(found: MachineCheck) -> str:
     left_out = not_included_text(machine, machine.condition)
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow([*columns, *where])
-    for answer in found.answers:
+    for answer in result.answers:
         row = as_data(machine, answer)
         told = row | {"not_included": left_out}
         writer.writerow([*(told[column] for column in columns), *row["at"].values()])

@@ -71,12 +71,12 @@ def compare(old: Machine, new: Machine, poses: ArrayLike | None = None) -> Machi
     return MachineComparison(old, new, comparing.compare(old, new, poses))
 
 
-def text(found: MachineComparison, form: str) -> Iterator[str]:
+def text(comparison: MachineComparison, form: str) -> Iterator[str]:
     """The pieces of a comparison as JSON, or its parameters as CSV."""
     from truepose.reporting.formats import json_text
     from truepose.reporting.result import Result
 
-    result = Result("compare", found.old, found.dataset)
+    result = Result("compare", comparison.old, comparison.dataset)
     return json_text.text(result) if form == "json" else calibrated_files.csv_text(result)
 
 

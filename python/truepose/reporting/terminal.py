@@ -88,8 +88,8 @@ def _rendered(shown: Iterable[Any], terminal: bool) -> str:
         force_terminal=terminal,
         width=None if terminal else PIPED_WIDTH,
     )
-    for each in shown:
-        console.print(each)
+    for part in shown:
+        console.print(part)
     return "".join(f"{line.rstrip(' ')}\n" for line in text.getvalue().splitlines())
 
 

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from truepose.uncertainty_analysis.uncertainty import uncertainty
     from truepose.uncertainty_analysis.worst_case import worst_case
     from truepose.verdict.accuracy import accuracy
+    from truepose.verdict.tightening import tightening
     from truepose.workpiece.evaluate import part
 
     __version__: str
@@ -67,6 +68,7 @@ _WHERE = {
     "shares": "truepose.uncertainty_analysis.shares",
     "strain": "truepose.error_budget.strain",
     "threads": "truepose._kernel",
+    "tightening": "truepose.verdict.tightening",
     "uncertainty": "truepose.uncertainty_analysis.uncertainty",
     "worst_case": "truepose.uncertainty_analysis.worst_case",
 }
@@ -97,6 +99,7 @@ __all__ = [
     "shares",
     "strain",
     "threads",
+    "tightening",
     "uncertainty",
     "worst_case",
 ]

@@ -56,6 +56,13 @@ def accuracy() -> None:
     assert {answer.state for answer in tp.accuracy(small(), POSE)}
 
 
+@use("tightening")
+def tightening() -> None:
+    advised = tp.tightening(small())
+    assert advised is not None
+    assert advised.enough
+
+
 @use("bounds")
 def bounds() -> None:
     expect(xr.Dataset, tp.bounds(small(), POSE))

@@ -109,6 +109,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
     ),
     "import_machine": (tp.import_machine, {"path": "none.cfg"}),
     "oddities": (tp.oddities, {"machine": MACHINE}),
+    "tightening": (tp.tightening, {"machine": MACHINE}),
     "load": (tp.load, {"path": MACHINES / "planar_two_slider.toml"}),
     "threads": (tp.threads, {}),
     "Condition": (tp.Condition, {}),

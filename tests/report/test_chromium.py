@@ -27,7 +27,6 @@ from truepose.reporting.figures import (
     _style,
     calibration_correlation,
     calibration_unknowns,
-    how_far,
     machine_drawing,
     tornado,
 )
@@ -40,7 +39,6 @@ COLOURS = {
     "source_errors": list(_style.SOURCE_COLOURS[:3]),
     "overall_error": [_style.BEFORE, _style.OVERALL],
     "before_after": [_style.BEFORE, _style.AFTER],
-    "how_far": list(how_far.COLOURS.values()),
     "distribution": [_style.BEFORE],
     "coverage_ellipses": [_style.SOURCE_COLOURS[0]],
     "tornado": [tornado.LOOKS["first"][1], tornado.LINEAR],

@@ -74,11 +74,11 @@ def command(**options: Any) -> int:
     kept after compensation.
     """
     from truepose.cli import _steps
-    from truepose.cli._show import show_answers, show_tables
+    from truepose.cli._show import show_answers, show_lines, show_tables
     from truepose.cli._verbose import say_result, step
     from truepose.files.one_run import is_stdin
     from truepose.files.writing import require_writable
-    from truepose.reporting import assembly, how_far, tables, uncertainty_tables
+    from truepose.reporting import assembly, how_far, page_one, tables, uncertainty_tables
     from truepose.verdict.answer import AFTER, met
 
     if options["output"] is None:
@@ -114,6 +114,7 @@ def command(**options: Any) -> int:
     else:
         _print(page.render(study, text, part), request.output, paper or "A4", browser)
     show_answers(machine, study.accuracy)
+    show_lines((name, "", text) for name, text in page_one.lines(study))
     shown = [
         tables.ranking(study),
         tables.highest_absolute(study),

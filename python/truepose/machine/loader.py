@@ -161,6 +161,8 @@ def _built(document: Document, validated: Validated, registry: Sequence[SourceTy
         name=machine.name,
         description=machine.description.strip(),
         origin=machine.origin.strip(),
+        serial=machine.serial.strip(),
+        date=machine.date.strip(),
         file=document.name,
         file_hash=document.file_hash,
         settings=document.settings,

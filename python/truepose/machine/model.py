@@ -108,6 +108,10 @@ class Machine(Represented):
     """Which geometry the nominal one is, that the controller works with: that of the drawing, or
     a calibrated one that was loaded into it. None where the file does not say."""
 
+    serial: str = ""
+    date: str = ""
+    """Serial number, and date of the state that the file describes; empty where it says none."""
+
     family: FamilyParameters | None = None
     """What the file's `[family]` says; None where it has none."""
 

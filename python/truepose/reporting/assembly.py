@@ -18,7 +18,7 @@ from truepose.reporting.display import is_position, nearest_middle, where_highes
 from truepose.reporting.study import Study
 from truepose.runs.poses import Progress
 from truepose.runs.quantities import quantities
-from truepose.verdict.answer import STATES
+from truepose.verdict.answer import AFTER, STATES, met
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -110,11 +110,19 @@ def answers(machine: Machine, watcher: Watcher, *states: str) -> tuple[Answer, .
 def compared(machine: Machine, watcher: Watcher) -> Study:
     """The machine with budget and compensation, the verdict on both, and what looks odd."""
     from truepose.plausibility import oddities
+    from truepose.verdict.tightening import tightening
 
     budget = evaluation(machine, watcher).dataset()
     corrected = compensation(machine, watcher)
-    odd = oddities(machine)
-    return Study(machine, budget, corrected, answers(machine, watcher), oddities=odd)
+    verdicts = answers(machine, watcher)
+    return Study(
+        machine,
+        budget,
+        corrected,
+        verdicts,
+        oddities=oddities(machine),
+        tightening=None if met(verdicts, AFTER) else tightening(machine),
+    )
 
 
 def study(

@@ -16,6 +16,7 @@ from truepose.reporting.table import Table
 from truepose.reporting.uncertainty_tables import rounded
 
 NUMBERS = {
+    "known": "known",
     "sampled": "95 %",
     "witness": "witness",
     "linear": "linear maximum",
@@ -46,6 +47,7 @@ def how_far(study: Study) -> list[HowFar]:
         share = sampled.get((answer.state, answer.quantity))
         worst = answer.coverage is None
         sizes = {
+            "known": _known(study, answer.state, answer.quantity),
             "sampled": math.nan if share is None else share.linear.value,
             "witness": answer.witness.value if worst else math.nan,
             "linear": answer.linear.value if worst else worst_cases[answer.state][answer.quantity],
@@ -54,6 +56,15 @@ def how_far(study: Study) -> list[HowFar]:
         finite = {name: size if math.isfinite(size) else math.nan for name, size in sizes.items()}
         rows.append(HowFar(answer.quantity, answer.state, finite))
     return rows
+
+
+def _known(study: Study, state: str, quantity: str) -> float:
+    """The largest error over all poses with every source as it is known, m or rad."""
+    errors = (
+        study.values("overall_error") if state == BEFORE else study.compensated("residual_middle")
+    )
+    size = study.position_norm if quantity == "position" else study.rotation_norm
+    return float(np.nanmax(size(errors)))
 
 
 def _linear_maxima(study: Study) -> Mapping[str, Mapping[str, float]]:
@@ -81,14 +92,20 @@ def share_note(study: Study) -> str:
     return f"{said}: {draws:,} machines at {up_to}{max(sampled):,} of {poses}."
 
 
+def cells(study: Study, row: HowFar) -> Mapping[str, str]:
+    """The numbers of a row by name, as people read them: a bound is rounded up."""
+    unit = study.units.error(row.quantity)
+    sizes = np.array([row.sizes[name] * unit.per_si for name in NUMBERS])
+    texts = rounded(sizes, [int(name == "bound") for name in NUMBERS])
+    return dict(zip(NUMBERS, texts, strict=True))
+
+
 def table(study: Study) -> Table:
     """The same as a table."""
     rows = []
     for row in how_far(study):
         unit = study.units.error(row.quantity)
-        sizes = np.array([row.sizes[name] * unit.per_si for name in NUMBERS])
-        cells = rounded(sizes, [int(name == "bound") for name in NUMBERS])
-        rows.append((row.quantity, row.state, *cells, unit.label))
+        rows.append((row.quantity, row.state, *cells(study, row).values(), unit.label))
     return Table(
         "how_far",
         "How far off can the tool be?",
@@ -99,4 +116,4 @@ def table(study: Study) -> Table:
     )
 
 
-__all__ = ["AFTER", "BEFORE", "NUMBERS", "HowFar", "how_far", "table"]
+__all__ = ["AFTER", "BEFORE", "NUMBERS", "HowFar", "cells", "how_far", "table"]

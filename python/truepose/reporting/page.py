@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from truepose.files.writing import replacing
 from truepose.language import grouped, say, say_counted
 from truepose.reporting import calibration, how_far, inputs, tables, uncertainty_tables
-from truepose.reporting.accuracy import gains, told, where_answered
+from truepose.reporting.accuracy import gains, where_answered
 from truepose.reporting.figures import DrawnFigure, draw
+from truepose.reporting.page_one import PageOne, page_one
 from truepose.reporting.shell import page_parts, template
 from truepose.reporting.study import Study
 from truepose.reporting.table import Table
 
-if TYPE_CHECKING:
-    from truepose.reporting.part import SummaryLine
+MACHINE = "machine_drawing"
+"""The figure that stands on page one."""
 
 
 def limits() -> str:
@@ -34,10 +34,10 @@ def limits() -> str:
 
 @dataclass(frozen=True)
 class PartShown:
-    """A part on a page: its program's name, what is told first, whose fault, figures, tables."""
+    """A part on a page: its program's name, its page one, whose fault, figures, tables."""
 
     program: str
-    lines: Sequence[SummaryLine]
+    page_one: PageOne
     blame: Sequence[Table]
     figures: Sequence[DrawnFigure]
     tables: Sequence[Table]
@@ -62,10 +62,11 @@ def render(study: Study, machine_text: str = "", part: PartShown | None = None) 
     parameters = inputs.parameters(study.machine)
     return template("page.html.jinja").render(
         machine=study.machine,
-        answers=told(study.machine, study.accuracy),
+        page_one=page_one(study, None if part is None else part.page_one),
+        machine_drawn=next(each for each in drawn if each.name == MACHINE),
         gains=gains(study.accuracy),
         where_answered=where_answered(study.accuracy) if study.accuracy else "",
-        figures=[each for each in drawn if not _of_calibration(each)],
+        figures=[each for each in drawn if each.name != MACHINE and not _of_calibration(each)],
         calibration=None if study.calibration is None else study.calibration.attrs,
         calibration_figures=[each for each in drawn if _of_calibration(each)],
         calibration_tables=[]
@@ -102,11 +103,9 @@ def _said(study: Study, parameters: int, part: PartShown | None) -> dict[str, st
         if calibrated
         else say("Positioning error report"),
         "meta": " · ".join([*meta, f"truepose {attrs['truepose_version']}"]),
-        "summary": say("The machine as filed") if calibrated else say("Summary"),
+        "summary": say("Summary"),
         "calibration": say("Calibration"),
-        "may_be_used": say("May the calibrated machine be used?"),
-        "yes": say("Yes"),
-        "no": say("No"),
+        "rests": say("What the verdict rests on"),
         "part": "" if part is None else say("The part: {program}", program=part.program),
         "figures": say("Figures"),
         "tables": say("Tables"),

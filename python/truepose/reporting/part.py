@@ -178,7 +178,7 @@ def _blame(evaluation: PartEvaluation) -> Table:
             (
                 of.label,
                 f"{', '.join(named)} {small.label}" if named else f"under {LEAST:g} {small.label}",
-                _mends(evaluation, at),
+                mends(evaluation, at),
             )
         )
     note = (
@@ -223,7 +223,8 @@ def _share_out(share: float, samples: int) -> str:
     return f"{100.0 * share:.3g} %" if share > 0.0 else f"< {300.0 / samples:.2g} %"
 
 
-def _mends(evaluation: PartEvaluation, at: int) -> str:
+def mends(evaluation: PartEvaluation, at: int) -> str:
+    """What would bring characteristic number `at` within its limits, in words."""
     of, programmed = evaluation.characteristics[at], evaluation.before().programmed[at]
     if _beyond(of.quantity, float(programmed)):
         unit = evaluation.shown.of(of.quantity.si)
@@ -292,7 +293,7 @@ def sheet(evaluation: PartEvaluation) -> list[dict[str, Any]]:
     """A row for each characteristic and state, in the units of features file, else machine."""
     count = len(evaluation.characteristics)
     # What would mend it is of both states together, and is searched for.
-    remedies = [_mends(evaluation, at) if evaluation.of_bands else "" for at in range(count)]
+    remedies = [mends(evaluation, at) if evaluation.of_bands else "" for at in range(count)]
     return [
         _sheet_row(evaluation, answers, at, remedies[at])
         for answers in evaluation.states
@@ -365,4 +366,4 @@ def json_text(evaluation: PartEvaluation) -> str:
     )
 
 
-__all__ = ["PROCESS", "csv_text", "json_text", "sheet", "summary", "tables"]
+__all__ = ["PROCESS", "csv_text", "json_text", "mends", "sheet", "summary", "tables"]

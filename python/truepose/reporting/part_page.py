@@ -6,6 +6,7 @@ from truepose.language import say
 from truepose.reporting import part
 from truepose.reporting.page import PartShown
 from truepose.reporting.part_figures import DrawnPath, figures
+from truepose.reporting.part_page_one import part_page_one
 from truepose.reporting.shell import page_parts, template
 from truepose.workpiece.evaluation import PartEvaluation
 from truepose.workpiece.result import attributes
@@ -17,7 +18,7 @@ def shown(evaluation: PartEvaluation, path: DrawnPath, program: str) -> PartShow
     count = len(evaluation.states)
     return PartShown(
         program,
-        part.summary(evaluation),
+        part_page_one(evaluation, program),
         tables[count:],
         figures(evaluation, path),
         [*tables[:count], operators],

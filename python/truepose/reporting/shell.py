@@ -141,7 +141,7 @@ def page_parts(title: str) -> dict[str, Any]:
         "title": title,
         "language": spoken().code,
         "version": version(),
-        "css": _resource("page.css"),
+        "css": _together(["page.css", "page_one.css"]),
         "loader": loader,
         "loader_hash": base64.b64encode(hashlib.sha256(loader.encode()).digest()).decode(),
         "plotly": packed(PLOTLY.joinpath("plotly.min.js").read_bytes()),

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from truepose.machine import Machine
     from truepose.plausibility import Oddity
     from truepose.verdict.answer import Answer
+    from truepose.verdict.tightening import Tightening
 
 
 def warnings_of(dataset: xr.Dataset) -> list[dict[str, str]]:
@@ -39,7 +40,8 @@ class Study:
     poses, `ellipses` is a `monte_carlo` at more of them with fewer samples; `missing` says, by
     name, why one of them is not there. `calibration` is that of `truepose.calibrate`, where there
     are measurements. `accuracy` are the answers of `truepose.accuracy` over the same poses,
-    `sampled` the same at a coverage of 95 %. `oddities` are those of `truepose.oddities`. All
+    `sampled` the same at a coverage of 95 %, `tightening` that of `truepose.tightening`, where they
+    are not met after compensation. `oddities` are those of `truepose.oddities`. All
     values here are SI.
     """
 
@@ -58,6 +60,7 @@ class Study:
     missing: Mapping[str, str] = field(default_factory=dict)
     calibration: xr.Dataset | None = None
     oddities: tuple[Oddity, ...] = ()
+    tightening: Tightening | None = None
 
     @property
     def strained(self) -> xr.Dataset:

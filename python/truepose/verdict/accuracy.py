@@ -68,7 +68,7 @@ def accuracy(
 
     Raises as `truepose.budget`, and `RequestError` (unknown-choice) for another state.
     """
-    asked = _required_states(states)
+    asked = required_states(states)
     population = Population(machine, poses, condition, progress)
     every: list[Answer] = []
     for state in asked:
@@ -78,7 +78,7 @@ def accuracy(
     return tuple(replace(a, poses_used=used, poses_left_out=left_out) for a in every)
 
 
-def _required_states(states: Sequence[str]) -> tuple[str, ...]:
+def required_states(states: Sequence[str]) -> tuple[str, ...]:
     """Each state once. A word alone is refused too: its letters are no states."""
     unknown = [states] if isinstance(states, str) else [s for s in states if s not in STATES]
     if not unknown and states:
@@ -359,4 +359,4 @@ def _why_open(bound: Number, proof: _Proof) -> str:
     return f"what is found and what is proven, within {proof.boxes:,} boxes"
 
 
-__all__ = ["accuracy", "answers", "at_coverage"]
+__all__ = ["accuracy", "answers", "at_coverage", "required_states"]

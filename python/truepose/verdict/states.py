@@ -8,7 +8,7 @@ of machines, asked by the same functions, at two commands.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,8 +73,12 @@ class Population:
         poses: ArrayLike | None = None,
         condition: Condition | None = None,
         progress: Progress | None = None,
+        *,
+        changed: Callable[[Variables], Variables] | None = None,
     ) -> None:
         """At `poses` (..., n_commanded), SI, default the file's; `condition`, default the file's.
+
+        `changed`: other variables than those of the sources, in either state.
 
         Raises `RequestError`: bad-poses, no-workspace, no-source, unknown-part.
         """
@@ -82,6 +86,7 @@ class Population:
         self.machine, self.table = machine, run.poses
         self.condition, self.sources = run.condition, run.sources
         self._poses, self._progress = poses, progress
+        self._changed = changed
         self._kept: dict[str, list[State]] = {}
         self._used = 0
 
@@ -127,10 +132,11 @@ class Population:
         self._used = used
 
     def _state(self, name: str, block: PoseBlock, variables: Variables) -> State:
-        if name == BEFORE:
-            fine = np.full(block.indices.size, OK, np.uint8)
-            return State(name, self.machine, block, variables, fine)
-        commanded, variables, status = corrected(self.machine, block, self.sources)
+        commanded, status = block, np.full(block.indices.size, OK, np.uint8)
+        if name == AFTER:
+            commanded, variables, status = corrected(self.machine, block, self.sources)
+        if self._changed is not None:
+            variables = self._changed(variables)
         return State(name, self.machine, commanded, variables, status)
 
 

@@ -374,7 +374,7 @@ def test_the_report_asks_at_the_middle_and_the_worst_pose(
     assert "How far off can the tool be?" in outcome.out
     text = page.read_text("utf-8")
     assert "<td>proven bound</td><td>strut.1.length has no ends (normal).</td>" in text
-    for name in ("how_far", "distribution", "coverage_ellipses", "tornado"):
+    for name in ("distribution", "coverage_ellipses", "tornado"):
         assert f'id="figure-{name}"' in text
 
 

@@ -132,7 +132,7 @@ def test_the_report_says_why_it_has_no_bound(
     text = page.read_text("utf-8")
     assert "more closures than freedoms" in text
     assert "<td>proven bound</td>" in text
-    assert 'id="figure-how_far"' in text
+    assert 'id="dots-position"' in text
     assert 'id="table-bounds"' not in text
     # A distribution without ends has one.
     assert call(capsys, "report", PLANAR, *FEW, *NORMAL, "--output", page).code == 0

@@ -14,7 +14,6 @@ from made_how_sure import shares, sure_study
 from made_study import hexapod_study, planar_study
 from sweeps import sweep
 from truepose.reporting import figures, variance_shares, within
-from truepose.reporting import how_far as numbers
 from truepose.reporting.figures import (
     FIGURES,
     _style,
@@ -22,14 +21,12 @@ from truepose.reporting.figures import (
     distribution,
     draw,
     error_over_time,
-    how_far,
     internal_forces,
     machine_drawing,
     ranking,
     tornado,
 )
 from truepose.reporting.study import Study
-from truepose.verdict.answer import Answer
 
 STUDIES = {
     "planar": sure_study(planar_study()),
@@ -105,13 +102,32 @@ def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: St
 def test_the_drawing_joins_carriages_and_tool() -> None:
     study = planar_study()
     figure = checked(machine_drawing.figure(study))
-    struts = trace(figure, "struts")
-    height = 200 + np.sqrt(500**2 - 300**2)
-    np.testing.assert_allclose(struts.x[[0, 1, 3, 4]], [0, 300, 600, 300], atol=1e-3)
-    np.testing.assert_allclose(struts.y[[0, 1, 3, 4]], [height, 200, height, 200], rtol=1e-6)
+    struts = trace(figure, "as commanded")
+    known = study.position_norm(study.values("overall_error"))
+    x, y = 1e3 * study.poses[int(np.argmax(known))]
+    heights = [y + np.sqrt(500**2 - (x - rail) ** 2) for rail in (0, 600)]
+    np.testing.assert_allclose(struts.x[[0, 1, 3, 4]], [0, x, 600, x], atol=1e-3)
+    np.testing.assert_allclose(struts.y[[0, 1, 3, 4]], [heights[0], y, heights[1], y], rtol=1e-5)
     assert figure.layout.yaxis.scaleanchor == "x", "drawn to scale"
     guideways = trace(figure, "travel of the drives")
     assert (np.nanmin(guideways.y), np.nanmax(guideways.y)) == (0, 900)
+
+
+def test_the_actual_platform_and_the_arrows_are_so_many_times_their_errors() -> None:
+    study = planar_study()
+    figure = checked(machine_drawing.figure(study))
+    known = study.values("overall_error")[:, study.positions]
+    worst = int(np.argmax(study.position_norm(study.values("overall_error"))))
+    arrows = next(each for each in figure.data if each.name.startswith("known error, "))
+    factor = float(arrows.name.split()[2].replace(",", ""))
+    at, to = np.stack([arrows.x, arrows.y], axis=-1).reshape(-1, 3, 2)[:, :2].swapaxes(0, 1)
+    for start, end in zip(at, to, strict=True):
+        pose = int(np.argmin(np.linalg.norm(study.poses * 1e3 - start, axis=1)))
+        np.testing.assert_allclose((end - start) / factor, known[pose] * 1e3, atol=1e-3)
+    actual = next(each for each in figure.data if each.name.startswith("as it is"))
+    tool = np.array([actual.x[-2], actual.y[-2]])
+    np.testing.assert_allclose(tool, 1e3 * (study.poses[worst] + factor * known[worst]), atol=1e-2)
+    assert f"{factor:,.0f} times" in machine_drawing.says(study)
 
 
 def test_the_drawing_of_a_body_has_its_platform_and_frame() -> None:
@@ -120,9 +136,10 @@ def test_the_drawing_of_a_body_has_its_platform_and_frame() -> None:
     for name in ("platform", "frame"):
         outline = trace(figure, name)
         assert len(outline.x) == 7, "six corners, closed"
-        radius = np.hypot(outline.x, outline.y)
-        assert np.allclose(radius, radius[0])
-        turn = np.unwrap(np.arctan2(outline.y, outline.x))
+        x, y = outline.x - outline.x[:6].mean(), outline.y - outline.y[:6].mean()
+        radius = np.hypot(x, y)
+        assert np.allclose(radius, radius[0], rtol=1e-4)
+        turn = np.unwrap(np.arctan2(y, x))
         assert abs(turn[-1] - turn[0]) == pytest.approx(2 * np.pi), "once round, no crossing"
     assert figure.layout.scene.aspectmode == "data"
 
@@ -214,36 +231,6 @@ def test_how_many_keep_what_is_asked_is_one_number(study: Study) -> None:
 def test_a_share_is_never_rounded_up(share: float, text: str, short: str) -> None:
     found = within.Within("position", "before compensation", 5e-4, share, 4000)
     assert (found.text, found.short) == (text, short)
-
-
-def test_how_far_off_has_a_bar_for_each_number_and_state(study: Study) -> None:
-    drawn = checked(how_far.figure(study))
-    rows = numbers.how_far(study)
-    kinds = list(dict.fromkeys(row.quantity for row in rows))
-    for key, title in numbers.NUMBERS.items():
-        for nth, kind in enumerate(kinds):
-            bars = trace(drawn, title, nth)
-            of_kind = [row for row in rows if row.quantity == kind]
-            assert list(bars.x) == [row.state for row in of_kind]
-            expected = [row.sizes[key] * 1e6 for row in of_kind]
-            np.testing.assert_allclose(bars.y, expected, rtol=1e-6)
-    (asked,) = [shape for shape in drawn.layout.shapes if shape.type == "line"]
-    assert asked.y0 == asked.y1 == pytest.approx(500.0), "no angle is asked for"
-    lines = [each.name for each in drawn.data if each.type == "scatter"]
-    assert lines == ["position asked, 0.5 mm"]
-
-
-def test_a_number_that_there_is_not_has_no_bar(study: Study) -> None:
-    def without_a_bound(answer: Answer) -> Answer:
-        return replace(answer, bound=replace(answer.bound, value=np.inf))
-
-    unbounded = tuple(without_a_bound(answer) for answer in study.accuracy)
-    names = {
-        each.name
-        for each in checked(how_far.figure(replace(study, accuracy=unbounded, sampled=()))).data
-        if each.type == "bar"
-    }
-    assert names == {"witness", "linear maximum"}
 
 
 def test_the_tornado_has_the_largest_on_top(study: Study) -> None:

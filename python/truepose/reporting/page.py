@@ -63,12 +63,12 @@ def render(study: Study, machine_text: str = "", part: PartShown | None = None) 
     return template("page.html.jinja").render(
         machine=study.machine,
         page_one=page_one(study, None if part is None else part.page_one),
-        machine_drawn=next(each for each in drawn if each.name == MACHINE),
+        machine_drawn=next(one for one in drawn if one.name == MACHINE),
         gains=gains(study.accuracy),
         where_answered=where_answered(study.accuracy) if study.accuracy else "",
-        figures=[each for each in drawn if each.name != MACHINE and not _of_calibration(each)],
+        figures=[one for one in drawn if one.name != MACHINE and not _of_calibration(one)],
         calibration=None if study.calibration is None else study.calibration.attrs,
-        calibration_figures=[each for each in drawn if _of_calibration(each)],
+        calibration_figures=[one for one in drawn if _of_calibration(one)],
         calibration_tables=[]
         if study.calibration is None
         else calibration.of_page(study.calibration, study.units),

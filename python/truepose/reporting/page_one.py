@@ -44,7 +44,7 @@ ROOM = 1.08
 
 
 @dataclass(frozen=True)
-class Finding:
+class Judgement:
     """What holds in one state: its label, `word` of a `colour`, text, and what that rests on."""
 
     label: str
@@ -64,7 +64,7 @@ class Verdict:
     question: str
     word: str
     colour: str
-    rows: tuple[tuple[str, tuple[Finding, ...]], ...]
+    rows: tuple[tuple[str, tuple[Judgement, ...]], ...]
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def page_one(study: Study, part: PageOne | None = None) -> PageOne:
 
 
 def lines(study: Study) -> tuple[tuple[str, str], ...]:
-    """What is worst, what to do, what is not included: a name and a sentence each."""
+    """What is worst, what to do, what is not included: a name and a sentence one."""
     calibrated = () if study.calibration is None else (_after_calibration(study.calibrated),)
     return (
         *calibrated,
@@ -139,11 +139,11 @@ def machine_verdict(study: Study) -> Verdict:
         if study.calibration is not None
         else say("Is the machine good enough?")
     )
-    quantities = dict.fromkeys(each.answer.quantity for each in answers)
+    quantities = dict.fromkeys(one.answer.quantity for one in answers)
     rows = tuple(
         (
-            _judged(next(each for each in answers if each.answer.quantity == quantity)),
-            tuple(_finding(each) for each in answers if each.answer.quantity == quantity),
+            _judged(next(one for one in answers if one.answer.quantity == quantity)),
+            tuple(_judgement(one) for one in answers if one.answer.quantity == quantity),
         )
         for quantity in quantities
     )
@@ -152,7 +152,7 @@ def machine_verdict(study: Study) -> Verdict:
 
 def _overall(answers: Sequence[Told], state: str) -> str | None:
     """The answer to all that is asked in one state; None where nothing is."""
-    said = [each.answer.answer for each in answers if each.answer.state == state]
+    said = [one.answer.answer for one in answers if one.answer.state == state]
     decided = [answer for answer in said if answer is not None]
     if not decided:
         return None
@@ -181,19 +181,19 @@ def _judged(of: Told) -> str:
     return say("{quantity}, asked {asked}", quantity=quantity, asked=of.asked)
 
 
-def _finding(of: Told) -> Finding:
+def _judgement(of: Told) -> Judgement:
     answer, label = of.answer, say(STATES[of.answer.state])
     if answer.answer is not None:
-        return Finding(label, f"{say(of.word)}: {of.size}", of.colour, basis=of.basis)
+        return Judgement(label, f"{say(of.word)}: {of.size}", of.colour, basis=of.basis)
     if answer.coverage is not None:
-        return Finding(label, of.size, of.colour, basis=of.basis)
+        return Judgement(label, of.size, of.colour, basis=of.basis)
     # Nothing is judged: what was found and what is proven, as the dots have them.
     size = say(
         "{found} found, at most {proven}",
         found=of.text(answer.witness.value),
         proven=of.text(answer.bound.value, 1),
     )
-    return Finding(label, size, of.colour, basis=say("at {pose}", pose=of.at(answer.witness)))
+    return Judgement(label, size, of.colour, basis=say("at {pose}", pose=of.at(answer.witness)))
 
 
 def _calibration_verdict(study: Study) -> Verdict:
@@ -201,7 +201,7 @@ def _calibration_verdict(study: Study) -> Verdict:
     accepted = bool(attrs["accepted"])
     sentence = str(attrs["answer"]).partition(": ")[2]
     word, colour = (say("Yes"), "met") if accepted else (say("No"), "missed")
-    finding = Finding("", "", colour, sentence[:1].upper() + sentence[1:])
+    finding = Judgement("", "", colour, sentence[:1].upper() + sentence[1:])
     return Verdict(say("May the calibrated machine be used?"), word, colour, (("", (finding,)),))
 
 
@@ -226,7 +226,7 @@ def _worst(study: Study) -> str:
     """Which source dominates, and where the tool is farthest off."""
     first = study.by_rank[0]
     answers = told(study.machine, study.accuracy)
-    farthest = next(each for each in answers if each.answer.state == BEFORE)
+    farthest = next(one for one in answers if one.answer.state == BEFORE)
     return say(
         "{source} does most: {share} % of the sources' worst cases added up ({kind}). As "
         "commanded, the {quantity} is farthest off at {pose}.",
@@ -276,7 +276,7 @@ def _nothing_to_do(after: str | None) -> str:
 def _tighten(study: Study, of: Tightening) -> str:
     values = {"band": of.band.name, "parts": _parts(of), "width": _width(study, of)}
     reached = "; ".join(
-        f"{each.answer.quantity} {each.size}" for each in told(study.machine, of.answers)
+        f"{one.answer.quantity} {one.size}" for one in told(study.machine, of.answers)
     )
     if of.enough and all(answer.answer != UNDECIDED for answer in of.answers):
         return say(
@@ -402,7 +402,7 @@ def of_machine(machine: Machine) -> tuple[tuple[str, str], ...]:
 
 
 def identification(study: Study) -> tuple[tuple[str, str], ...]:
-    """What the numbers are of: a name and a text each."""
+    """What the numbers are of: a name and a text one."""
     attrs = study.budget.attrs
     evaluated = say_counted("{count} pose evaluated", "{count} poses evaluated", study.n_pose)
     measured: tuple[tuple[str, str], ...] = ()
@@ -430,7 +430,7 @@ __all__ = [
     "Dot",
     "DotPlot",
     "DotRow",
-    "Finding",
+    "Judgement",
     "PageOne",
     "Verdict",
     "lines",

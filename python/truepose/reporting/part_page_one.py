@@ -7,7 +7,7 @@ import math
 from truepose.language import grouped, say
 from truepose.reporting import part
 from truepose.reporting.display import number
-from truepose.reporting.page_one import Finding, PageOne, Verdict, of_machine
+from truepose.reporting.page_one import Judgement, PageOne, Verdict, of_machine
 from truepose.verdict.states import BEFORE
 from truepose.workpiece.advice import culprits
 from truepose.workpiece.evaluation import (
@@ -42,7 +42,7 @@ def part_page_one(evaluation: PartEvaluation, program: str) -> PageOne:
 
 
 def lines(evaluation: PartEvaluation) -> tuple[tuple[str, str], ...]:
-    """What is worst on the part, and what to do: a name and a sentence each."""
+    """What is worst on the part, and what to do: a name and a sentence one."""
     answers, at = _worst(evaluation)
     return (
         (say("What is worst on the part"), _told(evaluation, answers, at)),
@@ -61,7 +61,7 @@ def _verdict(evaluation: PartEvaluation) -> Verdict:
         word, colour = say("Undecided"), "open"
     else:
         word, colour = say("No"), "missed"
-    findings = tuple(Finding("", line.word, line.colour, line.text) for line in told)
+    findings = tuple(Judgement("", line.word, line.colour, line.text) for line in told)
     return Verdict(say("Is the part good?"), word, colour, (("", findings),))
 
 
@@ -128,7 +128,7 @@ def _to_do(evaluation: PartEvaluation, at: int) -> str:
     after = [one for one in evaluation.states[-1].answers if one.verdict == NOT_MET]
     if len(after) > 1:
         others = say(
-            "{count} quantities are not met after compensation: the table below has each.",
+            "{count} quantities are not met after compensation: the table below has one.",
             count=len(after),
         )
         return f"{text} {others}"

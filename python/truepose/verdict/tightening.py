@@ -41,7 +41,7 @@ MOST_POSES = 500
 """Poses at which bands are compared, those of the largest errors; the verdict is of all."""
 
 MOST_SAMPLED, DRAWS = 4, 4000
-"""At a coverage bands are compared at these few of them, with so many machines each."""
+"""At a coverage bands are compared at these few of them, with so many machines one."""
 
 SEED = 0
 
@@ -50,7 +50,7 @@ _AXIS = re.compile(r"\.[xyz]$")
 
 
 @dataclass(frozen=True)
-class Band:
+class ToleranceBand:
     """What is made tighter together: its `name`, such as strut.*.length, and its `source`."""
 
     name: str
@@ -61,7 +61,7 @@ class Band:
         named = zip(variables.names, variables.sources, strict=True)
         return np.array([band_of(name, source) == self for name, source in named], np.bool_)
 
-    def narrowed(self, variables: Variables, share: float) -> Variables:
+    def tightened(self, variables: Variables, share: float) -> Variables:
         """The same variables, its own over a `share` of their widths."""
         scale = np.where(self.members(variables), share, 1.0)
         return dataclasses.replace(
@@ -77,7 +77,7 @@ class Tightening:
     its variables differ in that, and `unit`, "m" or "rad" or "".
     """
 
-    band: Band
+    band: ToleranceBand
     share: float
     answers: tuple[Answer, ...]
     parts: int
@@ -90,12 +90,12 @@ class Tightening:
         return all(answer.met is not False for answer in self.answers)
 
 
-def band_of(name: str, source: str) -> Band:
+def band_of(name: str, source: str) -> ToleranceBand:
     """The band of a variable of a source."""
     part = _PART.match(name)
     if part is None:
-        return Band(name, source)
-    return Band(f"{part['kind']}.*.{_AXIS.sub('', part['key'])}", source)
+        return ToleranceBand(name, source)
+    return ToleranceBand(f"{part['kind']}.*.{_AXIS.sub('', part['key'])}", source)
 
 
 @checked
@@ -144,7 +144,7 @@ class _Compared:
     machine: Machine
     state: str
     variables: Variables
-    bands: tuple[Band, ...]
+    bands: tuple[ToleranceBand, ...]
     asked_of: Mapping[str, tuple[Indices, float]]
     value: Floats
     effects: Floats
@@ -236,12 +236,12 @@ class _Compared:
             np.quantile(np.linalg.norm(errors, axis=2), self.probability, axis=1, method="higher")
         )
 
-    def size(self, band: Band, share: float) -> float:
+    def size(self, band: ToleranceBand, share: float) -> float:
         """The largest error by its target, with one band over a share of its width."""
         scale = np.where(band.members(self.variables), share, 1.0)
         return float(self.sizes(scale).max())
 
-    def widest(self, band: Band) -> int:
+    def widest(self, band: ToleranceBand) -> int:
         """The largest percentage of its width that is enough; at `LEAST` it is."""
         low, high = round(LEAST * PERCENT), PERCENT
         while high - low > 1:
@@ -251,12 +251,12 @@ class _Compared:
             )
         return low
 
-    def asked(self, condition: Condition | None, band: Band, share: float) -> Tightening:
+    def asked(self, condition: Condition | None, band: ToleranceBand, share: float) -> Tightening:
         """What the verdict is with one band over a share of its width."""
         population = Population(
             self.machine,
             condition=condition,
-            changed=lambda variables: band.narrowed(variables, share),
+            changed=lambda variables: band.tightened(variables, share),
         )
         variables = self.variables
         columns = np.flatnonzero(band.members(variables)[variables.variable_of])
@@ -275,4 +275,4 @@ class _Compared:
         )
 
 
-__all__ = ["LEAST", "Band", "Tightening", "band_of", "tightening"]
+__all__ = ["LEAST", "Tightening", "ToleranceBand", "band_of", "tightening"]

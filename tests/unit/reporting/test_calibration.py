@@ -275,8 +275,8 @@ def test_figures_say_what_the_tables_say(study: Study) -> None:
 
 def test_the_page_begins_with_it(study: Study) -> None:
     text = page.render(study)
-    assert text.index('id="calibration"') < text.index('id="summary"')
-    assert "<h2>The machine as filed</h2>" in text
+    first, second = "May the calibrated machine be used?", "Is the machine as filed good enough?"
+    assert text.index(first) < text.index(second) < text.index('id="calibration"')
     assert "Calibration and positioning error report" in text
     without = page.render(replace(study, calibration=None))
     assert 'id="calibration"' not in without

@@ -53,7 +53,7 @@ def test_the_answer_in_a_word(before: str, after: str) -> None:
     assert verdict.word == WORDS[before, after]
     ((name, findings),) = verdict.rows
     assert name.startswith("position, asked ")
-    assert [each.label for each in findings] == ["as commanded", "compensated"]
+    assert [one.label for one in findings] == ["as commanded", "compensated"]
 
 
 def test_where_nothing_is_asked_the_found_and_the_proven_are_told() -> None:

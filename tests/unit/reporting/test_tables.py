@@ -12,6 +12,7 @@ from truepose.files.shown_units import METRIC
 from truepose.reporting import how_far, inputs, tables
 from truepose.reporting.display import LOWER, UPPER, column, number, pose_text, where_highest
 from truepose.reporting.study import Study
+from truepose.verdict.answer import BEFORE
 
 STUDIES = {"planar": planar_study(), "hexapod": hexapod_study(3)}
 
@@ -127,15 +128,22 @@ def test_a_pose_that_cannot_be_compensated_is_missing_and_does_not_count() -> No
 
 def test_how_far_off_is_the_same_over_the_whole_workspace(study: Study) -> None:
     table = how_far.table(study)
-    assert table.header[2:6] == ("95 %", "witness", "linear maximum", "proven bound")
+    assert table.header[2:7] == ("known", "95 %", "witness", "linear maximum", "proven bound")
     assert [row[1] for row in table.rows] == [answer.state for answer in study.accuracy]
     for row, worst, share in zip(table.rows, study.accuracy, study.sampled, strict=True):
         numbers = (share.linear, worst.witness, worst.linear, worst.bound)
         expected = [number.value * 1e6 for number in numbers]
-        *others, bound = [cell(text) for text in row[2:6]]
+        known, *others, bound = [cell(text) for text in row[2:7]]
+        size = study.position_norm if worst.quantity == "position" else study.rotation_norm
+        errors = (
+            study.values("overall_error")
+            if worst.state == BEFORE
+            else study.compensated("residual_middle")
+        )
+        assert known == pytest.approx(size(errors).max() * 1e6, abs=0.06)
         assert others == pytest.approx(expected[:3], abs=0.06)
         assert expected[3] <= bound < expected[3] + 0.1001, "rounded up"
-        assert row[6] == ("µm" if worst.quantity == "position" else "µrad")
+        assert row[7] == ("µm" if worst.quantity == "position" else "µrad")
 
 
 def test_a_number_that_there_is_not_is_a_dash() -> None:
@@ -143,7 +151,7 @@ def test_a_number_that_there_is_not_is_a_dash() -> None:
     before, after = study.accuracy
     unbounded = replace(before, bound=replace(before.bound, value=np.inf))
     row, _ = how_far.table(replace(study, accuracy=(unbounded, after), sampled=())).rows
-    assert (row[2], row[5]) == ("–", "–")
+    assert (row[3], row[6]) == ("–", "–")
     row, _ = tables.answers(study.machine, (unbounded, after)).rows
     assert row[4] == "–"
 

@@ -13,24 +13,26 @@ from build_machine import MACHINES
 from truepose.verdict.accuracy import answers
 from truepose.verdict.answer import AFTER, BEFORE, met
 from truepose.verdict.states import Population
-from truepose.verdict.tightening import LEAST, Band, band_of
+from truepose.verdict.tightening import LEAST, ToleranceBand, band_of
 
 TWO_SLIDER = MACHINES / "planar_two_slider.toml"
 HALF = 0.3
 """Of the tolerance of a strut of that machine, mm."""
 
 
-def narrowed(share: float) -> tp.Machine:
+def tightened(share: float) -> tp.Machine:
     """The machine with struts whose tolerance is a share of what it is."""
     half = f"{share * HALF:.12g}"
     return tp.load(TWO_SLIDER, settings=[f"strut.*.length_tolerance=[-{half}, {half}]"])
 
 
 def test_a_band_is_of_parts_that_differ_in_their_name_alone() -> None:
-    assert band_of("strut.1.length", "tolerance") == Band("strut.*.length", "tolerance")
-    assert band_of("strut.b2.platform.y", "tolerance") == Band("strut.*.platform", "tolerance")
+    assert band_of("strut.1.length", "tolerance") == ToleranceBand("strut.*.length", "tolerance")
+    assert band_of("strut.b2.platform.y", "tolerance") == ToleranceBand(
+        "strut.*.platform", "tolerance"
+    )
     assert band_of("strut.1.length", "thermal") != band_of("strut.1.length", "tolerance")
-    assert band_of("joint 1, x", "tolerance") == Band("joint 1, x", "tolerance")
+    assert band_of("joint 1, x", "tolerance") == ToleranceBand("joint 1, x", "tolerance")
 
 
 @pytest.mark.parametrize("state", [BEFORE, AFTER])
@@ -38,17 +40,17 @@ def test_a_machine_file_that_says_the_share_meets_and_one_percent_more_does_not(
     advised = tp.tightening(tp.load(TWO_SLIDER), state=state)
     assert advised is not None
     assert advised.enough
-    assert advised.band == Band("strut.*.length", "tolerance")
+    assert advised.band == ToleranceBand("strut.*.length", "tolerance")
     assert advised.parts == 2
     assert advised.width == pytest.approx(2e-3 * HALF)
-    there = tp.accuracy(narrowed(advised.share), states=(state,))
+    there = tp.accuracy(tightened(advised.share), states=(state,))
     assert met(there, state)
     assert [a.bound.value for a in there] == pytest.approx(
         [a.bound.value for a in advised.answers], rel=1e-12
     )
     target = tp.load(TWO_SLIDER).accuracy.target
     assert target is not None
-    wider = tp.accuracy(narrowed(advised.share + 0.01), states=(state,))
+    wider = tp.accuracy(tightened(advised.share + 0.01), states=(state,))
     assert wider[0].linear.value > target * (1.0 - 1e-4)
 
 
@@ -67,7 +69,7 @@ def test_where_no_band_is_enough_it_is_the_one_that_reaches_most() -> None:
     bands = set(map(band_of, variables.names, variables.sources))
     assert len(bands) > 3
     for band in bands:
-        change = partial(Band.narrowed, band, share=LEAST)
+        change = partial(ToleranceBand.tightened, band, share=LEAST)
         other = answers(Population(machine, changed=change), AFTER)
         # Bands are compared to the 0.05 % of the linear maximum.
         assert reached(other) >= reached(advised.answers) * (1.0 - 1e-3)

@@ -41,7 +41,7 @@ COLOURS = {
     "before_after": [_style.BEFORE, _style.AFTER],
     "distribution": [_style.BEFORE],
     "coverage_ellipses": [_style.SOURCE_COLOURS[0]],
-    "tornado": [tornado.LOOKS["first"][1], tornado.LINEAR],
+    "tornado": [tornado.COLOURS["first"], tornado.LINEAR],
     "calibration_residuals": [_style.BEFORE, _style.AFTER],
     "calibration_unknowns": [calibration_unknowns.DATA, _style.AFTER],
     "calibration_correlation": [calibration_correlation.SCALE[-1][1]],

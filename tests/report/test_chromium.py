@@ -74,17 +74,21 @@ COUNT = """async ([data, colours]) => {
   const pixels = context.getImageData(0, 0, image.width, image.height).data;
   const wanted = colours.map(c => [1, 3, 5].map(i => parseInt(c.slice(i, i + 2), 16)));
   const near = wanted.map(() => 0), seen = new Set();
+  const paper = pixels.slice(0, 3);
   let marked = 0;
   for (let i = 0; i < pixels.length; i += 4) {
     const [r, g, b] = [pixels[i], pixels[i + 1], pixels[i + 2]];
-    if (Math.min(r, g, b) < 235) marked++;
+    if (Math.max(...[r, g, b].map((value, k) => Math.abs(value - paper[k]))) > 20) marked++;
     seen.add((r >> 3 << 10) | (g >> 3 << 5) | b >> 3);
     wanted.forEach((w, k) => {
       if (Math.abs(r - w[0]) + Math.abs(g - w[1]) + Math.abs(b - w[2]) < 45) near[k]++;
     });
   }
-  return {marked: 4 * marked / pixels.length, colours: seen.size, near};
+  return {marked: 4 * marked / pixels.length, colours: seen.size, near, paper: [...paper]};
 }"""
+
+
+WIDTHS = "() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
 
 
 @dataclass(kw_only=True)
@@ -197,6 +201,71 @@ def test_a_figure_is_not_blank(name: str, report: Visit) -> None:
     assert all(count > 60 for count in found["near"]), found
 
 
+def test_figures_follow_the_scheme_and_are_light_in_print(report: Visit) -> None:
+    """By night figures are on dark paper, with all their colours; printed they are light."""
+    names = [name for name in FIGURE_NAMES if name not in report.absent]
+    dark = [int(_style.DARK[_style.PAPER][at : at + 2], 16) for at in (1, 3, 5)]
+
+    def all_are_there(paper: list[int], colours: dict[str, str]) -> None:
+        for name in names:
+            wanted = [colours.get(one, one) for one in COLOURS.get(name, [])]
+            found = report.look(f"#figure-{name}", wanted)
+            assert found["paper"] == paper, (name, found)
+            assert found["marked"] > 0.005, (name, found)
+            assert all(count > 60 for count in found["near"]), (name, found)
+
+    report.page.emulate_media(color_scheme="dark")
+    all_are_there(dark, _style.DARK)
+    report.page.emulate_media(color_scheme="dark", media="print")
+    report.page.evaluate("() => dispatchEvent(new Event('beforeprint'))")
+    all_are_there([255, 255, 255], {})
+    assert report.page.locator("details:not([open])").count() == 0
+    report.page.evaluate("() => dispatchEvent(new Event('afterprint'))")
+    report.page.emulate_media(color_scheme="light", media="screen")
+    assert report.page.locator("details[open]").count() == 0
+    assert report.complaints == []
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_serious_keeps_people_from_reading(width: int, scheme: str, report: Visit) -> None:
+    from axe_playwright_python.sync_playwright import Axe
+
+    report.page.set_viewport_size({"width": width, "height": 900})
+    report.page.emulate_media(color_scheme=scheme)
+    wide, window = report.page.evaluate(WIDTHS)
+    violations = Axe().run(report.page).response["violations"]
+    report.page.emulate_media(color_scheme="light")
+    report.page.set_viewport_size({"width": 1200, "height": 900})
+    assert wide <= window
+    serious = [
+        (one["id"], one["nodes"][0]["html"][:200])
+        for one in violations
+        if one["impact"] in {"serious", "critical"}
+    ]
+    assert not serious
+
+
+def test_the_contents_show_where_one_is(report: Visit) -> None:
+    report.page.locator("#tables").scroll_into_view_if_needed()
+    report.page.evaluate("() => document.getElementById('tables').scrollIntoView()")
+    current = report.page.locator("nav a[aria-current]")
+    report.page.wait_for_selector("nav a[href='#tables'][aria-current]")
+    assert current.count() == 1
+
+
+def test_figures_and_tables_are_saved_as_csv(report: Visit) -> None:
+    """The bytes are those that Python writes, of the same figure: test_figure_data.py."""
+    for place, first in (("#ranking", "trace"), ("#table-ranking", "source")):
+        with report.page.expect_download() as waiting:
+            report.page.locator(f"{place} button.csv").click()
+        assert waiting.value.suggested_filename == place[1:] + ".csv"
+        lines = Path(waiting.value.path()).read_text("utf-8").splitlines()
+        assert first in lines[0].split(",")
+        assert len(lines) > 2
+    assert report.complaints == []
+
+
 def test_the_maps_differ_from_place_to_place(report: Visit) -> None:
     found = report.look("#figure-workspace_maps", [])
     assert found["colours"] > 100, "one colour from edge to edge"
@@ -209,9 +278,7 @@ def test_nothing_was_asked_from_the_network_and_nothing_went_wrong(report: Visit
 
 
 def test_nothing_is_wider_than_the_page(report: Visit) -> None:
-    widths = report.page.evaluate(
-        "() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
-    )
+    widths = report.page.evaluate(WIDTHS)
     assert widths[0] <= widths[1]
 
 
@@ -283,9 +350,10 @@ def test_a_blank_figure_would_be_seen(browser: Any, tmp_path: Path) -> None:
     seen = Visit(page=page)
     seen.listen(page)
     page.goto(file.as_uri())
-    assert seen.look("#blank", ["#0072B2"]) == {"marked": 0, "colours": 1, "near": [0]}
+    blank = seen.look("#blank", ["#0072B2"])
+    assert blank == {"marked": 0, "colours": 1, "near": [0], "paper": [255, 255, 255]}
     plain = seen.look("#plain", [])
-    assert (plain["marked"], plain["colours"]) == (1, 1)
+    assert (plain["marked"], plain["colours"], plain["paper"]) == (0, 1, [0x44, 0x01, 0x54])
     assert "https://example.invalid/a.js" in seen.requests
     assert any("nothing" in complaint for complaint in seen.complaints)
     page.close()

@@ -8,6 +8,7 @@
   const HALF_PAGE = 470, WHOLE_PAGE = 1080;
   const forPrint = location.hash === "#print";
   const dark = matchMedia("(prefers-color-scheme: dark)");
+  const narrow = matchMedia("(max-width: 640px)");
   let drawn = {};
 
   async function unpacked(id) {
@@ -39,6 +40,16 @@
     return copy;
   }
 
+  // What figures/_flow.py changes on a small screen: "xaxis2.domain" and its value, and so on.
+  function narrowed(layout) {
+    for (const [path, value] of Object.entries((layout.meta || {}).narrow || {})) {
+      const steps = path.replace(/\[(\d+)\]/g, ".$1").split("."), last = steps.pop();
+      let at = layout;
+      for (const step of steps) at = at[step] = at[step] || {};
+      at[last] = value;
+    }
+  }
+
   function draw(name, printed) {
     const {data, layout} = drawn.figures[name];
     const night = dark.matches && !printed;
@@ -47,6 +58,7 @@
     const shown = {
       template: coloured(drawn.template, ofTemplate), uirevision: name, ...coloured(layout, colours),
     };
+    if (narrow.matches && !printed) narrowed(shown);
     if (printed) {
       shown.width = PRINT_WIDTH;
       shown.height = printedHeight(layout.height);
@@ -84,7 +96,7 @@
     if (forPrint) return;
     addEventListener("beforeprint", () => { unfold(); drawAll(true); });
     addEventListener("afterprint", () => { fold(); drawAll(false); });
-    dark.addEventListener("change", () => drawAll(false));
+    for (const each of [dark, narrow]) each.addEventListener("change", () => drawAll(false));
   }
 
   function saved(name, text) {

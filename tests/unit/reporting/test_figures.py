@@ -11,9 +11,10 @@ import pytest
 
 from checked_figures import checked
 from made_how_sure import shares, sure_study
-from made_study import hexapod_study, planar_study
+from made_study import MADE_UNITS, hexapod_study, planar_study
 from sweeps import sweep
 from truepose.reporting import figures, variance_shares, within
+from truepose.reporting.display import pose_text
 from truepose.reporting.figures import (
     FIGURES,
     _style,
@@ -80,6 +81,14 @@ def test_bars_are_the_highest_with_the_largest_on_top(study: Study) -> None:
     assert list(bars.y) == ["elastic", "thermal", "tolerance"]
     expected = study.budget["highest"].sel(quantity="position", source=list(bars.y)).values
     np.testing.assert_allclose(bars.x, expected * 1e6, rtol=1e-6)
+    largest = study.budget["largest"].sel(quantity="position", source="tolerance")
+    where = pose_text(
+        study.poses[int(largest.values.argmax())], study.machine.commanded, MADE_UNITS
+    )
+    share = 100 * expected[2] / expected.sum()
+    said = ranking.says(study)
+    assert f"tolerance can do most: up to {expected[2] * 1e6:.1f} µm at {where}" in said
+    assert f"{share:.0f} %" in said
 
 
 def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: Study) -> None:
@@ -95,8 +104,15 @@ def test_internal_forces_are_those_of_the_sources_and_of_every_closure(study: St
     for closure in study.strained["closure"].values:
         line = trace(figure, str(closure))
         expected = study.strained["overall_force"].sel(closure=closure).values
-        np.testing.assert_allclose(line.y, expected, rtol=1e-6)
+        np.testing.assert_allclose(line.y[np.isfinite(line.y)], expected, rtol=1e-6)
     assert "more closures than freedoms" in internal_forces.caption(study)
+    force = study.strained["overall_force"].stack(at=("pose", "closure"))
+    largest = force[np.abs(force.values).argmax()]
+    said = internal_forces.says(study)
+    assert f"is {float(largest):.1f} N in {largest['closure'].item()}, at " in said
+    assert (
+        pose_text(study.poses[largest["pose"].item()], study.machine.commanded, MADE_UNITS) in said
+    )
 
 
 def test_the_drawing_joins_carriages_and_tool() -> None:
@@ -168,10 +184,14 @@ def test_the_error_over_time_is_drawn_at_each_pose_and_over_the_temperatures(stu
     assert [each.name for each in others] == ["strut.1", "strut.2 and 1 more"]
     temperatures = study.time["temperature"].values[:, 0] - 273.15
     assert np.allclose(others[0].y, temperatures, atol=5e-4)
-    titles = {axis.title.text for axis in drawn.select_yaxes()}
+    titles = {note.text for note in drawn.layout.annotations}
     assert {"error in x, µm", "temperature, °C"} <= titles
     assert "time, min" in {axis.title.text for axis in drawn.select_xaxes()}
     assert "log.csv" in error_over_time.caption(study)
+    size = np.linalg.norm(errors[..., study.positions], axis=-1).max()
+    said = error_over_time.says(study)
+    assert f"up to {size:.4g} µm" in said
+    assert "60.0 min after" in said
 
 
 def test_many_times_are_thinned_and_the_last_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:

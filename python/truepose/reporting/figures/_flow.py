@@ -37,9 +37,9 @@ class Flow:
     titles: Sequence[str]
     columns: int
     narrow: int
-    panel: int = 170
+    panel: int = 150
     narrow_panel: int = 120
-    gap: int = 70
+    gap: int = 66
     top: int = 35
     narrow_top: int = 35
     bottom: int = 45

@@ -2,68 +2,149 @@
 
 from __future__ import annotations
 
-from truepose.reporting.figures._plot import Plot, grid, trace
-from truepose.reporting.figures._style import VERDICT_COLOURS, finish, small
+from truepose.language import say
+from truepose.reporting.display import decimals_for, number, pose_text, where_highest
+from truepose.reporting.figures._flow import Flow
+from truepose.reporting.figures._plot import Plot, trace
+from truepose.reporting.figures._style import PAPER, SHOWN, TARGET, VERDICT_COLOURS, finish, small
+from truepose.reporting.figures._text import NO_BOX
 from truepose.reporting.study import Study
 
 TITLE = "The sources compared"
 
+BAR = 40
+"""Pixels of a source."""
+
+INSIDE = 0.7
+"""Of the longest: the number of a bar that is longer stands in it."""
+
+PATTERNS = {"dominant": "", "relevant": "/", "negligible": "."}
+"""Of the bars, so that their colour is never alone."""
+
+
+def says(study: Study) -> str:
+    """The source that can do most, how much and where, and how large its share is."""
+    first = study.by_rank[0]
+    highest = study.values("highest")[:, 0]
+    unit = study.units.error("position" if study.positions else "orientation")
+    pose = where_highest(study.values("largest")[:, first, 0])
+    size = float(highest[first]) * unit.per_si
+    total = float(highest.sum())
+    return say(
+        "Of the sources {source} can do most: up to {size} {unit} at {pose}, {share} % of what "
+        "they can do one by one.",
+        source=study.sources[first],
+        size=number(size, decimals_for(size, 4)),
+        unit=unit.label,
+        pose=pose_text(study.poses[pose], study.machine.commanded, study.units),
+        share=number(100.0 * float(highest[first]) / total if total > 0.0 else 0.0, 0),
+    )
+
 
 def caption(study: Study) -> str:
     """What a bar is and what its colour means."""
-    asked = study.machine.accuracy.target
-    line = "" if asked is None else " The line is the accuracy asked."
-    return (
-        "The most that each source alone can do to the tool, over all poses: its exact error at "
-        "the known shift and its whole band. Dominant: the largest that together make 80 % of "
-        "the total. Negligible: below 5 % of the accuracy asked, or of the total where none is "
-        "asked." + line
-    )
+    text = [
+        say(
+            "The most that each source alone can do to the tool, over all poses: its exact error "
+            "at the known shift and its whole band. Dominant: the largest that together make 80 % "
+            "of the total. Negligible: below 5 % of the accuracy asked, or of the total where none "
+            "is asked."
+        )
+    ]
+    if study.machine.accuracy.asks:
+        text.append(say("The dashed line is the accuracy asked."))
+    return " ".join(text)
 
 
 def figure(study: Study) -> Plot:
     """Horizontal bars, the largest on top: position and, where it turns, angle."""
-    asked = (study.machine.accuracy.target, study.machine.accuracy.angle_target)
-    parts = [("position", study.units.error("position"), study.values("highest")[:, 0], asked[0])]
-    if study.rotations:
-        unit = study.units.error("orientation")
-        parts.append(("orientation", unit, study.values("highest")[:, 1], asked[1]))
+    accuracy = study.machine.accuracy
+    asked = {
+        "position": (say("position"), accuracy.target),
+        "orientation": (say("orientation"), accuracy.angle_target),
+    }
+    parts = [(str(name), *asked[str(name)]) for name in study.budget["quantity"].values]
     order = study.by_rank[::-1]
     verdicts = [str(study.values("verdict")[index]) for index in order]
-    figure = grid(rows=1, cols=len(parts), shared_yaxes=True, horizontal_spacing=0.08)
-    for column, (part, unit, highest, target) in enumerate(parts, start=1):
+    names = {
+        "dominant": say("dominant"),
+        "relevant": say("relevant"),
+        "negligible": say("negligible"),
+    }
+    flow = Flow(
+        [
+            say(
+                "highest {quantity} error, {unit}",
+                quantity=said,
+                unit=study.units.error(part).label,
+            )
+            for part, said, _ in parts
+        ],
+        columns=len(parts),
+        narrow=1,
+        panel=BAR * len(order),
+        narrow_panel=BAR * len(order),
+        gap=55,
+        top=55,
+        narrow_top=55,
+        apart=(0.04, 0.0),
+    )
+    figure = flow.empty()
+    finish(
+        figure,
+        flow.height,
+        bargap=0.35,
+        margin={"l": 110, "r": 20, "t": flow.top, "b": flow.bottom},
+    )
+    for column, (part, _, target) in enumerate(parts):
+        unit, at = study.units.error(part), flow.place(column)
+        highest = study.values("highest")[order, column] * unit.per_si
+        longest = max(float(highest.max()), (target or 0.0) * unit.per_si)
         figure.add_trace(
             trace(
                 "bar",
-                x=small(highest[order] * unit.per_si),
+                x=small(highest),
                 y=[study.sources[index] for index in order],
                 orientation="h",
-                marker={"color": [VERDICT_COLOURS[verdict] for verdict in verdicts]},
-                text=[f"{value * unit.per_si:.4g}" for value in highest[order]],
-                textposition="auto",
-                customdata=verdicts,
-                hovertemplate=f"%{{y}}: %{{x:.3f}} {unit.label}, %{{customdata}}<extra></extra>",
+                marker={
+                    "color": [VERDICT_COLOURS[verdict] for verdict in verdicts],
+                    "pattern": _pattern([PATTERNS[verdict] for verdict in verdicts]),
+                },
+                text=[number(size, decimals_for(size, 4)) for size in highest.tolist()],
+                textposition=[
+                    "inside" if size > INSIDE * longest else "outside" for size in highest.tolist()
+                ],
+                insidetextanchor="start",
+                textfont={"size": 12},
+                customdata=[names[verdict] for verdict in verdicts],
+                hovertemplate=f"%{{y}}: %{{x:{SHOWN}}} {unit.label}, %{{customdata}}{NO_BOX}",
                 showlegend=False,
             ),
-            row=1,
-            col=column,
+            **at,
         )
-        figure.update_xaxes(
-            title={"text": f"highest {part} error, {unit.label}"},
-            rangemode="tozero",
-            row=1,
-            col=column,
-        )
+        figure.update_xaxes(rangemode="tozero", nticks=6, **at)
         if target is not None:
-            figure.add_vline(
-                x=target * unit.per_si, line={"color": "#1B2A41", "dash": "dash"}, row=1, col=column
-            )
+            figure.add_vline(target * unit.per_si, line={"color": TARGET, "dash": "dash"}, **at)
     for verdict in dict.fromkeys(reversed(verdicts)):
         figure.add_trace(
             trace(
-                "bar", x=[None], y=[None], name=verdict, marker={"color": VERDICT_COLOURS[verdict]}
+                "bar",
+                x=[None],
+                y=[None],
+                name=names[verdict],
+                marker={
+                    "color": VERDICT_COLOURS[verdict],
+                    "pattern": _pattern(PATTERNS[verdict]),
+                },
             )
         )
-    finish(figure, 130 + 46 * len(order), bargap=0.35, margin={"l": 110, "r": 20, "t": 40, "b": 55})
     figure.update_yaxes(ticks="")
+    if len(parts) > 1:
+        # Beside each other the first has the names, below each other both.
+        figure.update_yaxes(showticklabels=False, **flow.place(1))
+        figure.layout["meta"]["narrow"]["yaxis2.showticklabels"] = True
     return figure
+
+
+def _pattern(shape: str | list[str]) -> dict[str, object]:
+    return {"shape": shape, "fgcolor": PAPER, "fillmode": "overlay", "size": 6, "solidity": 0.25}

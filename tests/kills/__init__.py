@@ -50,7 +50,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "montecarlo": ("montecarlo", str(PLANAR), "--samples", "2000", "-o", "out.json"),
     "bounds": ("bounds", str(PLANAR), "-o", "out.json"),
     "shares": ("shares", str(PLANAR), "-o", "out.json"),
-    "report": ("report", str(PLANAR), "-o", "page.html"),
+    "report": ("report", str(PLANAR), "-o", "page.html", "--figure-data", "data"),
     "calibrate": (
         "calibrate", str(DATA / "delta_printer.toml"), str(DATA / "delta_positions.csv"),
         "-o", "out.json", "--machine-output", "calibrated.toml", "--date", "2026-01-01",

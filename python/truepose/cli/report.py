@@ -61,6 +61,14 @@ ENDINGS = (".html", ".pdf")
         type=InputFile(".toml"),
         help="Features of the part. Default: what comments of the program say.",
     ),
+    click.option(
+        "--figure-data",
+        "figure_data",
+        metavar="FOLDER",
+        type=OutputFile(),
+        help="Write what every figure draws, and every table, as CSV into FOLDER, which is made "
+        "where it is not there: figure-3-workspace_maps.csv, by the numbers on the page.",
+    ),
     strict_option,
     accuracy_option,
     verbose_option,
@@ -77,8 +85,15 @@ def command(**options: Any) -> int:
     from truepose.cli._show import show_answers, show_lines, show_tables
     from truepose.cli._verbose import say_result, step
     from truepose.files.one_run import is_stdin
-    from truepose.files.writing import require_writable
-    from truepose.reporting import assembly, how_far, page_one, tables, uncertainty_tables
+    from truepose.files.writing import require_own_folder, require_writable, written_together
+    from truepose.reporting import (
+        assembly,
+        figure_data,
+        how_far,
+        page_one,
+        tables,
+        uncertainty_tables,
+    )
     from truepose.verdict.answer import AFTER, met
 
     if options["output"] is None:
@@ -92,6 +107,7 @@ def command(**options: Any) -> int:
     paper: str | None = options.pop("paper")
     if paper is not None and options["output"].suffix.lower() != ".pdf":
         raise click.UsageError("--paper goes with --output FILE.pdf.")
+    data_folder: Path | None = options.pop("figure_data")
     request = Request(**options)
     assert request.output is not None
     page = _steps.report_page()
@@ -100,6 +116,8 @@ def command(**options: Any) -> int:
         require_writable(request.output, ENDINGS, [request.machine_file, *beside])
     machine = _steps.read_machine(request, ENDINGS)
     browser = _browser() if request.output.suffix.lower() == ".pdf" else None
+    if data_folder is not None:
+        require_own_folder(data_folder, figure_data.is_data_file, "--figure-data")
     study = assembly.study(machine, measurements, _steps.Watching(request))
     part = None
     if program is not None:
@@ -108,11 +126,20 @@ def command(**options: Any) -> int:
         part = _part.shown_on_page(machine, program, features)
     text = _steps.machine_text(request)
     say_result(study.budget)
-    if browser is None:
-        with step(f"{request.output} written"):
-            page.write(study, request.output, text, part)
-    else:
-        _print(page.render(study, text, part), request.output, paper or "A4", browser)
+    shown_page, contents = page.rendered(study, text, part)
+    data = {}
+    if data_folder is not None:
+        data = figure_data.data_files(contents.drawn.values(), contents.tables)
+    with written_together():
+        if browser is None:
+            with step(f"{request.output} written"):
+                page.write_text(shown_page, request.output)
+        else:
+            _print(shown_page, request.output, paper or "A4", browser)
+        if data_folder is not None:
+            figure_data.write_data(data_folder, data)
+    if data_folder is not None:
+        figure_data.remove_others(data_folder, data)
     show_answers(machine, study.accuracy)
     show_lines((name, "", text) for name, text in page_one.lines(study))
     shown = [
@@ -127,7 +154,7 @@ def command(**options: Any) -> int:
         tables.poses_left_out(study),
     ]
     show_tables(table for table in shown if table is not None)
-    _steps.note_written(request.output)
+    _steps.note_written(request.output, *([] if data_folder is None else [data_folder]))
     return _steps.exit_code(request, met(study.accuracy, AFTER))
 
 

@@ -13,7 +13,7 @@ import secrets
 import signal
 import stat
 import threading
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
@@ -135,6 +135,28 @@ def require_folder(path: Path, names: Collection[str] = ()) -> None:
     for name in names:
         with _refused(path / name):
             _require_ordinary(path / name)
+
+
+def require_own_folder(path: Path, is_own: Callable[[str], bool], option: str) -> None:
+    """Make a folder for files of one kind, or refuse one that holds any other (by `is_own`).
+
+    Raises `RequestError` (codes `output-exists`, `output-not-writable`).
+    """
+    with _refused(path):
+        names = sorted(one.name for one in path.iterdir()) if path.is_dir() else []
+    others = [name for name in names if not is_own(name)]
+    if others:
+        raise _refusal(
+            Fault(
+                "output-exists",
+                "the folder holds other files, and nothing is written between them",
+                found=one_of(others[:3]) if len(others) <= 3 else f"{others[0]}, and others",
+                expected="a folder that is empty, that is not there, or of an earlier report",
+                hint=f"give another name: {option} FOLDER",
+            ),
+            path,
+        )
+    require_folder(path)
 
 
 @contextmanager

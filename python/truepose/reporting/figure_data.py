@@ -11,15 +11,20 @@ import base64
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from decimal import ROUND_HALF_UP, Context, Decimal
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from truepose.files.writing import replacing, written_together
 from truepose.reporting.figures._json import as_json
 from truepose.reporting.figures._plot import Keys, Plot
 from truepose.reporting.table import Table
+
+if TYPE_CHECKING:
+    from truepose.reporting.figures import DrawnFigure
 
 COLUMNS = (
     *("panel", "panel_title", "trace"),
@@ -58,6 +63,43 @@ def table_data(table: Table) -> str:
     """The cells of a table as CSV, as they are shown; a minus sign is a hyphen."""
     header = [table.header] if any(table.header) else []
     return _csv([_MINUS.sub("-", cell) for cell in row] for row in (*header, *table.rows))
+
+
+def data_files(figures: Iterable[DrawnFigure], tables: Iterable[Table]) -> dict[str, str]:
+    """The CSV of each by the name of its file, which has its number on the page."""
+    named = {
+        _file("figure", number, one.name): figure_data(one.figure)
+        for number, one in enumerate(figures, start=1)
+    }
+    return named | {
+        _file("table", number, one.name): table_data(one)
+        for number, one in enumerate(tables, start=1)
+    }
+
+
+def _file(kind: str, number: int, name: str) -> str:
+    return f"{kind}-{number}-{re.sub('[^a-zA-Z0-9_]+', '_', name)}.csv"
+
+
+def is_data_file(name: str) -> bool:
+    """Whether a file may be one of these, or what is left of one where a run was killed."""
+    left = r"\.(figure|table)-\d+-\w*\.[0-9a-f]{8}\.(csv|before)"
+    return re.fullmatch(rf"(figure|table)-\d+-\w+\.csv|{left}", name) is not None
+
+
+def write_data(folder: Path, files: Mapping[str, str]) -> None:
+    """Write them into a folder, all or none."""
+    with written_together():
+        for name, text in files.items():
+            with replacing(folder / name) as temporary:
+                temporary.write_text(text, encoding="utf-8", newline="")
+
+
+def remove_others(folder: Path, files: Collection[str]) -> None:
+    """Files of another page, with more figures or others, go from a folder that was written."""
+    for path in folder.iterdir():
+        if is_data_file(path.name) and path.name not in files:
+            path.unlink(missing_ok=True)
 
 
 def _csv(rows: Iterable[Sequence[str]]) -> str:
@@ -310,4 +352,11 @@ def _plain(text: str | None, end: str) -> str:
     return plain
 
 
-__all__ = ["figure_data", "table_data"]
+__all__ = [
+    "data_files",
+    "figure_data",
+    "is_data_file",
+    "remove_others",
+    "table_data",
+    "write_data",
+]

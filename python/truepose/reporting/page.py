@@ -12,7 +12,7 @@ from truepose.reporting import calibration, how_far, inputs, tables, uncertainty
 from truepose.reporting.accuracy import gains, where_answered
 from truepose.reporting.figures import DrawnFigure, draw
 from truepose.reporting.page_one import PageOne, page_one
-from truepose.reporting.shell import page_parts, template
+from truepose.reporting.shell import Contents, page_parts, template
 from truepose.reporting.study import Study
 from truepose.reporting.table import Table
 
@@ -49,6 +49,13 @@ def render(study: Study, machine_text: str = "", part: PartShown | None = None) 
 
     `part`: what the machine makes of a program, where one is given.
     """
+    return rendered(study, machine_text, part)[0]
+
+
+def rendered(
+    study: Study, machine_text: str = "", part: PartShown | None = None
+) -> tuple[str, Contents]:
+    """The same, and what stands on it, in its order."""
     results = [tables.ranking(study), tables.highest_absolute(study), tables.highest_percent(study)]
     if study.compensation is not None:
         results.append(tables.compensation(study))
@@ -60,7 +67,8 @@ def render(study: Study, machine_text: str = "", part: PartShown | None = None) 
         results.append(left_out)
     drawn = list(draw(study))
     parameters = inputs.parameters(study.machine)
-    return template("page.html.jinja").render(
+    parts = page_parts(say("{machine} · positioning error", machine=study.machine.name))
+    text = template("page.html.jinja").render(
         machine=study.machine,
         page_one=page_one(study, None if part is None else part.page_one),
         machine_drawn=next(one for one in drawn if one.name == MACHINE),
@@ -85,8 +93,9 @@ def render(study: Study, machine_text: str = "", part: PartShown | None = None) 
         limits=limits(),
         said=_said(study, len(parameters.rows), part),
         hashes=_hashes(study),
-        **page_parts(say("{machine} · positioning error", machine=study.machine.name)),
+        **parts,
     )
+    return text, parts["contents"]
 
 
 def _said(study: Study, parameters: int, part: PartShown | None) -> dict[str, str]:
@@ -145,6 +154,10 @@ def _of_calibration(drawn: DrawnFigure) -> bool:
 
 def write(study: Study, path: Path, machine_text: str = "", part: PartShown | None = None) -> None:
     """Write the page to `path`, whole or not at all."""
-    text = render(study, machine_text, part)
+    write_text(render(study, machine_text, part), path)
+
+
+def write_text(text: str, path: Path) -> None:
+    """Write a page that is rendered, whole or not at all."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")

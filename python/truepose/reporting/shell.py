@@ -74,7 +74,7 @@ class Contents:
 
     entries: list[ContentsEntry] = field(default_factory=list)
     drawn: dict[str, DrawnFigure] = field(default_factory=dict)
-    tables: int = 0
+    tables: list[Table] = field(default_factory=list)
 
     def section(self, name: str, title: str) -> str:
         """Note a section; returns its title."""
@@ -88,10 +88,10 @@ class Contents:
         self.entries.append(ContentsEntry(figure.name, say(figure.title), count))
         return say("Figure {number}", number=count)
 
-    def table(self, _: Table) -> str:
+    def table(self, table: Table) -> str:
         """Number a table: "Table 2"."""
-        self.tables += 1
-        return say("Table {number}", number=self.tables)
+        self.tables.append(table)
+        return say("Table {number}", number=len(self.tables))
 
     @property
     def packed(self) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 from truepose.files.writing import replacing
 from truepose.language import grouped, say, say_counted
 from truepose.reporting import calibration, how_far, inputs, tables, uncertainty_tables
-from truepose.reporting.accuracy import gains, where_answered
+from truepose.reporting.accuracy import gains, told, where_answered
 from truepose.reporting.figures import DrawnFigure, draw
 from truepose.reporting.page_one import PageOne, page_one
 from truepose.reporting.shell import Contents, page_parts, template
@@ -72,6 +72,15 @@ def rendered(
         machine=study.machine,
         page_one=page_one(study, None if part is None else part.page_one),
         machine_drawn=next(one for one in drawn if one.name == MACHINE),
+        witnesses=[
+            say(
+                "{name}: the machine that is so far off has {causes}.",
+                name=of.name,
+                causes=of.witness,
+            )
+            for of in told(study.machine, study.accuracy)
+            if of.witness
+        ],
         gains=gains(study.accuracy),
         where_answered=where_answered(study.accuracy) if study.accuracy else "",
         figures=[one for one in drawn if one.name != MACHINE and not _of_calibration(one)],

@@ -95,7 +95,7 @@ def figure(study: Study) -> Plot:
             "yaxis": {"title": {"text": f"y, {unit}"}, **axis},
             "zaxis": {"title": {"text": f"z, {unit}"}, **axis},
             "camera": {
-                "eye": {"x": 1.4, "y": -1.9, "z": 0.75},
+                "eye": {"x": 1.3, "y": -1.75, "z": 0.7},
                 "center": {"x": 0, "y": 0, "z": -0.12},
             },
         },
@@ -155,7 +155,7 @@ def _lines(shape: Outline, workspace: Floats) -> Iterable[dict[str, Any]]:
         "points": workspace,
         "name": say("poses evaluated"),
         "mode": "markers",
-        "marker": {"color": WORKSPACE, "size": 4, "opacity": 0.6},
+        "marker": {"color": WORKSPACE, "size": 4, "opacity": 0.5},
     }
     if len(shape.frame):
         yield {
@@ -225,5 +225,5 @@ def _trace(planar: bool, unit: Shown, points: Floats, **look: Any) -> Keys:
     if planar:
         return trace("scatter", x=x, y=y, hovertemplate=hover, **look)
     if "marker" in look:  # markers look larger in three dimensions
-        look["marker"] = look["marker"] | {"size": max(2, look["marker"]["size"] - 3)}
+        look["marker"] = look["marker"] | {"size": max(1.5, look["marker"]["size"] - 3)}
     return trace("scatter3d", x=x, y=y, z=z, hovertemplate=hover, **look)

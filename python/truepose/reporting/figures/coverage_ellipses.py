@@ -58,11 +58,12 @@ def says(study: Study) -> str:
     """At how many poses 95 of 100 machines keep what is asked, and where the longest ellipse is."""
     result = study.ellipses
     assert result is not None
-    drawn = [(panel, pose) for panel in _panels(study) for pose in panel.poses]
-    halves = [_half_length(result, pose, panel.axes) for panel, pose in drawn]
+    panels = _panels(study)
+    drawn = [pose for panel in panels for pose in panel.poses]
+    halves = np.concatenate([_half_lengths(result, panel) for panel in panels])
     longest = where_highest(halves)
     size = study.units.small_length.text(halves[longest], 3)
-    at = at_text(study.machine, result, drawn[longest][1])
+    at = at_text(study.machine, result, drawn[longest])
     asked = study.machine.accuracy.target
     if asked is None:
         return say(
@@ -136,7 +137,7 @@ def figure(study: Study) -> Plot:
     assert result is not None
     names = [str(name) for name in result["axis"].values]
     panels = _panels(study)
-    times = magnified(study)
+    times, circle = magnified(study), _has_circle(study)
     figure = grid(rows=1, cols=len(panels), horizontal_spacing=0.09)
     for at, panel in enumerate(panels, start=1):
         drawn = [panel.places]
@@ -144,7 +145,7 @@ def figure(study: Study) -> Plot:
             centre, outline = ellipse(result, pose, panel.axes)
             place = panel.places[nth]
             first = at == 1 and nth == 0
-            if _has_circle(study):
+            if circle:
                 drawn.append(_draw_asked(figure, study, place, times, at, first=first))
             _draw(figure, study, pose, panel, nth, times, at, first=first)
             drawn.append(place + times * (centre + outline))
@@ -230,24 +231,24 @@ def _panel(pair: tuple[int, ...], places: Floats, hidden: list[Floats]) -> Panel
     return Panel((pair[0], pair[1]), chosen, places[chosen])
 
 
-def _half_length(result: xr.Dataset, pose: int, axes: tuple[int, int]) -> float:
-    """Half the length of an ellipse, m."""
-    return float(np.linalg.norm(ellipse(result, pose, axes)[1], axis=1).max())
+def _half_lengths(result: xr.Dataset, panel: Panel) -> Floats:
+    """(n_pose,) half the length of each ellipse of a panel, m.
 
-
-def _farthest(result: xr.Dataset, pose: int, axes: tuple[int, int]) -> float:
-    """How far the farthest point of an ellipse is from the commanded place, m."""
-    centre, outline = ellipse(result, pose, axes)
-    return float(np.linalg.norm(centre + outline, axis=1).max())
+    The root of the larger eigenvalue of its matrix.
+    """
+    pair = list(panel.axes)
+    shapes = np.asarray(result["ellipse"].values)[panel.poses][:, pair][:, :, pair]
+    return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(shapes)[:, -1], 0.0)))
 
 
 def _reach(study: Study, panel: Panel) -> float:
-    """Half of the room that the largest ellipse and its offset take, m."""
+    """Half of the room that the largest ellipse and its offset take at most, m."""
     result = study.ellipses
     assert result is not None
-    halves = [_half_length(result, pose, panel.axes) for pose in panel.poses]
-    farthest = [_farthest(result, pose, panel.axes) / 2 for pose in panel.poses]
-    return max(*halves, *farthest)
+    half = _half_lengths(result, panel)
+    centres = np.asarray(result["ellipse_centre"].values)[panel.poses][:, list(panel.axes)]
+    offset = np.linalg.norm(centres, axis=1)
+    return float(np.maximum(half, 0.5 * (offset + half)).max())
 
 
 def _has_circle(study: Study) -> bool:
@@ -348,7 +349,7 @@ def _draw(
             hoveron="fills",
             text=say(
                 "reaches {size} from its middle, which is {off} off",
-                size=fine.text(_half_length(result, pose, panel.axes), 3),
+                size=fine.text(float(_half_lengths(result, panel)[nth]), 3),
                 off=fine.text(float(np.linalg.norm(centre)), 3),
             ),
             hoverinfo="text",

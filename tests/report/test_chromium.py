@@ -320,12 +320,13 @@ def test_a_figure_of_the_part_is_not_blank(name: str, part_page: Visit) -> None:
 
 
 def test_the_path_shows_how_well_it_is_known(part_page: Visit) -> None:
-    """The menu over the path hides the known error and shows the half width, and back."""
+    """The menu over the path hides the known error and shows another view, and back."""
     place = part_page.page.locator("#figure-path")
     shown = """element => (element.data ? element : element.querySelector(".js-plotly-plot"))
         .data.map(trace => trace.visible !== false)"""
-    assert place.evaluate(shown) == [True, True, False]
-    for number, wanted in ((1, [True, False, True]), (0, [True, True, False])):
+    assert place.evaluate(shown) == [True, True, False, False]
+    views = [[True, *(other == view for other in range(3))] for view in range(3)]
+    for number, wanted in ((1, views[1]), (2, views[2]), (0, views[0])):
         before = part_page.look("#figure-path", [])
         place.locator(".updatemenu-header").click()
         place.locator(".updatemenu-dropdown-button").nth(number).click()

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.language import grouped, say
 from truepose.machine import Machine
+from truepose.reporting.display import where_highest
 from truepose.reporting.figures import DrawnFigure
 from truepose.reporting.figures._plot import Keys, Plot, grid, trace
 from truepose.reporting.figures._style import (
@@ -19,14 +21,18 @@ from truepose.reporting.figures._style import (
     COLOUR_SCALE,
     GRID,
     INK,
+    PAPER,
+    SHADE_DARKER,
     finish,
     small,
 )
 from truepose.reporting.figures._text import as_text
+from truepose.verdict.states import AFTER as AFTER_STATE
+from truepose.verdict.states import BEFORE as BEFORE_STATE
 from truepose.workpiece.along import PathErrors
-from truepose.workpiece.evaluation import PartEvaluation, QuantityAnswer
+from truepose.workpiece.evaluation import MET, PartEvaluation, QuantityAnswer
 
-MOST_POINTS = 6000
+MOST_POINTS = 2000
 """Points of the path that are drawn; of a longer one every second is left out, again and again."""
 
 SHARE = 0.06
@@ -79,19 +85,76 @@ class DrawnPath:
 
 
 def figures(evaluation: PartEvaluation, path: DrawnPath) -> list[DrawnFigure]:
-    """The path, then the strips."""
-    drawn = [DrawnFigure("strips", "Every quantity in its zone", _STRIPS, _strips(evaluation))]
+    """The strips, then the path."""
+    drawn = [
+        DrawnFigure(
+            "strips",
+            "Every quantity in its zone",
+            _strips_caption(),
+            as_text(_strips(evaluation)),
+            says=_strips_say(evaluation),
+        )
+    ]
     if len(path.rows):
         figure, caption = _path(evaluation, path.rows)
-        drawn.append(DrawnFigure("path", "The path and the errors on it", caption, figure))
-    return [DrawnFigure(one.name, one.title, one.caption, as_text(one.figure)) for one in drawn]
+        drawn.append(
+            DrawnFigure(
+                "path",
+                "The path and the errors on it",
+                caption,
+                as_text(figure),
+                says=_path_says(evaluation, path.rows),
+            )
+        )
+    return drawn
 
 
-_STRIPS = (
-    "Grey: the tolerance zone of the drawing. Red as commanded, green after compensation: the dot "
-    "is the known value, the thick bar the coverage interval, the thin line what machines inside "
-    "the bands reach, the ends of the dotted line what none goes beyond, where that is proven."
-)
+def _strips_caption() -> str:
+    return say(
+        "Grey: the tolerance zone of the drawing. Hollow and dashed as commanded, filled after "
+        "compensation: the mark is the known value, the thick bar the coverage interval, the thin "
+        "line what machines inside the bands reach, the ends of the dotted line what none goes "
+        "beyond, where that is proven."
+    )
+
+
+def _strips_say(evaluation: PartEvaluation) -> str:
+    """How many quantities are certainly within tolerance."""
+    good = {
+        answers.state.name: sum(one.verdict == MET for one in answers.answers)
+        for answers in evaluation.states
+    }
+    every = len(evaluation.characteristics)
+    if BEFORE_STATE in good and AFTER_STATE in good:
+        return say(
+            "{before} of {every} quantities are certainly within tolerance as commanded, and "
+            "{after} after compensation.",
+            before=good[BEFORE_STATE],
+            after=good[AFTER_STATE],
+            every=every,
+        )
+    return say(
+        "{good} of {every} quantities are certainly within tolerance.",
+        good=next(iter(good.values())),
+        every=every,
+    )
+
+
+def _path_says(evaluation: PartEvaluation, rows: Floats) -> str:
+    """The largest known error, and how much of it only moves the part."""
+    known, unit = rows[:, 3:6], evaluation.shown.small_length
+    sizes = np.linalg.norm(known, axis=1)
+    worst = where_highest(sizes)
+    apart = np.linalg.norm(known - known.mean(axis=0), axis=1)
+    return say(
+        "As commanded the tool is known to be up to {size} off, on line {line}; all points share "
+        "{shift} of it, which moves the part and keeps its form, and up to {apart} differ from "
+        "point to point.",
+        size=unit.text(float(sizes[worst]), 3),
+        line=int(rows[worst, 7]),
+        apart=unit.text(float(apart.max()), 3),
+        shift=unit.text(float(np.linalg.norm(known.mean(axis=0))), 3),
+    )
 
 
 def _strips(evaluation: PartEvaluation) -> Plot:
@@ -108,16 +171,19 @@ def _strips(evaluation: PartEvaluation) -> Plot:
         ends = [0.0]
         for place, answers in enumerate(evaluation.states):
             answer = answers.answers[row - 1]
-            colour = (BEFORE, AFTER)[place]
-            for line in _marks(answer, nominal, scale, 0.28 - 0.56 * place, colour):
+            is_after = answers.state.name == AFTER_STATE
+            y = 0.28 - 0.56 * place
+            for line in _marks(answer, nominal, scale, y, is_after=is_after):
                 ends += [x for x in line["x"] if math.isfinite(x)]
+                leads = line.pop("leads")
                 figure.add_trace(
                     trace(
                         "scatter",
-                        showlegend=row == 1 and line.pop("leads"),
-                        name=answers.state.name,
+                        showlegend=leads and row == 1,
+                        name=say("after compensation") if is_after else say("before compensation"),
                         legendgroup=answers.state.name,
-                        hovertemplate=f"{of.label}: %{{x:.2f}} {small_unit.label}",
+                        text=of.label,
+                        hovertemplate=f"%{{text}}: %{{x:.2f}} {small_unit.label}",
                         **line,
                     ),
                     row,
@@ -129,7 +195,8 @@ def _strips(evaluation: PartEvaluation) -> Plot:
             most if high is None else high,
             row,
             1,
-            fillcolor="#DDE3EC",
+            name=say("tolerance zone"),
+            fillcolor=SHADE_DARKER,
             line={"width": 0},
             layer="below",
         )
@@ -141,12 +208,15 @@ def _strips(evaluation: PartEvaluation) -> Plot:
             1,
             range=[-0.75, 0.75],
             tickvals=[0.0],
-            ticktext=[f"{of.label}: {_words(evaluation, row - 1)}"],
+            ticktext=[f"{of.label}\n{_words(evaluation, row - 1)}"],
             showgrid=False,
+            automargin=True,
         )
     # The last x axis says what is shown.
-    figure.update_xaxes(count, 1, title={"text": "deviation from nominal; of a form its value"})
-    return finish(figure, STRIP * count + 150, margin={"l": 330, "r": 30, "t": 50, "b": 60})
+    figure.update_xaxes(
+        count, 1, title={"text": say("deviation from nominal; of a form its value")}
+    )
+    return finish(figure, STRIP * count + 150, margin={"l": 10, "r": 30, "t": 50, "b": 60})
 
 
 def _range(ends: list[float]) -> tuple[float, float]:
@@ -162,9 +232,10 @@ def _words(evaluation: PartEvaluation, at: int) -> str:
 
 
 def _marks(
-    answer: QuantityAnswer, nominal: float, scale: float, y: float, colour: str
+    answer: QuantityAnswer, nominal: float, scale: float, y: float, *, is_after: bool
 ) -> list[Keys]:
-    """Lines and a dot of one state of a strip."""
+    """Lines and a mark of one state of a strip: before hollow and dashed, after filled."""
+    colour = AFTER if is_after else BEFORE
 
     def at(*values: float) -> list[float]:
         return [(value - nominal) * scale for value in values]
@@ -185,11 +256,23 @@ def _marks(
             "mode": "lines",
             "line": {"color": colour, "width": 2},
         },
-        {"x": at(*answer.interval), "mode": "lines", "line": {"color": colour, "width": 7}},
+        {
+            "x": at(*answer.interval),
+            "mode": "lines",
+            "line": {
+                "color": colour,
+                "width": 7 if is_after else 5,
+                "dash": "solid" if is_after else "3px,2px",
+            },
+        },
         {
             "x": at(answer.known),
             "mode": "markers",
-            "marker": {"color": "white", "size": 9, "line": {"color": colour, "width": 2}},
+            "marker": {
+                "color": colour if is_after else PAPER,
+                "size": 9,
+                "line": {"color": colour, "width": 2},
+            },
         },
     ]
     return [
@@ -206,43 +289,74 @@ def _path(evaluation: PartEvaluation, rows: Floats) -> tuple[Plot, str]:
     most = float(sizes.max())
     factor = _round(SHARE * part / most) if most > 0.0 else 1.0
     moved = points + factor * known
+    apart = known - known.mean(axis=0)
+    beyond = np.linalg.norm(apart, axis=1)
+    own = _round(SHARE * part / float(beyond.max())) if beyond.max() > 0.0 else factor
     planar = "z" not in evaluation.machine.dof
     figure = Plot()
     text = [
-        f"line {line:.0f}<br>known {size:.2f} {unit.label}<br>95 % ± {wide:.2f} {unit.label}"
-        for line, size, wide in zip(
-            rows[:, 7], sizes * unit.per_si, half * unit.per_si, strict=True
+        say(
+            "line {line}\nknown {size}, of it not shared {apart}\n95 % ± {half}",
+            line=int(line),
+            size=unit.text(size, 3),
+            apart=unit.text(left, 3),
+            half=unit.text(wide, 3),
+        )
+        for line, size, left, wide in zip(
+            rows[:, 7].tolist(), sizes.tolist(), beyond.tolist(), half.tolist(), strict=True
         )
     ]
     common = {"text": text, "hoverinfo": "text", "mode": "markers"}
     bar = {"thickness": 14, "len": 0.75}
-    for place, line, name in (
-        (points, None, "programmed"),
-        (moved, (sizes, f"known error, {unit.label}"), f"actual, error × {factor:g}"),
-        (points, (half, f"95 % half width, {unit.label}"), "95 % half width"),
-    ):
-        marker: Keys = {"size": 4 if planar else 2, "color": AXIS}
-        if line is not None:
-            marker |= {
-                "color": small(line[0] * unit.per_si),
-                "colorscale": COLOUR_SCALE,
-                "colorbar": bar | {"title": {"text": line[1], "side": "right"}},
-                "showscale": True,
-            }
+    views = (
+        (say("known error"), moved, sizes, say("known error, {unit}", unit=unit.label)),
+        (
+            say("without what all points share"),
+            points + own * apart,
+            beyond,
+            say("known error not shared, {unit}", unit=unit.label),
+        ),
+        (say("95 % half width"), points, half, say("95 % half width, {unit}", unit=unit.label)),
+    )
+    figure.add_trace(
+        _spatial(
+            planar,
+            points * length.per_si,
+            name=say("programmed"),
+            marker={"size": 4 if planar else 2, "color": AXIS},
+            **common,
+        )
+    )
+    for at, (name, place, colours, title) in enumerate(views):
+        marker: Keys = {
+            "size": 4 if planar else 2,
+            "color": small(colours * unit.per_si),
+            "colorscale": COLOUR_SCALE,
+            "colorbar": bar | {"title": {"text": title, "side": "right"}},
+            "showscale": True,
+        }
         figure.add_trace(
             _spatial(planar, place * length.per_si, name=name, marker=marker, **common)
         )
-    shown = {"visible": [True, True, False]}, {"visible": [True, False, True]}
-    figure.data[2]["visible"] = False
+        figure.data[-1]["visible"] = at == 0
     buttons = [
-        {"label": label, "method": "update", "args": [states]}
-        for label, states in zip(("known error", "95 % half width"), shown, strict=True)
+        {
+            "label": name,
+            "method": "update",
+            "args": [{"visible": [True, *(other == at for other in range(len(views)))]}],
+        }
+        for at, (name, *_) in enumerate(views)
     ]
     menu = {"buttons": buttons, "x": 0.0, "xanchor": "left", "y": 1.06, "yanchor": "bottom"}
-    caption = (
-        f"The programmed path in grey; beside it where the tool is known to go, the error drawn "
-        f"{factor:g} times as large, coloured by its size. The other view colours the path by half "
-        f"the 95 % interval of the position, to first order. {len(rows):,} of the path's points."
+    caption = say(
+        "The programmed path in grey; beside it where the tool is known to go as commanded, the "
+        "error drawn {factor} times as large, coloured by its size. An error that all points share "
+        "moves the whole part and hides what differs from point to point: the second view leaves "
+        "it out, {own} times as large. The third colours the path by half the 95 % interval of "
+        "the position, to first order. {points} of the path's points.",
+        factor=grouped(round(factor)),
+        own=grouped(round(own)),
+        points=grouped(len(rows)),
     )
     finish(figure, 640, margin={"l": 10, "r": 10, "t": 90, "b": 20}, updatemenus=[menu])
     if planar:
@@ -250,7 +364,7 @@ def _path(evaluation: PartEvaluation, rows: Floats) -> tuple[Plot, str]:
         figure.update_yaxes(title={"text": f"y, {length.label}"}, scaleanchor="x", scaleratio=1)
     else:
         axis = {"gridcolor": GRID, "color": INK}
-        both = np.concatenate([points, moved]) * length.per_si
+        both = np.concatenate([points, moved, points + own * apart]) * length.per_si
         middles = 0.5 * (both.min(axis=0) + both.max(axis=0))
         extents = np.ptp(both, axis=0) * (1.0 + MARGIN)
         extents = np.maximum(extents, FLAT * extents.max())

@@ -86,6 +86,7 @@ def command(**options: Any) -> int:
     from truepose.cli._verbose import say_result, step
     from truepose.files.one_run import is_stdin
     from truepose.files.writing import require_own_folder, require_writable, written_together
+    from truepose.language import say
     from truepose.reporting import (
         assembly,
         figure_data,
@@ -93,6 +94,7 @@ def command(**options: Any) -> int:
         page_one,
         tables,
         uncertainty_tables,
+        within,
     )
     from truepose.verdict.answer import AFTER, met
 
@@ -141,7 +143,9 @@ def command(**options: Any) -> int:
     if data_folder is not None:
         figure_data.remove_others(data_folder, data)
     show_answers(machine, study.accuracy)
-    show_lines((name, "", text) for name, text in page_one.lines(study))
+    said = [(name, "", text) for name, text in page_one.lines(study)]
+    kept = within.within_note(study)
+    show_lines([*said, (say("How many"), "", kept)] if kept else said)
     shown = [
         tables.ranking(study),
         tables.highest_absolute(study),

@@ -32,6 +32,9 @@ def test_every_figure_and_table_has_its_number_and_the_files_of_before_go(
     wanted = {f"{kind.lower()}-{number}-{name}.csv" for name, kind, number in shown}
     assert set(written) == wanted
     assert all(len(one.splitlines()) > 1 for one in written.values())
+    # How many machines keep what is asked: the figure says what the command does.
+    (share,) = re.findall(r"At its worst pose (\S+ %) of all machines keep", text)
+    assert f"Before compensation {share} of all machines keep" in " ".join(outcome.out.split())
     # What is shown in the table stands in its file.
     (ranking,) = (
         one for name, one in written.items() if re.fullmatch(r"table-\d+-ranking.csv", name)

@@ -206,22 +206,24 @@ def test_figures_follow_the_scheme_and_are_light_in_print(report: Visit) -> None
     names = [name for name in FIGURE_NAMES if name not in report.absent]
     dark = [int(_style.DARK[_style.PAPER][at : at + 2], 16) for at in (1, 3, 5)]
 
-    def all_are_there(paper: list[int], colours: dict[str, str]) -> None:
+    def all_are_there(paper: list[int], colours: dict[str, str], least: int) -> None:
         for name in names:
             wanted = [colours.get(one, one) for one in COLOURS.get(name, [])]
             found = report.look(f"#figure-{name}", wanted)
             assert found["paper"] == paper, (name, found)
             assert found["marked"] > 0.005, (name, found)
-            assert all(count > 60 for count in found["near"]), (name, found)
+            assert all(count > least for count in found["near"]), (name, found)
 
-    report.page.emulate_media(color_scheme="dark")
-    all_are_there(dark, _style.DARK)
-    report.page.emulate_media(color_scheme="dark", media="print")
-    report.page.evaluate("() => dispatchEvent(new Event('beforeprint'))")
-    all_are_there([255, 255, 255], {})
-    assert report.page.locator("details:not([open])").count() == 0
-    report.page.evaluate("() => dispatchEvent(new Event('afterprint'))")
-    report.page.emulate_media(color_scheme="light", media="screen")
+    try:
+        report.page.emulate_media(color_scheme="dark")
+        all_are_there(dark, _style.DARK, least=60)
+        report.page.emulate_media(color_scheme="dark", media="print")
+        report.page.evaluate("() => dispatchEvent(new Event('beforeprint'))")
+        all_are_there([255, 255, 255], {}, least=25)  # of half as many pixels
+        assert report.page.locator("details:not([open])").count() == 0
+    finally:
+        report.page.evaluate("() => dispatchEvent(new Event('afterprint'))")
+        report.page.emulate_media(color_scheme="light", media="screen")
     assert report.page.locator("details[open]").count() == 0
     assert report.complaints == []
 

@@ -5,7 +5,8 @@
   const root = document.documentElement;
   // How wide a figure is drawn that is printed, in pixels; page.css makes it as wide as the paper.
   const PRINT_WIDTH = 900;
-  const HALF_PAGE = 470, WHOLE_PAGE = 1080;
+  const HALF_PAGE = 410, WHOLE_PAGE = 1080;
+  const BESIDE = {width: 420, height: 400};
   const forPrint = location.hash === "#print";
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const narrow = matchMedia("(max-width: 640px)");
@@ -59,13 +60,16 @@
       template: coloured(drawn.template, ofTemplate), uirevision: name, ...coloured(layout, colours),
     };
     if (narrow.matches && !printed) narrowed(shown);
-    if (printed) {
-      shown.width = PRINT_WIDTH;
-      shown.height = printedHeight(layout.height);
-    }
     const place = document.getElementById("figure-" + name);
+    if (printed) {
+      Object.assign(shown, place.closest(".beside")
+        ? BESIDE : {width: PRINT_WIDTH, height: printedHeight(layout.height)});
+      place.style.width = shown.width + "px";
+    } else {
+      place.style.width = "";
+    }
     place.style.height = shown.height + "px";
-    const settings = {...drawn.settings, responsive: !printed, staticPlot: printed};
+    const settings = {...drawn.settings, responsive: !printed};
     return Plotly.react(place, coloured(data, colours), shown, settings);
   }
 

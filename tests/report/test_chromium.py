@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlparse
+from urllib.request import url2pathname
 
 import numpy as np
 import pytest
@@ -171,7 +173,8 @@ def write_report(name: str, file: Path) -> set[str]:
     machine = str(MACHINES / f"{name}.toml")
     setting = f"condition.temperature_log={log}"
     measured = [] if name != MEASURED else ["--measurements", str(measurements(file))]
-    assert run(["report", machine, "--set", setting, "--output", str(file), *measured]) == 0
+    data = ["--figure-data", str(file.with_suffix(""))]
+    assert run(["report", machine, "--set", setting, "--output", str(file), *measured, *data]) == 0
     absent = set() if name == OVERCONSTRAINED else ONLY_OVERCONSTRAINED
     return absent if measured else absent | ONLY_MEASURED
 
@@ -282,6 +285,16 @@ def test_nothing_was_asked_from_the_network_and_nothing_went_wrong(report: Visit
 def test_nothing_is_wider_than_the_page(report: Visit) -> None:
     widths = report.page.evaluate(WIDTHS)
     assert widths[0] <= widths[1]
+
+
+def test_the_buttons_give_what_the_command_writes(report: Visit) -> None:
+    folder = Path(url2pathname(urlparse(report.page.url).path)).with_suffix("")
+    written = {path.name.split("-", 2)[2]: path for path in folder.iterdir()}
+    for button in ("#distribution .csv", "#workspace_maps .csv", "#table-compensation .csv"):
+        with report.page.expect_download() as waiting:
+            report.page.locator(button).click()
+        name = button.split(" ")[0].removeprefix("#").removeprefix("table-")
+        assert Path(waiting.value.path()).read_bytes() == written[f"{name}.csv"].read_bytes()
 
 
 PART = Path(__file__).parents[2] / "examples" / "part"

@@ -123,9 +123,11 @@ def figure(study: Study) -> Plot:
         barmode="stack",
         legend={"traceorder": "normal"},
         bargap=0.25,
-        margin={"l": 190, "r": 20, "t": 45, "b": 55},
+        margin={"l": 20, "r": 20, "t": 60, "b": 55},
     )
     figure.update_yaxes(range=[len(drawn) - 0.5, -0.5], ticks="", showgrid=False, dtick=1)
+    figure.update_yaxes(automargin=True, row=1, col=1)
+    figure.update_xaxes(nticks=5, tickangle=0)
     figure.update_xaxes(title={"text": say("share of the value, %")}, range=[0, 100], row=1, col=1)
     figure.update_xaxes(
         title={"text": say("change, half bands")}, range=_range(change, spread), zeroline=True,

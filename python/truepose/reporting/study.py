@@ -145,7 +145,7 @@ class Study:
         """Why each pose of `left_out` cannot be used."""
         return tuple(str(status) for status in self.values("left_out_status"))
 
-    @property
+    @cached_property
     def units(self) -> ShownUnits:
         """The units for people."""
         return self.machine.shown

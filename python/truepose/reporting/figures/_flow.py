@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from truepose.reporting.figures._plot import Keys, Plot, grid
 
-PANEL_TITLE_SIZE = 12
+PANEL_TITLE_SIZE, NARROW_TITLE_SIZE = 12, 10
 
 
 LEGEND_ROW, LETTER, LEGEND_MARK = 19, 6.6, 48
@@ -70,6 +70,7 @@ class Flow:
             changed[f"{axis}.domain"] = small[axis]["domain"]
         for number, title in enumerate(small["annotations"]):
             changed |= {f"annotations[{number}].{key}": title[key] for key in "xy"}
+            changed[f"annotations[{number}].font.size"] = NARROW_TITLE_SIZE
         plot.update_layout(
             meta={"narrow": changed},
             height=self.height,

@@ -7,11 +7,14 @@ that reads like a tag, or like an entity, is shown as it stands there.
 from __future__ import annotations
 
 import html
+import re
 from typing import Any
 
 import numpy as np
 
 from truepose.reporting.figures._plot import Plot
+
+MARKUP = re.compile("[&<>\n]")
 
 NO_BOX = "<extra></extra>"
 """At the end of a hover text: no second box with the name of the trace."""
@@ -26,6 +29,8 @@ def as_text(figure: Plot) -> Plot:
 
 def _marked(value: Any) -> Any:
     if isinstance(value, str):
+        if not MARKUP.search(value):
+            return value
         text = value.removesuffix(NO_BOX)
         return html.escape(text, quote=False).replace("\n", "<br>") + value[len(text) :]
     if isinstance(value, dict):

@@ -161,9 +161,21 @@ def figure(study: Study) -> Plot:
             "showscale": False,
             "colorbar": _bar(unit),
         },
+        meta={"narrow": _narrow(figure, flow)},
         updatemenus=[_menu(own, grids, common, 12 + 17 * _title_lines(panels))],
     )
     return figure
+
+
+def _narrow(figure: Plot, flow: Flow) -> Keys:
+    """What else changes on a small screen: numbers and ticks are smaller, and there are fewer."""
+    changed: Keys = {"margin.l": 42, "margin.r": 8}
+    for note in range(len(flow.titles), len(figure.layout["annotations"])):
+        changed[f"annotations[{note}].font.size"] = 9
+    for axis in (name for name in figure.layout if name[1:5] == "axis"):
+        ends = [float(f"{end:.3g}") for end in figure.layout[axis]["range"]]
+        changed |= {f"{axis}.tickvals": ends, f"{axis}.tickangle": 0, f"{axis}.tickfont.size": 10}
+    return changed
 
 
 def _bar(unit: Shown) -> Keys:
@@ -219,7 +231,8 @@ def _menu(own: list[Keys], grids: list[bool], common: Keys, above: int) -> Keys:
     return {
         "type": "buttons",
         "direction": "right",
-        "showactive": True,
+        # What plotly paints the active one is not to be read by night; the bar says which it is.
+        "showactive": False,
         "active": 0,
         "x": 0.0,
         "xanchor": "left",
@@ -255,7 +268,7 @@ def _flow(maps: list[WorkspaceMap], panels: list[MapPanel]) -> Flow:
         top=MENU + 12 + 17 * lines,
         narrow_top=MENU + 12 + 17 * lines,
         bottom=90,
-        apart=(0.07, 0.15),
+        apart=(0.07, 0.13),
     )
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from truepose.plausibility import oddities
     from truepose.reporting.check import check
     from truepose.reporting.compare import compare
+    from truepose.reporting.report import report
     from truepose.uncertainty_analysis.bounds import bounds
     from truepose.uncertainty_analysis.functions.inputs import Input
     from truepose.uncertainty_analysis.monte_carlo import monte_carlo
@@ -65,6 +66,7 @@ _WHERE = {
     "over_time": "truepose.error_budget.over_time",
     "part": "truepose.workpiece.evaluate",
     "plan": "truepose.calibration.planning.plan",
+    "report": "truepose.reporting.report",
     "shares": "truepose.uncertainty_analysis.shares",
     "strain": "truepose.error_budget.strain",
     "threads": "truepose._kernel",
@@ -72,6 +74,14 @@ _WHERE = {
     "uncertainty": "truepose.uncertainty_analysis.uncertainty",
     "worst_case": "truepose.uncertainty_analysis.worst_case",
 }
+
+_HANDED_ON = {
+    "answers_html": "truepose.reporting.notebook",
+    "calibration_html": "truepose.reporting.notebook",
+    "facts_of_answer": "truepose.reporting.notebook",
+    "plot": "truepose.reporting.plot",
+}
+"""Not public: what methods of lower layers hand on to (`lazy_names.of_the_package`)."""
 
 __all__ = [
     "Condition",
@@ -96,6 +106,7 @@ __all__ = [
     "over_time",
     "part",
     "plan",
+    "report",
     "shares",
     "strain",
     "threads",
@@ -122,8 +133,9 @@ if not TYPE_CHECKING:  # type checkers know the names above, and refuse all othe
     def __getattr__(name: str) -> Any:
         from importlib import import_module
 
-        if name in _WHERE:
-            value = getattr(import_module(_WHERE[name]), name)
+        where = _WHERE.get(name) or _HANDED_ON.get(name)
+        if where is not None:
+            value = getattr(import_module(where), name)
         elif name == "errors":
             value = import_module("truepose.errors")
         elif name == "__version__":

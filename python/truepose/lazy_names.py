@@ -8,6 +8,16 @@ from importlib import import_module
 from typing import Any
 
 
+def of_the_package(name: str) -> Any:
+    """What stands under this name in `truepose` itself, which shows what all its layers have.
+
+    So a method of a lower layer hands on to a higher one, and is only there for convenience:
+    nothing is computed with what comes back.
+    """
+    package: str = __name__.rpartition(".")[0]
+    return getattr(sys.modules[package], name)
+
+
 def imported_when_used(package: str, where: Mapping[str, str]) -> Callable[[str], Any]:
     """A package's `__getattr__` for names -> the modules that have them.
 

@@ -44,15 +44,21 @@ class Represented:
         return clipped(f"<{type(self).__name__} {told}", MOST - 1) + ">"
 
     def _repr_html_(self) -> str:
-        rows = "".join(
-            f'<tr><th scope="row" style="{_LEFT}">{html.escape(label)}</th>'
-            f'<td style="{_LEFT}">{html.escape(shown(value, MOST))}</td></tr>'
-            for label, value in self._facts()
-        )
-        return f"<table><caption>{type(self).__name__}</caption><tbody>{rows}</tbody></table>"
+        return facts_html(type(self).__name__, self._facts())
 
 
-_LEFT = "text-align: left"
+LEFT = "text-align: left"
+"""How words stand in a cell."""
+
+
+def facts_html(caption: str, facts: Facts) -> str:
+    """Facts as a table, a row each."""
+    rows = "".join(
+        f'<tr><th scope="row" style="{LEFT}">{html.escape(label)}</th>'
+        f'<td style="{LEFT}">{html.escape(shown(value, MOST))}</td></tr>'
+        for label, value in facts
+    )
+    return f"<table><caption>{html.escape(caption)}</caption><tbody>{rows}</tbody></table>"
 
 
 def shown(value: object, most: int = MOST_OF_VALUE) -> str:
@@ -91,4 +97,4 @@ def clipped(text: str, most: int) -> str:
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
-__all__ = ["Facts", "Represented", "clipped", "shown"]
+__all__ = ["LEFT", "Facts", "Represented", "clipped", "facts_html", "shown"]

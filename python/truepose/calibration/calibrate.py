@@ -53,6 +53,7 @@ from truepose.calibration.measurements import Measurements
 from truepose.calibration.measurements.read_csv import read_measurements
 from truepose.calibration.residual_checks import residual_patterns
 from truepose.errors import Problem, RequestError
+from truepose.lazy_names import of_the_package
 from truepose.machine import Machine
 from truepose.representation import Facts, Represented
 from truepose.runs.arguments import checked
@@ -100,6 +101,11 @@ class Calibration(Represented):
         yield "readings that do not fit", len(self.outliers)
         yield "suspicions", [suspicion.code for suspicion in self.suspicions]
         yield "verdict", verdict_of(self)
+
+    def _repr_html_(self) -> str:
+        """The answer, then what the command says of it, without the list of all unknowns."""
+        tables: str = of_the_package("calibration_html")(self)
+        return super()._repr_html_() + tables
 
     @property
     def accepted(self) -> bool:

@@ -103,9 +103,9 @@ def run(machine_file: Path, output: Path | None, given: dict[str, Any]) -> int:
     options = _options(machine, test, given)
     page = None
     if output is not None and output.suffix.lower() == ".html":
-        from truepose.cli._steps import with_report_packages
+        from truepose.reporting.drawing_packages import module_that_draws
 
-        page = with_report_packages(test.page)
+        page = module_that_draws(test.page)
     samples = {} if given["samples"] is None else {"samples": given["samples"]}
     with progress("test", "samples") as report:
         result = test.run(

@@ -95,21 +95,6 @@ def evaluate(machine_file: Path, program: Path, output: Path | None, given: dict
     return int(any(answer.verdict == NOT_MET for answer in judged.answers))
 
 
-def shown_on_page(machine: Machine, program: Path, features: Path | None) -> Any:
-    """The part as a page shows it, with the defaults of `truepose part`."""
-    page = _page()
-    path = page.DrawnPath(machine)
-    with progress("part", "samples") as report:
-        evaluation = evaluate_part(
-            machine,
-            read_part(machine, program, features),
-            machine.condition,
-            sinks=[path],
-            progress=report,
-        )
-    return page.shown(evaluation, path, program.name)
-
-
 def propose(machine_file: Path, program: Path, output: Path | None, given: dict[str, Any]) -> int:
     """Write the features that are found in the program."""
     from truepose.workpiece.propose import propose_features
@@ -138,9 +123,9 @@ def _options(machine: Machine, given: dict[str, Any]) -> Any:
 
 def _page() -> Any:
     """The module that draws the page. Raises `RequestError` (extra-missing) without plotly."""
-    from truepose.cli._steps import with_report_packages
+    from truepose.reporting.drawing_packages import module_that_draws
 
-    return with_report_packages("truepose.reporting.part_page")
+    return module_that_draws("truepose.reporting.part_page")
 
 
 def _write(evaluation: PartEvaluation, output: Path) -> None:

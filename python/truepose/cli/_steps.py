@@ -5,9 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 import click
@@ -241,29 +239,6 @@ def _no_witness(found: str, hint: str | None) -> RequestError:
 def exit_code(request: Request, met: bool | None) -> int:
     """1 where the accuracy asked is required and not met, else 0."""
     return int(request.require_accuracy and met is False)
-
-
-def report_page() -> ModuleType:
-    """The module that draws the page. Raises `RequestError` (extra-missing) without plotly."""
-    return with_report_packages("truepose.reporting.page")
-
-
-def with_report_packages(module: str) -> ModuleType:
-    """A module that draws. Raises `RequestError` (extra-missing) without plotly."""
-    try:
-        return import_module(module)
-    except ImportError as failure:
-        if failure.name is None or failure.name.startswith("truepose"):
-            raise
-        raise RequestError(
-            Problem(
-                "extra-missing",
-                "the report needs packages that are not installed",
-                found=f"no {failure.name}",
-                expected="jinja2 and plotly",
-                hint="pip install 'truepose[report]'",
-            )
-        ) from failure
 
 
 def note_written(*paths: Path | None) -> None:

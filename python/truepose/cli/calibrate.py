@@ -133,12 +133,13 @@ def command(**options: Any) -> int:
     from truepose.cli._progress import waiting
     from truepose.errors import TrueposeError
     from truepose.files.writing import require_writable
+    from truepose.reporting.drawing_packages import module_that_draws
     from truepose.reporting.result import Result
     from truepose.runs.controller_geometry import require_known_controller
 
     request = asked.request
     if asked.page is not None:
-        _steps.report_page()
+        module_that_draws("truepose.reporting.page")
     inputs = [request.machine_file, asked.data]
     for path, endings in ((asked.machine_output, [".toml"]), (asked.page, [".html"])):
         if path is not None:
@@ -281,7 +282,8 @@ def _write_page(request: Request, machine: Machine, dataset: Any, page: Path) ->
     from dataclasses import replace
 
     from truepose.cli import _steps
+    from truepose.reporting.drawing_packages import module_that_draws
 
     study = replace(_steps.compared(request, machine), calibration=dataset)
     text = _steps.machine_text(request)
-    _steps.report_page().write(study, page, text)
+    module_that_draws("truepose.reporting.page").write(study, page, text)

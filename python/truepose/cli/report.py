@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,6 @@ from truepose.cli._options import (
     takes,
 )
 from truepose.cli._verbose import verbose_option
-
-ENDINGS = (".html", ".pdf")
 
 
 @click.command("report")
@@ -83,20 +82,13 @@ def command(**options: Any) -> int:
     """
     from truepose.cli import _steps
     from truepose.cli._show import show_answers, show_lines, show_tables
-    from truepose.cli._verbose import say_result, step
+    from truepose.cli._verbose import say_result
     from truepose.files.one_run import is_stdin
     from truepose.files.writing import require_own_folder, require_writable, written_together
-    from truepose.language import say
-    from truepose.reporting import (
-        assembly,
-        figure_data,
-        how_far,
-        page_one,
-        tables,
-        uncertainty_tables,
-        within,
-    )
-    from truepose.verdict.answer import AFTER, met
+    from truepose.reporting import figure_data
+    from truepose.reporting.drawing_packages import module_that_draws
+    from truepose.reporting.report import ENDINGS, made, write_page
+    from truepose.verdict.answer import AFTER
 
     if options["output"] is None:
         file = options["machine_file"]
@@ -112,7 +104,7 @@ def command(**options: Any) -> int:
     data_folder: Path | None = options.pop("figure_data")
     request = Request(**options)
     assert request.output is not None
-    page = _steps.report_page()
+    module_that_draws("truepose.reporting.page")
     beside = [path for path in (measurements, program, features) if path is not None]
     if beside:
         require_writable(request.output, ENDINGS, [request.machine_file, *beside])
@@ -120,46 +112,25 @@ def command(**options: Any) -> int:
     browser = _browser() if request.output.suffix.lower() == ".pdf" else None
     if data_folder is not None:
         require_own_folder(data_folder, figure_data.is_data_file, "--figure-data")
-    study = assembly.study(machine, measurements, _steps.Watching(request))
-    part = None
-    if program is not None:
-        from truepose.cli import _part
-
-        part = _part.shown_on_page(machine, program, features)
-    text = _steps.machine_text(request)
-    say_result(study.budget)
-    shown_page, contents = page.rendered(study, text, part)
+    text, watching = _steps.machine_text(request), _steps.Watching(request)
+    report = made(machine, measurements, program, features, text, watching)
+    say_result(report.study.budget)
+    shown_page, contents = report.rendered()
     data = {}
     if data_folder is not None:
         data = figure_data.data_files(contents.drawn.values(), contents.tables)
     with written_together():
-        if browser is None:
-            with step(f"{request.output} written"):
-                page.write_text(shown_page, request.output)
-        else:
-            _print(shown_page, request.output, paper or "A4", browser)
+        with _writing(request.output, browser):
+            write_page(shown_page, request.output, paper or "A4", browser)
         if data_folder is not None:
             figure_data.write_data(data_folder, data)
     if data_folder is not None:
         figure_data.remove_others(data_folder, data)
-    show_answers(machine, study.accuracy)
-    said = [(name, "", text) for name, text in page_one.lines(study)]
-    kept = within.within_note(study)
-    show_lines([*said, (say("How many"), "", kept)] if kept else said)
-    shown = [
-        tables.ranking(study),
-        tables.highest_absolute(study),
-        tables.highest_percent(study),
-        tables.compensation(study),
-        *tables.strain(study),
-        how_far.table(study),
-        *uncertainty_tables.in_short(study),
-        tables.answers(machine, study.accuracy),
-        tables.poses_left_out(study),
-    ]
-    show_tables(table for table in shown if table is not None)
+    show_answers(machine, report.answers)
+    show_lines((name, "", text) for name, text in report.lines)
+    show_tables(report.tables)
     _steps.note_written(request.output, *([] if data_folder is None else [data_folder]))
-    return _steps.exit_code(request, met(study.accuracy, AFTER))
+    return _steps.exit_code(request, report.met[AFTER])
 
 
 def _browser() -> str:
@@ -172,10 +143,11 @@ def _browser() -> str:
     return browser
 
 
-def _print(page: str, output: Path, paper: str, browser: str) -> None:
-    """Print a page, its HTML, to a PDF file."""
+def _writing(output: Path, browser: str | None) -> AbstractContextManager[None]:
+    """The step in which a page is written, or printed by a browser."""
     from truepose.cli._progress import waiting
-    from truepose.reporting import pdf
+    from truepose.cli._verbose import step
 
-    with waiting(f"{output} printed by {browser}"):
-        pdf.write(page, output, paper, browser)
+    if browser is None:
+        return step(f"{output} written")
+    return waiting(f"{output} printed by {browser}")

@@ -1,8 +1,9 @@
-"""The types of a machine's kinematic calls, which are the kernel's own methods."""
+"""The types of a machine's kinematic calls, the kernel's own methods, and of a figure of it."""
 
 from __future__ import annotations
 
-from typing import Literal, Protocol, overload
+from os import PathLike
+from typing import Any, Literal, Protocol, overload
 
 from numpy.typing import ArrayLike
 
@@ -44,3 +45,22 @@ class OfWrenches(Protocol):
     def __call__(
         self, poses: ArrayLike, wrench: ArrayLike, *, status: Literal[True]
     ) -> WithStatus: ...
+
+
+class Plotted(Protocol):
+    """What `Machine.plot` returns: a figure of plotly.js that shows itself in a notebook."""
+
+    @property
+    def name(self) -> str:
+        """Of the figure, as it was asked for."""
+
+    @property
+    def caption(self) -> str:
+        """How it is read."""
+
+    @property
+    def figure(self) -> dict[str, Any]:
+        """Its `data` and `layout`."""
+
+    def write(self, path: str | PathLike[str]) -> None:
+        """Write it, FILE.html or FILE.json."""

@@ -17,8 +17,9 @@ from truepose.arrays import Flags, Floats, Indices, real_numbers
 from truepose.errors import ArgumentError, PoseError, Problem, RequestError
 from truepose.files.shown_units import ShownUnits, shown_units
 from truepose.files.units import FileUnit
-from truepose.files.wording import did_you_mean, one_of
-from truepose.machine.calls import OfJoints, OfPoses, OfWrenches, WithStatus
+from truepose.files.wording import counted, did_you_mean, one_of
+from truepose.lazy_names import of_the_package
+from truepose.machine.calls import OfJoints, OfPoses, OfWrenches, Plotted, WithStatus
 from truepose.machine.chains import Vector
 from truepose.machine.compliances import (
     compliances,
@@ -52,6 +53,8 @@ _MAPPINGS = ("settings", "file_units", "data_files", "replaced")
 
 _NOT_HELD = "the struts do not hold the platform"
 _HELD = "guides and what has no stiffness are rigid: the stiffness is infinite, not the compliance"
+
+_ASKED_OF = ("position", "orientation")
 
 _POSITIVE = (".length", ".scale")
 """Endings of the parameters that make sense above zero only."""
@@ -132,11 +135,38 @@ class Machine(Represented):
         yield "name", self.name
         yield "description", self.description or None
         yield "file", self.file or None
+        yield "SHA-256", self.file_hash or None
+        yield "family", None if self.family is None else self.family.family.kind
         yield "freedoms", self.dof
+        yield "drives", ", ".join(f"{drive.name} ({drive.kind})" for drive in self.drives)
         yield "struts", len(self.struts)
         yield "parameters", len(self.parameters)
+        yield "workspace", self._workspace_text()
+        yield "accuracy asked", ", ".join(filter(None, map(self.accuracy.said, _ASKED_OF))) or None
         yield "error sources", self.sources
         yield "calibrated", None if self.calibration is None else self.calibration.date
+
+    def _workspace_text(self) -> str | None:
+        """Between which coordinates the workspace lies, and how many poses there are of it."""
+        if self.workspace is None:
+            return None
+        poses = self.workspace.poses()
+        ends = []
+        for name, least, most in zip(self.commanded, poses.min(0), poses.max(0), strict=True):
+            unit = self.shown.pose(name)
+            first, last = (f"{value * unit.per_si:.6g}" for value in (least, most))
+            ends.append(f"{name} {first} to {last} {unit.label}")
+        return f"{', '.join(ends)}: {counted(len(poses), 'pose')}"
+
+    def plot(self, figure: str = "machine_drawing") -> Plotted:
+        """A figure of its report, which shows itself in a notebook: by default the machine drawn.
+
+        `figure` is a name such as "workspace_maps"; what the figure needs is computed. The result
+        has the `figure` of plotly.js, and `write` writes it. Raises `RequestError` (extra-missing
+        without the extra `report`, unknown-choice, no-workspace, no-source).
+        """
+        drawn: Plotted = of_the_package("plot")(self, figure)
+        return drawn
 
     def __reduce__(self) -> tuple[Callable[..., Machine], tuple[dict[str, Any]]]:
         state = {

@@ -99,7 +99,7 @@ class Contents:
         return packed(
             as_json(
                 {
-                    "template": _template_of_figures(),
+                    "template": template_of_figures(),
                     "settings": SETTINGS,
                     "dark": DARK,
                     "templateDark": TEMPLATE_DARK,
@@ -183,7 +183,8 @@ def _page_number() -> str:
 
 
 @cache
-def _template_of_figures() -> Any:
+def template_of_figures() -> Any:
+    """What plotly's figures look like, where they do not say it."""
     import json
 
     return json.loads(PLOTLY.joinpath("templates", "plotly_white.json").read_text("utf-8"))
@@ -202,4 +203,12 @@ def _resource(name: str) -> str:
     return files("truepose.reporting").joinpath(name).read_text(encoding="utf-8")
 
 
-__all__ = ["Contents", "ContentsEntry", "css_text", "packed", "page_parts", "template"]
+__all__ = [
+    "Contents",
+    "ContentsEntry",
+    "css_text",
+    "packed",
+    "page_parts",
+    "template",
+    "template_of_figures",
+]

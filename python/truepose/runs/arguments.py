@@ -179,6 +179,10 @@ KINDS: dict[str, Kind] = {
         lambda value: _path(value) or type(value).__name__ == "Measurements",
         "the name of a file of measurements, or what is read from it",
     ),
+    "Measurements | str | Path | None": (
+        lambda value: value is None or _path(value) or type(value).__name__ == "Measurements",
+        "the name of a file of measurements, or what is read from it, or None",
+    ),
     "Instrument | Iterable[Instrument]": _LATER,
     "ArrayLike | None": _or_none(_NUMBERS),
     "Condition | None": _or_none(_CONDITION),

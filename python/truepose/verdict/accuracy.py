@@ -26,7 +26,7 @@ from truepose.runs.poses import OK, Progress
 from truepose.runs.quantities import quantities
 from truepose.runs.variables import Variables
 from truepose.verdict import engine
-from truepose.verdict.answer import MET, NOT_MET, UNDECIDED, Answer, Number
+from truepose.verdict.answer import MET, NOT_MET, UNDECIDED, Answer, Answers, Number
 from truepose.verdict.coverage import MOST_POSES, coverage
 from truepose.verdict.search import farthest
 from truepose.verdict.states import STATES, Blocks, Population, State
@@ -75,7 +75,9 @@ def accuracy(
         every += answers(population, state)
     used = population.used
     left_out = len(population.table) - used
-    return tuple(replace(a, poses_used=used, poses_left_out=left_out) for a in every)
+    return Answers(
+        replace(a, poses_used=used, poses_left_out=left_out, machine=machine) for a in every
+    )
 
 
 def required_states(states: Sequence[str]) -> tuple[str, ...]:

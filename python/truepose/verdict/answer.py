@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from truepose.arrays import Floats
-from truepose.representation import Facts, Represented
+from truepose.lazy_names import of_the_package
+from truepose.representation import Facts, Represented, facts_html
 from truepose.verdict.states import AFTER, BEFORE, STATES
 
 if TYPE_CHECKING:
+    from truepose.machine import Machine
     from truepose.verdict.coverage import CoverageAnswer
     from truepose.verdict.witness import Witness
 
@@ -55,6 +57,8 @@ class Answer(Represented):
     coverage: CoverageAnswer | None = None
     poses_used: int = 0
     poses_left_out: int = 0
+    machine: Machine | None = field(default=None, compare=False)
+    """Of which it is the answer, so that it can be told in its units."""
 
     def _facts(self) -> Facts:
         yield "quantity", self.quantity
@@ -67,6 +71,12 @@ class Answer(Represented):
         yield "rests on", self.rests_on
         yield "poses used", self.poses_used
         yield "poses left out", self.poses_left_out
+
+    def _repr_html_(self) -> str:
+        """In the units of the machine, as the command says it."""
+        if self.machine is None:
+            return super()._repr_html_()
+        return facts_html("Answer", of_the_package("facts_of_answer")(self))
 
     @property
     def met(self) -> bool | None:
@@ -89,6 +99,16 @@ class Answer(Represented):
         return math.isinf(self.witness.value)
 
 
+class Answers(tuple[Answer, ...]):
+    """Answers of one machine: a tuple, which a notebook shows as the command says it."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        text: str = of_the_package("answers_html")(self[0].machine, self) if self else "<p>()</p>"
+        return text
+
+
 def met(answers: tuple[Answer, ...], state: str) -> bool | None:
     """Whether everything asked is met in one state; None where nothing is asked."""
     decided = [answer.met for answer in answers if answer.state == state and answer.met is not None]
@@ -103,6 +123,7 @@ __all__ = [
     "STATES",
     "UNDECIDED",
     "Answer",
+    "Answers",
     "Number",
     "met",
 ]

@@ -77,14 +77,23 @@ def _there(result: object) -> bool:
 def draw(study: Study) -> Iterator[DrawnFigure]:
     """Every registered figure of a study, in the order of the report."""
     for module in FIGURES:
-        needed: str | None = getattr(module, "NEEDS", None)
-        if needed is not None and not _there(getattr(study, needed)):
-            continue
-        yield DrawnFigure(
-            name=module.__name__.rpartition(".")[2],
-            title=module.TITLE,
-            caption=module.caption(study),
-            figure=as_text(module.figure(study)),
-            needs=needed,
-            says=module.says(study) if hasattr(module, "says") else "",
-        )
+        if is_there(study, module):
+            yield draw_one(study, module)
+
+
+def is_there(study: Study, module: ModuleType) -> bool:
+    """Whether a study has the result that a figure is of."""
+    needed: str | None = getattr(module, "NEEDS", None)
+    return needed is None or _there(getattr(study, needed))
+
+
+def draw_one(study: Study, module: ModuleType) -> DrawnFigure:
+    """One registered figure of a study that has the result that it is of."""
+    return DrawnFigure(
+        name=module.__name__.rpartition(".")[2],
+        title=module.TITLE,
+        caption=module.caption(study),
+        figure=as_text(module.figure(study)),
+        needs=getattr(module, "NEEDS", None),
+        says=module.says(study) if hasattr(module, "says") else "",
+    )

@@ -179,6 +179,14 @@ def part() -> None:
         expect(xr.Dataset, tp.part(small(), program, features, samples=20))
 
 
+@use("report")
+def report() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        written = tp.report(small(), Path(folder) / "page.html")
+        assert written.path is not None
+        assert written.path.read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
 @use("shares")
 def shares() -> None:
     expect(xr.Dataset, tp.shares(small(), POSE, samples=64))

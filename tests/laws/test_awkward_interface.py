@@ -103,6 +103,8 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], Mapping[str, Any]]] = {
         tp.correct_program, {"machine": MACHINE, "source": "none.ngc", "target": None},
     ),
     "export": (tp.export, {"machine": MACHINE, "name": "c"}),
+    "report": (tp.report, {"machine": MACHINE, "output": "none.txt"}),
+    "Machine.plot": (MACHINE.plot, {"figure": "nothing"}),
     "part": (tp.part, {"machine": MACHINE, "program": "none.ngc"}),
     "plan": (
         tp.plan, {"machine": MACHINE, "instrument": instrument(), "budget": 3, "starts": 1},

@@ -10,7 +10,7 @@ from truepose.machine import Machine
 from truepose.plausibility import Oddity, oddities_where_checked
 from truepose.reporting import assembly, inputs, workspace_check
 from truepose.reporting.workspace_check import WorkspaceCheck, check_workspace
-from truepose.representation import Facts, Represented
+from truepose.representation import Facts, Represented, facts_html
 from truepose.runs.arguments import checked
 from truepose.verdict.answer import BEFORE, Answer, met
 
@@ -97,8 +97,16 @@ class MachineCheck(Represented):
         yield "met", self.met
         yield "poses", len(self.workspace.poses)
         yield "usable", int(self.workspace.usable.sum())
-        yield "looks odd", [oddity.code for oddity in self.oddities]
-        yield "warnings", [warning["code"] for warning in self.warnings]
+        yield "looks odd", [oddity.code for oddity in self.oddities] or None
+        yield "warnings", [warning["code"] for warning in self.warnings] or None
+
+    def _repr_html_(self) -> str:
+        """What looks odd, and the answers."""
+        from truepose.reporting.notebook import answers_html
+
+        odd = [(f"looks odd: {oddity.code}", oddity.sentence) for oddity in self.oddities]
+        facts = facts_html("MachineCheck", [*self._facts(), *odd])
+        return facts + answers_html(self.machine, self.answers)
 
 
 @checked

@@ -56,6 +56,12 @@ class MachineComparison(Represented):
         yield "changed", self.changed
         yield "verdict", self.verdict
 
+    def _repr_html_(self) -> str:
+        """The answer, then the tables of the command."""
+        from truepose.reporting.notebook import table_html
+
+        return super()._repr_html_() + "".join(map(table_html, self.tables))
+
 
 @checked
 def compare(old: Machine, new: Machine, poses: ArrayLike | None = None) -> MachineComparison:

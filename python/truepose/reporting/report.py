@@ -121,14 +121,19 @@ class MachineReport(Represented):
         yield "sources", self.study.sources
 
     def _repr_html_(self) -> str:
-        """The verdict, and how far off the tool can be."""
+        """Page one in brief: the verdict, what is worst and what to do, how far off the tool is."""
         from truepose.reporting import how_far
         from truepose.reporting.notebook import answers_html, table_html
+        from truepose.reporting.page_one import page_one
 
         page = [] if self.path is None else [("page", str(self.path))]
+        of_part = None if self.page_of_part is None else self.page_of_part.page_one
         with speaking(self.language):
+            one = page_one(self.study, of_part)
+            verdicts = [(verdict.question, verdict.word) for verdict in one.verdicts]
+            said = [("machine", self.machine.name), *verdicts, *one.lines, *page]
             return (
-                facts_html("MachineReport", [("machine", self.machine.name), *page])
+                facts_html("MachineReport", said)
                 + answers_html(self.machine, self.answers)
                 + table_html(how_far.table(self.study))
             )

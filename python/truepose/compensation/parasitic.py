@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.files.dimensions import FREEDOMS
+from truepose.language import marked, say
 from truepose.machine import Machine
 from truepose.runs.controller_geometry import ROUNDING
 
@@ -30,12 +31,15 @@ def parasitic_remains(machine: Machine, residual: xr.DataArray) -> list[dict[str
         size = float(np.abs(residual.sel(component=component)).max())
         if size > ROUNDING:
             unit = "um" if name in "xyz" else "urad"
-            remaining.append(f"{component} {1e6 * size:.4g} {unit}")
+            remaining.append(marked(f"{component} {1e6 * size:.4g} {unit}"))
     if not remaining:
         return []
-    sentence = (
-        f"{', '.join(free)} are parasitic: they follow from {', '.join(machine.commanded)}, and no "
-        f"command takes their error out; of what is known remain at most {', '.join(remaining)}"
+    sentence = say(
+        "{names} are parasitic: they follow from {commanded}, and no command takes their error "
+        "out; of what is known remain at most {remaining}",
+        names=", ".join(free),
+        commanded=", ".join(machine.commanded),
+        remaining=", ".join(remaining),
     )
     return [{"code": CODE, "sentence": sentence}]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from truepose.arrays import Flags, Floats
+from truepose.language import marked, say
 from truepose.machine import Guide, Machine
 from truepose.sources import PoseBlock
 from truepose.sources._play import NO_LOAD, all_that_acts
@@ -48,15 +49,20 @@ class GuideLoads:
     def warnings(self) -> list[dict[str, str]]:
         """One warning, its code and sentence, where a guide carries anything; else none."""
         loaded = [
-            f"{guide.name} carries up to {load:.4g} {'N m' if _is_turned(guide) else 'N'}"
+            say(
+                "{guide} carries up to {load}",
+                guide=guide.name,
+                load=marked(f"{load:.4g} {'N m' if _is_turned(guide) else 'N'}"),
+            )
             for guide, load, lever in zip(self._guides, self._highest, self._lever, strict=True)
             if load > NO_LOAD * self._acting * lever
         ]
         if not loaded:
             return []
-        sentence = (
-            f"guides are taken as rigid: {', '.join(loaded)}; "
-            "the bending of the limbs that they stand for is in no result"
+        sentence = say(
+            "guides are taken as rigid: {loads}; the bending of the limbs that they stand for is "
+            "in no result",
+            loads=", ".join(loaded),
         )
         return [{"code": CODE, "sentence": sentence}]
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.language import marked
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,7 +54,7 @@ class Shown:
         whole = f"{scaled:.0f}"
         short = f"{scaled:.{digits}g}"
         number = whole if len(whole.lstrip("-")) > digits else short
-        return f"{number} {self.label}".rstrip()
+        return f"{marked(number)} {self.label}".rstrip()
 
 
 MILLIMETRES, MICROMETRES = Shown("mm", 1e3), Shown("µm", 1e6)

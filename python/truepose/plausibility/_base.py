@@ -17,6 +17,7 @@ import numpy as np
 from truepose._kernel import STATUS
 from truepose.arrays import Codes, Floats
 from truepose.errors import TrueposeError
+from truepose.language import marked, say
 from truepose.sources import Deviation, PoseBlock, acting
 
 if TYPE_CHECKING:
@@ -228,7 +229,7 @@ class MachineAtHome:
         unit = self.machine.shown.length
         if abs(metres) * unit.per_si < READABLE:
             return unit.text(metres)
-        return f"{metres * unit.per_si:.3g} {unit.label}"
+        return marked(f"{metres * unit.per_si:.3g} {unit.label}")
 
     def quantity(self, value: float, column: int) -> str:
         """A deviation of a parameter for people."""
@@ -241,7 +242,7 @@ class MachineAtHome:
     def degrees(self, kelvin: float) -> str:
         """A temperature for people, on the scale of the file."""
         shown = self.machine.shown
-        return f"{float(shown.temperature(kelvin)):.4g} {shown.degree}"
+        return marked(f"{float(shown.temperature(kelvin)):.4g} {shown.degree}")
 
 
 def listed(paths: Iterable[str], most: int = 3) -> str:
@@ -249,4 +250,5 @@ def listed(paths: Iterable[str], most: int = 3) -> str:
     every = list(paths)
     if len(every) <= most:
         return ", ".join(every)
-    return f"{', '.join(every[:most])} and {len(every) - most} more"
+    named = ", ".join(every[:most])
+    return say("{names} and {count} more", names=named, count=len(every) - most)

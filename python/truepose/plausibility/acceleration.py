@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 STRONGEST_GRAVITY = 30.0
@@ -17,16 +18,23 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     condition = view.machine.condition
     if condition.gravity > STRONGEST_GRAVITY:
         yield (
-            f"gravity is {condition.gravity:.5g} m/s^2; usual is 9.81, and 25 on Jupiter. Look at "
-            "the unit: 9810 are mm/s^2",
+            say(
+                "gravity is {gravity} m/s^2; usual is 9.81, and 25 on Jupiter. Look at the unit: "
+                "9810 are mm/s^2",
+                gravity=marked(f"{condition.gravity:.5g}"),
+            ),
             ("condition.gravity",),
         )
     size = math.hypot(*condition.acceleration)
     if size > FASTEST:
         yield (
-            f"the platform accelerates by {size:.5g} m/s^2, {size / 9.80665:.3g} times gravity; "
-            "usual is up to 20 times, and the fastest machine built has 100. Look at the unit, "
-            "m/s^2 or mm/s^2. If it is meant, leave it",
+            say(
+                "the platform accelerates by {size} m/s^2, {times} times gravity; usual is up to "
+                "20 times, and the fastest machine built has 100. Look at the unit, m/s^2 or "
+                "mm/s^2. If it is meant, leave it",
+                size=marked(f"{size:.5g}"),
+                times=marked(f"{size / 9.80665:.3g}"),
+            ),
             ("condition.acceleration",),
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 from truepose.plausibility._roots import inside_otherwise
 
@@ -13,9 +14,12 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     wrong = inside_otherwise(view, turn=-1.0)
     if wrong:
         yield (
-            f"{listed(wrong)}: home is out of travel, and inside it were the axis to point the "
-            "other way; usual is a home that all drives reach. Look at the sign of axis, and at "
-            "the travel. If it is meant, give [workspace] another home",
+            say(
+                "{names}: home is out of travel, and inside it were the axis to point the other "
+                "way; usual is a home that all drives reach. Look at the sign of axis, and at the "
+                "travel. If it is meant, give [workspace] another home",
+                names=listed(wrong),
+            ),
             tuple(f"{part}.axis" for part in wrong),
         )
 

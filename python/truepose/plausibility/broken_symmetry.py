@@ -9,6 +9,7 @@ from itertools import permutations, product
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 ALIKE = 0.002
@@ -30,9 +31,14 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         for at, expected in _misfits(points):
             said, asked = (_point(view, point) for point in (points[at], expected))
             yield (
-                f"{paths[at]} is {said}, where the others, turned by 120°, would have {asked}; "
-                "usual is that all fit. Look at the signs and the order of its coordinates. If it "
-                "is meant, leave it",
+                say(
+                    "{path} is {said}, where the others, turned by 120°, would have {asked}; "
+                    "usual is that all fit. Look at the signs and the order of its coordinates. "
+                    "If it is meant, leave it",
+                    path=paths[at],
+                    said=said,
+                    asked=asked,
+                ),
                 (paths[at],),
             )
 

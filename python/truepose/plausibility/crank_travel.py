@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 MOST = 2.0 * math.pi
@@ -21,9 +22,14 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         turn = max(odd.values()) / MOST
         yield (
-            f"{listed(odd)}: a travel of {turn:.3g} turns; usual is less than one, beyond which "
-            "all repeats. Look at [units]: the file's angles are read as "
-            f"{view.machine.unit_labels['angle']}. If it is meant, leave it",
+            say(
+                "{names}: a travel of {turn} turns; usual is less than one, beyond which all "
+                "repeats. Look at [units]: the file's angles are read as {angle}. If it is meant, "
+                "leave it",
+                names=listed(odd),
+                turn=marked(f"{turn:.3g}"),
+                angle=view.machine.unit_labels["angle"],
+            ),
             tuple(f"{part}.travel" for part in odd),
         )
 

@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 THIN = 0.01
@@ -32,10 +33,16 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         if all(END < share < 1.0 - END for share in at) and gap < 0.5 * (bars[one] + bars[other]):
             names = struts[one].part, struts[other].part
             yield (
-                f"{names[0]} and {names[1]} cross at home: {view.length(gap)} apart, "
-                f"{100 * at[0]:.0f} % along the first from its base; usual is that struts keep "
-                "clear of each other. Look whether their platform joints, or their drives, are "
-                "exchanged. If it is meant, leave it: collisions are not computed",
+                say(
+                    "{one} and {other} cross at home: {gap} apart, {share} % along the first from "
+                    "its base; usual is that struts keep clear of each other. Look whether their "
+                    "platform joints, or their drives, are exchanged. If it is meant, leave it: "
+                    "collisions are not computed",
+                    one=names[0],
+                    other=names[1],
+                    gap=view.length(gap),
+                    share=marked(f"{100 * at[0]:.0f}"),
+                ),
                 names,
             )
 

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 SAME = 1e-6
@@ -20,9 +21,13 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         if apart < SAME * view.size:  # not where one is unknown
             names = view.machine.struts[one].part, view.machine.struts[other].part
             yield (
-                f"{names[0]} and {names[1]} have both joint centres in common; usual is that no "
-                "two struts do, as the second holds nothing that the first does not. Look "
-                "whether one was copied and its points not changed. If it is meant, leave it",
+                say(
+                    "{one} and {other} have both joint centres in common; usual is that no two "
+                    "struts do, as the second holds nothing that the first does not. Look whether "
+                    "one was copied and its points not changed. If it is meant, leave it",
+                    one=names[0],
+                    other=names[1],
+                ),
                 names,
             )
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 WIDEST = 1.25
@@ -28,9 +29,13 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     base, platform = np.sqrt((about**2).sum(axis=2).mean(axis=0)).tolist()
     if platform > WIDEST * base:
         yield (
-            f"the joint centres of the platform lie {view.length(platform)} from their middle, "
-            f"those of the base {view.length(base)}; usual is a platform smaller than the base. "
-            "Look whether base and platform of the struts are exchanged. If it is meant, leave it",
+            say(
+                "the joint centres of the platform lie {platform} from their middle, those of the "
+                "base {base}; usual is a platform smaller than the base. Look whether base and "
+                "platform of the struts are exchanged. If it is meant, leave it",
+                platform=view.length(platform),
+                base=view.length(base),
+            ),
             ("strut.*.base", "strut.*.platform"),
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 LEAST = -2e-5
@@ -27,9 +28,13 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         value = max(odd.values(), key=abs)
         yield (
-            f"{listed(odd)}: an expansion of {value:.3g} 1/K; usual is 0 to 3e-05 1/K of what "
-            "machines are built of (steel 1.2e-05), and no solid has more than 3e-04. Look at the "
-            'power of ten: "11.5 ppm/K" is 1.15e-05 1/K. ' + "If it is meant, leave it",
+            say(
+                "{names}: an expansion of {value} 1/K; usual is 0 to 3e-05 1/K of what machines "
+                "are built of (steel 1.2e-05), and no solid has more than 3e-04. Look at the "
+                'power of ten: "11.5 ppm/K" is 1.15e-05 1/K. If it is meant, leave it',
+                names=listed(odd),
+                value=marked(f"{value:.3g}"),
+            ),
             tuple(f"{part}.expansion" for part in odd),
         )
 

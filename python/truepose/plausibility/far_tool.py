@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 MOST = 5.0
@@ -23,10 +24,14 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     away = float(np.linalg.norm(tool - known.mean(axis=0)))
     if away > MOST * own:
         yield (
-            f"the tool point is {view.length(away)} from the platform's joints, whose struts are "
-            f"{view.length(float(np.nanmax(view.lengths)))} long; usual is less than the machine's "
-            "own size. Look at the unit of [machine] tool. If it is meant, leave it: errors of "
-            "orientation become large errors of position",
+            say(
+                "the tool point is {away} from the platform's joints, whose struts are {lengths} "
+                "long; usual is less than the machine's own size. Look at the unit of [machine] "
+                "tool. If it is meant, leave it: errors of orientation become large errors of "
+                "position",
+                away=view.length(away),
+                lengths=view.length(float(np.nanmax(view.lengths))),
+            ),
             ("machine.tool",),
         )
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 from truepose.sources.tolerance import bands_of
 
@@ -27,10 +28,14 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         first = int(fine[0])
         names = [view.machine.parameters[columns[at]] for at in fine]
         yield (
-            f"{listed(names)}: a tolerance of ±{half[first] * 1e9:.3g} nm on "
-            f"{view.length(levers[first])}; usual is more than a ten-millionth, finer than which "
-            "no length is measured in air. Look at its unit: a bare number is in the file's "
-            "length. If it is meant, leave it",
+            say(
+                "{names}: a tolerance of ±{half} nm on {length}; usual is more than a "
+                "ten-millionth, finer than which no length is measured in air. Look at its unit: "
+                "a bare number is in the file's length. If it is meant, leave it",
+                names=listed(names),
+                half=marked(f"{half[first] * 1e9:.3g}"),
+                length=view.length(levers[first]),
+            ),
             tuple(names),
         )
 

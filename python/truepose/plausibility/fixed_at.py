@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 
@@ -20,10 +21,14 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         at, away = next(iter(odd.values()))
         yield (
-            f"{listed(odd)}: fixed_at is {view.length(at)}, {view.length(away)} from the nearer "
-            "end of the travel; usual is a bearing within or near the travel. Look at its unit "
-            "and for a slipped decimal point. If it is meant, leave it: the screw grows from "
-            "there",
+            say(
+                "{names}: fixed_at is {at}, {away} from the nearer end of the travel; usual is a "
+                "bearing within or near the travel. Look at its unit and for a slipped decimal "
+                "point. If it is meant, leave it: the screw grows from there",
+                names=listed(odd),
+                at=view.length(at),
+                away=view.length(away),
+            ),
             tuple(f"{part}.fixed_at" for part in odd),
         )
 

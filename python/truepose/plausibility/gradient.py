@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 MOST = 100.0
@@ -19,9 +20,15 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         difference = math.hypot(*gradient) * length
         if difference > MOST:
             yield (
-                f"the gradient of {part} makes its ends differ by {difference:.3g} K over "
-                f"{view.length(length)}; usual is some kelvin, and at most {MOST:g} K. Look at the "
-                'unit: "2 K/m" is not 2 K/mm. If it is meant, leave it',
+                say(
+                    "the gradient of {part} makes its ends differ by {difference} K over "
+                    '{length}; usual is some kelvin, and at most {most} K. Look at the unit: "2 '
+                    'K/m" is not 2 K/mm. If it is meant, leave it',
+                    part=part,
+                    difference=marked(f"{difference:.3g}"),
+                    length=view.length(length),
+                    most=marked(f"{MOST:g}"),
+                ),
                 (f"condition.gradient.{part}",),
             )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from truepose._kernel import STATUS
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 from truepose.runs.poses import faults_text, reason_text
 
@@ -20,12 +21,15 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     faults = machine.kernel.explain(view.pose[0])
     because = faults_text(machine, faults[:NAMED])
     if len(faults) > NAMED:
-        because += f" and {len(faults) - NAMED} more"
+        because += " " + say("and {count} more", count=len(faults) - NAMED)
+    why = reason_text(STATUS[view.placed[2]])
     yield (
-        f"home cannot be used ({reason_text(STATUS[view.placed[2]])}"
-        f"{f': {because}' if because else ''}); usual is a home inside the workspace. Look at "
-        "[workspace] home, without which it is the middle of the grid, and at units and travels. "
-        "If it is meant, leave it",
+        say(
+            "home cannot be used ({why}); usual is a home inside the workspace. Look "
+            "at [workspace] home, without which it is the middle of the grid, and at units and "
+            "travels. If it is meant, leave it",
+            why=f"{why}: {because}" if because else why,
+        ),
         ("workspace.home",),
     )
 

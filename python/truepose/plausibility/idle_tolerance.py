@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 from truepose.sources.tolerance import DimensionalTolerance
 
@@ -16,10 +17,15 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         if isinstance(source, DimensionalTolerance):
             for pattern, parameter, by in source.idle:
                 yield (
-                    f'"{pattern}" under [tolerance] changes nothing: what counts for {parameter} '
-                    f"is {by}, and each other that it matches has its own too; usual is a pattern "
-                    "that some parameter is left for. Look at what counts, and change that or take "
-                    "the pattern out. If it is meant, leave it",
+                    say(
+                        '"{pattern}" under [tolerance] changes nothing: what counts for '
+                        "{parameter} is {by}, and each other that it matches has its own too; "
+                        "usual is a pattern that some parameter is left for. Look at what counts, "
+                        "and change that or take the pattern out. If it is meant, leave it",
+                        pattern=pattern,
+                        parameter=parameter,
+                        by=by,
+                    ),
                     (f"tolerance.{pattern}",),
                 )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 SMALLEST = 0.01
@@ -16,11 +17,22 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if SMALLEST <= view.size <= LARGEST:
         return
     label = view.machine.unit_labels["length"]
-    side = "larger than any that was built" if view.size > LARGEST else "smaller than a fingertip"
+    side = (
+        say("larger than any that was built")
+        if view.size > LARGEST
+        else say("smaller than a fingertip")
+    )
     yield (
-        f"the machine's joint centres span {view.length(view.size)}, {side}; usual is from "
-        f"{view.length(SMALLEST)} to {view.length(LARGEST)}. Look at [units]: the file's lengths "
-        f'are read as {label}, and length = "mm" and length = "m" differ by a thousand',
+        say(
+            "the machine's joint centres span {size}, {side}; usual is from {smallest} to "
+            "{largest}. Look at [units]: the file's lengths are read as {label}, and length = "
+            '"mm" and length = "m" differ by a thousand',
+            size=view.length(view.size),
+            side=side,
+            smallest=view.length(SMALLEST),
+            largest=view.length(LARGEST),
+            label=label,
+        ),
         ("units.length",),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 STEEL = 7850.0
@@ -28,8 +29,13 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         mass, block = next(iter(odd.values()))
         yield (
-            f"{listed(odd)}: a mass of {mass:.3g} kg; a solid block of steel in its place would "
-            f"have {block:.3g} kg. Look at the unit: 25 kg are 25000 g. If it is meant, leave it",
+            say(
+                "{names}: a mass of {mass} kg; a solid block of steel in its place would have "
+                "{block} kg. Look at the unit: 25 kg are 25000 g. If it is meant, leave it",
+                names=listed(odd),
+                mass=marked(f"{mass:.3g}"),
+                block=marked(f"{block:.3g}"),
+            ),
             tuple(f"{part}.mass" for part in odd),
         )
 

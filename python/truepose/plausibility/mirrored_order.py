@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 from truepose.spatial import tangents
 
@@ -32,10 +33,12 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     share = float(np.linalg.det(base.T @ platform)) / full**0.5
     if share < -CLEAR:
         yield (
-            "going round the struts, the joints of the platform come in the opposite order to "
-            "those of the base; usual is the same order, so that struts stand beside each other. "
-            "Look whether two platform joints are exchanged, or one list is counted the other "
-            "way round. If it is meant, leave it",
+            say(
+                "going round the struts, the joints of the platform come in the opposite order to "
+                "those of the base; usual is the same order, so that struts stand beside each "
+                "other. Look whether two platform joints are exchanged, or one list is counted "
+                "the other way round. If it is meant, leave it"
+            ),
             ("strut.*.base", "strut.*.platform"),
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 SOFTEST = 1e9
@@ -21,9 +22,13 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         value = next(iter(odd.values())) / 1e9
         yield (
-            f"{listed(odd)}: a modulus of {value:.3g} GPa; usual is from 1 GPa (plastics) over 70 "
-            "(aluminium) and 210 (steel) to 1200 (diamond). Look at the unit, GPa or MPa: 210 GPa "
-            "are 210000 N/mm2. If it is meant, leave it",
+            say(
+                "{names}: a modulus of {value} GPa; usual is from 1 GPa (plastics) over 70 "
+                "(aluminium) and 210 (steel) to 1200 (diamond). Look at the unit, GPa or MPa: 210 "
+                "GPa are 210000 N/mm2. If it is meant, leave it",
+                names=listed(odd),
+                value=marked(f"{value:.3g}"),
+            ),
             tuple(f"{part}.modulus" for part in odd),
         )
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 MOST = {"m": 0.002, "rad": 0.01}
@@ -29,11 +30,15 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         parameter = view.machine.parameters[columns[worst]]
         by = view.quantity(abs(float(deviation.shift[0, worst])), columns[worst])
         yield (
-            f"under the file's forces {parameter} gives way by {by}; usual is less than "
-            f"{view.quantity(most[worst], columns[worst])}: 0.2 % of a strut, at which steel "
-            "yields, or 0.01 rad of a crank. Look at the unit of forces (N or kN), and at "
-            "sections and stiffnesses. If it is meant, leave it, but deflections are computed as "
-            "small ones",
+            say(
+                "under the file's forces {parameter} gives way by {by}; usual is less than "
+                "{most}: 0.2 % of a strut, at which steel yields, or 0.01 rad of a crank. Look at "
+                "the unit of forces (N or kN), and at sections and stiffnesses. If it is meant, "
+                "leave it, but deflections are computed as small ones",
+                parameter=parameter,
+                by=by,
+                most=view.quantity(most[worst], columns[worst]),
+            ),
             (parameter,),
         )
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 STEEP = 0.7
@@ -29,9 +30,12 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
             down.append(drive.part)
     if down:
         yield (
-            f"{listed(down)}: the rail points down and its carriage is under the platform at home; "
-            "usual is an axis that points up, or one that counts down from carriages above. Look "
-            "at the sign of axis. If it is meant, leave it",
+            say(
+                "{names}: the rail points down and its carriage is under the platform at home; "
+                "usual is an axis that points up, or one that counts down from carriages above. "
+                "Look at the sign of axis. If it is meant, leave it",
+                names=listed(down),
+            ),
             tuple(f"{part}.axis" for part in down),
         )
 

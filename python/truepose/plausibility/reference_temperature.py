@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 LOWEST = 283.15
@@ -17,9 +18,13 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if LOWEST <= kelvin <= HIGHEST:
         return
     yield (
-        f"the dimensions hold at a reference temperature of {view.degrees(kelvin)}; usual is "
-        f"{view.degrees(293.15)} (ISO 1). Look at the unit: 20 °C is 68 °F and 293 K. If the "
-        "dimensions were really taken there, leave it",
+        say(
+            "the dimensions hold at a reference temperature of {kelvin}; usual is {value} (ISO "
+            "1). Look at the unit: 20 °C is 68 °F and 293 K. If the dimensions were really taken "
+            "there, leave it",
+            kelvin=view.degrees(kelvin),
+            value=view.degrees(293.15),
+        ),
         ("condition.reference_temperature",),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 THICKEST = 0.5
@@ -23,11 +24,15 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         diameter, length = next(iter(odd.values()))
         yield (
-            f"{listed(odd)}: a section_area like that of a round bar {view.length(diameter)} "
-            f"thick, the strut {view.length(length)} long; usual is a bar from 1/2000 to 1/2 of "
-            "its length. Look at the unit: a bare number is in the square of the file's length, "
-            '"28 '
-            'mm^2" is not. If it is meant, leave it',
+            say(
+                "{names}: a section_area like that of a round bar {diameter} thick, the strut "
+                "{length} long; usual is a bar from 1/2000 to 1/2 of its length. Look at the "
+                'unit: a bare number is in the square of the file\'s length, "28 mm^2" is not. '
+                "If it is meant, leave it",
+                names=listed(odd),
+                diameter=view.length(diameter),
+                length=view.length(length),
+            ),
             tuple(f"{part}.section_area" for part in odd),
         )
 

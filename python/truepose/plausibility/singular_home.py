@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 LEAST = 0.002
@@ -15,10 +16,16 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     value = view.conditioning
     if value < LEAST:
         yield (
-            f"home is all but singular: conditioning {value:.2g}, so that an error of a strut may "
-            f"grow {'without bound' if value == 0.0 else f'{1.0 / value:.0f} times'}; usual is "
-            "more than 0.05. Look whether base and platform are of one shape and turned alike, or "
-            "struts lie in one plane or go through one line. If it is meant, leave it",
+            say(
+                "home is all but singular: conditioning {value}, so that an error of a strut may "
+                "grow {growth}; usual is more than 0.05. Look whether base and platform are of "
+                "one shape and turned alike, or struts lie in one plane or go through one line. "
+                "If it is meant, leave it",
+                value=marked(f"{value:.2g}"),
+                growth=say("without bound")
+                if value == 0.0
+                else say("{times} times", times=f"{1.0 / value:.0f}"),
+            ),
             ("workspace.home",),
         )
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 from truepose.sources.tolerance import bands_of
 
@@ -36,7 +37,16 @@ def _largest(values: dict[str, float], alike: float) -> Iterator[Remark]:
     if len(rest) > 1 and 0.0 < values[rest[0]] <= alike * values[rest[-1]]:
         factor = values[path] / values[rest[0]]
         if factor > FACTOR:
-            yield _remark(path, f"{factor:.3g} times as large as")
+            yield (
+                say(
+                    "{path} is {factor} times as large as that of any other, and those are alike; "
+                    "usual is that all are. Look for a slipped decimal point. If it is meant, "
+                    "leave it",
+                    path=path,
+                    factor=marked(f"{factor:.3g}"),
+                ),
+                (path,),
+            )
 
 
 def _smallest(values: dict[str, float]) -> Iterator[Remark]:
@@ -44,15 +54,16 @@ def _smallest(values: dict[str, float]) -> Iterator[Remark]:
     if len(rest) > 1 and values[rest[-1]] <= ALIKE * values[rest[0]]:
         factor = values[rest[0]] / values[path]
         if factor > FACTOR:
-            yield _remark(path, f"{factor:.3g} times smaller than")
-
-
-def _remark(path: str, how: str) -> Remark:
-    return (
-        f"{path} is {how} that of any other, and those are alike; usual is that all are. Look for "
-        "a slipped decimal point. If it is meant, leave it",
-        (path,),
-    )
+            yield (
+                say(
+                    "{path} is {factor} times smaller than that of any other, and those are "
+                    "alike; usual is that all are. Look for a slipped decimal point. If it is "
+                    "meant, leave it",
+                    path=path,
+                    factor=marked(f"{factor:.3g}"),
+                ),
+                (path,),
+            )
 
 
 def _sizes(view: MachineAtHome) -> Iterator[dict[str, float]]:

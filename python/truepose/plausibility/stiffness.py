@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 STEEL = 2.1e11
@@ -35,10 +36,15 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         stiffness, bar, length = next(iter(odd.values()))
         yield (
-            f"{listed(odd)}: {stiffness / 1e6:.3g} N/µm, like a steel bar {view.length(length)} "
-            f"long and {view.length(bar)} thick; usual is one from 1/5000 to 1/2 as thick as long. "
-            'Look at the unit: a bare number is in N per file length, "30 N/um" is 3e7 N/m. If it '
-            "is meant, leave it",
+            say(
+                "{names}: {stiffness} N/µm, like a steel bar {length} long and {bar} thick; usual "
+                "is one from 1/5000 to 1/2 as thick as long. Look at the unit: a bare number is "
+                'in N per file length, "30 N/um" is 3e7 N/m. If it is meant, leave it',
+                names=listed(odd),
+                stiffness=marked(f"{stiffness / 1e6:.3g}"),
+                length=view.length(length),
+                bar=view.length(bar),
+            ),
             tuple(odd),
         )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 COARSEST = 0.01
@@ -23,17 +24,26 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         share = accuracy.target / view.size
         if not FINEST <= share <= COARSEST:
             yield (
-                f"the accuracy asked, {accuracy.said('position')}, is {share:.2g} of the machine's "
-                f"size of {view.length(view.size)}; usual is from 1e-08 to 0.01 of it. Look at its "
-                "unit: a bare number is in the file's length. If it is meant, leave it",
+                say(
+                    "the accuracy asked, {value}, is {share} of the machine's size of {size}; "
+                    "usual is from 1e-08 to 0.01 of it. Look at its unit: a bare number is in the "
+                    "file's length. If it is meant, leave it",
+                    value=accuracy.said("position"),
+                    share=marked(f"{share:.2g}"),
+                    size=view.length(view.size),
+                ),
                 ("accuracy.target",),
             )
     angle = accuracy.angle_target
     if angle is not None and not FINEST_ANGLE <= angle <= COARSEST_ANGLE:
         yield (
-            f"the accuracy of orientation asked, {accuracy.said('orientation')}, is "
-            f"{math.degrees(angle):.3g}°; usual is from 1e-08 rad to 5°. Look at its unit: a bare "
-            "number is in the file's angle. If it is meant, leave it",
+            say(
+                "the accuracy of orientation asked, {value}, is {angle}°; usual is from 1e-08 rad "
+                "to 5°. Look at its unit: a bare number is in the file's angle. If it is meant, "
+                "leave it",
+                value=accuracy.said("orientation"),
+                angle=marked(f"{math.degrees(angle):.3g}"),
+            ),
             ("accuracy.angle_target",),
         )
 

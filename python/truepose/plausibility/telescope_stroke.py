@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 MOST = 5.0
@@ -20,10 +21,15 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     if odd:
         short, long = next(iter(odd.values()))
         yield (
-            f"{listed(odd)}: the strut goes from {view.length(short)} to {view.length(long)}; "
-            "usual is up to twice as long as at its shortest, and up to five times of four "
-            "stages or a screw that passes through its joint. Look whether the travel is a "
-            "stroke: offset is the length at zero. If it is meant, leave it",
+            say(
+                "{names}: the strut goes from {short} to {long}; usual is up to twice as long as "
+                "at its shortest, and up to five times of four stages or a screw that passes "
+                "through its joint. Look whether the travel is a stroke: offset is the length at "
+                "zero. If it is meant, leave it",
+                names=listed(odd),
+                short=view.length(short),
+                long=view.length(long),
+            ),
             tuple(f"{part}.travel" for part in odd),
         )
 

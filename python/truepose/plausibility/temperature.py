@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 
 COLDEST = 183.15
@@ -25,10 +26,16 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         return
     kelvin = max(odd.values(), key=lambda value: abs(value - 293.15))
     yield (
-        f"{listed(odd)}: a temperature of {view.degrees(kelvin)}; usual is from "
-        f"{view.degrees(COLDEST)}, the coldest air on Earth, to {view.degrees(HOTTEST)}, from "
-        "which on bearings grow for good. Look at the unit of temperatures: 35 °C is 308 K and "
-        "95 °F. If it is meant, leave it, but expansion is taken as the same at all temperatures",
+        say(
+            "{names}: a temperature of {kelvin}; usual is from {coldest}, the coldest air on "
+            "Earth, to {hottest}, from which on bearings grow for good. Look at the unit of "
+            "temperatures: 35 °C is 308 K and 95 °F. If it is meant, leave it, but expansion is "
+            "taken as the same at all temperatures",
+            names=listed(odd),
+            kelvin=view.degrees(kelvin),
+            coldest=view.degrees(COLDEST),
+            hottest=view.degrees(HOTTEST),
+        ),
         ("condition.temperature",),
     )
 

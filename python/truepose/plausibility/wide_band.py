@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 MOST = 0.01
@@ -28,10 +29,15 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
             continue
         parameter = view.machine.parameters[columns[worst]]
         yield (
-            f"the error source {name} moves {parameter} by up to "
-            f"{view.quantity(reach[worst], columns[worst])}, {100 * shares[worst]:.3g} % of its "
-            "strut's length; usual is less than 1 %. Look at the unit of what the file says of it, "
-            "µm or mm. If it is meant, leave it",
+            say(
+                "the error source {name} moves {parameter} by up to {reach}, {share} % of its "
+                "strut's length; usual is less than 1 %. Look at the unit of what the file says of "
+                "it, µm or mm. If it is meant, leave it",
+                name=name,
+                parameter=parameter,
+                reach=view.quantity(reach[worst], columns[worst]),
+                share=marked(f"{100 * shares[worst]:.3g}"),
+            ),
             (parameter,),
         )
 

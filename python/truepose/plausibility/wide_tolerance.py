@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 from truepose.sources.tolerance import bands_of
 
@@ -27,14 +28,20 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         worst = int(wide[np.argmax(shares[wide])])
         names = [view.machine.parameters[columns[at]] for at in wide]
         of = (
-            f"of {view.length(levers[worst])}"
+            say("of {length}", length=view.length(levers[worst]))
             if view.machine.units[columns[worst]] == "m"
-            else "of its lever"
+            else say("of its lever")
         )
         yield (
-            f"{listed(names)}: a tolerance of up to {view.quantity(reach[worst], columns[worst])}, "
-            f"{100 * shares[worst]:.3g} % {of}; usual is less than 1 %, as even coarse work "
-            "keeps. Look at its unit, and for a slipped decimal point. If it is meant, leave it",
+            say(
+                "{names}: a tolerance of up to {reach}, {share} % {of}; usual is less than 1 %, "
+                "as even coarse work keeps. Look at its unit, and for a slipped decimal point. If "
+                "it is meant, leave it",
+                names=listed(names),
+                reach=view.quantity(reach[worst], columns[worst]),
+                share=marked(f"{100 * shares[worst]:.3g}"),
+                of=of,
+            ),
             tuple(names),
         )
 

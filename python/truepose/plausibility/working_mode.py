@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule, listed
 from truepose.plausibility._roots import inside_otherwise
 
@@ -13,10 +14,13 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
     wrong = inside_otherwise(view, mode=-1.0)
     if wrong:
         yield (
-            f"{listed(wrong)}: home is out of travel, and inside it in the other working mode; "
-            "usual is a home that all drives reach. Look at working_mode, on which side of the "
-            "platform joint the carriage or the elbow stands. If it is meant, give [workspace] "
-            "another home",
+            say(
+                "{names}: home is out of travel, and inside it in the other working mode; usual "
+                "is a home that all drives reach. Look at working_mode, on which side of the "
+                "platform joint the carriage or the elbow stands. If it is meant, give "
+                "[workspace] another home",
+                names=listed(wrong),
+            ),
             tuple(f"{part}.working_mode" for part in wrong),
         )
 

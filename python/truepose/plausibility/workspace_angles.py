@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import marked, say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 MOST = {"a": math.radians(120.0), "b": math.radians(120.0), "c": 2.0 * math.pi}
@@ -22,9 +23,14 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         if largest > 1.001 * MOST[name]:
             unit = view.machine.unit_labels["angle"]
             yield (
-                f"the workspace has {name} up to {math.degrees(largest):.4g}°; usual is less than "
-                f"{math.degrees(MOST[name]):.0f}°. Look at [units]: the file's angles are read "
-                f"as {unit}. If it is meant, leave it",
+                say(
+                    "the workspace has {name} up to {largest}°; usual is less than {most}°. Look "
+                    "at [units]: the file's angles are read as {unit}. If it is meant, leave it",
+                    name=name,
+                    largest=marked(f"{math.degrees(largest):.4g}"),
+                    most=marked(f"{math.degrees(MOST[name]):.0f}"),
+                    unit=unit,
+                ),
                 (f"workspace.grid.{name}",),
             )
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from truepose._kernel import STATUS
+from truepose.language import grouped, say
 from truepose.plausibility._base import OK, MachineAtHome, Remark, Rule
 from truepose.runs.poses import reason_text
 
@@ -18,9 +19,13 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         return
     if not usable.any():
         yield (
-            f"none of the workspace's {usable.size:,} poses can be used ({_why(view.status)}); "
-            "usual is all. Look at the unit of the workspace, at travels and working modes. No "
-            "accuracy can be answered for it",
+            say(
+                "none of the workspace's {count} poses can be used ({status}); usual is all. Look "
+                "at the unit of the workspace, at travels and working modes. No accuracy can be "
+                "answered for it",
+                count=grouped(usable.size),
+                status=_why(view.status),
+            ),
             ("workspace",),
         )
         return
@@ -35,17 +40,23 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
                 continue
             unit = machine.shown.pose(axis.name)
             yield (
-                f"the whole face {axis.name} = {unit.text(end)} of the workspace is out of reach: "
-                f"none of its {int(face.sum()):,} poses can be used ({_why(view.status[face])}); "
-                "usual is that a workspace is what is reached. Look at that end of the grid. If it "
-                "is meant, leave it: these poses are left out",
+                say(
+                    "the whole face {name} = {end} of the workspace is out of reach: none of its "
+                    "{count} poses can be used ({status}); usual is that a workspace is what is "
+                    "reached. Look at that end of the grid. If it is meant, leave it: these poses "
+                    "are left out",
+                    name=axis.name,
+                    end=unit.text(end),
+                    count=grouped(int(face.sum())),
+                    status=_why(view.status[face]),
+                ),
                 (f"workspace.grid.{axis.name}",),
             )
 
 
 def _why(status: np.ndarray) -> str:
     codes, counts = np.unique(status, return_counts=True)
-    return f"most often {reason_text(STATUS[codes[np.argmax(counts)]])}"
+    return say("most often {status}", status=reason_text(STATUS[codes[np.argmax(counts)]]))
 
 
 RULE = Rule(

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from truepose.language import say
 from truepose.plausibility._base import MachineAtHome, Remark, Rule
 
 SMALLEST = 1e-3
@@ -24,9 +25,14 @@ def inspect(view: MachineAtHome) -> Iterator[Remark]:
         return
     small = side < SMALLEST * view.size
     yield (
-        f"the workspace is {view.length(side)} long, the machine {view.length(view.size)}; usual "
-        f"is {'more than a thousandth' if small else 'less than five times'} of it. Look at the "
-        "unit of [workspace]: bare numbers are in the file's length. If it is meant, leave it",
+        say(
+            "the workspace is {side} long, the machine {size}; usual is {share} of it. Look at "
+            "the unit of [workspace]: bare numbers are in the file's length. If it is meant, "
+            "leave it",
+            side=view.length(side),
+            size=view.length(view.size),
+            share=say("more than a thousandth") if small else say("less than five times"),
+        ),
         ("workspace",),
     )
 

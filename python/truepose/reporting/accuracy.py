@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from truepose.language import grouped, marked, say
 from truepose.reporting.display import MISSING, ROUNDING, number, pose_text
 from truepose.reporting.result import in_file_units, pose_in_file_units
+from truepose.reporting.result_words import word
 from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, UNDECIDED, Answer, Number
 from truepose.verdict.coverage import CONFIDENCE
 
@@ -22,8 +24,6 @@ MOST_DECIMALS = 6
 
 GAIN = 0.005
 """Part of an error below which compensation is said to gain nothing."""
-
-ANSWERED = {MET: "met", NOT_MET: "NOT met", UNDECIDED: "undecided", None: "not asked"}
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,16 @@ class Told:
     @property
     def name(self) -> str:
         """The quantity and the state: "position before compensation"."""
-        return f"{self.answer.quantity} {self.answer.state}"
+        return say(
+            "{quantity} {state}",
+            quantity=word(self.answer.quantity),
+            state=word(self.answer.state),
+        )
 
     @property
     def word(self) -> str:
         """Met, NOT met, undecided, or not asked."""
-        return ANSWERED[self.answer.answer]
+        return say("not asked") if self.answer.answer is None else word(self.answer.answer)
 
     @property
     def colour(self) -> str:
@@ -86,10 +90,14 @@ class Told:
         if answer.coverage is not None:
             return self._share(answer.coverage.probability)
         if answer.answer == MET:
-            return f"at most {self.text(answer.bound.value, 1)}"
+            return say("at most {value}", value=self.text(answer.bound.value, 1))
         if answer.not_assembled:
             led = answer.example is None or answer.example.commanded
-            return "a machine that cannot be assembled" if led else "a command that leads nowhere"
+            return (
+                say("a machine that cannot be assembled")
+                if led
+                else say("a command that leads nowhere")
+            )
         if answer.answer == UNDECIDED:
             return self._between(answer.witness.value, answer.bound.value)
         return self.text(answer.told.value)
@@ -97,18 +105,29 @@ class Told:
     def _share(self, probability: float) -> str:
         """What so many of all machines keep, and how sure that is."""
         answer = self.answer
-        share = f"{100.0 * probability:.6g} %"
+        share = marked(f"{100.0 * probability:.6g} %")
         if not math.isfinite(answer.linear.value):
-            return f"fewer than {share} of all machines can be assembled"
+            return say("fewer than {share} of all machines can be assembled", share=share)
         between = self._between(answer.witness.value, answer.bound.value)
-        sure = f"{100.0 * CONFIDENCE:.6g} % confidence: {between}"
-        return f"{share} within {self.text(answer.linear.value)} ({sure})"
+        sure = say(
+            "{confidence} % confidence: {between}",
+            confidence=marked(f"{100.0 * CONFIDENCE:.6g}"),
+            between=between,
+        )
+        return say(
+            "{share} within {value} ({sure})",
+            share=share,
+            value=self.text(answer.linear.value),
+            sure=sure,
+        )
 
     def _between(self, least: float, most: float) -> str:
         """Two ends, each rounded away from the other."""
         if math.isinf(most):
-            return f"{self.text(least, -1)} or more"
-        return f"between {self.amount(least, -1)} and {self.text(most, 1)}"
+            return say("{least} or more", least=self.text(least, -1))
+        return say(
+            "between {least} and {most}", least=self.amount(least, -1), most=self.text(most, 1)
+        )
 
     @property
     def asked(self) -> str:
@@ -118,10 +137,11 @@ class Told:
             return MISSING
         said = self.machine.accuracy.said(answer.quantity)
         if said.rpartition(" ")[2].replace("u", "µ", 1) == self.unit.label:
-            return said
+            return marked(said)
         same = answer.asked * self.unit.per_si
         shown = f"{round(same, self.unit.decimals):.12g}"
-        return f"{said} ({f'{same:.3g}' if shown == '0' else shown} {self.unit.label})"
+        same_text = f"{same:.3g}" if shown == "0" else shown
+        return marked(f"{said} ({same_text} {self.unit.label})")
 
     def at(self, of: Number) -> str:
         """The pose of a number."""
@@ -136,14 +156,18 @@ class Told:
     def line(self) -> str:
         """Answer, number, target, pose and what it rests on, in one line."""
         answer = self.answer
-        asked = "" if answer.asked is None else f", asked {self.asked}"
-        return f"{self.name}: {self.size}{asked}, {self.basis}"
+        size = self.size
+        if answer.asked is not None:
+            size = say("{size}, asked {asked}", size=size, asked=self.asked)
+        return f"{self.name}: {size}, {self.basis}"
 
     @property
     def basis(self) -> str:
         """At which pose the number is, and what the answer rests on."""
-        rests = "" if self.answer.answer == UNDECIDED else "rests on "
-        return f"at {self.at(self.told)}; {rests}{self.answer.rests_on}"
+        pose, on = self.at(self.told), self.answer.rests_on
+        if self.answer.answer == UNDECIDED:
+            return say("at {pose}; {why}", pose=pose, why=on)
+        return say("at {pose}; rests on {on}", pose=pose, on=on)
 
     @property
     def witness(self) -> str:
@@ -167,10 +191,16 @@ def where_answered(answers: Sequence[Answer]) -> str:
     """For which poses the answers are, in a sentence: a verdict is read as one on everything."""
     used, left_out = answers[0].poses_used, answers[0].poses_left_out
     if left_out == 0:
-        return f"At all {used:,} poses of the workspace; nothing is said between them."
-    return (
-        f"At {used:,} of the workspace's {used + left_out:,} poses ONLY: the machine cannot take "
-        f"the other {left_out:,}, and nothing is said of them, nor of what lies between."
+        return say(
+            "At all {used} poses of the workspace; nothing is said between them.",
+            used=grouped(used),
+        )
+    return say(
+        "At {used} of the workspace's {every} poses ONLY: the machine cannot take the other "
+        "{left_out}, and nothing is said of them, nor of what lies between.",
+        used=grouped(used),
+        every=grouped(used + left_out),
+        left_out=grouped(left_out),
     )
 
 
@@ -188,15 +218,24 @@ def gains(answers: Sequence[Answer]) -> tuple[str, ...]:
 
 def _gain(quantity: str, before: float, after: float) -> str:
     if not (math.isfinite(before) and math.isfinite(after)) or before == 0.0:
-        return f"{quantity}: what compensation does cannot be said."
+        return say("{quantity}: what compensation does cannot be said.", quantity=word(quantity))
     change = 1.0 - after / before
     if change >= GAIN:
-        return f"{quantity}: reduced by {100.0 * change:.0f} % by compensation."
+        return say(
+            "{quantity}: reduced by {change} % by compensation.",
+            quantity=word(quantity),
+            change=marked(f"{100.0 * change:.0f}"),
+        )
     if change > -GAIN:
-        return f"{quantity}: nothing to gain by compensation: what is left is unknown."
-    return (
-        f"{quantity}: made {-100.0 * change:.0f} % larger by compensation: it corrects commanded "
-        "freedoms by what is known, and what is not known or not commanded stood against that."
+        return say(
+            "{quantity}: nothing to gain by compensation: what is left is unknown.",
+            quantity=word(quantity),
+        )
+    return say(
+        "{quantity}: made {change} % larger by compensation: it corrects commanded freedoms "
+        "by what is known, and what is not known or not commanded stood against that.",
+        quantity=word(quantity),
+        change=marked(f"{-100.0 * change:.0f}"),
     )
 
 

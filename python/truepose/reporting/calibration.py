@@ -15,7 +15,9 @@ from truepose.arrays import Floats
 from truepose.calibration.acceptance.sentences import listed, quantity, sentence
 from truepose.calibration.identification.robust import OUTLIER
 from truepose.files.shown_units import Shown, ShownUnits
+from truepose.language import marked, say
 from truepose.reporting.display import MISSING, decimals_for, number, where_highest
+from truepose.reporting.result_words import word
 from truepose.reporting.table import Table
 from truepose.reporting.tables import MOST_LISTED
 
@@ -34,12 +36,6 @@ FOLDED = 0.05
 """Below this share of the measurements in a value it is told with all its like in one row."""
 RESTS = 0.5
 """Below this share of the measurements in a value it rests on its tolerance."""
-_FLAGS = {
-    "open": "nothing determines it",
-    "less certain": "the tolerance says more than the measurements",
-    "off tolerance": "the value is not within its tolerance",
-    "mostly tolerance": "the measurements say less than half of the value",
-}
 
 
 def tables(result: xr.Dataset, units: ShownUnits) -> list[Table]:
@@ -85,18 +81,22 @@ def json_attribute(result: xr.Dataset, name: str) -> Any:
 def suspicions(result: xr.Dataset) -> Table | None:
     """What the measurements look like before anything is fitted."""
     rows = [
-        (suspicion["code"], "yes" if suspicion["refuses"] else "no", suspicion["sentence"])
+        (
+            suspicion["code"],
+            say("yes") if suspicion["refuses"] else say("no"),
+            suspicion["sentence"],
+        )
         for suspicion in json_attribute(result, "suspicions")
     ]
     if not rows:
         return None
     return Table(
         "suspicions",
-        "What the measurements look like",
-        ("suspicion", "refused for it", "why"),
+        say("What the measurements look like"),
+        (say("suspicion"), say("refused for it"), say("why")),
         tuple(rows),
         words=3,
-        note="Suspected, not repaired: the fit below is of the measurements as they are.",
+        note=say("Suspected, not repaired: the fit below is of the measurements as they are."),
     )
 
 
@@ -115,18 +115,27 @@ def outliers(result: xr.Dataset) -> Table | None:
         )
         for row in every[:MOST_LISTED]
     ]
-    note = "They count less in the fit, unless the robust loss is switched off."
+    note = say("They count less in the fit, unless the robust loss is switched off.")
     if not odd_readings(result).any():
-        note = (
-            f"{len(every)} of {result.attrs['observations']} readings: these are no odd ones, the "
-            "data or the model are wrong as a whole."
+        note = say(
+            "{count} of {every} readings: these are no odd ones, the data or the model "
+            "are wrong as a whole.",
+            count=len(every),
+            every=result.attrs["observations"],
         )
     if len(every) > len(rows):
-        note += f" {len(every) - len(rows)} more are in the files for programs."
+        note += " " + say(
+            "{count} more are in the files for programs.", count=len(every) - len(rows)
+        )
     return Table(
         "outliers",
-        "Readings that do not fit",
-        ("instrument", "reading", "line" if in_file else "row", "standard deviations"),
+        say("Readings that do not fit"),
+        (
+            say("instrument"),
+            say("reading"),
+            say("line") if in_file else say("row"),
+            say("standard deviations"),
+        ),
         tuple(rows),
         words=2,
         note=note,
@@ -152,7 +161,7 @@ def unknowns(result: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> 
         rows.append(
             (
                 str(result["unknown_label"].values[at]),
-                _flag(result, at),
+                _flag_words(_flag(result, at))[0],
                 _value(float(values["nominal"][at]), unit, shown_in),
                 _value(float(values["identified"][at]), unit, shown_in),
                 signed(float(values["value"][at]), unit, shown_in),
@@ -163,23 +172,27 @@ def unknowns(result: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> 
         )
     more = result.sizes["unknown"] - len(rows) - len(folded)
     if folded:
-        few = f"less than {100.0 * FOLDED:.0f}"
-        label = f"{len(folded)} {'others' if rows else 'unknowns'} rest on their tolerances"
+        few = say("less than {percent}", percent=marked(f"{100.0 * FOLDED:.0f}"))
+        label = (
+            say("{count} others rest on their tolerances", count=len(folded))
+            if rows
+            else say("{count} unknowns rest on their tolerances", count=len(folded))
+        )
         rows.append((label, "", "", "", "", "", "", few))
-    note = (
-        "±: standard uncertainty. From the data: how much of the value the "
-        "measurements say; the rest is its tolerance."
+    note = say(
+        "±: standard uncertainty. From the data: how much of the value the measurements say; "
+        "the rest is its tolerance."
     )
-    flags = dict.fromkeys(row[1] for row in rows if row[1])
-    note += "".join(f" {sentence(flag)}: {_FLAGS[flag]}." for flag in flags)
+    flags = dict.fromkeys(flag for flag in (_flag(result, at) for at in shown) if flag)
+    note += "".join(f" {sentence(flag)}: {meaning}." for flag, meaning in map(_flag_words, flags))
     if more:
-        note += f" {more} more are in the files for programs."
+        note += " " + say("{count} more are in the files for programs.", count=more)
     return Table(
         "unknowns",
-        "What was found",
+        say("What was found"),
         (
-            "", "", "nominal", "identified", "change", "± before", "± after",
-            "from the data, %",
+            "", "", say("nominal"), say("identified"), say("change"),
+            say("± before"), say("± after"), say("from the data, %"),
         ),
         tuple(rows),
         words=2,
@@ -222,6 +235,24 @@ def _flag(result: xr.Dataset, at: int) -> str:
     return ""
 
 
+def _flag_words(flag: str) -> tuple[str, str]:
+    """A flag for people, and what it means."""
+    words = {
+        "": ("", ""),
+        "open": (say("open"), say("nothing determines it")),
+        "less certain": (
+            say("less certain"),
+            say("the tolerance says more than the measurements"),
+        ),
+        "off tolerance": (say("off tolerance"), say("the value is not within its tolerance")),
+        "mostly tolerance": (
+            say("mostly tolerance"),
+            say("the measurements say less than half of the value"),
+        ),
+    }
+    return words[flag]
+
+
 def bar(share: float) -> str:
     """A share as a bar of blocks."""
     filled = round(BAR * share) if math.isfinite(share) else 0
@@ -246,7 +277,7 @@ def signed(value: float, unit: str, units: ShownUnits) -> str:
 
 
 def _uncertainty(value: float, unit: str, units: ShownUnits) -> str:
-    return "open" if math.isinf(value) else quantity(value, unit, units=units)
+    return say("open") if math.isinf(value) else quantity(value, unit, units=units)
 
 
 def instruments(result: xr.Dataset, units: ShownUnits) -> Table | None:
@@ -268,10 +299,10 @@ def instruments(result: xr.Dataset, units: ShownUnits) -> Table | None:
     ]
     return Table(
         "instruments",
-        "What was found of the instruments",
-        ("", "from where it was looked for", "uncertainty"),
+        say("What was found of the instruments"),
+        ("", say("from where it was looked for"), say("uncertainty")),
         tuple(rows),
-        note="Open: moving the instrument does what moving the whole machine does.",
+        note=say("Open: moving the instrument does what moving the whole machine does."),
     )
 
 
@@ -281,17 +312,21 @@ def undetermined(result: xr.Dataset) -> Table | None:
     if not rows:
         return None
     condition = float(result.attrs["condition_number"])
-    seen = (
-        f"Rank of the identification Jacobian: {result.attrs['rank']} of {result.sizes['unknown']}"
-    )
+    ranks = {"rank": result.attrs["rank"], "every": result.sizes["unknown"]}
     if math.isfinite(condition):
-        seen += f", condition number {condition:.3g}"
+        seen = say(
+            "Rank of the identification Jacobian: {rank} of {every}, condition number {condition}.",
+            condition=marked(f"{condition:.3g}"),
+            **ranks,
+        )
+    else:
+        seen = say("Rank of the identification Jacobian: {rank} of {every}.", **ranks)
     return Table(
         "undetermined",
-        "What could not be determined",
+        say("What could not be determined"),
         ("",),
         tuple(rows),
-        note=f"{seen}.",
+        note=seen,
     )
 
 
@@ -331,19 +366,23 @@ def residuals(result: xr.Dataset, shown_in: ShownUnits) -> Table:
         )
     kind, folds = result.attrs["validation"], result.attrs["folds"]
     how = {
-        "none": "Too few rows to hold any out.",
-        "folds": f"Held out: each of {folds} folds of the rows predicted by the others.",
-        "stated set": "Held out: the rows that the file keeps from the fit.",
+        "none": say("Too few rows to hold any out."),
+        "folds": say(
+            "Held out: each of {folds} folds of the rows predicted by the others.", folds=folds
+        ),
+        "stated set": say("Held out: the rows that the file keeps from the fit."),
     }[kind]
-    note = f"{how} Before: the machine as filed, the instruments placed as fits it best."
+    before = say("Before: the machine as filed, the instruments placed as fits it best.")
+    note = f"{how} {before}"
     if named.any():
-        note += " Without the readings named as not fitting."
+        note += " " + say("Without the readings named as not fitting.")
     return Table(
         "residuals",
-        "Measurements against the machine, root mean square",
+        say("Measurements against the machine, root mean square"),
         (
-            "instrument", "readings", "number", "stated", "before", "after",
-            "held out, before", "held out, after", "after / stated",
+            say("instrument"), say("readings"), say("number"), say("stated"),
+            say("before"), say("after"), say("held out, before"), say("held out, after"),
+            say("after / stated"),
         ),
         tuple(rows),
         words=2,
@@ -377,7 +416,7 @@ def tool(result: xr.Dataset, units: ShownUnits) -> Table:
         unit = units.error(name)
         rows.append(
             (
-                f"{name}, {unit.label}",
+                f"{word(name)}, {unit.label}",
                 *_of_tool(
                     result["tool_size_before"].values[:, at] * unit.per_si,
                     result["tool_size_after"].values[:, at] * unit.per_si,
@@ -390,13 +429,22 @@ def tool(result: xr.Dataset, units: ShownUnits) -> Table:
             result[f"tool_{when}"].values[:, at] * unit.per_si for when in ("before", "after")
         )
         rows.append((f"{component}, {unit.label}", *_of_tool(before, after)))
-    note = "Standard uncertainty of where the tool is, over the poses of the workspace."
+    note = say("Standard uncertainty of where the tool is, over the poses of the workspace.")
     if result.attrs["relative"]:
-        note += " Where the machine as a whole stands in the instrument's frame is not in it."
+        note += " " + say(
+            "Where the machine as a whole stands in the instrument's frame is not in it."
+        )
     return Table(
         "tool",
-        "Uncertainty of the tool",
-        ("", "worst before", "worst after", "rms before", "rms after", "after / before"),
+        say("Uncertainty of the tool"),
+        (
+            "",
+            say("worst before"),
+            say("worst after"),
+            say("rms before"),
+            say("rms after"),
+            say("after / before"),
+        ),
         tuple(rows),
         note=note,
     )
@@ -407,7 +455,7 @@ def _of_tool(before: Floats, after: Floats) -> tuple[str, ...]:
     places = decimals_for([size for size in sizes if math.isfinite(size)], 4)
     ratio = sizes[1] / sizes[0] if sizes[0] > 0.0 and math.isfinite(sizes[1]) else float("nan")
     return (
-        *("open" if math.isinf(size) else number(size, places) for size in sizes),
+        *(say("open") if math.isinf(size) else number(size, places) for size in sizes),
         number(ratio, 2),
     )
 
@@ -429,7 +477,7 @@ def warning_lines(result: xr.Dataset) -> Table | None:
     rows = [
         (f"{sentence(warning['sentence'])}.",) for warning in json_attribute(result, "warnings")
     ]
-    return Table("heed", "Warnings", ("",), tuple(rows)) if rows else None
+    return Table("heed", say("Warnings"), ("",), tuple(rows)) if rows else None
 
 
 def next_measurement(result: xr.Dataset, units: ShownUnits) -> Table | None:
@@ -439,7 +487,11 @@ def next_measurement(result: xr.Dataset, units: ShownUnits) -> Table | None:
         return None
     note = ""
     then = [
-        f"{what} known to {quantity(remedy[name], unit, units=units)}"
+        say(
+            "its {quantity} known to {size}",
+            quantity=word(what),
+            size=quantity(remedy[name], unit, units=units),
+        )
         for what, name, unit in (
             ("position", "position", "m"),
             ("orientation", "rotation", "rad"),
@@ -447,9 +499,9 @@ def next_measurement(result: xr.Dataset, units: ShownUnits) -> Table | None:
         if remedy[name]
     ]
     if then:
-        note = f"With it the tool would have its {' and its '.join(then)} at the worst pose."
+        note = say("With it the tool would have {known} at the worst pose.", known=listed(then))
     rows = ((f"{sentence(remedy['sentence'])}.",),)
-    return Table("next", "Recommended next measurement", ("",), rows, note=note)
+    return Table("next", say("Recommended next measurement"), ("",), rows, note=note)
 
 
 def csv_text(result: Result) -> Iterator[str]:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.files.shown_units import Shown
-from truepose.files.wording import counted
+from truepose.language import marked, say, say_counted
 from truepose.reporting.display import column, number
 from truepose.reporting.result import Result
+from truepose.reporting.result_words import word
 from truepose.reporting.table import Table
 
 if TYPE_CHECKING:
@@ -44,19 +45,25 @@ def summary(machine: Machine, result: xr.Dataset) -> list[tuple[str, str, str]]:
     if "reading" not in result.sizes:
         return []
     attrs = result.attrs
-    percent = f"{100.0 * attrs['probability']:.3g} %"
+    percent = marked(f"{100.0 * attrs['probability']:.3g} %")
     share = 100.0 * float(attrs["share_as_far_off"])
-    outside = (
-        f"{100.0 * float(attrs['share_outside']):.3g} % of the readings are outside the {percent} "
-        "band at their angle"
+    outside = say(
+        "{share_outside} % of the readings are outside the {percent} band at their angle",
+        share_outside=marked(f"{100.0 * float(attrs['share_outside']):.3g}"),
+        percent=percent,
     )
     if attrs["within"]:
         return [
             (
-                WITHIN,
+                word(WITHIN),
                 "met",
-                f"{attrs['measured_file']}: as the model says; {share:.3g} % of its machines "
-                f"are as far off, or farther; {outside}.",
+                say(
+                    "{file}: as the model says; {share} % of its machines are as far off, or "
+                    "farther; {outside}.",
+                    file=attrs["measured_file"],
+                    share=marked(f"{share:.3g}"),
+                    outside=outside,
+                ),
             )
         ]
     (first, *_), value, explained = (
@@ -66,60 +73,104 @@ def summary(machine: Machine, result: xr.Dataset) -> list[tuple[str, str, str]]:
     )
     far = attrs["farthest"] > attrs["farthest_limit"]
     why = (
-        f"a reading is {attrs['farthest']:.3g} standard uncertainties from the mean of the "
-        f"machines, of which {percent} stay below {attrs['farthest_limit']:.3g}"
+        say(
+            "a reading is {farthest} standard uncertainties from the mean of the machines, of "
+            "which {percent} stay below {farthest_limit}",
+            farthest=marked(f"{attrs['farthest']:.3g}"),
+            percent=percent,
+            farthest_limit=marked(f"{attrs['farthest_limit']:.3g}"),
+        )
         if far
-        else f"no machine of the model draws this: readings are {attrs['distance']:.3g} standard "
-        f"uncertainties off (rms), {percent} of the machines stay below "
-        f"{attrs['distance_limit']:.3g}"
+        else say(
+            "no machine of the model draws this: readings are {distance} standard uncertainties "
+            "off (rms), {percent} of the machines stay below {distance_limit}",
+            distance=marked(f"{attrs['distance']:.3g}"),
+            percent=percent,
+            distance_limit=marked(f"{attrs['distance_limit']:.3g}"),
+        )
     )
     by_all = 100.0 * float(attrs["explained_within_bands"])
     return [
         (
-            NOT_WITHIN,
+            word(NOT_WITHIN),
             "missed",
             f"{attrs['measured_file']}: {why}; {outside}.",
         ),
-        ("", "none", f"{first} off by {value} besides would explain {explained:.3g} %."),
-        ("", "none", f"All that has a band explains {by_all:.3g} % while it stays plausible."),
+        (
+            "",
+            "none",
+            say(
+                "{first} off by {value} besides would explain {explained} %.",
+                first=first,
+                value=value,
+                explained=marked(f"{explained:.3g}"),
+            ),
+        ),
+        (
+            "",
+            "none",
+            say(
+                "All that has a band explains {by_all} % while it stays plausible.",
+                by_all=marked(f"{by_all:.3g}"),
+            ),
+        ),
     ]
 
 
 def quantities(machine: Machine, result: xr.Dataset) -> Table:
     """The quantities of the standard."""
     unit = machine.shown.small_length
-    percent = f"{100.0 * result.attrs['probability']:.3g} %"
+    percent = marked(f"{100.0 * result.attrs['probability']:.3g} %")
     known, after = (result["known"].values[at] * unit.per_si for at in (0, 1))
     spread = result["standard_uncertainty"].values[0] * unit.per_si
     ends = [result[name].values[0] * unit.per_si for name in ("lower", "upper")]
-    header = ["quantity", "known", "std. uncertainty", f"{percent} from", "to"]
+    header = [
+        say("quantity"),
+        say("known"),
+        say("std. uncertainty"),
+        say("{percent} from", percent=percent),
+        say("to"),
+    ]
     columns = [known, spread, *ends]
-    header += ["known after comp.", f"{percent} from", "to"]
+    header += [say("known after comp."), say("{percent} from", percent=percent), say("to")]
     columns += [after, *(result[name].values[1] * unit.per_si for name in ("lower", "upper"))]
     shown = [column(values, unit.decimals) for values in columns]
     if "reading" in result.sizes:
         measured, low, high = (
             result[name].values * unit.per_si for name in ("measured", "read_lower", "read_upper")
         )
-        header += ["measured", "as the model says"]
+        header += [say("measured"), say("as the model says")]
         inside = (low <= measured) & (measured <= high)
         shown += [
             column(measured, unit.decimals),
-            tuple("yes" if fine else "NO" for fine in inside),
+            tuple(say("yes") if fine else say("NO") for fine in inside),
         ]
     names = [str(name) for name in result["quantity_name"].values]
     radius = machine.shown.length.text(float(result.attrs["radius"]), 6)
     step, overshoot = (_angle(machine, float(result.attrs[name])) for name in ("step", "overshoot"))
     return Table(
         "circular test",
-        f"Circular test, {result.attrs['plane']}, radius {radius}, {unit.label}",
+        say(
+            "Circular test, {plane}, radius {radius}, {unit}",
+            plane=result.attrs["plane"],
+            radius=radius,
+            unit=unit.label,
+        ),
         tuple(header),
         tuple(zip(names, *shown, strict=True)),
-        note=f"{result.attrs['standard']}. G by the narrowest ring (minimum zone), F about the "
-        f"least-squares centre of both paths; readings every {step}, after an "
-        f"overshoot of {overshoot}.\n"
-        f"{counted(int(result.attrs['samples']), 'machine')}, seed {result.attrs['seed']}. A form "
-        "is never negative, so that its interval can lie above what is known of it.",
+        note=say(
+            "{standard}. G by the narrowest ring (minimum zone), F about the least-squares "
+            "centre of both paths; readings every {step}, after an overshoot of {overshoot}.\n"
+            "{machines}, seed {seed}. A form is never negative, so that its interval can lie above "
+            "what is known of it.",
+            standard=result.attrs["standard"],
+            step=step,
+            overshoot=overshoot,
+            machines=say_counted(
+                "{count} machine", "{count} machines", int(result.attrs["samples"])
+            ),
+            seed=result.attrs["seed"],
+        ),
     )
 
 
@@ -134,23 +185,42 @@ def causes(machine: Machine, result: xr.Dataset, kind: str) -> Table:
         column(result[f"{kind}_radius"].values[chosen] * unit.per_si, unit.decimals),
         column(result[f"{kind}_share"].values[chosen] * 100.0, 1),
     ]
-    header = ["cause", f"G(b) alone, {unit.label}", f"D alone, {unit.label}", "share, %"]
-    title = "Causes of the known error"
-    note = (
-        "As commanded. Share: of the sum of squares of F; causes that work against each other have "
-        "shares beyond 100 % and below 0."
+    header = [
+        say("cause"),
+        say("G(b) alone, {unit}", unit=unit.label),
+        say("D alone, {unit}", unit=unit.label),
+        say("share, %"),
+    ]
+    title = say("Causes of the known error")
+    note = say(
+        "As commanded. Share: of the sum of squares of F; causes that work against each "
+        "other have shares beyond 100 % and below 0."
     )
     if kind == "known":
-        header.append("looks like")
+        header.append(say("looks like"))
         shown.append([str(shape) for shape in result["known_shape"].values[chosen]])
     else:
-        header[0:3] = ["not known", f"form, {unit.label} rms", f"D, {unit.label}"]
-        title = "What makes the test uncertain"
-        note = "Standard uncertainties, to first order. Share: of the variance of F."
+        header[0:3] = [
+            say("not known"),
+            say("form, {unit} rms", unit=unit.label),
+            f"D, {unit.label}",
+        ]
+        title = say("What makes the test uncertain")
+        note = say("Standard uncertainties, to first order. Share: of the variance of F.")
     more = len(names) - MOST_CAUSES
     if more > 0:
-        note += f"\nAnd {counted(more, 'more cause')}: --output writes all."
-    return Table(f"{kind} causes", title, tuple(header), tuple(zip(*shown, strict=True)), note=note)
+        note += "\n" + say_counted(
+            "And {count} more cause: --output writes all.",
+            "And {count} more causes: --output writes all.",
+            more,
+        )
+    return Table(
+        f"{kind} causes",
+        title,
+        tuple(header),
+        tuple(zip(*shown, strict=True)),
+        note=note,
+    )
 
 
 def turns(machine: Machine, result: xr.Dataset) -> Table:
@@ -165,16 +235,19 @@ def turns(machine: Machine, result: xr.Dataset) -> Table:
     assert [str(way) for way in ways[:2]] == ["counter-clockwise", "clockwise"]
     return Table(
         "turns",
-        "Where drives turn round, and what the radius does there",
+        say("Where drives turn round, and what the radius does there"),
         (
-            "drive",
-            f"at, {turn.label}",
-            f"counter-clockwise, {unit.label}",
-            f"clockwise, {unit.label}",
+            say("drive"),
+            say("at, {unit}", unit=turn.label),
+            say("counter-clockwise, {unit}", unit=unit.label),
+            say("clockwise, {unit}", unit=unit.label),
         ),
         tuple(rows),
-        note="The step of what is known, outwards positive: of play that friction leaves open, and "
-        "of reversal in a table. Where a load presses the drive to one side there is none.",
+        note=say(
+            "The step of what is known, outwards positive: of play that friction leaves open, "
+            "and of reversal in a table. Where a load presses the drive to one side there is "
+            "none."
+        ),
     )
 
 
@@ -183,7 +256,9 @@ def explanations(machine: Machine, result: xr.Dataset) -> Table:
     rows = []
     for at, name in enumerate(result["explanation"].values[:MOST_CAUSES]):
         alike = [word for word in str(result["explanation_alike"].values[at]).split(", ") if word]
-        named = ", ".join(alike[:3]) + (f" and {len(alike) - 3} more" if len(alike) > 3 else "")
+        named = ", ".join(alike[:3]) + (
+            " " + say("and {count} more", count=len(alike) - 3) if len(alike) > 3 else ""
+        )
         bands = float(result["explained_bands"].values[at])
         rows.append(
             (
@@ -191,23 +266,25 @@ def explanations(machine: Machine, result: xr.Dataset) -> Table:
                 named,
                 number(float(result["explained_share"].values[at]) * 100.0, 1),
                 _explained(machine, result, at),
-                number(bands, 1) if np.isfinite(bands) else "no band",
+                number(bands, 1) if np.isfinite(bands) else say("no band"),
             )
         )
     return Table(
         "explanations",
-        "What would explain the difference from the known error",
+        say("What would explain the difference from the known error"),
         (
-            "parameter",
-            "this test cannot tell it from",
-            "explains, %",
-            "off by",
-            "std. uncertainties",
+            say("parameter"),
+            say("this test cannot tell it from"),
+            say("explains, %"),
+            say("off by"),
+            say("std. uncertainties"),
         ),
         tuple(rows),
         words=2,
-        note="Each alone, by least squares. --readings FILE.csv writes the readings for "
-        "`truepose calibrate`, which finds parameters together.",
+        note=say(
+            "Each alone, by least squares. --readings FILE.csv writes the readings for `truepose "
+            "calibrate`, which finds parameters together."
+        ),
     )
 
 
@@ -243,17 +320,17 @@ def csv_text(result: Result) -> Iterator[str]:
     measured = "reading" in result.dataset.sizes
     read = result.values("measured").array if measured else None
     states, names = result.labels("state"), result.labels("quantity")
-    for state, word in enumerate(states):
+    for state, called in enumerate(states):
         for at, name in enumerate(names):
             values = [one.array[state, at] for one in (known, spread, low, high)]
             own = "" if read is None or state else read[at]
-            rows.append(["quantity", word, name, "", *values, own])
+            rows.append(["quantity", called, name, "", *values, own])
     radial = [result.values(f"radial_{name}").array for name in ("known", "lower", "upper")]
-    for state, word in enumerate(states):
+    for state, called in enumerate(states):
         for way, name in enumerate(ways):
             for at, angle in enumerate(angles.array):
                 middle, *ends = (values[state, way, at] for values in radial)
-                rows.append(["radial deviation", word, name, angle, middle, "", *ends, ""])
+                rows.append(["radial deviation", called, name, angle, middle, "", *ends, ""])
     if measured:
         measured_radial = result.values("radial_measured").array
         there = result.values("reading_angle").array

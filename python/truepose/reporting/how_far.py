@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from truepose.files.wording import counted
+from truepose.language import grouped, say, say_counted
 from truepose.reporting.accuracy import AFTER, BEFORE
 from truepose.reporting.display import MISSING
+from truepose.reporting.result_words import word
 from truepose.reporting.study import Study
 from truepose.reporting.table import Table
 from truepose.reporting.uncertainty_tables import rounded
@@ -81,15 +82,19 @@ def _linear_maxima(study: Study) -> Mapping[str, Mapping[str, float]]:
 
 def share_note(study: Study) -> str:
     """What 95 % is, and how it was found."""
-    said = "95 %: so many of all machines stay below it at the worst pose, sampled, solved exactly"
+    said = say(
+        "95 %: so many of all machines stay below it at the worst pose, sampled, solved exactly"
+    )
     coverages = [answer.coverage for answer in study.sampled if answer.coverage is not None]
     if not coverages:
         return f"{said}."
     draws = max(coverage.draws for coverage in coverages)
     sampled = {coverage.sampled for coverage in coverages}
-    up_to = "up to " if len(sampled) > 1 else ""
-    poses = counted(coverages[0].poses, "pose")
-    return f"{said}: {draws:,} machines at {up_to}{max(sampled):,} of {poses}."
+    poses = say_counted("{count} pose", "{count} poses", coverages[0].poses)
+    values = {"draws": grouped(draws), "sampled": grouped(max(sampled)), "poses": poses}
+    if len(sampled) > 1:
+        return f"{said}: {say('{draws} machines at up to {sampled} of {poses}.', **values)}"
+    return f"{said}: {say('{draws} machines at {sampled} of {poses}.', **values)}"
 
 
 def cells(study: Study, row: HowFar) -> Mapping[str, str]:
@@ -105,14 +110,19 @@ def table(study: Study) -> Table:
     rows = []
     for row in how_far(study):
         unit = study.units.error(row.quantity)
-        rows.append((row.quantity, row.state, *cells(study, row).values(), unit.label))
+        texts = cells(study, row).values()
+        rows.append((word(row.quantity), word(row.state), *texts, unit.label))
     return Table(
         "how_far",
-        "How far off can the tool be?",
-        ("", "", *NUMBERS.values(), ""),
+        say("How far off can the tool be?"),
+        ("", "", *(word(name) for name in NUMBERS.values()), ""),
         tuple(rows),
         words=2,
-        note=f"The largest over all poses. {share_note(study)} {MISSING}: there is no such number.",
+        note=say(
+            "The largest over all poses. {share} {missing}: there is no such number.",
+            share=share_note(study),
+            missing=MISSING,
+        ),
     )
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from truepose.files.shown_units import Shown, ShownUnits
+from truepose.language import grouped, marked, say
 from truepose.machine.parts import is_body
 from truepose.reporting.display import MISSING, nearest_middle, number, pose_text
 from truepose.reporting.result import in_file_units
@@ -27,22 +28,25 @@ TRIED = 1000
 def machine(it: Machine) -> Table:
     """What the machine is: freedoms, closures, parameters, size."""
     rows = [
-        ("name", it.name),
-        ("freedoms of the platform", " ".join(it.dof)),
-        ("commanded", " ".join(it.commanded)),
-        *([] if it.family is None else [("family", _family(it.family, it.shown))]),
-        ("drives", ", ".join(f"{drive.name} ({drive.kind})" for drive in it.drives)),
-        ("struts (closures)", f"{len(it.struts)}: " + ", ".join(strut.name for strut in it.struts)),
+        (say("name"), it.name),
+        (say("freedoms of the platform"), " ".join(it.dof)),
+        (say("commanded"), " ".join(it.commanded)),
+        *([] if it.family is None else [(say("family"), _family(it.family, it.shown))]),
+        (say("drives"), ", ".join(f"{drive.name} ({drive.kind})" for drive in it.drives)),
+        (
+            say("struts (closures)"),
+            f"{len(it.struts)}: " + ", ".join(strut.name for strut in it.struts),
+        ),
         *(
-            [("limbs", ", ".join(f"{limb.name} ({limb.family})" for limb in it.limbs))]
+            [(say("limbs"), ", ".join(f"{limb.name} ({limb.family})" for limb in it.limbs))]
             if it.limbs
             else []
         ),
-        ("parameters", str(len(it.parameters))),
-        ("characteristic length", it.shown.length.text(it.characteristic_length, 6)),
-        ("home", pose_text(it.home, it.dof, it.shown)),
+        (say("parameters"), str(len(it.parameters))),
+        (say("characteristic length"), it.shown.length.text(it.characteristic_length, 6)),
+        (say("home"), pose_text(it.home, it.dof, it.shown)),
     ]
-    return Table("machine", "Machine", ("", ""), tuple(rows), words=2)
+    return Table("machine", say("Machine"), ("", ""), tuple(rows), words=2)
 
 
 def _family(parameters: FamilyParameters, shown: ShownUnits) -> str:
@@ -59,38 +63,44 @@ def condition(of: Machine) -> Table:
     """Temperatures, what acts on the tool, the accuracy asked and what `--set` changed."""
     it, asked, units = of.condition, of.accuracy, of.shown
     rows = [
-        ("reference temperature", _degrees(it.reference_temperature, units)),
-        ("temperature", _degrees(it.default_temperature, units)),
+        (say("reference temperature"), _degrees(it.reference_temperature, units)),
+        (say("temperature"), _degrees(it.default_temperature, units)),
         *(
-            (f"temperature of {part}", _degrees(value, units))
+            (say("temperature of {part}", part=part), _degrees(value, units))
             for part, value in it.part_temperatures.items()
         ),
         *_log(it),
         *(
-            (f"temperature gradient of {part}", _gradient(part, value))
+            (say("temperature gradient of {part}", part=part), _gradient(part, value))
             for part, value in it.gradients.items()
         ),
-        ("force on the tool", _vector(it.force, units.force)),
+        (say("force on the tool"), _vector(it.force, units.force)),
     ]
     if any(it.moment):
-        rows.append(("moment on the tool", _vector(it.moment, Shown("N m", 1.0))))
+        rows.append((say("moment on the tool"), _vector(it.moment, Shown("N m", 1.0))))
     if it.envelope is not None:
         across = (
             ""
             if it.envelope.normal is None
-            else f" across {_vector(it.envelope.normal, Shown('', 1.0))}"
+            else " " + say("across {normal}", normal=_vector(it.envelope.normal, Shown("", 1.0)))
         )
-        force = f"{units.force.text(it.envelope.force, 6)} in any direction{across}"
-        rows.append(("further force on the tool", force))
+        force = say(
+            "{force} in any direction{across}",
+            force=units.force.text(it.envelope.force, 6),
+            across=across,
+        )
+        rows.append((say("further force on the tool"), force))
     if any(it.acceleration):
-        rows.append(("acceleration of the platform", _vector(it.acceleration, Shown("m/s²", 1.0))))
+        rows.append(
+            (say("acceleration of the platform"), _vector(it.acceleration, Shown("m/s²", 1.0)))
+        )
     rows += [(key, f"{value}") for key, value in it.source_keys.items()]
     if asked.target is not None:
-        rows.append(("accuracy asked", asked.said("position")))
+        rows.append((say("accuracy asked"), marked(asked.said("position"))))
     if asked.angle_target is not None:
-        rows.append(("accuracy of angle asked", asked.said("orientation")))
+        rows.append((say("accuracy of angle asked"), marked(asked.said("orientation"))))
     rows += [(f"--set {key}", value) for key, value in of.settings.items()]
-    return Table("condition", "Condition", ("", ""), tuple(rows), words=2)
+    return Table("condition", say("Condition"), ("", ""), tuple(rows), words=2)
 
 
 def _log(it: Condition) -> list[tuple[str, str]]:
@@ -98,29 +108,34 @@ def _log(it: Condition) -> list[tuple[str, str]]:
     log = it.temperature_log
     if log is None:
         return []
-    moment = "its last moment" if it.time is None else f"at {it.time:.10g} s"
-    return [("temperature log", f"{log.name or 'given by the call'}, {moment}")]
+    moment = (
+        say("its last moment")
+        if it.time is None
+        else say("at {time} s", time=marked(f"{it.time:.10g}"))
+    )
+    return [(say("temperature log"), f"{log.name or say('given by the call')}, {moment}")]
 
 
 def _gradient(part: str, value: tuple[float, float, float]) -> str:
     if is_body(part):
         return _vector(value, Shown("K/m", 1.0))
-    return f"{value[0]:.6g} K/m along it".replace("-", "\N{MINUS SIGN}")
+    gradient = marked(f"{value[0]:.6g}").replace("-", "\N{MINUS SIGN}")
+    return say("{gradient} K/m along it", gradient=gradient)
 
 
 def sources(it: Machine) -> Table:
     """The error sources of the file, and whether they act under this condition."""
     rows = [
-        (source.name, source.doc, "yes" if source.acts(it.condition) else "no")
+        (source.name, say(source.doc), say("yes") if source.acts(it.condition) else say("no"))
         for source in _sources(it)
     ]
     return Table(
         "sources",
-        "Error sources found",
-        ("source", "what it is", "acts here"),
+        say("Error sources found"),
+        (say("source"), say("what it is"), say("acts here")),
         tuple(rows),
         words=3,
-        note="A source of the file that does nothing under this condition is left out.",
+        note=say("A source of the file that does nothing under this condition is left out."),
     )
 
 
@@ -203,14 +218,19 @@ def deviations(it: Machine) -> Table:
             key = (source.name, number(shift * unit.per_si, 3), band, unit.label)
             alike.setdefault(key, []).append(it.parameters[parameter])
     rows += [(name, _listed(parameters), *others) for (name, *others), parameters in alike.items()]
-    more = f" The first {MOST_DEVIATIONS} of {len(rows)}." if len(rows) > MOST_DEVIATIONS else ""
+    more = (
+        " " + say("The first {count} of {every}.", count=MOST_DEVIATIONS, every=grouped(len(rows)))
+        if len(rows) > MOST_DEVIATIONS
+        else ""
+    )
     return Table(
         "deviations",
-        "What the sources do to the parameters",
-        ("source", "parameters", "known shift", "unknown band", "unit"),
+        say("What the sources do to the parameters"),
+        (say("source"), say("parameters"), say("known shift"), say("unknown band"), say("unit")),
         tuple(rows[:MOST_DEVIATIONS]),
         words=2,
-        note="Actual minus nominal, at the usable pose nearest the middle of the workspace." + more,
+        note=say("Actual minus nominal, at the usable pose nearest the middle of the workspace.")
+        + more,
     )
 
 
@@ -232,7 +252,12 @@ def _listed(names: list[str]) -> str:
     """Names in words: all of a few, the first and the last of many."""
     if len(names) <= 3:
         return ", ".join(names)
-    return f"{names[0]} … {names[-1]} ({len(names)} parameters)"
+    return say(
+        "{first} … {last} ({count} parameters)",
+        first=names[0],
+        last=names[-1],
+        count=len(names),
+    )
 
 
 def _deviations_at_middle(it: Machine) -> list[tuple[Source, Deviation]]:
@@ -252,13 +277,19 @@ def parameters(it: Machine) -> Table:
     for name, value, unit in zip(it.parameters, it.nominal, it.units, strict=True):
         shown = it.shown.of(unit)
         rows.append((name, number(float(value) * shown.per_si, 6), shown.label))
-    return Table("parameters", "Parameters", ("parameter", "nominal value", "unit"), tuple(rows))
+    return Table(
+        "parameters",
+        say("Parameters"),
+        (say("parameter"), say("nominal value"), say("unit")),
+        tuple(rows),
+    )
 
 
 def _degrees(kelvin: float, units: ShownUnits) -> str:
-    return f"{float(units.temperature(kelvin)):.6g} {units.degree}"
+    return marked(f"{float(units.temperature(kelvin)):.6g} {units.degree}")
 
 
 def _vector(values: tuple[float, ...], unit: Shown) -> str:
     parts = [f"{axis} {value * unit.per_si:.6g}" for axis, value in zip("xyz", values, strict=True)]
-    return ", ".join(parts).replace("-", "\N{MINUS SIGN}") + f" {unit.label}".rstrip()
+    text = ", ".join(marked(part) for part in parts).replace("-", "\N{MINUS SIGN}")
+    return f"{text} {unit.label}".rstrip()

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from truepose.files.dimensions import BY_UNIT
+from truepose.language import grouped, marked, say
+from truepose.reporting.result_words import word
 from truepose.reporting.table import Table
 from truepose.sources import not_included_text
 from truepose.verdict.states import BEFORE
@@ -31,7 +33,7 @@ PROCESS = (
     "What the process adds (cutter, deflection of the tool, extrusion, clamping, wear) is not in "
     "it."
 )
-"""Stands on every page about a part."""
+"""Stands in every file about a part."""
 
 LEAST = 0.05
 """Of the small unit: what is shown as 0.0 and not named."""
@@ -41,6 +43,14 @@ ROUNDING = 1e-9
 
 NAMED = 3
 """Sources that are named."""
+
+
+def process() -> str:
+    """What is not in it, in the language spoken; stands on every page about a part."""
+    return say(
+        "What the process adds (cutter, deflection of the tool, extrusion, clamping, wear) is not "
+        "in it."
+    )
 
 
 def tables(evaluation: PartEvaluation) -> Iterator[Table]:
@@ -68,19 +78,32 @@ def summary(evaluation: PartEvaluation) -> list[SummaryLine]:
         told = list(zip(evaluation.characteristics, answers.answers, strict=True))
         missed = [of for of, answer in told if answer.verdict == NOT_MET]
         unsure = [of for of, answer in told if answer.verdict == UNDECIDED]
-        word, colour = (
+        verdict, colour = (
             (NOT_MET, "missed") if missed else (UNDECIDED, "open") if unsure else (MET, "met")
         )
-        text = f"{answers.state.name}: {len(told) - len(missed) - len(unsure)} of {len(told)} "
-        text += "quantities certainly within tolerance"
-        text += f"; NOT met: {_by_feature(missed)}" if missed else ""
-        text += f"; undecided: {_by_feature(unsure)}" if unsure else ""
+        text = say(
+            "{state}: {good} of {every} quantities certainly within tolerance",
+            state=word(answers.state.name),
+            good=len(told) - len(missed) - len(unsure),
+            every=len(told),
+        )
+        if missed:
+            text += "; " + say("NOT met: {names}", names=_by_feature(missed))
+        if unsure:
+            text += "; " + say("undecided: {names}", names=_by_feature(unsure))
         of, answer = max(told, key=lambda one: one[1].out)
         if answer.out > 0.0:
-            text += f". Most often out: {of.label}, of {100.0 * answer.out:.3g} % of the machines"
+            text += ". " + say(
+                "Most often out: {name}, of {out} % of the machines",
+                name=of.label,
+                out=marked(f"{100.0 * answer.out:.3g}"),
+            )
         elif missed and evaluation.of_bands:
-            text += f". None of {evaluation.samples:,} machines drawn is out; one at its limits is"
-        lines.append(SummaryLine(word, colour, text))
+            text += ". " + say(
+                "None of {samples} machines drawn is out; one at its limits is",
+                samples=grouped(evaluation.samples),
+            )
+        lines.append(SummaryLine(word(verdict), colour, text))
     return lines
 
 
@@ -98,37 +121,46 @@ def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
         for of, answer in zip(evaluation.characteristics, answers.answers, strict=True)
     )
     header = (
-        "feature",
-        "quantity",
-        "verdict",
-        "nominal",
-        "limits",
-        "in",
-        "known",
-        f"{100.0 * evaluation.probability:g} % interval",
+        say("feature"),
+        say("quantity"),
+        say("verdict"),
+        say("nominal"),
+        say("limits"),
+        say("in"),
+        say("known"),
+        say("{probability} % interval", probability=marked(f"{100.0 * evaluation.probability:g}")),
         "u",
-        "reached",
-        "no machine beyond",
-        "out",
+        say("reached"),
+        say("no machine beyond"),
+        say("out"),
     )
     walked = evaluation.walked
     small = evaluation.shown.small_length
-    note = (
-        f"Verdict by the rule {evaluation.rule}. {evaluation.samples:,} machines that yours may "
-        f"be, seed {evaluation.seed}, each goes to every point; "
-        f"alignment: {evaluation.alignment.kind}. Deviations from nominal, of a form its value. "
+    note = say(
+        "Verdict by the rule {rule}. {samples} machines that yours may be, seed {seed}, each goes "
+        "to every point; alignment: {kind}. Deviations from nominal, of a form its value.",
+        rule=evaluation.rule,
+        samples=grouped(evaluation.samples),
+        seed=evaluation.seed,
+        kind=evaluation.alignment.kind,
     )
     if answers.state.name == BEFORE:
-        note += (
-            f"Along the path the known error of the tool's place is at most "
-            f"{small.text(walked.largest)} (line {walked.largest_line}). "
+        note += " " + say(
+            "Along the path the known error of the tool's place is at most {size} (line {line}).",
+            size=small.text(walked.largest),
+            line=walked.largest_line,
         )
-    note += PROCESS
+    note += f" {process()}"
     missing = not_included_text(evaluation.machine, evaluation.condition)
     if missing:
-        note += f" Not included: {missing}."
+        note += " " + say("Not included: {missing}.", missing=missing)
     return Table(
-        f"part {answers.state.name}", f"The part {answers.state.name}", header, rows, 3, note
+        f"part {answers.state.name}",
+        say("The part {state}", state=word(answers.state.name)),
+        header,
+        rows,
+        3,
+        note,
     )
 
 
@@ -138,27 +170,31 @@ def _row(evaluation: PartEvaluation, of: Characteristic, answer: QuantityAnswer)
 
     def off(value: float) -> str:
         if not math.isfinite(value):
-            return "no limit" if math.isinf(value) else "none"
+            return say("no limit") if math.isinf(value) else say("none")
         scaled = round((value - quantity.nominal) * small.per_si, 1) + 0.0
-        return f"{scaled:{'' if quantity.is_form else '+'}.1f}"
+        return marked(f"{scaled:{'' if quantity.is_form else '+'}.1f}")
 
     def ends(low: float, high: float) -> str:
         return f"{off(high)}" if quantity.is_form else f"{off(low)} .. {off(high)}"
 
-    nominal = "" if quantity.is_form else f"{quantity.nominal * large.per_si:.10g} {large.label}"
+    nominal = (
+        "" if quantity.is_form else marked(f"{quantity.nominal * large.per_si:.10g} {large.label}")
+    )
     above = ends(answer.above.lower, answer.above.upper)
     return (
         of.feature.name,
         quantity.name,
-        answer.verdict,
+        word(answer.verdict),
         nominal,
         ends(quantity.lower, quantity.upper),
         small.label,
         off(answer.known),
         ends(*answer.interval),
-        "not stated" if quantity.is_form else f"{answer.uncertainty * small.per_si:.1f}",
+        say("not stated")
+        if quantity.is_form
+        else marked(f"{answer.uncertainty * small.per_si:.1f}"),
         ends(answer.search.lower.value, answer.search.upper.value),
-        above if answer.above.proven else f"{above} (not proven)",
+        above if answer.above.proven else say("{above} (not proven)", above=above),
         _share_out(answer.out, evaluation.samples),
     )
 
@@ -170,27 +206,29 @@ def _blame(evaluation: PartEvaluation) -> Table:
         small = evaluation.shown.small(of.quantity.si)
         named = [
             f"{one.source} {_adds(one.known * small.per_si, one.half * small.per_si)}"
-            + (f" (most: {one.first})" if one.first else "")
+            + (" " + say("(most: {first})", first=one.first) if one.first else "")
             for one in culprits(before, at)[:NAMED]
             if (abs(one.known) + one.half) * small.per_si >= LEAST
         ]
         rows.append(
             (
                 of.label,
-                f"{', '.join(named)} {small.label}" if named else f"under {LEAST:g} {small.label}",
+                f"{', '.join(named)} {small.label}"
+                if named
+                else say("under {least} {unit}", least=marked(f"{LEAST:g}"), unit=small.label),
                 mends(evaluation, at),
             )
         )
-    note = (
-        "Each source alone: what it is known to add as commanded, and half the 95 % interval of "
-        "what it leaves unknown, with the variable that does most of it. What is known holds in "
-        "the condition of the machine file, its temperatures and forces: in another one "
-        "compensation would put the error in."
+    note = say(
+        "Each source alone: what it is known to add as commanded, and half the 95 % interval "
+        "of what it leaves unknown, with the variable that does most of it. What is known "
+        "holds in the condition of the machine file, its temperatures and forces: in another "
+        "one compensation would put the error in."
     )
     return Table(
         "blame",
-        "Who is to blame, and what would mend it",
-        ("characteristic", "sources", "what would mend it"),
+        say("Who is to blame, and what would mend it"),
+        (say("characteristic"), say("sources"), say("what would mend it")),
         tuple(rows),
         3,
         note,
@@ -201,15 +239,16 @@ def _operators(evaluation: PartEvaluation) -> Table:
     rows = tuple(
         (of.label, of.quantity.operator, of.quantity.filter) for of in evaluation.characteristics
     )
-    title, header = "How each is evaluated", ("characteristic", "operator", "filter")
+    title = say("How each is evaluated")
+    header = (say("characteristic"), say("operator"), say("filter"))
     return Table("operators", title, header, rows, 3)
 
 
 def _adds(known: float, half: float) -> str:
     known, half = round(known, 1), round(half, 1)
     if not half:
-        return f"{known:+.1f}"
-    return f"{known:+.1f} ± {half:.1f}" if known else f"± {half:.1f}"
+        return marked(f"{known:+.1f}")
+    return marked(f"{known:+.1f} ± {half:.1f}" if known else f"± {half:.1f}")
 
 
 def _beyond(quantity: Quantity, programmed: float) -> bool:
@@ -220,7 +259,7 @@ def _beyond(quantity: Quantity, programmed: float) -> bool:
 
 def _share_out(share: float, samples: int) -> str:
     """In percent. Of none of n it is below 3 / n with 95 % confidence (the rule of three)."""
-    return f"{100.0 * share:.3g} %" if share > 0.0 else f"< {300.0 / samples:.2g} %"
+    return marked(f"{100.0 * share:.3g} %" if share > 0.0 else f"< {300.0 / samples:.2g} %")
 
 
 def mends(evaluation: PartEvaluation, at: int) -> str:
@@ -228,37 +267,57 @@ def mends(evaluation: PartEvaluation, at: int) -> str:
     of, programmed = evaluation.characteristics[at], evaluation.before().programmed[at]
     if _beyond(of.quantity, float(programmed)):
         unit = evaluation.shown.of(of.quantity.si)
-        return (
-            f"the program itself asks for {unit.text(float(programmed), 7)}, out of tolerance: "
-            "look at the lines, at side and at tool_radius"
+        return say(
+            "the program itself asks for {programmed}, out of tolerance: look at the lines, at "
+            "side and at tool_radius",
+            programmed=unit.text(float(programmed), 7),
         )
     suggested = advice(evaluation, at)
     if suggested is None:
-        return "nothing to mend"
+        return say("nothing to mend")
     if suggested.why and not suggested.source:
-        also = "compensation: " if suggested.compensation else ""
-        return f"{also}nothing is found to be out, but there is no proof: {suggested.why}"
+        unproven = say(
+            "nothing is found to be out, but there is no proof: {why}", why=suggested.why
+        )
+        return say("compensation: {then}", then=unproven) if suggested.compensation else unproven
     if suggested.compensation:
-        return "compensation: truepose gcode corrects the program"
+        return say("compensation: truepose gcode corrects the program")
     if suggested.aim:
         small = evaluation.shown.small(evaluation.characteristics[at].quantity.si)
-        word = "larger" if suggested.aim > 0.0 else "smaller"
-        amount = f"{abs(suggested.aim) * small.per_si:.1f} {small.label}"
-        half = f" ({abs(suggested.aim) * small.per_si / 2.0:.1f} on the radius)"
-        return (
-            f"compensation, and the middle of the limits: program it {amount} {word}"
-            f"{half if of.feature.kind == 'circle' else ''}"
+        amount = marked(f"{abs(suggested.aim) * small.per_si:.1f} {small.label}")
+        if suggested.aim > 0.0:
+            program = say("program it {amount} larger", amount=amount)
+        else:
+            program = say("program it {amount} smaller", amount=amount)
+        half = " " + say(
+            "({amount} on the radius)",
+            amount=marked(f"{abs(suggested.aim) * small.per_si / 2.0:.1f}"),
+        )
+        return say(
+            "compensation, and the middle of the limits: {program}{half}",
+            program=program,
+            half=half if of.feature.kind == "circle" else "",
         )
     if not suggested.source:
-        return "no source's bands alone: compensate, then tighten several, or ask for less"
-    also = "" if suggested.state == BEFORE else "compensation, and "
+        return say("no source's bands alone: compensate, then tighten several, or ask for less")
     # Rounded down: a little wider would be too wide.
     share = math.floor(1000.0 * suggested.narrowed) / 10.0
-    unproven = f"; even then not proven: {suggested.why}" if suggested.why else ""
-    return (
-        f"{also}all bands of the machine's {suggested.source} narrowed to {share:g} % of their "
-        f"width: better or measured parts{unproven}"
-    )
+    values = {"source": suggested.source, "share": marked(f"{share:g}")}
+    if suggested.state == BEFORE:
+        narrowed = say(
+            "all bands of the machine's {source} narrowed to {share} % of their width: better or "
+            "measured parts",
+            **values,
+        )
+    else:
+        narrowed = say(
+            "compensation, and all bands of the machine's {source} narrowed to {share} % of their "
+            "width: better or measured parts",
+            **values,
+        )
+    if not suggested.why:
+        return narrowed
+    return f"{narrowed}; {say('even then not proven: {why}', why=suggested.why)}"
 
 
 SHEET = (
@@ -366,4 +425,4 @@ def json_text(evaluation: PartEvaluation) -> str:
     )
 
 
-__all__ = ["PROCESS", "csv_text", "json_text", "mends", "sheet", "summary", "tables"]
+__all__ = ["PROCESS", "csv_text", "json_text", "mends", "process", "sheet", "summary", "tables"]

@@ -22,7 +22,7 @@ def shown(evaluation: PartEvaluation, path: DrawnPath, program: str) -> PartShow
         tables[count:],
         figures(evaluation, path),
         [*tables[:count], operators],
-        part.PROCESS,
+        part.process(),
     )
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.language import marked
 from truepose.reporting.display import is_position, pose_text, where_highest
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 def percent_text(probability: float) -> str:
     """A probability as people write it: "95 %"."""
-    return f"{100.0 * probability:.6g} %"
+    return marked(f"{100.0 * probability:.6g} %")
 
 
 def components(result: xr.Dataset) -> list[str]:

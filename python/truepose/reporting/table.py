@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from truepose.language import say
+
 
 @dataclass(frozen=True)
 class Table:
@@ -28,4 +30,6 @@ def with_not_included(table: Table, parts: str) -> Table:
 
     `parts`: as the attribute `not_included` of a result has them, `frame (no material)`.
     """
-    return replace(table, note=f"{table.note} Not included: {parts}.") if parts else table
+    if not parts:
+        return table
+    return replace(table, note=f"{table.note} {say('Not included: {parts}.', parts=parts)}")

@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.language import grouped, marked, say
 from truepose.reporting.accuracy import told
 from truepose.reporting.display import (
-    LOWER,
-    UPPER,
     column,
     decimals_for,
     is_position,
@@ -22,6 +21,7 @@ from truepose.reporting.display import (
     pose_text,
     where_highest,
 )
+from truepose.reporting.result_words import ends, word
 from truepose.reporting.study import Study, warnings_of
 from truepose.reporting.table import Table, with_not_included
 from truepose.runs.poses import reason_text
@@ -40,27 +40,32 @@ def ranking(study: Study) -> Table:
     """The sources by rank: what each alone can do at most, its share and the verdict."""
     order = study.by_rank
     parts = [str(name) for name in study.budget["quantity"].values]
-    header = ["source", "verdict", "rank"]
+    header = [say("source"), say("verdict"), say("rank")]
     columns: list[Sequence[str]] = [
         [study.sources[index] for index in order],
-        [str(study.values("verdict")[index]) for index in order],
+        [word(str(study.values("verdict")[index])) for index in order],
         [str(int(study.values("rank")[index])) for index in order],
     ]
     for part, name in enumerate(parts):
         unit = study.units.error(name)
-        header += [f"highest {name}, {unit.label}", f"rms {name}, {unit.label}"]
+        header += [
+            say("highest {quantity}, {unit}", quantity=word(name), unit=unit.label),
+            say("rms {quantity}, {unit}", quantity=word(name), unit=unit.label),
+        ]
         columns += [
             column(study.values(kind)[order, part] * unit.per_si) for kind in ("highest", "rms")
         ]
-    header.append("share, %")
+    header.append(say("share, %"))
     columns.append(column(study.values("share")[order] * 100, 1))
     table = Table(
         "ranking",
-        "The sources compared",
+        say("The sources compared"),
         tuple(header),
         tuple(zip(*columns, strict=True)),
         words=2,
-        note="Highest: the worst case of this source alone (linear maximum), at its worst pose.",
+        note=say(
+            "Highest: the worst case of this source alone (linear maximum), at its worst pose."
+        ),
     )
     return with_not_included(table, str(study.budget.attrs["not_included"]))
 
@@ -75,12 +80,14 @@ def highest_absolute(study: Study) -> Table:
     ]
     return Table(
         "highest_absolute",
-        "Highest absolute error",
-        ("source", *(f"{name}, {study.units.error(name).label}" for name in study.components)),
+        say("Highest absolute error"),
+        (say("source"), *(f"{name}, {study.units.error(name).label}" for name in study.components)),
         tuple(zip(_end_labels(study), *cells, strict=True)),
-        note="Over all poses, per axis of the base frame, exact. All at lower, all at upper ends: "
-        "lengths and offsets all at that end of their tolerance bands, the rest as known; the "
-        "worst case of a source is in the ranking.",
+        note=say(
+            "Over all poses, per axis of the base frame, exact. All at lower, all at upper ends: "
+            "lengths and offsets all at that end of their tolerance bands, the rest as known; "
+            "the worst case of a source is in the ranking."
+        ),
     )
 
 
@@ -91,25 +98,26 @@ def highest_percent(study: Study) -> Table:
     cells = [column(highest[:, index], 4) for index in shown]
     return Table(
         "highest_percent",
-        "Highest error as a percentage of the coordinate",
-        ("source", *(f"{study.components[index]}, %" for index in shown)),
+        say("Highest error as a percentage of the coordinate"),
+        (say("source"), *(f"{study.components[index]}, %" for index in shown)),
         tuple(zip(_end_labels(study), *cells, strict=True)),
-        note="Of the commanded coordinate at the same pose, where that is not near zero.",
+        note=say("Of the commanded coordinate at the same pose, where that is not near zero."),
     )
 
 
 def compensation(study: Study) -> Table:
     """Highest absolute error per component and of the position, before and after."""
     components = study.components
+    lower, upper = ends()
     rows: list[tuple[str, Floats, Floats | None]] = [
-        (f"before, {LOWER}", study.values("overall_error_lower"), None),
-        ("before, known error", study.values("overall_error"), None),
-        (f"before, {UPPER}", study.values("overall_error_upper"), None),
-        ("before, worst case", study.overall_worst, study.largest),
-        (f"after, {LOWER}", study.compensated("residual_lower"), None),
-        ("after, known error", study.compensated("residual_middle"), None),
-        (f"after, {UPPER}", study.compensated("residual_upper"), None),
-        ("after, worst case", study.compensated("bound"), study.remaining_largest),
+        (say("before, {ends}", ends=lower), study.values("overall_error_lower"), None),
+        (say("before, known error"), study.values("overall_error"), None),
+        (say("before, {ends}", ends=upper), study.values("overall_error_upper"), None),
+        (say("before, worst case"), study.overall_worst, study.largest),
+        (say("after, {ends}", ends=lower), study.compensated("residual_lower"), None),
+        (say("after, known error"), study.compensated("residual_middle"), None),
+        (say("after, {ends}", ends=upper), study.compensated("residual_upper"), None),
+        (say("after, worst case"), study.compensated("bound"), study.remaining_largest),
     ]
     units, names = study.units, (*components, *(["position"] if study.positions else []))
     highest = np.stack(
@@ -127,16 +135,18 @@ def compensation(study: Study) -> Table:
     cells = [column(values, decimals_for(values)) for values in units.errors(highest, names).T]
     return Table(
         "compensation",
-        "Before and after compensation",
+        say("Before and after compensation"),
         (
-            "highest over all poses",
-            *(f"{name}, {units.error(name).label}" for name in names),
+            say("highest over all poses"),
+            *(f"{word(name)}, {units.error(name).label}" for name in names),
         ),
         tuple(zip([name for name, _, _ in rows], *cells, strict=True)),
-        note="After: the corrected command driven through the actual machine. Known error: of all "
-        "that is known. All at lower, all at upper ends: lengths and offsets all at that end of "
-        "their tolerance bands. Worst case: of each component by itself, and of the position what "
-        "one machine can do (linear maximum); both to first order.",
+        note=say(
+            "After: the corrected command driven through the actual machine. Known error: of all "
+            "that is known. All at lower, all at upper ends: lengths and offsets all at that end "
+            "of their tolerance bands. Worst case: of each component by itself, and of the "
+            "position what one machine can do (linear maximum); both to first order."
+        ),
     )
 
 
@@ -155,7 +165,10 @@ def over_time(machine: Machine, result: xr.Dataset) -> Table:
     rows = [*shown, worst]
     pose = np.array([result[f"pose_{name}"].values[0] for name in machine.commanded])
     columns = [
-        [*(number(times[row] / 60.0, 2) for row in shown), f"{times[worst] / 60.0:.2f} (worst)"],
+        [
+            *(number(times[row] / 60.0, 2) for row in shown),
+            say("{time} (worst)", time=marked(f"{times[worst] / 60.0:.2f}")),
+        ],
         *(
             column(error[rows, index] * units.error(name).per_si)
             for index, name in enumerate(components)
@@ -164,14 +177,16 @@ def over_time(machine: Machine, result: xr.Dataset) -> Table:
     ]
     return Table(
         "over_time",
-        "Error over time",
+        say("Error over time"),
         (
-            "time, min",
-            *(f"{name}, {units.error(name).label}" for name in (*components, "position")),
+            say("time, min"),
+            *(f"{word(name)}, {units.error(name).label}" for name in (*components, "position")),
         ),
         tuple(zip(*columns, strict=True)),
-        note=f"From the logged temperatures alone, exact, at "
-        f"{pose_text(pose, machine.commanded, units)}.",
+        note=say(
+            "From the logged temperatures alone, exact, at {pose}.",
+            pose=pose_text(pose, machine.commanded, units),
+        ),
     )
 
 
@@ -203,7 +218,7 @@ def internal_forces(study: Study) -> Table:
 
     columns = [
         [str(name) for name in strained["source"].values[order]],
-        [str(verdict) for verdict in strained["verdict"].values[order]],
+        [word(str(verdict)) for verdict in strained["verdict"].values[order]],
         closures,
         places,
         column(highest("force") * force_unit.per_si),
@@ -214,23 +229,25 @@ def internal_forces(study: Study) -> Table:
     ]
     return Table(
         "internal_forces",
-        "Internal forces from each source",
+        say("Internal forces from each source"),
         (
-            "source",
-            "verdict",
-            "closure",
-            "at",
-            f"highest force, {force_unit.label}",
-            f"without clearances, {force_unit.label}",
-            "remains, %",
-            f"absorbed, {small.label}",
-            f"strain, {small.label}",
+            say("source"),
+            say("verdict"),
+            say("closure"),
+            say("at"),
+            say("highest force, {unit}", unit=force_unit.label),
+            say("without clearances, {unit}", unit=force_unit.label),
+            say("remains, %"),
+            say("absorbed, {unit}", unit=small.label),
+            say("strain, {unit}", unit=small.label),
         ),
         tuple(zip(*columns, strict=True)),
         words=4,
-        note="Each source alone and without load, where it loads a closure most. Fits: no force "
-        "even without clearances. Absorbed: the clearances take all of it; partly: some of it; "
-        "strains: next to nothing.",
+        note=say(
+            "Each source alone and without load, where it loads a closure most. Fits: no force "
+            "even without clearances. Absorbed: the clearances take all of it; partly: some of "
+            "it; strains: next to nothing."
+        ),
     )
 
 
@@ -245,13 +262,13 @@ def closure_forces(study: Study) -> Table:
     )
     return Table(
         "closure_forces",
-        "Forces in the closures",
+        say("Forces in the closures"),
         (
-            "closure",
-            f"lowest, {unit.label}",
-            f"highest, {unit.label}",
-            f"absorbed, {small.label}",
-            f"strain, {small.label}",
+            say("closure"),
+            say("lowest, {unit}", unit=unit.label),
+            say("highest, {unit}", unit=unit.label),
+            say("absorbed, {unit}", unit=small.label),
+            say("strain, {unit}", unit=small.label),
         ),
         tuple(
             zip(
@@ -263,7 +280,9 @@ def closure_forces(study: Study) -> Table:
                 strict=True,
             )
         ),
-        note="Over all poses: all sources at their shifts, under all loads. Tension is positive.",
+        note=say(
+            "Over all poses: all sources at their shifts, under all loads. Tension is positive."
+        ),
     )
 
 
@@ -287,45 +306,41 @@ def answers(machine: Machine, answered: Sequence[Answer]) -> Table:
         )
         for line in told(machine, answered)
     ]
-    names: Sequence[str] = NUMBERS
+    names = (say("witness"), say("linear maximum"), say("proven bound"))
+    note = say(
+        "Witness: the largest error found of one machine inside the bands, solved exactly. Linear "
+        "maximum: of all of them, to first order. Proven bound: no machine inside the bands "
+        "exceeds it."
+    )
     if shares:
-        quantile = f"{100.0 * shares.pop():.6g} % quantile"
-        names = ("confidence, lower end", quantile, "confidence, upper end")
+        quantile = say("{share} % quantile", share=marked(f"{100.0 * shares.pop():.6g}"))
+        names = (say("confidence, lower end"), quantile, say("confidence, upper end"))
+        note = say(
+            "At a coverage: the quantile of the error's length at the worst pose, and the ends of "
+            "its confidence interval of 99 %."
+        )
     return Table(
         "answers",
-        "Against the accuracy asked",
-        ("", "answer", *names, "asked", "at"),
+        say("Against the accuracy asked"),
+        ("", say("answer"), *names, say("asked"), say("at")),
         tuple(rows),
         words=2,
-        note=_NUMBERS if names is NUMBERS else _SAMPLED,
+        note=note,
     )
-
-
-NUMBERS = ("witness", "linear maximum", "proven bound")
-"""The numbers that are known of a largest error."""
-
-_NUMBERS = (
-    "Witness: the largest error found of one machine inside the bands, solved exactly. Linear "
-    "maximum: of all of them, to first order. Proven bound: no machine inside the bands exceeds it."
-)
-_SAMPLED = (
-    "At a coverage: the quantile of the error's length at the worst pose, and the ends of its "
-    "confidence interval of 99 %."
-)
 
 
 def warnings(study: Study) -> Table | None:
     """What the budget warns of; None where nothing."""
     sentences = [warning["sentence"] for warning in warnings_of(study.budget)]
     rows = [(f"{text[:1].upper()}{text[1:]}.",) for text in sentences]
-    return Table("warnings", "Warnings", ("",), tuple(rows)) if rows else None
+    return Table("warnings", say("Warnings"), ("",), tuple(rows)) if rows else None
 
 
 def oddities(study: Study) -> Table | None:
     """What looks odd about the machine; None where nothing does."""
     sentences = [oddity.sentence for oddity in study.oddities]
     rows = [(f"{text[:1].upper()}{text[1:]}.",) for text in sentences]
-    return Table("oddities", "What looks odd", ("",), tuple(rows)) if rows else None
+    return Table("oddities", say("What looks odd"), ("",), tuple(rows)) if rows else None
 
 
 def poses_left_out(study: Study) -> Table | None:
@@ -339,23 +354,30 @@ def poses_left_out(study: Study) -> Table | None:
             study.left_out[:MOST_LISTED], study.left_out_statuses[:MOST_LISTED], strict=True
         )
     ]
-    more = f" The first {MOST_LISTED} are listed." if count > MOST_LISTED else ""
+    more = (
+        " " + say("The first {count} are listed.", count=MOST_LISTED) if count > MOST_LISTED else ""
+    )
     return Table(
         "left_out",
-        f"Poses left out: {count:,} of {count + study.n_pose:,}",
-        ("pose", "status"),
+        say(
+            "Poses left out: {count} of {every}",
+            count=grouped(count),
+            every=grouped(count + study.n_pose),
+        ),
+        (say("pose"), say("status")),
         tuple(rows),
         words=2,
-        note="No result includes them." + more,
+        note=say("No result includes them.") + more,
     )
 
 
 def _end_labels(study: Study) -> list[str]:
     """Rows of the paper's tables: both ends of a source with a band, one row otherwise."""
+    lower, upper = ends()
     labels = []
     for source, band in zip(study.sources, study.has_band, strict=True):
-        labels += [f"{source}, {LOWER}", f"{source}, {UPPER}"] if band else [source]
-    return [*labels, f"overall, {LOWER}", f"overall, {UPPER}"]
+        labels += [f"{source}, {lower}", f"{source}, {upper}"] if band else [source]
+    return [*labels, say("overall, {ends}", ends=lower), say("overall, {ends}", ends=upper)]
 
 
 def _highest(study: Study, of_source: str, overall: str) -> Floats:

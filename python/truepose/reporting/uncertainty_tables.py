@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.files.wording import counted
+from truepose.calibration.acceptance.sentences import listed
+from truepose.language import grouped, marked, say, say_counted
 from truepose.reporting.display import (
     MISSING,
     column,
@@ -23,11 +24,12 @@ from truepose.reporting.display import (
     where_highest,
 )
 from truepose.reporting.reading import at_text, components, percent_text, quantities, worst_pose
+from truepose.reporting.result_words import word
 from truepose.reporting.study import Study
 from truepose.reporting.table import Table
 from truepose.reporting.tables import MOST_LISTED
 from truepose.reporting.variance_shares import shares
-from truepose.runs.poses import not_assembled_text
+from truepose.runs.poses import not_assembled_text, reason_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,11 +37,6 @@ if TYPE_CHECKING:
     from truepose.machine import Machine
 
 PROVEN = "proven"
-UNPROVEN = {
-    "box_too_wide": "the bands are too wide for a proof",
-    "near_singular": "too near a singularity for a proof",
-}
-"""What a status without a proof means."""
 
 
 def rounded(values: Floats, senses: Sequence[int]) -> tuple[str, ...]:
@@ -82,7 +79,7 @@ def spread_over(poses: Floats, axes: list[int]) -> list[int]:
 
 def _named(machine: Machine, name: str) -> str:
     """A component or quantity with its unit for people."""
-    return f"{name}, {machine.shown.error(name).label}"
+    return f"{word(name)}, {machine.shown.error(name).label}"
 
 
 def sampled(machine: Machine, result: xr.Dataset) -> list[Table]:
@@ -113,22 +110,26 @@ def _sampled_at(machine: Machine, result: xr.Dataset, pose: int) -> Table:
     percent = percent_text(float(result.attrs["probability"]))
     return Table(
         "sampled",
-        f"Sampled error, {percent} coverage intervals",
+        say("Sampled error, {percent} coverage intervals", percent=percent),
         (
             "",
-            "mean",
-            "standard deviation",
-            f"{percent} from",
-            "to",
-            "shortest from",
-            "to",
-            "least sample",
-            "largest sample",
+            say("mean"),
+            say("standard deviation"),
+            say("{percent} from", percent=percent),
+            say("to"),
+            say("shortest from"),
+            say("to"),
+            say("least sample"),
+            say("largest sample"),
         ),
         tuple(rows),
-        note=f"At {at_text(machine, result, pose)}, where the position is farthest off. "
-        f"{percent} of the samples lie in this coverage interval, as many below as above it; the "
-        "shortest interval with as many is beside it. Of a magnitude, as many lie below its end. "
+        note=say(
+            "At {pose}, where the position is farthest off. {percent} of the samples lie in this "
+            "coverage interval, as many below as above it; the shortest interval with as many is "
+            "beside it. Of a magnitude, as many lie below its end. ",
+            pose=at_text(machine, result, pose),
+            percent=percent,
+        )
         + _drawn(result, pose),
     )
 
@@ -136,18 +137,25 @@ def _sampled_at(machine: Machine, result: xr.Dataset, pose: int) -> Table:
 def _drawn(result: xr.Dataset, pose: int) -> str:
     """How many samples, how drawn, and how many of them the machine could not follow."""
     count, failed = int(result["samples"].values[pose]), int(result["failed"].values[pose])
-    how = "scrambled Sobol points" if result.attrs["sampling"] == "sobol" else "samples"
-    text = f"{count:,} {how}, seed {result.attrs['seed']}."
+    values = {"count": grouped(count), "seed": result.attrs["seed"]}
+    if result.attrs["sampling"] == "sobol":
+        text = say("{count} scrambled Sobol points, seed {seed}.", **values)
+    else:
+        text = say("{count} samples, seed {seed}.", **values)
     if result.attrs.get("digits"):
-        digits = counted(int(result.attrs["digits"]), "digit")
-        text += f" As many as make {digits} of the standard deviation stable (JCGM 101, 7.9)."
+        digits = say_counted("{count} digit", "{count} digits", int(result.attrs["digits"]))
+        text += " " + say(
+            "As many as make {digits} of the standard deviation stable (JCGM 101, 7.9).",
+            digits=digits,
+        )
     if failed:
-        text += (
-            f" {not_assembled_text(failed, count + failed)}: they count as beyond both ends of "
-            "every interval, and are in no mean, standard deviation or extreme."
+        text += " " + say(
+            "{lost}: they count as beyond both ends of every interval, and are in no mean, "
+            "standard deviation or extreme.",
+            lost=not_assembled_text(failed, count + failed),
         )
     if result.attrs.get("interrupted"):
-        text += " Interrupted: fewer than were asked for."
+        text += " " + say("Interrupted: fewer than were asked for.")
     return text
 
 
@@ -170,17 +178,17 @@ def _sampled_over(machine: Machine, result: xr.Dataset) -> Table:
         rows.append((_named(machine, name), at_text(machine, result, pose), *cells))
     return Table(
         "sampled_over",
-        f"Sampled error over {result.sizes['pose']:,} poses",
+        say("Sampled error over {count} poses", count=grouped(result.sizes["pose"])),
         (
             "",
-            "farthest at",
-            "highest standard deviation",
-            f"farthest of {percent_text(float(result.attrs['probability']))}",
-            "farthest sample",
+            say("farthest at"),
+            say("highest standard deviation"),
+            say("farthest of {percent}", percent=percent_text(float(result.attrs["probability"]))),
+            say("farthest sample"),
         ),
         tuple(rows),
         words=2,
-        note="Farthest: the end of the coverage interval that is farther from zero."
+        note=say("Farthest: the end of the coverage interval that is farther from zero.")
         + _lost(result),
     )
 
@@ -191,8 +199,20 @@ def _lost(result: xr.Dataset) -> str:
     if lost == "none":
         return ""
     none = int(np.isnan(result["magnitude_upper"].values[:, 0]).sum())
-    where = f"; at {counted(none, 'pose')} so many that no interval is left" if none else ""
-    return f" Of all samples {lost}{where}."
+    where = (
+        say_counted(
+            "at {count} pose so many that no interval is left",
+            "at {count} poses so many that no interval is left",
+            none,
+        )
+        if none
+        else ""
+    )
+    return " " + (
+        say("Of all samples {lost}; {where}.", lost=lost, where=where)
+        if none
+        else say("Of all samples {lost}.", lost=lost)
+    )
 
 
 def bounds(machine: Machine, result: xr.Dataset) -> list[Table]:
@@ -219,13 +239,23 @@ def _bounds_at(machine: Machine, result: xr.Dataset, pose: int) -> Table:
         rows.append((_named(machine, name), *rounded(row, (0, 0, -1, 1, 0))))
     return Table(
         "bounds",
-        "Proven bounds",
-        ("", "never below", "reached", "reached", "never above", "linear worst case"),
+        say("Proven bounds"),
+        (
+            "",
+            say("never below"),
+            say("reached"),
+            say("reached"),
+            say("never above"),
+            say("linear worst case"),
+        ),
         tuple(rows),
-        note=f"At {at_text(machine, result, pose)}, where the position's bound is highest. For "
-        "every deviation inside the bands the tool is there and nowhere else, and its error "
-        "between these ends, rounding included; the error that is reached shows how much of the "
-        "bound is used." + _taken_to_end(result),
+        note=say(
+            "At {pose}, where the position's bound is highest. For every deviation inside the "
+            "bands the tool is there and nowhere else, and its error between these ends, "
+            "rounding included; the error that is reached shows how much of the bound is used.",
+            pose=at_text(machine, result, pose),
+        )
+        + _taken_to_end(result),
     )
 
 
@@ -234,12 +264,16 @@ def _taken_to_end(result: xr.Dataset) -> str:
     where = result.attrs.get("truncate", "none")
     if where == "none":
         return ""
-    kinds = " and ".join(
-        entry.split(":")[0] for entry in str(result.attrs["unbounded"]).split("; ")
-    )
+    kinds = listed([entry.split(":")[0] for entry in str(result.attrs["unbounded"]).split("; ")])
     if where == "as stated":
-        return f" Deviations without ends are taken at their stated k sigma: {kinds}."
-    return f" Deviations without ends ({kinds}) are taken to end at {where:g} standard deviations."
+        return " " + say(
+            "Deviations without ends are taken at their stated k sigma: {kinds}.", kinds=kinds
+        )
+    return " " + say(
+        "Deviations without ends ({kinds}) are taken to end at {where} standard deviations.",
+        kinds=kinds,
+        where=marked(f"{where:g}"),
+    )
 
 
 def _unproven(machine: Machine, result: xr.Dataset) -> Table | None:
@@ -252,14 +286,22 @@ def _unproven(machine: Machine, result: xr.Dataset) -> Table | None:
         (at_text(machine, result, int(pose)), unproven_text(status[pose]))
         for pose in lost[:MOST_LISTED]
     ]
-    more = f" The first {MOST_LISTED} are listed." if lost.size > MOST_LISTED else ""
+    more = (
+        " " + say("The first {count} are listed.", count=MOST_LISTED)
+        if lost.size > MOST_LISTED
+        else ""
+    )
     return Table(
         "unproven",
-        f"Poses without a proof: {lost.size:,} of {status.size:,}",
-        ("pose", "status"),
+        say(
+            "Poses without a proof: {count} of {every}",
+            count=grouped(lost.size),
+            every=grouped(status.size),
+        ),
+        (say("pose"), say("status")),
         tuple(rows),
         words=2,
-        note="No bound is given where none is proven." + more,
+        note=say("No bound is given where none is proven.") + more,
     )
 
 
@@ -286,51 +328,60 @@ def _region(machine: Machine, result: xr.Dataset) -> Table:
     open_ = (
         ""
         if bound <= reached * (1.0 + asked)
-        else (f" The gap asked, {percent_text(asked)}, was not reached.")
+        else (" " + say("The gap asked, {percent}, was not reached.", percent=percent_text(asked)))
     )
     status = str(result["status"].values)
     proof = (
-        f"Proven over the whole region, cut into {int(result['boxes'].values):,} boxes."
+        say(
+            "Proven over the whole region, cut into {boxes} boxes.",
+            boxes=grouped(int(result["boxes"].values)),
+        )
         if status == PROVEN
-        else f"Not proven: {_unproven_where(machine, result)}."
+        else say("Not proven: {why}.", why=_unproven_where(machine, result))
     )
     return Table(
         "region",
-        "Proven bounds over a region",
-        ("", "reached at", "nowhere more than", "reached", "gap, %"),
+        say("Proven bounds over a region"),
+        ("", say("reached at"), say("nowhere more than"), say("reached"), say("gap, %")),
         tuple(rows),
         words=2,
         note=proof
-        + (" Interrupted." if result.attrs.get("interrupted") else "")
+        + (" " + say("Interrupted.") if result.attrs.get("interrupted") else "")
         + open_
-        + " Every pose in the region, not only those of a grid; the error's sign left "
-        "out." + _taken_to_end(result),
+        + " "
+        + say("Every pose in the region, not only those of a grid; the error's sign left out.")
+        + _taken_to_end(result),
     )
 
 
 def interrupted_bounds(result: xr.Dataset) -> str:
     """What bounds hold for that were stopped before their end."""
     if "pose" in result.sizes:
-        return (
-            f"Interrupted after {counted(result.sizes['pose'], 'pose')}, those of the largest "
-            "first-order deviation: the bounds are of these."
+        return say(
+            "Interrupted after {count}, those of the largest first-order deviation: the bounds "
+            "are of these.",
+            count=say_counted("{count} pose", "{count} poses", result.sizes["pose"]),
         )
     boxes = int(result["boxes"].values)
     if str(result["status"].values) == PROVEN:
         percent = math.ceil(1000.0 * float(result.attrs["gap_reached"])) / 10.0
-        so_far = (
-            "the bounds hold over the whole region, and lie up to "
-            f"{percent} % above what is reached"
+        so_far = say(
+            "the bounds hold over the whole region, and lie up to {percent} % above what is "
+            "reached",
+            percent=marked(str(percent)),
         )
     else:
         open_parts = int(result["part_magnitude"].isnull().any("quantity").sum())
-        so_far = (
-            f"of {counted(open_parts, 'part')} of the region nothing is proven yet, so that there "
-            "are no bounds over the whole"
+        so_far = say(
+            "of {count} of the region nothing is proven yet, so that there are no bounds over "
+            "the whole",
+            count=say_counted("{count} part", "{count} parts", open_parts),
         )
-    return (
-        f"Interrupted after {boxes:,} box{'' if boxes == 1 else 'es'}: {so_far}. Where the result "
-        "was written to a .nc file (--output), --resume goes on from there."
+    return say(
+        "Interrupted after {boxes}: {so_far}. Where the result was written to a "
+        ".nc file (--output), --resume goes on from there.",
+        boxes=say_counted("{count} box", "{count} boxes", boxes),
+        so_far=so_far,
     )
 
 
@@ -359,21 +410,35 @@ def _unproven_where(machine: Machine, result: xr.Dataset) -> str:
     pose = np.asarray(result["where_unproven"].values)
     if not np.isfinite(pose).all():
         return reason
-    return f"{reason} at {pose_text(pose, machine.commanded, machine.shown)}"
+    return say(
+        "{reason} at {pose}", reason=reason, pose=pose_text(pose, machine.commanded, machine.shown)
+    )
 
 
 def sentence(machine: Machine, result: xr.Dataset) -> str:
     """A region's answer in words."""
     name, bound, reached, where = region_answers(result)[0]
     if str(result["status"].values) != PROVEN or not np.isfinite(bound):
-        return f"No bound is proven over this region: {_unproven_where(machine, result)}."
+        return say(
+            "No bound is proven over this region: {why}.",
+            why=_unproven_where(machine, result),
+        )
     unit = machine.shown.error(name)
     most, least = rounded(np.array([bound, reached]) * unit.per_si, (1, -1))
-    what = "deviate" if name == "position" else "turn"
-    return (
-        f"Nowhere in this region does the tool {what} more than {most} {unit.label}; "
-        f"{least} {unit.label} is reached at "
-        f"{pose_text(where, machine.commanded, machine.shown)}."
+    values = {
+        "most": f"{most} {unit.label}",
+        "least": f"{least} {unit.label}",
+        "pose": pose_text(where, machine.commanded, machine.shown),
+    }
+    if name == "position":
+        return say(
+            "Nowhere in this region does the tool deviate more than {most}; {least} is reached "
+            "at {pose}.",
+            **values,
+        )
+    return say(
+        "Nowhere in this region does the tool turn more than {most}; {least} is reached at {pose}.",
+        **values,
     )
 
 
@@ -386,36 +451,38 @@ def against_target(machine: Machine, result: xr.Dataset) -> list[str]:
         if target is None:
             continue
         unit = machine.shown.error(name)
-        said = f"Accuracy asked, {name}: {machine.accuracy.said(name)}:"
+        said = say(
+            "Accuracy asked, {quantity}: {asked}:",
+            quantity=word(name),
+            asked=marked(machine.accuracy.said(name)),
+        )
         proven = str(result["status"].values) == PROVEN
         if reached > target:
-            sentences.append(f"{said} NOT met: what is reached exceeds it.")
+            sentences.append(say("{said} NOT met: what is reached exceeds it.", said=said))
         elif proven and bound <= target:
-            sentences.append(f"{said} met, everywhere in the region.")
+            sentences.append(say("{said} met, everywhere in the region.", said=said))
         elif not proven:
-            sentences.append(f"{said} undecided, for no bound is proven.")
+            sentences.append(say("{said} undecided, for no bound is proven.", said=said))
         else:
             (least,) = rounded(np.array([reached]) * unit.per_si, (-1,))
             sentences.append(
-                f"{said} undecided, for between {least} {unit.label} and the bound nothing is "
-                "known; a smaller --gap looks closer."
+                say(
+                    "{said} undecided, for between {least} and the bound nothing is known; a "
+                    "smaller --gap looks closer.",
+                    said=said,
+                    least=f"{least} {unit.label}",
+                )
             )
     return sentences
 
 
-LACKING = {
-    "monte_carlo": "sampled answer",
-    "ellipses": "coverage ellipse",
-    "bounds": "proven bound",
-    "worst_case": "worst case",
-    "shares": "shares",
-}
-"""What is said not to be there, by the result that would have it."""
-
-
 def unproven_text(status: str) -> str:
     """Why there is no proof, for people."""
-    return UNPROVEN.get(status, status.replace("_", " "))
+    means = {
+        "box_too_wide": say("the bands are too wide for a proof"),
+        "near_singular": say("too near a singularity for a proof"),
+    }
+    return means.get(status) or reason_text(status)
 
 
 IN_SHORT = ("shares_parameter_position", "shares_parameter_orientation", "lacking")
@@ -437,7 +504,16 @@ def tables(study: Study) -> list[Table]:
     ):
         if result is not None:
             shown += of(study.machine, result)
-    rows = tuple((LACKING[name], why) for name, why in study.missing.items() if name in LACKING)
+    lacking = {
+        "monte_carlo": say("sampled answer"),
+        "ellipses": say("coverage ellipse"),
+        "bounds": say("proven bound"),
+        "worst_case": say("worst case"),
+        "shares": say("shares"),
+    }
+    rows = tuple((lacking[name], why) for name, why in study.missing.items() if name in lacking)
     if rows:
-        shown.append(Table("lacking", "What could not be said, and why", ("", ""), rows, words=2))
+        shown.append(
+            Table("lacking", say("What could not be said, and why"), ("", ""), rows, words=2)
+        )
     return shown

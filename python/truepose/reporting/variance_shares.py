@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from truepose.arrays import Floats
-from truepose.files.wording import counted
+from truepose.language import grouped, marked, say, say_counted
 from truepose.reporting.display import column, is_position, where_highest
 from truepose.reporting.reading import at_text, components, position_of
 from truepose.reporting.table import Table
@@ -91,12 +91,12 @@ def shares(machine: Machine, result: xr.Dataset) -> list[Table]:
 
 def _shares(machine: Machine, result: xr.Dataset, pose: int, of: str, part: str) -> Table:
     who = blame(result, pose, of, part)
-    header, cells = [of], []
+    header, cells = [say("source") if of == "source" else say("parameter")], []
     for kind, title in (
-        ("first", "first, %"),
-        ("total", "total, %"),
-        ("linear", "linear, %"),
-        ("shapley", "Shapley, %"),
+        ("first", say("first, %")),
+        ("total", say("total, %")),
+        ("linear", say("linear, %")),
+        ("shapley", say("Shapley, %")),
     ):
         if kind not in who.kinds:
             continue
@@ -108,30 +108,56 @@ def _shares(machine: Machine, result: xr.Dataset, pose: int, of: str, part: str)
     rows = tuple(zip(who.names, *cells, strict=True))
     more = ""
     if of == "parameter" and len(rows) > MOST_LISTED:
-        more = f" The {MOST_LISTED} largest of {len(rows)}."
+        more = " " + say(
+            "The {count} largest of {every}.", count=MOST_LISTED, every=grouped(len(rows))
+        )
         rows = rows[:MOST_LISTED]
     first = ""
     if of == "parameter" and rows:
-        first = f" To be tightened first: {who.names[0]}."
+        first = " " + say("To be tightened first: {name}.", name=who.names[0])
         if part == parts_of(result)[0] and result.sizes["pose"] > 1:
             name, share = first_to_tighten(result)
-            first += (
-                f" Over all {result.sizes['pose']:,} poses together: {name}, {100 * share:.1f} % "
-                "of the variance."
+            first += " " + say(
+                "Over all {count} poses together: {name}, {share} % of the variance.",
+                count=grouped(result.sizes["pose"]),
+                name=name,
+                share=marked(f"{100 * share:.1f}"),
             )
     failed = int(result["failed"].values[pose])
     lost = (
-        f" At this pose {counted(failed, 'base sample')} could not be assembled: the shares are "
-        "those of the machines that could."
+        " "
+        + say_counted(
+            "At this pose {count} base sample could not be assembled: the shares are those of "
+            "the machines that could.",
+            "At this pose {count} base samples could not be assembled: the shares are those of "
+            "the machines that could.",
+            failed,
+        )
         if failed
         else ""
     )
     return Table(
         f"shares_{of}_{part}",
-        f"Shares of the {part}'s variance, by {of}",
+        _title(of, part),
         tuple(header),
         rows,
-        note=f"At {at_text(machine, result, pose)}, where the tool spreads most, of the variances "
-        "of all components together. First: what would go if this one were known; total: what "
-        "would stay if all others were; linear: to first order." + first + more + lost,
+        note=say(
+            "At {pose}, where the tool spreads most, of the variances of all components "
+            "together. First: what would go if this one were known; total: what would stay if "
+            "all others were; linear: to first order.",
+            pose=at_text(machine, result, pose),
+        )
+        + first
+        + more
+        + lost,
     )
+
+
+def _title(of: str, part: str) -> str:
+    titles = {
+        ("parameter", "position"): say("Shares of the position's variance, by parameter"),
+        ("parameter", "orientation"): say("Shares of the orientation's variance, by parameter"),
+        ("source", "position"): say("Shares of the position's variance, by source"),
+        ("source", "orientation"): say("Shares of the orientation's variance, by source"),
+    }
+    return titles[of, part]

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from truepose._kernel import STATUS
 from truepose.arrays import Flags, Floats, Indices, real_numbers
 from truepose.errors import ArgumentError, Problem, RequestError
+from truepose.language import grouped, marked, say
 from truepose.machine import Condition, Machine
 from truepose.sources import PoseBlock, Source, acting
 
@@ -247,15 +248,27 @@ def broken(status: np.ndarray) -> Flags:
 def reason_text(status: str) -> str:
     """Why a pose is left out, for people."""
     if status == BAND:
-        return "some machines inside the bands cannot be assembled"
+        return say("some machines inside the bands cannot be assembled")
     if status.startswith(CORRECTION):
-        return f"correction {status.removeprefix(CORRECTION)}".replace("_", " ")
-    return status.replace("_", " ")
+        return say("correction {status}", status=reason_text(status.removeprefix(CORRECTION)))
+    words = {
+        "out_of_travel": say("out of travel"),
+        "unreachable": say("unreachable"),
+        "singular": say("singular"),
+        "not_converged": say("not converged"),
+        "branch_lost": say("branch lost"),
+        "joint_limit": say("joint limit"),
+    }
+    return words.get(status) or status.replace("_", " ")
 
 
 def not_assembled_text(failed: int, every: int) -> str:
     """How many samples the machine could not follow: "12 of 10,000 could not be assembled"."""
-    return f"{failed:,} of {every:,} could not be assembled"
+    return say(
+        "{failed} of {every} could not be assembled",
+        failed=grouped(failed),
+        every=grouped(every),
+    )
 
 
 class Travel:
@@ -350,15 +363,32 @@ def _fault(machine: Machine, fault: dict[str, object]) -> str:
     what, name, amount = fault["what"], fault["name"], fault["amount"]
     assert isinstance(amount, float | int)
     if what == "singular":
-        return f"singular, {amount:.3g} of the limit"
+        return say("singular, {share} of the limit", share=marked(f"{amount:.3g}"))
     if what == "travel":
         coordinate = next((d.coordinate for d in machine.drives if d.name == name), "length")
-        return f"drive {name} is {_in_file_units(machine, abs(amount), coordinate)} out of travel"
+        return say(
+            "drive {name} is {amount} out of travel",
+            name=name,
+            amount=_in_file_units(machine, abs(amount), coordinate),
+        )
     if what in ("base_joint", "platform_joint"):
-        joint = str(what).replace("_", " ")
         angle = _in_file_units(machine, amount, "angle")
-        return f"strut {name} leans {angle} beyond the limit of its {joint}"
-    return f"strut {name} misses by {_in_file_units(machine, abs(amount), 'length')}"
+        if what == "base_joint":
+            return say(
+                "strut {name} leans {angle} beyond the limit of its base joint",
+                name=name,
+                angle=angle,
+            )
+        return say(
+            "strut {name} leans {angle} beyond the limit of its platform joint",
+            name=name,
+            angle=angle,
+        )
+    return say(
+        "strut {name} misses by {length}",
+        name=name,
+        length=_in_file_units(machine, abs(amount), "length"),
+    )
 
 
 def _dimension_of(freedom: str) -> str:
@@ -368,5 +398,5 @@ def _dimension_of(freedom: str) -> str:
 def _in_file_units(machine: Machine, value: float, dimension: str) -> str:
     unit = machine.file_units.get(dimension)
     if unit is None:
-        return f"{value:.6g} {'m' if dimension == 'length' else 'rad'}"
-    return f"{float(unit.to_file(np.float64(value))):.6g} {unit.label}"
+        return marked(f"{value:.6g} {'m' if dimension == 'length' else 'rad'}")
+    return marked(f"{float(unit.to_file(np.float64(value))):.6g} {unit.label}")

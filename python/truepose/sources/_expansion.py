@@ -15,6 +15,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.errors import Problem
+from truepose.language import say
 from truepose.machine.limbs import Limb
 from truepose.machine.parts import Body, Drive, Guide, Strut, is_body
 
@@ -68,7 +69,7 @@ def not_included(machine: Machine, condition: Condition) -> tuple[str, ...]:
 def not_included_text(machine: Machine, condition: Condition) -> str:
     """The same for people: `frame, drive.d1 (no material)`; empty where every part is in."""
     parts = not_included(machine, condition)
-    return f"{', '.join(parts)} ({NO_MATERIAL})" if parts else ""
+    return say("{parts} (no material)", parts=", ".join(parts)) if parts else ""
 
 
 class _Points:

@@ -20,9 +20,10 @@ from numpy.typing import ArrayLike
 from truepose._kernel import STATUS
 from truepose.arrays import Floats, Indices, sorted_union
 from truepose.errors import Problem, RequestError
+from truepose.language import grouped, say
 from truepose.machine import Condition, Machine
 from truepose.runs.arguments import checked
-from truepose.runs.poses import OK, Progress
+from truepose.runs.poses import OK, Progress, reason_text
 from truepose.runs.quantities import quantities
 from truepose.runs.variables import Variables
 from truepose.verdict import engine
@@ -44,10 +45,6 @@ UNASKED = 8
 
 OPEN = 32
 """Poses that no proof decides at which one is searched for after that."""
-
-EXACT = "one machine inside the bands, solved exactly"
-REMAINDER = "the linear maximum and its proven remainder"
-ENGINE = "the proof engine"
 
 
 @checked
@@ -316,14 +313,19 @@ def _answer(
     bound = _number(population, surveyed, proof.bound[:, at])
     seen = Number(witness.size, witness.number, witness.pose)
     # An enclosure holds what rounding may do; what was found is not above it for that reason.
-    answer, rests_on = None, "the linear maximum"
+    answer, rests_on = None, say("the linear maximum")
     if target is not None:
         if _exceeds(witness, target):
             answer, rests_on = NOT_MET, _of_witness(witness)
         elif bound.value <= target:
             by_engine = bool((surveyed.bound[:, at] > target).any())
             answer = MET
-            rests_on = f"{REMAINDER}, {ENGINE} ({proof.boxes:,} boxes)" if by_engine else REMAINDER
+            rests_on = say("the linear maximum and its proven remainder")
+            if by_engine:
+                rests_on = say(
+                    "the linear maximum and its proven remainder, the proof engine ({boxes} boxes)",
+                    boxes=grouped(proof.boxes),
+                )
         else:
             answer, rests_on = UNDECIDED, _why_open(bound, proof)
     rests_on += _ends_taken(witness.spread)
@@ -335,7 +337,9 @@ def _ends_taken(variables: Variables) -> str:
     endless = dict.fromkeys(
         str(distribution) for distribution in variables.distributions if not distribution.bounded
     )
-    return f"; taken to end there: {'; '.join(endless)}" if endless else ""
+    if not endless:
+        return ""
+    return "; " + say("taken to end there: {ends}", ends="; ".join(endless))
 
 
 def _number(population: Population, surveyed: Survey, values: Floats) -> Number:
@@ -346,19 +350,19 @@ def _number(population: Population, surveyed: Survey, values: Floats) -> Number:
 
 def _of_witness(witness: Witness) -> str:
     if witness.status == "ok":
-        return EXACT
-    why = witness.status.replace("_", " ")
+        return say("one machine inside the bands, solved exactly")
+    why = reason_text(witness.status)
     if witness.commanded:
-        return f"one machine inside the bands that cannot be assembled ({why})"
-    return f"a command that the machine cannot follow ({why})"
+        return say("one machine inside the bands that cannot be assembled ({why})", why=why)
+    return say("a command that the machine cannot follow ({why})", why=why)
 
 
 def _why_open(bound: Number, proof: _Proof) -> str:
     if proof.refused:
-        return f"no proof: {proof.refused}"
+        return say("no proof: {why}", why=proof.refused)
     if np.isinf(bound.value):
-        return f"no proof within {proof.boxes:,} boxes"
-    return f"what is found and what is proven, within {proof.boxes:,} boxes"
+        return say("no proof within {boxes} boxes", boxes=grouped(proof.boxes))
+    return say("what is found and what is proven, within {boxes} boxes", boxes=grouped(proof.boxes))
 
 
 __all__ = ["accuracy", "answers", "at_coverage", "required_states"]

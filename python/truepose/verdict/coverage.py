@@ -23,6 +23,7 @@ from typing import Literal
 import numpy as np
 
 from truepose.arrays import Flags, Floats, Indices
+from truepose.language import grouped, marked, say
 from truepose.machine import Machine
 from truepose.representation import Represented
 from truepose.runs.poses import Progress
@@ -95,16 +96,35 @@ class CoverageAnswer(Represented):
     @property
     def rests_on(self) -> str:
         """What the answer rests on, in words."""
-        drawn = f"{self.draws:,} machines drawn at the worst pose, seed {self.seed}"
+        drawn = say(
+            "{draws} machines drawn at the worst pose, seed {seed}",
+            draws=grouped(self.draws),
+            seed=self.seed,
+        )
         if self.poses == 1:
             return drawn
         if self.sampled == self.poses:
-            return f"{drawn}; each of the {self.poses:,} poses sampled"
-        some = f"{drawn}; {self.sampled:,} of {self.poses:,} poses sampled"
+            return f"{drawn}; {say('each of the {poses} poses sampled', poses=grouped(self.poses))}"
+        values = {
+            "sampled": grouped(self.sampled),
+            "poses": grouped(self.poses),
+            "within": grouped(self.within),
+            "below": marked(f"{100.0 * WITHIN:g}"),
+        }
         if self.sampled < self.within:
-            some += f", the largest by first order of {self.within:,} that may be the worst"
-        below = f"{100.0 * WITHIN:g} % or more"
-        return f"{some}, all others are {below} below the largest by first order"
+            some = say(
+                "{sampled} of {poses} poses sampled, the largest by first order of {within} that "
+                "may be the worst, all others are {below} % or more below the largest by first "
+                "order",
+                **values,
+            )
+        else:
+            some = say(
+                "{sampled} of {poses} poses sampled, all others are {below} % or more below the "
+                "largest by first order",
+                **values,
+            )
+        return f"{drawn}; {some}"
 
 
 def coverage(

@@ -19,6 +19,7 @@ import numpy as np
 from truepose.arrays import Floats, Indices
 from truepose.files.dimensions import BY_UNIT, FREEDOMS
 from truepose.files.shown_units import Shown
+from truepose.language import marked, say
 from truepose.machine import Machine
 from truepose.representation import Represented
 from truepose.runs.displacement import ParameterDeviation
@@ -210,10 +211,14 @@ class Witness(Represented):
         More than `most` are counted. In the units in which the machine's file is answered.
         """
         causes = self.causes()
-        lines = [f"{self.state}, at {pose_in_words(self.machine, self.pose)}"]
+        pose = pose_in_words(self.machine, self.pose)
+        if self.state == BEFORE:
+            lines = [say("before compensation, at {pose}", pose=pose)]
+        else:
+            lines = [say("after compensation, at {pose}", pose=pose)]
         lines += [self._said(cause) for cause in causes[:most]]
         if len(causes) > most:
-            lines.append(f"and {len(causes) - most} more")
+            lines.append(say("and {count} more", count=len(causes) - most))
         return lines
 
     def _said(self, cause: Cause) -> str:
@@ -221,21 +226,36 @@ class Witness(Represented):
         if cause.force is not None:
             size = math.hypot(*cause.force)
             unit = [component / size if size else 0.0 for component in cause.force]
-            direction = ", ".join(f"{component + 0.0:.3f}" for component in unit)
-            return f"force of {shown.force.text(size)} along ({direction})"
+            direction = ", ".join(marked(f"{component + 0.0:.3f}") for component in unit)
+            return say(
+                "force of {force} along ({direction})",
+                force=shown.force.text(size),
+                direction=direction,
+            )
         small: Shown = shown.small(cause.unit)
         if cause.unit == "m" and abs(cause.deviation) >= COARSE * shown.least_dimension:
             small = shown.length
         sign = "-" if cause.deviation < 0.0 else "+"
         amount = f"{sign}{small.text(abs(cause.deviation))}"
-        where = f"at {amount}"
         if cause.sigmas:
-            where = f"at {cause.sigmas:+.3g} standard deviations ({amount})"
+            where = say(
+                "at {sigmas} standard deviations ({amount})",
+                sigmas=marked(f"{cause.sigmas:+.3g}"),
+                amount=amount,
+            )
+        elif cause.end == "upper":
+            where = say("at its upper end ({amount})", amount=amount)
         elif cause.end:
-            where = f"at its {cause.end} end ({amount})"
+            where = say("at its lower end ({amount})", amount=amount)
+        else:
+            where = say("at {amount}", amount=amount)
+        what = cause.parameter
+        if cause.more:
+            what = say(
+                "{parameter} and {count} that vary with it", parameter=what, count=cause.more
+            )
         of = "" if cause.source == "tolerance" else f" ({cause.source})"
-        more = f" and {cause.more} that vary with it" if cause.more else ""
-        return f"{cause.parameter}{more}{of} {where}"
+        return f"{what}{of} {where}"
 
     def as_data(self) -> dict[str, Any]:
         """For programs, ready for JSON, in the units of the machine's file.

@@ -14,6 +14,7 @@ import numpy as np
 from truepose.calibration.acceptance import sentences
 from truepose.calibration.acceptance.tool_uncertainty import KEPT, ToolUncertainty
 from truepose.files.shown_units import METRIC, ShownUnits
+from truepose.language import marked, say, say_counted
 from truepose.representation import Facts, Represented
 
 NOTHING = 100.0
@@ -62,7 +63,7 @@ class HeldOut:
     def shown(self, value: float, units: ShownUnits, digits: int = 2) -> str:
         """A value of it for people: "12 µm", "1.2 times the noise"."""
         if self.unit == "1":
-            return f"{sentences.times(value, digits)} times the noise"
+            return say("{value} times the noise", value=sentences.times(value, digits))
         return sentences.quantity(value, self.unit, digits, units)
 
 
@@ -104,12 +105,13 @@ def open_clauses(values: Values) -> list[str]:
 def verdict_sentences(reasons: Sequence[Reason], gain: str) -> str:
     """Yes with its `gain`, or no with its reasons."""
     if not reasons:
-        return f"Yes: {gain}."
+        return say("Yes: {gain}.", gain=gain)
     wrong = [reason.sentence for reason in reasons if reason.code == WRONG_DATA]
     others = "; ".join(reason.sentence for reason in reasons if reason.code != WRONG_DATA)
     if not wrong:
-        return f"No: {others}."
-    return f"No: {wrong[0]}." + (f" As they are: {others}." if others else "")
+        return say("No: {reasons}.", reasons=others)
+    no = say("No: {reasons}.", reasons=wrong[0])
+    return f"{no} {say('As they are: {others}.', others=others)}" if others else no
 
 
 def gain_sentence(
@@ -123,17 +125,27 @@ def gain_sentence(
     for size in sizes:
         if size.after == 0.0 and not size.before:
             continue
-        was = "" if size.before is None else f", against {_of(size, size.before, shown)} before"
-        texts.append(
-            f"the tool's {size.quantity} becomes known to within {_of(size, size.after, shown)} at "
-            f"the worst pose ({100.0 * KEPT:g} %){was}"
+        text = say(
+            "the tool's {quantity} becomes known to within {size} at the worst pose ({percent} %)",
+            quantity=_named(size),
+            size=_of(size, size.after, shown),
+            percent=marked(f"{100.0 * KEPT:g}"),
         )
+        if size.before is not None:
+            text += ", " + say("against {size} before", size=_of(size, size.before, shown))
+        texts.append(text)
     if texts and left_out:
-        texts[-1] += f", {' and '.join(left_out)} left out"
-    texts = texts or ["the unknowns are determined"]
+        texts[-1] += ", " + say("{names} left out", names=sentences.listed(left_out))
+    texts = texts or [say("the unknowns are determined")]
     if falling is not None:
         was, now = (falling.shown(size, shown) for size in (falling.before, falling.after))
-        texts.append(f"on poses that were not fitted the error falls from {was} to {now}")
+        texts.append(
+            say(
+                "on poses that were not fitted the error falls from {was} to {now}",
+                was=was,
+                now=now,
+            )
+        )
     return "; ".join(texts)
 
 
@@ -145,9 +157,9 @@ def left_out_of(after: ToolUncertainty, relative: bool) -> list[str]:
         for name in parasitic
         if after.standard[:, after.components.index(name)].max(initial=0.0) > 0.0
     ]
-    texts = ["where the machine as a whole stands in the room"] if relative else []
+    texts = [say("where the machine as a whole stands in the room")] if relative else []
     if moved:
-        texts.append(f"its parasitic motion in {sentences.listed(moved)}")
+        texts.append(say("its parasitic motion in {names}", names=sentences.listed(moved)))
     return texts
 
 
@@ -156,7 +168,7 @@ def left_out_of(after: ToolUncertainty, relative: bool) -> list[str]:
 
 def _wrong_data(values: Values, shown: ShownUnits) -> str:
     # They begin with the instrument's name, which stays as it is written.
-    return f"the measurements look wrong. {'. '.join(values['suspected'])}"
+    return say("the measurements look wrong. {suspected}", suspected=". ".join(values["suspected"]))
 
 
 def _open_choice(values: Values, shown: ShownUnits) -> str:
@@ -175,19 +187,30 @@ def _open(values: Values, shown: ShownUnits) -> str:
 def _less_than_tolerance(values: Values, shown: ShownUnits) -> str:
     label, unit, half, own = (values[key] for key in ("label", "unit", "half", "uncertainty"))
     if np.isfinite(half) and own > half:
-        known = f"its tolerance is {sentences.stated(half, unit, shown)}"
+        known = say("its tolerance is {half}", half=sentences.stated(half, unit, shown))
     else:
         sigma = sentences.quantity(values["deviation"], unit, units=shown)
-        known = f"its tolerance already to {sigma}"
+        known = say("its tolerance already to {sigma}", sigma=sigma)
     if np.isfinite(half) and own > NOTHING * half:
-        text = f"the measurements say almost nothing about {label}, {known}"
+        text = say(
+            "the measurements say almost nothing about {label}, {known}", label=label, known=known
+        )
     else:
         uncertainty = sentences.quantity(own, unit, units=shown)
-        text = f"the measurements determine {label} only to {uncertainty}, {known}"
+        text = say(
+            "the measurements determine {label} only to {uncertainty}, {known}",
+            label=label,
+            uncertainty=uncertainty,
+            known=known,
+        )
     more = values["others"]
     if more:
-        others = "one more unknown is" if more == 1 else f"{more} more are"
-        text += f" ({others} less certain than the tolerance, too)"
+        others = say_counted(
+            "one more unknown is less certain than the tolerance, too",
+            "{count} more are less certain than the tolerance, too",
+            more,
+        )
+        text += f" ({others})"
     return text
 
 
@@ -195,72 +218,108 @@ def _of(size: ToolSize, value: float, shown: ShownUnits) -> str:
     return sentences.quantity(value, size.unit, units=shown)
 
 
-def _against(sizes: Sequence[ToolSize], link: str, whose: str, shown: ShownUnits) -> list[str]:
-    return [
-        f"the tool's {size.quantity} {link} {_of(size, size.after, shown)}, against "
-        f"{_of(size, size.before or 0.0, shown)} {whose}"
-        for size in sizes
-    ]
+def _named(size: ToolSize) -> str:
+    return say("position") if size.quantity == "position" else say("rotation")
 
 
-_AS_FILED = "of the machine as filed"
+def _compared(size: ToolSize, shown: ShownUnits, *, measured: bool = False) -> dict[str, str]:
+    """The places of a sentence that compares a size with what it was."""
+    before = _of(size, size.before or 0.0, shown)
+    return {
+        "quantity": _named(size),
+        "size": _of(size, size.after, shown),
+        "before": say("{size} measured before", size=before)
+        if measured
+        else say("{size} of the machine as filed", size=before),
+    }
 
 
 def _kept(values: Values) -> str:
     if not values["kept"]:
         return ""
-    return "; but the machine as filed already keeps the accuracy that is asked"
+    return "; " + say("but the machine as filed already keeps the accuracy that is asked")
 
 
 def _no_gain(values: Values, shown: ShownUnits) -> str:
-    whose = "measured before" if values["measured"] else _AS_FILED
-    first, *rest = values["sizes"]
-    texts = _against([first], "would be uncertain by", whose, shown)
-    texts += _against(rest, "by", whose, shown)
-    return f"at the worst pose of the workspace {', and '.join(texts)}{_kept(values)}"
+    first, *rest = (
+        _compared(size, shown, measured=bool(values["measured"])) for size in values["sizes"]
+    )
+    text = say(
+        "at the worst pose of the workspace the tool's {quantity} would be uncertain by {size}, "
+        "against {before}",
+        **first,
+    )
+    for other in rest:
+        text += ", " + say("and the tool's {quantity} by {size}, against {before}", **other)
+    return text + _kept(values)
 
 
 def _not_identified(values: Values, shown: ShownUnits) -> str:
     """As a reason; as a warning (with `exact`) what would be if they were exact."""
     named = sentences.listed(sentences.collapsed(values["labels"], values["every"]))
     if "exact" not in values:
-        texts = ", and ".join(_against(values["sizes"], "uncertain by", _AS_FILED, shown))
-        return (
-            f"the tolerances that were not identified ({named}) leave {texts}, at the worst pose "
-            f"of the workspace: identify them too{_kept(values)}"
+        first, *rest = (_compared(size, shown) for size in values["sizes"])
+        text = say(
+            "the tolerances that were not identified ({names}) leave the tool's {quantity} "
+            "uncertain by {size}, against {before}",
+            names=named,
+            **first,
         )
+        for other in rest:
+            text += ", " + say(
+                "and the tool's {quantity} uncertain by {size}, against {before}", **other
+            )
+        asked = say("at the worst pose of the workspace: identify them too")
+        return f"{text}, {asked}{_kept(values)}"
     more = [
-        f"the tool's {size.quantity} would be known to {_of(size, size.after, shown)} instead of "
-        f"{_of(size, size.before or 0.0, shown)}"
+        say(
+            "the tool's {quantity} would be known to {size} instead of {other}",
+            quantity=_named(size),
+            size=_of(size, size.after, shown),
+            other=_of(size, size.before or 0.0, shown),
+        )
         for size in values["exact"]
     ]
-    return (
-        f"{named} were not identified and count with their tolerances: if they were exact, "
-        f"{' and '.join(more)}; identify them too if this is too uncertain"
+    return say(
+        "{names} were not identified and count with their tolerances: if they were exact, "
+        "{more}; identify them too if this is too uncertain",
+        names=named,
+        more=sentences.listed(more),
     )
 
 
 def _gain_unconfirmed(values: Values, shown: ShownUnits) -> str:
     held: HeldOut = values["held_out"]
     was, now = (held.shown(size, shown, 3) for size in (held.before, held.after))
-    much = "nothing" if values["share"] < 0.005 else f"only {100.0 * values['share']:.0f} %"
-    return (
-        f"of the variance of what is commanded the measurements take away {much}, at the worst "
-        f"pose, and poses that were not fitted show no gain: {was} before, {now} after"
-        f"{_kept(values)}"
+    much = (
+        say("nothing")
+        if values["share"] < 0.005
+        else say("only {share} %", share=marked(f"{100.0 * values['share']:.0f}"))
     )
+    return say(
+        "of the variance of what is commanded the measurements take away {much}, at the "
+        "worst pose, and poses that were not fitted show no gain: {was} before, {now} "
+        "after",
+        much=much,
+        was=was,
+        now=now,
+    ) + _kept(values)
 
 
 def _not_confirmed(values: Values, shown: ShownUnits) -> str:
     held: HeldOut = values["held_out"]
     was, now = (held.shown(size, shown) for size in (held.before, held.after))
-    change = f"falls from {was} to {now} only"
+    change = say("falls from {was} to {now} only", was=was, now=now)
     if held.after >= held.before:
-        change = f"does not fall: {was} before, {now} after"
-    noise = f"the noise is {held.shown(held.noise, shown)}"
+        change = say("does not fall: {was} before, {now} after", was=was, now=now)
+    noise = say("the noise is {noise}", noise=held.shown(held.noise, shown))
     if held.unit == "1":
-        noise = "that is above the noise"
-    return f"on poses that were not fitted the error {change}, though {noise}"
+        noise = say("that is above the noise")
+    return say(
+        "on poses that were not fitted the error {change}, though {noise}",
+        change=change,
+        noise=noise,
+    )
 
 
 def _absurd_value(values: Values, shown: ShownUnits) -> str:
@@ -269,20 +328,32 @@ def _absurd_value(values: Values, shown: ShownUnits) -> str:
     if np.isfinite(values["value"]):
         would = f"{sentences.quantity(values['value'], unit, 4, shown)}, "
     times = off / (half if np.isfinite(half) else values["deviation"])
-    what = "its tolerance" if np.isfinite(half) else "the standard deviation of its tolerance"
-    text = (
-        f"{values['label']} would be {would}{sentences.quantity(off, unit, 3, shown)} off its "
-        f"drawing, {sentences.times(times)} times {what}"
+    what = (
+        say("its tolerance")
+        if np.isfinite(half)
+        else say("the standard deviation of its tolerance")
+    )
+    text = say(
+        "{label} would be {would}{off} off its drawing, {times} times {what}",
+        label=values["label"],
+        would=would,
+        off=sentences.quantity(off, unit, 3, shown),
+        times=sentences.times(times),
+        what=what,
     )
     more = sentences.collapsed(values["others"], values["every"])
-    return f"{text}; {sentences.listed(more)} would be off too" if more else text
+    return (
+        say("{text}; {names} would be off too", text=text, names=sentences.listed(more))
+        if more
+        else text
+    )
 
 
 def _contradicts_noise(values: Values, shown: ShownUnits) -> str:
-    return (
-        f"the measurements differ from the calibrated machine {sentences.times(values['rms'])} "
-        "times as much as their uncertainties allow: the model, the data or the uncertainties are "
-        "wrong"
+    return say(
+        "the measurements differ from the calibrated machine {rms} times as much as their "
+        "uncertainties allow: the model, the data or the uncertainties are wrong",
+        rms=sentences.times(values["rms"]),
     )
 
 
@@ -290,34 +361,39 @@ def _contradicts_noise(values: Values, shown: ShownUnits) -> str:
 
 
 def _noise_too_small(values: Values, shown: ShownUnits) -> str:
-    return (
-        f"the residuals are {sentences.times(values['rms'])} times as large as the stated "
-        "uncertainties, which have been multiplied by this factor"
+    return say(
+        "the residuals are {rms} times as large as the stated uncertainties, which have been "
+        "multiplied by this factor",
+        rms=sentences.times(values["rms"]),
     )
 
 
 def _noise_too_large(values: Values, shown: ShownUnits) -> str:
-    return (
-        f"the residuals are only {sentences.times(values['rms'])} times the stated uncertainties, "
-        "which seem too large"
+    return say(
+        "the residuals are only {rms} times the stated uncertainties, which seem too large",
+        rms=sentences.times(values["rms"]),
     )
 
 
 def _rests_on_tolerances(values: Values, shown: ShownUnits) -> str:
-    return (
-        f"{_open(values, shown)}: what is stated for these rests on their tolerances, not on the "
-        "measurements"
+    return say(
+        "{open}: what is stated for these rests on their tolerances, not on the measurements",
+        open=_open(values, shown),
     )
 
 
 def _one_sided(values: Values, shown: ShownUnits) -> str:
     size: ToolSize = values["size"]
     known = _of(size, size.after, shown)
-    return f"the tool's {size.quantity} is not known better than before, {known}"
+    return say(
+        "the tool's {quantity} is not known better than before, {known}",
+        quantity=_named(size),
+        known=known,
+    )
 
 
-def _always(text: str) -> Callable[[Values, ShownUnits], str]:
-    return lambda values, shown: text
+def _always(said: Callable[[], str]) -> Callable[[Values, ShownUnits], str]:
+    return lambda values, shown: said()
 
 
 WRONG_DATA = "data-look-wrong"
@@ -328,8 +404,10 @@ SENTENCES: Mapping[str, Callable[[Values, ShownUnits], str]] = {
     OPEN_CHOICE: _open_choice,
     "no-fit": _no_fit,
     "out-of-reach": _always(
-        "the calibrated machine reaches none of the poses of the workspace: it cannot be assembled "
-        "there"
+        lambda: say(
+            "the calibrated machine reaches none of the poses of the workspace: it cannot be "
+            "assembled there"
+        )
     ),
     "not-determined": _open,
     "not-told-apart": _open,
@@ -343,20 +421,30 @@ SENTENCES: Mapping[str, Callable[[Values, ShownUnits], str]] = {
     "noise-too-small": _noise_too_small,
     "noise-too-large": _noise_too_large,
     "noise-unchecked": _always(
-        "there are no more readings than unknowns, so the stated uncertainties cannot be checked"
+        lambda: say(
+            "there are no more readings than unknowns, so the stated uncertainties cannot be "
+            "checked"
+        )
     ),
     "rests-on-tolerances": _rests_on_tolerances,
     "gauge": _always(
-        "where the machine as a whole stands in the instrument's frame is not determined, which "
-        "does not affect its accuracy: the uncertainties at the tool leave it out"
+        lambda: say(
+            "where the machine as a whole stands in the instrument's frame is not determined, "
+            "which does not affect its accuracy: the uncertainties at the tool leave it out"
+        )
     ),
     "one-sided": _one_sided,
     "nothing-to-compare": _always(
-        "not every unknown has a tolerance, and no error was measured before: nothing shows that "
-        "the machine becomes better"
+        lambda: say(
+            "not every unknown has a tolerance, and no error was measured before: nothing shows "
+            "that the machine becomes better"
+        )
     ),
     "not-needed": _always(
-        "the machine as filed already keeps the accuracy that is asked: calibration is not needed"
+        lambda: say(
+            "the machine as filed already keeps the accuracy that is asked: calibration is not "
+            "needed"
+        )
     ),
 }
 """By code: the sentence that a reason's values make."""

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from truepose.arrays import Floats
 from truepose.files.shown_units import METRIC, ShownUnits
+from truepose.language import marked, say, say_counted
 
 NAMED = 0.1
 """Of the largest part of a direction: smaller parts are not named."""
@@ -37,7 +38,7 @@ def quantity(value: float, unit: str, digits: int = 2, units: ShownUnits = METRI
     From 0.1 mm (0.01 in) and 1 mrad on in the unit of dimensions, below in that of errors.
     """
     if not math.isfinite(value):
-        return "without limit" if value > 0.0 else "–"
+        return say("without limit") if value > 0.0 else "–"
     if unit in ("m", "rad"):
         small = abs(value) < (0.999 * units.least_dimension if unit == "m" else 0.999e-3)
         shown = units.small(unit) if small else units.of(unit)
@@ -46,7 +47,7 @@ def quantity(value: float, unit: str, digits: int = 2, units: ShownUnits = METRI
     elif unit == "1":
         text = _digits(value, digits)
     else:
-        text = f"{value:.{digits}g} {unit}"
+        text = marked(f"{value:.{digits}g} {unit}")
     return text.replace("-", "\N{MINUS SIGN}")
 
 
@@ -59,7 +60,7 @@ def stated(value: float, unit: str, units: ShownUnits = METRIC) -> str:
 
 def _trimmed(text: str) -> str:
     """A number with what follows it, without zeros behind its point."""
-    return re.sub(r"^(\D?\d+)(?:\.0+|(\.\d*?)0+)(?!\d)", r"\1\2", text)
+    return re.sub(r"^(\D?\d+)(?:[.,]0+|([.,]\d*?)0+)(?!\d)", r"\1\2", text)
 
 
 def times(ratio: float, digits: int = 2) -> str:
@@ -74,17 +75,17 @@ def _digits(value: float, digits: int) -> str:
     value = float(f"{value:.{digits - 1}e}")  # what is rounded up to 10 has a digit less behind
     places = digits - 1 - math.floor(math.log10(abs(value)))
     if places > 8:
-        return f"{value:.{digits - 1}e}"
-    return f"{value:.{max(places, 0)}f}"
+        return marked(f"{value:.{digits - 1}e}")
+    return marked(f"{value:.{max(places, 0)}f}")
 
 
 def listed(parts: Sequence[str], most: int = MOST_NAMES) -> str:
     """As "a, b and c"; a longer list is cut: "a, b and 7 more"."""
     if len(parts) > most:
-        parts = [*parts[: most - 1], f"{len(parts) - most + 1} more"]
+        parts = [*parts[: most - 1], say("{count} more", count=len(parts) - most + 1)]
     if len(parts) < 2:
         return "".join(parts)
-    return f"{', '.join(parts[:-1])} and {parts[-1]}"
+    return say("{names} and {last}", names=", ".join(parts[:-1]), last=parts[-1])
 
 
 def sentence(text: str) -> str:
@@ -96,7 +97,7 @@ def by_phrase(phrases: Iterable[str]) -> str:
     """Several instruments' phrases as one: "by heights and distances together"."""
     distinct = list(dict.fromkeys(phrase for phrase in phrases if phrase))
     if len(distinct) < 2:
-        return distinct[0] if distinct else "by these measurements"
+        return distinct[0] if distinct else say("by these measurements")
     bare = [phrase.removeprefix("by ").removesuffix(" alone") for phrase in distinct]
     return f"by {listed(bare)} together"
 
@@ -326,19 +327,39 @@ def undetermined(
         own = [labels[i] for i in group.members]
         names = collapsed(own, labels)
         if group.n_direction >= len(own):
-            tolerances = "its tolerance says" if len(own) == 1 else "their tolerances say"
-            end = f"found {by}{f' better than {tolerances}' if within_tolerances else ''}"
+            if not within_tolerances:
+                end = say("{names} cannot be found {by}", names="{names}", by=by)
+            elif len(own) == 1:
+                end = say(
+                    "{names} cannot be found {by} better than its tolerance says",
+                    names="{names}",
+                    by=by,
+                )
+            else:
+                end = say(
+                    "{names} cannot be found {by} better than their tolerances say",
+                    names="{names}",
+                    by=by,
+                )
         else:
             if names == [_head(own[0])]:  # one name for several, which are told apart here
                 names = [f"{names[0]} {listed(_suffixes(own))}"]
-            end = f"told apart {by}{' within their tolerances' if within_tolerances else ''}"
+            if within_tolerances:
+                end = say(
+                    "{names} cannot be told apart {by} within their tolerances",
+                    names="{names}",
+                    by=by,
+                )
+            else:
+                end = say("{names} cannot be told apart {by}", names="{names}", by=by)
         by_ending.setdefault(end, []).append(listed(names))
     clauses = []
     for end, groups in by_ending.items():
         shown = list(dict.fromkeys(groups))
         rest = len(shown) - MOST_SENTENCES
         if rest > 0:
-            more = "one more such combination" if rest == 1 else f"{rest} more such combinations"
+            more = say_counted("one more such combination", "{count} more such combinations", rest)
             shown = [*shown[:MOST_SENTENCES], more]
-        clauses.append(", nor can ".join([f"{shown[0]} cannot be {end}", *shown[1:]]))
+        others = [say("nor can {names}", names=names) for names in shown[1:]]
+        clauses.append(", ".join([end.replace("{names}", shown[0]), *others]))
     return clauses

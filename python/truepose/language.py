@@ -117,4 +117,14 @@ def _language(code: str) -> Language:
     return Language(code, GNUTranslations(compiled), marks["decimal"], marks["group"])
 
 
-__all__ = ["Language", "grouped", "languages", "marked", "say", "say_counted", "speaking", "spoken"]
+__all__ = [
+    "ENGLISH",
+    "Language",
+    "grouped",
+    "languages",
+    "marked",
+    "say",
+    "say_counted",
+    "speaking",
+    "spoken",
+]

@@ -63,6 +63,13 @@ def controllers(_: click.Context, __: click.Parameter, incomplete: str) -> Offer
     return _plain(REGISTRY, incomplete)
 
 
+def languages(_: click.Context, __: click.Parameter, incomplete: str) -> Offered:
+    """Languages in which the report can be written."""
+    from truepose.language import languages
+
+    return _plain(languages(), incomplete)
+
+
 def readers(_: click.Context, __: click.Parameter, incomplete: str) -> Offered:
     """Controllers whose files are read."""
     from truepose.controllers import READERS

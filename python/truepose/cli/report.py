@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from truepose.cli import _complete
 from truepose.cli._options import (
     InputFile,
     OutputFile,
@@ -19,6 +20,7 @@ from truepose.cli._options import (
     takes,
 )
 from truepose.cli._verbose import verbose_option
+from truepose.language import ENGLISH
 
 
 @click.command("report")
@@ -68,6 +70,14 @@ from truepose.cli._verbose import verbose_option
         help="Write what every figure draws, and every table, as CSV into FOLDER, which is made "
         "where it is not there: figure-3-workspace_maps.csv, by the numbers on the page.",
     ),
+    click.option(
+        "--language",
+        metavar="CODE",
+        default=ENGLISH,
+        shell_complete=_complete.languages,
+        help="Language of the page and of what is printed. Default: en; others are files of "
+        "`languages/`, such as de and pt.",
+    ),
     strict_option,
     accuracy_option,
     verbose_option,
@@ -80,6 +90,13 @@ def command(**options: Any) -> int:
     With --require-accuracy the exit code is 1 when it is not certain that the accuracy asked is
     kept after compensation.
     """
+    from truepose.cli._language import speaking_for
+
+    with speaking_for(options.pop("language")):
+        return _report(options)
+
+
+def _report(options: dict[str, Any]) -> int:
     from truepose.cli import _steps
     from truepose.cli._show import show_answers, show_lines, show_tables
     from truepose.cli._verbose import say_result

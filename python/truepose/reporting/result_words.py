@@ -34,9 +34,18 @@ def word(of: str) -> str:
     return words.get(of, of)
 
 
+VERDICTS = ("dominant", "relevant", "negligible")
+"""Of a source: the page's style knows them by these names."""
+
+
+def verdict_of(cell: str) -> str:
+    """Which of the `VERDICTS` a cell says, in whatever language; empty where none."""
+    return {word(verdict): verdict for verdict in VERDICTS}.get(cell, "")
+
+
 def ends() -> tuple[str, str]:
     """Where lengths and offsets stand in their tolerance bands: the paper's minimum and maximum."""
     return say("all at lower ends"), say("all at upper ends")
 
 
-__all__ = ["ends", "word"]
+__all__ = ["VERDICTS", "ends", "verdict_of", "word"]

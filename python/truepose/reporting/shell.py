@@ -25,6 +25,7 @@ from truepose.language import say, spoken
 from truepose.reporting.figures import DrawnFigure
 from truepose.reporting.figures._json import as_json
 from truepose.reporting.figures._style import AXIS, DARK, GRID, INK, PAPER, SCENE_GRID
+from truepose.reporting.result_words import verdict_of
 from truepose.reporting.table import Table
 from truepose.version import version
 
@@ -131,6 +132,7 @@ def template(name: str) -> jinja2.Template:
     environment.filters["capitalise"] = sentence
     environment.filters["css_text"] = css_text
     environment.globals["say"] = say
+    environment.globals["verdict_of"] = verdict_of
     return environment.get_template(name)
 
 

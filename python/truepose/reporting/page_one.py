@@ -184,7 +184,7 @@ def _judged(of: Told) -> str:
 def _judgement(of: Told) -> Judgement:
     answer, label = of.answer, say(STATES[of.answer.state])
     if answer.answer is not None:
-        return Judgement(label, f"{say(of.word)}: {of.size}", of.colour, basis=of.basis)
+        return Judgement(label, f"{of.word}: {of.size}", of.colour, basis=of.basis)
     if answer.coverage is not None:
         return Judgement(label, of.size, of.colour, basis=of.basis)
     # Nothing is judged: what was found and what is proven, as the dots have them.

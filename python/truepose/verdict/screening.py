@@ -163,7 +163,8 @@ class Screen:
         few, largest = self._ranks(0), _Largest(self._sized)
         parts = []
         for number, (block, variables) in self._numbered():
-            part = self._part(number, block, variables, few)
+            # Single precision is far finer than what so few draws tell, and half the work.
+            part = self._part(number, block, variables, few, np.float32)
             parts.append((part.estimate, part.upper))
             largest.add(part, part.lower)
         if not parts:
@@ -186,16 +187,26 @@ class Screen:
         count = int(min(max(wanted, FEWEST[stage]), MOST[stage]))
         return ranks(count, min(self._probability, 1.0 - TAIL[stage] / count), RISK)
 
-    def _part(self, number: int, block: PoseBlock, variables: Variables, of: Ranks) -> _Part:
+    def _part(
+        self,
+        number: int,
+        block: PoseBlock,
+        variables: Variables,
+        of: Ranks,
+        precision: type = np.float64,
+    ) -> _Part:
         draws = Random(variables, self._seed)
-        t = draws.rows(FIRST, of.count)
+        t: np.ndarray = draws.rows(FIRST, of.count).astype(precision)
         value, effects, status = first_order(self._machine, block, variables)
-        value, effects = value[:, self._columns], effects[:, self._columns]
+        value = value[:, self._columns].astype(precision)
+        effects = effects[:, self._columns].astype(precision)
         ranks = np.empty((3, len(value)))
         step = max(1, AT_ONCE // (of.count * self._columns.size))
         for start in range(0, len(value), step):
             rows = slice(start, start + step)
-            errors = effects[rows] @ t.T
+            # One product of matrices, not one for each pose.
+            some = effects[rows]
+            errors = (some.reshape(-1, some.shape[2]) @ t.T).reshape(*some.shape[:2], -1)
             errors += value[rows, :, np.newaxis]
             ranks[:, rows] = np.sqrt(of.of(np.square(errors, out=errors).sum(axis=1)))
         # Without a first order nothing says that it is not the worst; nor that it is.

@@ -276,6 +276,20 @@ def test_the_maps_differ_from_place_to_place(report: Visit) -> None:
     assert found["colours"] > 100, "one colour from edge to edge"
 
 
+def test_the_maps_have_their_own_scales_or_one(report: Visit) -> None:
+    """The buttons over the maps put all on one colour scale, and back."""
+    place = report.page.locator("#figure-workspace_maps")
+    scales = "element => element.data.map(each => each.coloraxis).filter(Boolean)"
+    own = place.evaluate(scales)
+    assert len(set(own)) > 1
+    for button, wanted in ((1, ["coloraxis"] * len(own)), (0, own)):
+        before = report.look("#figure-workspace_maps", [])
+        place.locator(".updatemenu-button").nth(button).click()
+        report.page.wait_for_timeout(500)
+        assert place.evaluate(scales) == wanted
+        assert report.look("#figure-workspace_maps", []) != before
+
+
 def test_nothing_was_asked_from_the_network_and_nothing_went_wrong(report: Visit) -> None:
     assert report.outside == []
     assert len([url for url in report.requests if url.startswith("file:")]) == 1

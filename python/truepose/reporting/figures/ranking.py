@@ -5,8 +5,8 @@ from __future__ import annotations
 from truepose.language import say
 from truepose.reporting.display import decimals_for, number, pose_text, where_highest
 from truepose.reporting.figures._flow import Flow
-from truepose.reporting.figures._plot import Plot, trace
-from truepose.reporting.figures._style import PAPER, SHOWN, TARGET, VERDICT_COLOURS, finish, small
+from truepose.reporting.figures._plot import Keys, Plot, trace
+from truepose.reporting.figures._style import SHOWN, TARGET, VERDICT_COLOURS, finish, small
 from truepose.reporting.figures._text import NO_BOX
 from truepose.reporting.study import Study
 
@@ -106,10 +106,10 @@ def figure(study: Study) -> Plot:
                 x=small(highest),
                 y=[study.sources[index] for index in order],
                 orientation="h",
-                marker={
-                    "color": [VERDICT_COLOURS[verdict] for verdict in verdicts],
-                    "pattern": _pattern([PATTERNS[verdict] for verdict in verdicts]),
-                },
+                marker=_bars(
+                    [VERDICT_COLOURS[verdict] for verdict in verdicts],
+                    [PATTERNS[verdict] for verdict in verdicts],
+                ),
                 text=[number(size, decimals_for(size, 4)) for size in highest.tolist()],
                 textposition=[
                     "inside" if size > INSIDE * longest else "outside" for size in highest.tolist()
@@ -132,10 +132,7 @@ def figure(study: Study) -> Plot:
                 x=[None],
                 y=[None],
                 name=names[verdict],
-                marker={
-                    "color": VERDICT_COLOURS[verdict],
-                    "pattern": _pattern(PATTERNS[verdict]),
-                },
+                marker=_bars(VERDICT_COLOURS[verdict], PATTERNS[verdict]),
             )
         )
     figure.update_yaxes(ticks="")
@@ -146,5 +143,8 @@ def figure(study: Study) -> Plot:
     return figure
 
 
-def _pattern(shape: str | list[str]) -> dict[str, object]:
-    return {"shape": shape, "fgcolor": PAPER, "fillmode": "overlay", "size": 6, "solidity": 0.25}
+def _bars(colour: str | list[str], shape: str | list[str]) -> Keys:
+    """The look of bars: filled, or with an outline and a pattern of their colour."""
+    # What overlays would be warned of by plotly.js, which wants one colour under it.
+    pattern = {"shape": shape, "fillmode": "replace", "size": 6, "solidity": 0.35}
+    return {"color": colour, "line": {"color": colour, "width": 1}, "pattern": pattern}

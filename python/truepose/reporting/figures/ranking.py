@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from truepose.language import say
-from truepose.reporting.display import decimals_for, number, pose_text, where_highest
+from truepose.reporting.display import ROUNDING, decimals_for, number, pose_text, where_highest
 from truepose.reporting.figures._flow import Flow
 from truepose.reporting.figures._plot import Keys, Plot, trace
 from truepose.reporting.figures._style import SHOWN, TARGET, VERDICT_COLOURS, finish, small
@@ -110,7 +110,11 @@ def figure(study: Study) -> Plot:
                     [VERDICT_COLOURS[verdict] for verdict in verdicts],
                     [PATTERNS[verdict] for verdict in verdicts],
                 ),
-                text=[number(size, decimals_for(size, 4)) for size in highest.tolist()],
+                text=[
+                    # What is but the rounding of nothing is nothing.
+                    number(size, decimals_for(size, 4) if size > ROUNDING * longest else 0)
+                    for size in highest.tolist()
+                ],
                 textposition=[
                     "inside" if size > INSIDE * longest else "outside" for size in highest.tolist()
                 ],

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from truepose.arrays import Indices
 from truepose.language import say, say_counted
 from truepose.reporting.display import number
-from truepose.reporting.variance_shares import Blame
+from truepose.reporting.table import Table
+
+if TYPE_CHECKING:
+    from truepose.reporting.variance_shares import Blame
 
 LEAST = 0.01
 """Share of the variance: what makes less is not worth tightening."""
@@ -163,4 +167,28 @@ def _kind(name: str) -> tuple[str, ...]:
     return (parts[0], "*", *parts[2:]) if len(parts) > 2 else (name,)
 
 
-__all__ = ["Alike", "alike", "first_text", "rest_text"]
+def worth_tightening(who: Blame) -> int:
+    """How many of the names, which go by their shares, have a row: the largest at least."""
+    return max(sum(len(group.names) for group in alike(who)), 1)
+
+
+def with_ties(table: Table, who: Blame, part: str, pose: str) -> Table:
+    """The table of the shares of parameters, which says which rows are alike."""
+    groups = alike(who)
+    ties = "; ".join(", ".join(group.names) for group in groups if len(group.names) > 1)
+    notes = [table.note]
+    if ties:
+        notes.append(say("Alike, so that none of them is before the others: {ties}.", ties=ties))
+    notes += [text for text in (rest_text(who),) if text]
+    first = len(groups[0].names) if groups else 0
+    # After first and total each their confidence stands; Shapley shares are last.
+    share = len(table.header) - 1 if "shapley" in who.kinds else 3
+    return replace(
+        table,
+        note=" ".join(notes),
+        says=first_text(who, part, pose),
+        largest=frozenset((row, share) for row in range(min(first, len(table.rows)))),
+    )
+
+
+__all__ = ["Alike", "alike", "first_text", "rest_text", "with_ties", "worth_tightening"]

@@ -9,6 +9,7 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.language import grouped, marked, say, say_counted
+from truepose.reporting.alike import with_ties, worth_tightening
 from truepose.reporting.display import column, is_position, where_highest
 from truepose.reporting.reading import at_text, components, position_of
 from truepose.reporting.table import Table
@@ -85,7 +86,15 @@ def shares(machine: Machine, result: xr.Dataset) -> list[Table]:
     """Who makes the spread, by parameter and by source, where it is largest."""
     pose = spread_pose(result)
     parts = parts_of(result)
-    tables = [_shares(machine, result, pose, "parameter", part) for part in parts]
+    tables = [
+        with_ties(
+            _shares(machine, result, pose, "parameter", part),
+            blame(result, pose, "parameter", part),
+            part,
+            at_text(machine, result, pose),
+        )
+        for part in parts
+    ]
     return [*tables, *(_shares(machine, result, pose, "source", part) for part in parts)]
 
 
@@ -106,6 +115,7 @@ def _shares(machine: Machine, result: xr.Dataset, pose: int, of: str, part: str)
             header.append("±")
             cells.append(column(100.0 * who.confidence[kind], 2))
     rows = tuple(zip(who.names, *cells, strict=True))
+    rows = rows[: worth_tightening(who)] if of == "parameter" else rows
     more = ""
     if of == "parameter" and len(rows) > MOST_LISTED:
         more = " " + say(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -173,7 +174,11 @@ def test_the_shares_name_what_to_tighten_first(study: Study) -> None:
     assert "Over all 2 poses together: strut.1.length, " in first.note
     shown = [numbers[0] for numbers in rows(first).values()]
     assert shown == sorted(shown, reverse=True)
-    assert sum(shown) == pytest.approx(100.0, abs=0.5)
+    # What makes less than 1 % has no row, and is told together.
+    (rest,) = re.findall(r"([\d.]+) %(?: together)?\.$", first.note)[:1] or ["0"]
+    left = float(rest) if "together" in first.note else 0.0
+    assert all(share >= 1.0 for share in shown)
+    assert 99.0 <= sum(shown) + left <= 100.5
     assert "Shapley" not in "".join(first.header)
 
 

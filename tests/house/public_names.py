@@ -30,7 +30,7 @@ from house.recorder import ENVIRONMENT, prepare, record_case
 GOLDEN = REPOSITORY / "tests" / "golden" / "public_names.txt"
 DEEPEST = 3
 """How many objects behind what a function returns are looked into."""
-CLOSED = {"kernel", "sources", "fit", "spread", "dataset"}
+CLOSED = {"kernel", "sources", "fit", "spread", "dataset", "study", "page_of_part", "drawn"}
 """Attributes whose content is no promise (no page shows it) or, `dataset`, is listed apart."""
 PIN_PAGES = "linuxcnc"
 """Pages on which `truepose.enable` is a pin of LinuxCNC's."""
@@ -75,7 +75,7 @@ def is_ours(value: Any) -> bool:
 
 def names_below(value: Any, way: str, seen: set[type], depth: int = 0) -> Iterator[str]:
     """Attributes and methods of an object of ours and of what hangs on it; a class only once."""
-    if isinstance(value, (list, tuple)) and not is_ours(value):
+    if isinstance(value, (list, tuple)) and not hasattr(value, "_fields"):
         for content in value:
             yield from names_below(content, f"{way}[]", seen, depth)
         return
@@ -160,6 +160,10 @@ def functions() -> Iterator[str]:
             "load().condition": warming.condition,
             "Input": tp.Input.normal(1.0, 0.1),
             "accuracy": tp.accuracy(planar),
+            "check": tp.check(planar),
+            "compare": tp.compare(planar, planar),
+            "report": tp.report(planar, Path(temporary) / "page.html"),
+            "load().plot()": planar.plot(),
             "calibrate": calibration,
             "correct_program": tp.correct_program(planar, part, Path(temporary) / "out.ngc"),
             "export": tp.export(planar, "c"),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from importlib.resources import files
+
 import numpy as np
 import pytest
 from babel.numbers import format_decimal
@@ -46,6 +49,15 @@ def test_every_colour_has_one_for_the_night() -> None:
     assert named | set(_style.LINES) <= set(_style.DARK)
     lines = [_style.DARK[colour] for colour in _style.SOURCE_COLOURS]
     assert len(set(lines)) == len(lines)
+
+
+def test_no_figure_has_a_colour_of_its_own() -> None:
+    folder = files("truepose.reporting.figures")
+    own = re.compile('"#[0-9A-Fa-f]{3,8}"|rgba?\\(|"(white|black|red|green|blue)"')
+    assert own.search('line={"color": "#0072B2"}')
+    texts = {each.name: each.read_text() for each in folder.iterdir() if each.name.endswith(".py")}
+    del texts["_style.py"]
+    assert {name: found[0] for name, text in texts.items() if (found := own.search(text))} == {}
 
 
 def test_many_numbers_are_rounded_to_what_is_drawn() -> None:

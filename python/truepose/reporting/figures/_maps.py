@@ -12,7 +12,7 @@ from truepose.arrays import Floats, Indices
 from truepose.files.shown_units import ShownUnits
 from truepose.reporting.display import is_position
 from truepose.reporting.figures._plot import Keys, Plot, trace
-from truepose.reporting.figures._style import small
+from truepose.reporting.figures._style import SCENE, SCENE_GRID, small
 
 
 @dataclass(frozen=True)
@@ -119,8 +119,8 @@ def label_map_axes(figure: Plot, places: Places, n_map: int) -> None:
                 figure.update_layout(**{f"yaxis{number + 1 if number else ''}": same})
         return
     axis: dict[str, Any] = {
-        "gridcolor": "#D5DBE5",
-        "backgroundcolor": "#F6F8FB",
+        "gridcolor": SCENE_GRID,
+        "backgroundcolor": SCENE,
         "tickfont": {"size": 10},
         "nticks": 4,
     }

@@ -90,7 +90,7 @@ def command(**options: Any) -> int:
     With --require-accuracy the exit code is 1 when it is not certain that the accuracy asked is
     kept after compensation.
     """
-    from truepose.cli._language import speaking_for
+    from truepose.reporting.drawing_packages import speaking_for
 
     with speaking_for(options.pop("language")):
         return _report(options)

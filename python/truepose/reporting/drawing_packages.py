@@ -1,11 +1,14 @@
-"""Modules that draw need the extra `report`; who asks for one without it is told so."""
+"""Pages, figures and languages need the extra `report`; who asks for them without it is told so."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from types import ModuleType
 
 from truepose.errors import Problem, RequestError
+from truepose.language import speaking
 
 
 def module_that_draws(name: str) -> ModuleType:
@@ -24,3 +27,26 @@ def module_that_draws(name: str) -> ModuleType:
                 hint="pip install 'truepose[report]'",
             )
         ) from failure
+
+
+@contextmanager
+def speaking_for(code: str) -> Iterator[None]:
+    """Say everything in the language of this code, within the block.
+
+    Raises `RequestError`: unknown-language for one that there is not, extra-missing where it needs
+    Babel and it is not installed.
+    """
+    with ExitStack() as block:
+        try:
+            block.enter_context(speaking(code))
+        except ImportError as failure:
+            raise RequestError(
+                Problem(
+                    "extra-missing",
+                    "languages other than English need a package that is not installed",
+                    found=f"no {failure.name}",
+                    expected="babel",
+                    hint="pip install 'truepose[report]'",
+                )
+            ) from failure
+        yield

@@ -16,7 +16,7 @@ from truepose.files.writing import require_writable
 from truepose.language import say, speaking, spoken
 from truepose.machine import Machine
 from truepose.reporting import assembly
-from truepose.reporting.drawing_packages import module_that_draws
+from truepose.reporting.drawing_packages import module_that_draws, speaking_for
 from truepose.reporting.study import Study
 from truepose.representation import Facts, Represented, facts_html
 from truepose.runs.arguments import checked
@@ -174,7 +174,7 @@ def report(
         from truepose.reporting import pdf
 
         pdf.installed_browser()
-    with speaking(language or spoken().code):
+    with speaking_for(language or spoken().code):
         unwritten = made(
             machine, measurements, program, listed, file_text(machine), assembly.Watcher()
         )

@@ -7,6 +7,7 @@ figure is photographed and the colours that carry its meaning are looked for.
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -264,7 +265,10 @@ def test_figures_and_tables_are_saved_as_csv(report: Visit) -> None:
     for place, first in (("#ranking", "trace"), ("#table-ranking", "source")):
         with report.page.expect_download() as waiting:
             report.page.locator(f"{place} button.csv").click()
-        assert waiting.value.suggested_filename == place[1:] + ".csv"
+        kind, count = re.findall(
+            r"^(figure|table)-(\d+)-ranking.csv$", waiting.value.suggested_filename
+        )[0]
+        assert report.page.locator(f"{place} .count").inner_text().lower() == f"{kind} {count}"
         lines = Path(waiting.value.path()).read_text("utf-8").splitlines()
         assert first in lines[0].split(",")
         assert len(lines) > 2

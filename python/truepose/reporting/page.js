@@ -106,19 +106,19 @@
   function saved(name, text) {
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob([text], {type: "text/csv"}));
-    link.download = name + ".csv";
+    link.download = name;
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   }
 
   function csvOf(button) {
-    const name = button.dataset.figure;
-    if (name) return saved(name, figureData(drawn.figures[name].data, drawn.figures[name].layout));
+    const {figure: name, file} = button.dataset;
+    if (name) return saved(file, figureData(drawn.figures[name].data, drawn.figures[name].layout));
     const figure = button.closest("figure");
     const cells = row => Array.from(row.cells, cell => cell.textContent);
     const table = figure.querySelector("table");
     const header = table.tHead ? cells(table.tHead.rows[0]) : [];
-    saved(figure.id, tableData(header, Array.from(table.tBodies[0].rows, cells)));
+    saved(file, tableData(header, Array.from(table.tBodies[0].rows, cells)));
   }
 
   // The keyboard goes to a table only where there is something to scroll.

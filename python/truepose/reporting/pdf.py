@@ -201,7 +201,9 @@ class _Browser:
 @contextmanager
 def _started(program: str) -> Iterator[_Browser]:
     """A browser for a while, which is ended on the way out, Ctrl-C included; its profile goes."""
-    with tempfile.TemporaryDirectory(prefix="truepose-", ignore_cleanup_errors=True) as profile:
+    with tempfile.TemporaryDirectory(
+        prefix="truepose-browser-", ignore_cleanup_errors=True
+    ) as profile:
         hears, ours_out = _pipe()
         ours_in, says = _pipe()
         flags = [*_FLAGS, f"--user-data-dir={profile}"]

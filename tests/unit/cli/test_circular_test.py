@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import csv
+import gzip
 import io
 import json
 from pathlib import Path
@@ -78,7 +80,8 @@ def test_readings_for_a_calibration_and_the_page_are_written(capsys: Capture) ->
     assert "wrote r.csv" in outcome.err
     page = Path("test.html").read_text("utf-8")
     assert "Polar plot, after compensation" in page
-    assert "measured, clockwise" in page
+    packed = page.partition('id="figures-data">')[2].partition("<")[0]
+    assert b"measured, clockwise" in gzip.decompress(base64.b64decode(packed))
     assert 'kind = "distance"' in Path("r.csv").read_text()
     found = call(capsys, "calibrate", "m.toml", "r.csv")
     assert "length of strut 1 would be 501.2 mm" in " ".join(found.out.split())

@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 import truepose
 from checked_figures import checked
 from command_line import MACHINES
-from truepose.cli._part import shown_on_page
 from truepose.reporting.page import PartShown
+from truepose.reporting.part_page import DrawnPath
+from truepose.reporting.part_page import shown as on_page
+from truepose.workpiece.evaluate import evaluate_part
+from truepose.workpiece.read import read_part
 
 PART = Path(__file__).parents[3] / "examples" / "part"
 
@@ -22,7 +25,10 @@ PART = Path(__file__).parents[3] / "examples" / "part"
 @pytest.fixture(scope="module")
 def shown() -> PartShown:
     machine = truepose.load(MACHINES / "linear_delta.toml")
-    return shown_on_page(machine, PART / "square.ngc", PART / "square.toml")
+    path = DrawnPath(machine)
+    part = read_part(machine, PART / "square.ngc", PART / "square.toml")
+    evaluation = evaluate_part(machine, part, machine.condition, sinks=[path], samples=200)
+    return on_page(evaluation, path, "square.ngc")
 
 
 def places(drawn: go.Scatter3d) -> NDArray[np.float64]:

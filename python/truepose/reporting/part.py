@@ -227,7 +227,7 @@ def _blame(evaluation: PartEvaluation) -> Table:
     )
     return Table(
         "blame",
-        say("Who is to blame, and what would mend it"),
+        say("What it comes from, and what would mend it"),
         (say("characteristic"), say("sources"), say("what would mend it")),
         tuple(rows),
         3,

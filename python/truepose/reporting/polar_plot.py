@@ -9,6 +9,8 @@ import numpy as np
 
 from truepose.arrays import Floats
 from truepose.files.shown_units import Shown
+from truepose.language import marked, say
+from truepose.reporting.display import number
 from truepose.reporting.figures import DrawnFigure
 from truepose.reporting.figures._plot import Keys, Plot, trace
 from truepose.reporting.figures._style import (
@@ -58,7 +60,11 @@ def figures(machine: Machine, result: xr.Dataset) -> list[DrawnFigure]:
         polar = _Polar(machine, result, at)
         drawn.append(
             DrawnFigure(
-                f"polar-{at}", f"Polar plot, {state}", polar.caption(), as_text(polar.drawn())
+                f"polar-{at}",
+                f"Polar plot, {state}",
+                polar.caption(),
+                as_text(polar.drawn()),
+                says=polar.says(),
             )
         )
     return drawn
@@ -114,6 +120,17 @@ class _Polar:
     @property
     def percent(self) -> str:
         return f"{100.0 * self.result.attrs['probability']:.3g} %"
+
+    def says(self) -> str:
+        """Where what is known is farthest off the nominal circle."""
+        known = self.of("known")
+        way, at = np.unravel_index(int(np.nanargmax(np.abs(known))), known.shape)
+        angle = float(self.result["angle"].values[at]) * self.turn.per_si
+        return say(
+            "What is known is farthest off the nominal circle at {angle}, by {size}.",
+            angle=f"{marked(f'{angle:.4g}')} {self.turn.label}",
+            size=f"{number(float(known[way, at]), 1)} {self.unit.label}",
+        )
 
     def caption(self) -> str:
         """How to read it."""
@@ -171,21 +188,21 @@ class _Polar:
         """Rings of equal deviation, and their numbers."""
         ring = self.ring
         most = int(np.floor(self.reach * 1.15 / ring + 1e-9)) or 1
-        for number in range(-most, most + 1):
-            nominal = number == 0
+        for count in range(-most, most + 1):
+            nominal = count == 0
             self._draw(
                 _ROUND,
-                np.full(_ROUND.size, number * ring),
+                np.full(_ROUND.size, count * ring),
                 mode="lines",
                 line={"color": AXIS if nominal else GRID, "width": 1.6 if nominal else 1.0},
                 name="nominal circle" if nominal else None,
                 showlegend=nominal,
             )
-            label = "0" if nominal else f"{number * ring:+g}".replace("-", "\N{MINUS SIGN}")
+            label = "0" if nominal else f"{count * ring:+g}".replace("-", "\N{MINUS SIGN}")
             self._note(
                 np.radians(11.0),
-                MIDDLE + REACH / self.reach * number * ring,
-                f"{label} {self.unit.label}" if number == most else label,
+                MIDDLE + REACH / self.reach * count * ring,
+                f"{label} {self.unit.label}" if count == most else label,
                 font={"size": 11, "color": QUIET},
                 bgcolor=PAPER,
             )

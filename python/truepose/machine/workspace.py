@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from truepose.arrays import Floats, Indices
+from truepose.language import marked
 
 LARGEST_GRID = 10_000_000
 """More poses are refused before anything is allocated."""
@@ -153,4 +154,4 @@ class Accuracy:
         if asked is None:
             return ""
         text = self.target_text if of_position else self.angle_target_text
-        return text or f"{asked:.6g} {'m' if of_position else 'rad'}"
+        return marked(text or f"{asked:.6g} {'m' if of_position else 'rad'}")

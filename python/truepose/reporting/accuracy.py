@@ -137,7 +137,7 @@ class Told:
             return MISSING
         said = self.machine.accuracy.said(answer.quantity)
         if said.rpartition(" ")[2].replace("u", "µ", 1) == self.unit.label:
-            return marked(said)
+            return said
         same = answer.asked * self.unit.per_si
         shown = f"{round(same, self.unit.decimals):.12g}"
         same_text = f"{same:.3g}" if shown == "0" else shown

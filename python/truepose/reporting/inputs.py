@@ -96,9 +96,9 @@ def condition(of: Machine) -> Table:
         )
     rows += [(key, f"{value}") for key, value in it.source_keys.items()]
     if asked.target is not None:
-        rows.append((say("accuracy asked"), marked(asked.said("position"))))
+        rows.append((say("accuracy asked"), asked.said("position")))
     if asked.angle_target is not None:
-        rows.append((say("accuracy of angle asked"), marked(asked.said("orientation"))))
+        rows.append((say("accuracy of angle asked"), asked.said("orientation")))
     rows += [(f"--set {key}", value) for key, value in of.settings.items()]
     return Table("condition", say("Condition"), ("", ""), tuple(rows), words=2)
 

@@ -18,6 +18,7 @@ from truepose.reporting import inputs
 from truepose.reporting.accuracy import Told, told
 from truepose.reporting.display import MISSING, number
 from truepose.reporting.how_far import cells, how_far
+from truepose.reporting.result_words import word
 from truepose.reporting.study import Study
 from truepose.sources import REGISTRY
 from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, UNDECIDED
@@ -232,8 +233,8 @@ def _worst(study: Study) -> str:
         "commanded, the {quantity} is farthest off at {pose}.",
         source=study.sources[first],
         share=number(float(study.values("share")[first]) * 100.0, 1),
-        kind=str(study.values("verdict")[first]),
-        quantity=farthest.answer.quantity,
+        kind=word(str(study.values("verdict")[first])),
+        quantity=word(farthest.answer.quantity),
         pose=farthest.at(farthest.told),
     )
 
@@ -276,7 +277,7 @@ def _nothing_to_do(after: str | None) -> str:
 def _tighten(study: Study, of: Tightening) -> str:
     values = {"band": of.band.name, "parts": _parts(of), "width": _width(study, of)}
     reached = "; ".join(
-        f"{one.answer.quantity} {one.size}" for one in told(study.machine, of.answers)
+        f"{word(one.answer.quantity)} {one.size}" for one in told(study.machine, of.answers)
     )
     if of.enough and all(answer.answer != UNDECIDED for answer in of.answers):
         return say(

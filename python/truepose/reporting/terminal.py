@@ -6,6 +6,8 @@ import io
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from truepose.language import say
+
 if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
@@ -60,7 +62,7 @@ def answers_text(machine: Machine, answers: Sequence[Answer], *, terminal: bool 
     for answer in told(machine, answers):
         lines.add_row(Text(answer.word, f"bold {COLOURS[answer.colour]}"), Text(answer.line))
         if answer.witness:
-            lines.add_row("", Text(f"witness: {answer.witness}", style="dim"))
+            lines.add_row("", Text(say("witness: {causes}", causes=answer.witness), style="dim"))
     for sentence in gains(answers):
         lines.add_row("", Text(sentence))
     return _rendered([lines, Text()], terminal) if lines.row_count else ""

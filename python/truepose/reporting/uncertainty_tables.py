@@ -454,7 +454,7 @@ def against_target(machine: Machine, result: xr.Dataset) -> list[str]:
         said = say(
             "Accuracy asked, {quantity}: {asked}:",
             quantity=word(name),
-            asked=marked(machine.accuracy.said(name)),
+            asked=machine.accuracy.said(name),
         )
         proven = str(result["status"].values) == PROVEN
         if reached > target:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from functools import cache
 from io import BytesIO
 from pathlib import Path
+from typing import NamedTuple
 
 from babel.messages.catalog import Catalog
 from babel.messages.pofile import read_po, write_po
@@ -28,8 +29,7 @@ are read at their modules, and words of results, which `result_words` says."""
 NAMED = re.compile(r"\{(\w+)\}")
 
 
-@dataclass(frozen=True)
-class Message:
+class Message(NamedTuple):
     """What is said: a text, and its plural where it goes with a number."""
 
     text: str
@@ -46,7 +46,13 @@ class Message:
         return frozenset(NAMED.findall(self.text + (self.plural or "")))
 
 
-def messages(package: Path = PACKAGE) -> dict[Message, str]:
+@cache
+def said() -> dict[Message, str]:
+    """The messages of the package, and the file that says each first."""
+    return messages(PACKAGE)
+
+
+def messages(package: Path) -> dict[Message, str]:
     """Every message and the file that says it first, in the order of files and lines.
 
     Raises `ValueError` where something is said that is no text.
@@ -54,8 +60,8 @@ def messages(package: Path = PACKAGE) -> dict[Message, str]:
     found: dict[Message, str] = {}
     for path in sorted([*package.rglob("*.py"), *package.rglob("*.jinja")]):
         text, name = path.read_text(encoding="utf-8"), path.relative_to(package).as_posix()
-        said = _of_template(text) if path.suffix == ".jinja" else _of_module(text, name)
-        for line, message in said:
+        every = _of_template(text) if path.suffix == ".jinja" else _of_module(text, name)
+        for line, message in every:
             if message is None:
                 raise ValueError(f"{name}, line {line}: what is said has to be a text")
             found.setdefault(message, name)
@@ -153,7 +159,7 @@ def text_of(code: str) -> str:
     """The file of a language, brought up to the messages."""
     had = catalogue(code)
     now = Catalog(locale=code, header_comment=had.header_comment, fuzzy=False)
-    for message, path in messages().items():
+    for message, path in said().items():
         known = had.get(message.key)
         now.add(message.key, None if known is None else known.string, locations=[(path, None)])
     written = BytesIO()
@@ -178,7 +184,7 @@ def untranslated(code: str) -> list[str]:
     """Messages that a language does not have."""
     had = catalogue(code)
     lacking = []
-    for message in messages():
+    for message in said():
         known = had.get(message.key)
         strings = () if known is None else known.string
         strings = (strings,) if isinstance(strings, str) else strings

@@ -35,6 +35,8 @@ def test_the_sdist_has_what_a_kernel_is_built_from(tmp_path: Path) -> None:
     assert ".cargo/config.toml" in files
     library = {f"python/truepose/machine_library/{p.name}" for p in (ROOT / "machines").iterdir()}
     assert library <= files
+    languages = (ROOT / "python/truepose/languages").glob("*.po")
+    assert {path.relative_to(ROOT).as_posix() for path in languages} <= files
     sources = (ROOT / "crates").glob("*/src/**/*.rs")
     built = {path.relative_to(ROOT).as_posix() for path in sources}
     assert built

@@ -25,6 +25,7 @@ def word(of: str) -> str:
         "absorbed": say("absorbed"),
         "partly": say("partly"),
         "strains": say("strains"),
+        "known": say("known"),
         "witness": say("witness"),
         "linear maximum": say("linear maximum"),
         "proven bound": say("proven bound"),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from truepose.arrays import Floats
+from truepose.language import say
 from truepose.runs.quantities import quantities
 from truepose.uncertainty_analysis.bounds import PROVEN, proven_bounds
 from truepose.verdict.states import State
@@ -41,4 +42,4 @@ def bounds(state: State, targets: Sequence[float | None], boxes: int) -> tuple[F
 
 def refused(state: State) -> str:
     """Why the engine has nothing to say of a machine; empty where it has."""
-    return "more closures than freedoms" if state.machine.kernel.overconstrained else ""
+    return say("more closures than freedoms") if state.machine.kernel.overconstrained else ""

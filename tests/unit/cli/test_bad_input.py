@@ -131,8 +131,9 @@ def test_packages_that_are_not_installed(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.delitem(sys.modules, "truepose.reporting.page", raising=False)
-    monkeypatch.delattr("truepose.reporting.page", raising=False)
+    for module in ("page", "shell"):  # imported anew, whatever ran before
+        monkeypatch.delitem(sys.modules, f"truepose.reporting.{module}", raising=False)
+        monkeypatch.delattr(f"truepose.reporting.{module}", raising=False)
     monkeypatch.setitem(sys.modules, package, None)
     outcome = call(capsys, "report", PLANAR, "--output", tmp_path / "page.html")
     assert outcome.code == 2

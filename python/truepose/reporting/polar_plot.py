@@ -64,7 +64,7 @@ def figures(machine: Machine, result: xr.Dataset) -> list[DrawnFigure]:
                 f"Polar plot, {state}",
                 polar.caption(),
                 as_text(polar.drawn()),
-                says=polar.says(),
+                says=polar.finding(),
             )
         )
     return drawn
@@ -121,7 +121,7 @@ class _Polar:
     def percent(self) -> str:
         return f"{100.0 * self.result.attrs['probability']:.3g} %"
 
-    def says(self) -> str:
+    def finding(self) -> str:
         """Where what is known is farthest off the nominal circle."""
         known = self.of("known")
         way, at = np.unravel_index(int(np.nanargmax(np.abs(known))), known.shape)

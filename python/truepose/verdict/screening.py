@@ -206,7 +206,9 @@ class Screen:
             rows = slice(start, start + step)
             # One product of matrices, not one for each pose.
             some = effects[rows]
-            errors = (some.reshape(-1, some.shape[2]) @ t.T).reshape(*some.shape[:2], -1)
+            # Sizes in full: without a band there is no variable, of which -1 could not be told.
+            count, width, variable = some.shape
+            errors = (some.reshape(count * width, variable) @ t.T).reshape(count, width, of.count)
             errors += value[rows, :, np.newaxis]
             ranks[:, rows] = np.sqrt(of.of(np.square(errors, out=errors).sum(axis=1)))
         # Without a first order nothing says that it is not the worst; nor that it is.

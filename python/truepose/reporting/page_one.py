@@ -21,7 +21,7 @@ from truepose.reporting.how_far import cells, how_far
 from truepose.reporting.result_words import word
 from truepose.reporting.study import Study
 from truepose.sources import REGISTRY
-from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, UNDECIDED
+from truepose.verdict.answer import AFTER, BEFORE, MET, NOT_MET, UNDECIDED, Number
 from truepose.verdict.tightening import Tightening
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def page_one(study: Study, part: PageOne | None = None) -> PageOne:
 
 
 def lines(study: Study) -> tuple[tuple[str, str], ...]:
-    """What is worst, what to do, what is not included: a name and a sentence one."""
+    """What is worst, what to do, what is not included: a name with a sentence."""
     calibrated = () if study.calibration is None else (_after_calibration(study.calibrated),)
     return (
         *calibrated,
@@ -235,8 +235,14 @@ def _worst(study: Study) -> str:
         share=number(float(study.values("share")[first]) * 100.0, 1),
         kind=word(str(study.values("verdict")[first])),
         quantity=word(farthest.answer.quantity),
-        pose=farthest.at(farthest.told),
+        pose=farthest.at(_shown(farthest)),
     )
+
+
+def _shown(of: Told) -> Number:
+    """The number that page one shows of an answer: where nothing is judged, what was found."""
+    judged = of.answer.answer is not None or of.answer.coverage is not None
+    return of.told if judged else of.answer.witness
 
 
 def to_do(study: Study) -> str:

@@ -128,7 +128,7 @@ def _to_do(evaluation: PartEvaluation, at: int) -> str:
     after = [one for one in evaluation.states[-1].answers if one.verdict == NOT_MET]
     if len(after) > 1:
         others = say(
-            "{count} quantities are not met after compensation: the table below has one.",
+            "{count} quantities are not met after compensation: the table of causes says what would mend each.",
             count=len(after),
         )
         return f"{text} {others}"

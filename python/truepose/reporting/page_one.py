@@ -118,11 +118,15 @@ def page_one(study: Study, part: PageOne | None = None) -> PageOne:
 
 def lines(study: Study) -> tuple[tuple[str, str], ...]:
     """What is worst, what to do, what is not included: a name with a sentence."""
-    calibrated = () if study.calibration is None else (_after_calibration(study.calibrated),)
+    calibrated: tuple[tuple[str, str], ...] = ()
+    names = say("What is worst"), say("What to do")
+    if study.calibration is not None:
+        names = say("As filed, what is worst"), say("As filed, what to do")
+        calibrated = (_after_calibration(study.calibrated),)
     return (
         *calibrated,
-        (say("What is worst"), _worst(study)),
-        (say("What to do"), to_do(study)),
+        (names[0], _worst(study)),
+        (names[1], to_do(study)),
         (say("Not included"), _not_included(study)),
     )
 
@@ -208,7 +212,7 @@ def _calibration_verdict(study: Study) -> Verdict:
 
 def _after_calibration(result: xr.Dataset) -> tuple[str, str]:
     """What to do with the calibration, or what to measure first."""
-    name = say("The calibration")
+    name = say("What to do")
     if result.attrs["accepted"]:
         return name, say(
             "Use the calibrated machine file, which truepose calibrate writes; what follows is "
@@ -409,7 +413,7 @@ def of_machine(machine: Machine) -> tuple[tuple[str, str], ...]:
 
 
 def identification(study: Study) -> tuple[tuple[str, str], ...]:
-    """What the numbers are of: a name and a text one."""
+    """What the numbers are of: a name with a text."""
     attrs = study.budget.attrs
     evaluated = say_counted("{count} pose evaluated", "{count} poses evaluated", study.n_pose)
     measured: tuple[tuple[str, str], ...] = ()

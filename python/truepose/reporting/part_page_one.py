@@ -42,7 +42,7 @@ def part_page_one(evaluation: PartEvaluation, program: str) -> PageOne:
 
 
 def lines(evaluation: PartEvaluation) -> tuple[tuple[str, str], ...]:
-    """What is worst on the part, and what to do: a name and a sentence one."""
+    """What is worst on the part, and what to do: a name with a sentence."""
     answers, at = _worst(evaluation)
     return (
         (say("What is worst on the part"), _told(evaluation, answers, at)),
@@ -128,7 +128,8 @@ def _to_do(evaluation: PartEvaluation, at: int) -> str:
     after = [one for one in evaluation.states[-1].answers if one.verdict == NOT_MET]
     if len(after) > 1:
         others = say(
-            "{count} quantities are not met after compensation: the table of causes says what would mend each.",
+            "{count} quantities are not met after compensation: the table of causes says what "
+            "would mend each.",
             count=len(after),
         )
         return f"{text} {others}"

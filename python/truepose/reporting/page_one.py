@@ -148,7 +148,7 @@ def machine_verdict(study: Study) -> Verdict:
     rows = tuple(
         (
             _judged(next(one for one in answers if one.answer.quantity == quantity)),
-            tuple(_judgement(one) for one in answers if one.answer.quantity == quantity),
+            tuple(_judgement(study, one) for one in answers if one.answer.quantity == quantity),
         )
         for quantity in quantities
     )
@@ -186,12 +186,11 @@ def _judged(of: Told) -> str:
     return say("{quantity}, asked {asked}", quantity=quantity, asked=of.asked)
 
 
-def _judgement(of: Told) -> Judgement:
+def _judgement(study: Study, of: Told) -> Judgement:
     answer, label = of.answer, say(STATES[of.answer.state])
-    if answer.answer is not None:
-        return Judgement(label, f"{of.word}: {of.size}", of.colour, basis=of.basis)
-    if answer.coverage is not None:
-        return Judgement(label, of.size, of.colour, basis=of.basis)
+    if answer.coverage is not None or answer.answer is not None:
+        word = of.size if answer.answer is None else f"{of.word}: {of.size}"
+        return Judgement(label, word, of.colour, _most_machines(study, of), of.basis)
     # Nothing is judged: what was found and what is proven, as the dots have them.
     size = say(
         "{found} found, at most {proven}",
@@ -199,6 +198,26 @@ def _judgement(of: Told) -> Judgement:
         proven=of.text(answer.bound.value, 1),
     )
     return Judgement(label, size, of.colour, basis=say("at {pose}", pose=of.at(answer.witness)))
+
+
+def _most_machines(study: Study, of: Told) -> str:
+    """Which error 95 % of all machines keep, beside a worst case; empty where that is not known."""
+    row = next(
+        (
+            row
+            for row in how_far(study)
+            if (row.state, row.quantity) == (of.answer.state, of.answer.quantity)
+        ),
+        None,
+    )
+    worst = of.answer.coverage is None
+    if row is None or not worst or not math.isfinite(row.sizes["sampled"]):
+        return ""
+    return say(
+        "(95 % of machines: {size} {unit})",
+        size=cells(study, row)["sampled"],
+        unit=of.unit.label,
+    )
 
 
 def _calibration_verdict(study: Study) -> Verdict:
@@ -233,8 +252,8 @@ def _worst(study: Study) -> str:
     answers = told(study.machine, study.accuracy)
     farthest = next(one for one in answers if one.answer.state == BEFORE)
     return say(
-        "{source} does most: {share} % of the sources' worst cases added up ({kind}). As "
-        "commanded, the {quantity} is farthest off at {pose}.",
+        "Most of the error comes from the source {source}: {share} % of all sources' worst cases "
+        "added up ({kind}). As commanded, the {quantity} is farthest off at {pose}.",
         source=study.sources[first],
         share=number(float(study.values("share")[first]) * 100.0, 1),
         kind=word(str(study.values("verdict")[first])),
@@ -324,7 +343,7 @@ def _width(study: Study, of: Tightening) -> str:
     half = 0.5 * of.width * unit.per_si
     places = unit.decimals
     return say(
-        "from ±{wide} to ±{narrow} {unit} ({share} %)",
+        "from ±{wide} to ±{narrow} {unit}, {share} % of its width",
         wide=number(half, places),
         # Rounded down: a little wider would be too wide.
         narrow=number(math.floor(half * of.share * 10**places) / 10**places, places),

@@ -100,7 +100,8 @@ def summary(evaluation: PartEvaluation) -> list[SummaryLine]:
             )
         elif missed and evaluation.of_bands:
             text += ". " + say(
-                "None of {samples} machines drawn is out; one at its limits is",
+                "Of {samples} machines simulated none is out, but a machine at the limits of its "
+                "bands is",
                 samples=grouped(evaluation.samples),
             )
         lines.append(SummaryLine(word(verdict), colour, text))

@@ -96,7 +96,7 @@ def test_what_is_worst_is_first_in_the_ranking() -> None:
     study = planar_study()
     worst, _, left_out = page_one.lines(study)
     first = dict(zip(tables.ranking(study).header, tables.ranking(study).rows[0], strict=True))
-    assert worst[1].startswith(f"{first['source']} does most: {first['share, %']} %")
+    assert f" source {first['source']}: {first['share, %']} %" in worst[1]
     assert f"({first['verdict']})" in worst[1]
     assert "backlash" in left_out[1]
 

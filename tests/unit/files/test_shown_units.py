@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 import truepose as tp
 from command_line import MACHINES, PLANAR, call
+from page_data import figures_of
 from truepose.files.dimensions import DIMENSIONS
 from truepose.files.shown_units import Shown, ShownUnits, shown_units
 from truepose.files.units import unit_of
@@ -155,10 +157,8 @@ def test_the_page_speaks_the_units_of_the_file(
         assert word not in text
     assert "lengths in in, errors in µin and mdeg" in text
     assert "asked 0.1 mm (3937 µin)" in text
-    # Figures: the axes of their data, which plotly's own script does not name.
-    titles = re.findall(r'"text":"([^"]*)"', page)
-    said = [title.encode().decode("unicode_escape") for title in titles if title.isascii()]
-    said += [title for title in titles if not title.isascii()]
+    # Figures: the titles of their axes.
+    said = re.findall(r'"text": "([^"]*)"', json.dumps(figures_of(page), ensure_ascii=False))
     assert any(title.endswith("µin") for title in said)
     assert any(title.endswith("mdeg") for title in said)
     assert not [title for title in said if title.endswith(("µm", "µrad", ", mm"))]

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import base64
 import dataclasses
-import gzip
 import hashlib
 import json
 import re
-from typing import Any
 
 import plotly.io
 import pytest
@@ -16,6 +14,7 @@ from plotly.offline import get_plotlyjs
 
 from made_how_sure import sure_study
 from made_study import hexapod_study, planar_study
+from page_data import figures_of, unpacked
 from truepose.reporting import page, shell
 from truepose.reporting.figures import FIGURES, draw
 from truepose.reporting.figures._json import as_json
@@ -30,16 +29,6 @@ def planar() -> str:
 
 def without_scripts(text: str) -> str:
     return re.sub(r"<(script|style)\b.*?</\1>", "", text, flags=re.DOTALL)
-
-
-def unpacked(text: str, name: str) -> bytes:
-    """A data block of a page."""
-    (block,) = re.findall(f'<script type="application/gzip" id="{name}">(.*?)</script>', text)
-    return gzip.decompress(base64.b64decode(block))
-
-
-def drawn(text: str) -> Any:
-    return json.loads(unpacked(text, "figures-data"))
 
 
 def test_it_asks_for_nothing_from_outside(planar: str) -> None:
@@ -67,12 +56,12 @@ def test_the_library_is_there_once_and_small(planar: str) -> None:
 
 def test_what_is_taken_from_plotly_is_what_it_gives_itself(planar: str) -> None:
     given = plotly.io.templates["plotly_white"].to_plotly_json()
-    assert drawn(planar)["template"] == json.loads(json.dumps(given))
+    assert figures_of(planar)["template"] == json.loads(json.dumps(given))
 
 
 def test_the_figures_data_are_those_of_the_figures() -> None:
     study = planar_study()
-    figures = drawn(page.render(study))["figures"]
+    figures = figures_of(page.render(study))["figures"]
     wanted = {
         one.name: {"data": one.figure.data, "layout": one.figure.layout} for one in draw(study)
     }

@@ -1,4 +1,4 @@
-"""What stands compressed in a page: its blocks of data, and of them what its figures are drawn of."""
+"""What stands compressed in a page: blocks of data, and of them what its figures are drawn of."""
 
 from __future__ import annotations
 

@@ -197,6 +197,10 @@ def unknowns(result: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> 
         tuple(rows),
         words=2,
         note=note,
+        says=say(
+            "{instrument}: the residuals go from {before} to {after} ({what}).",
+            instrument=rows[0][0], before=rows[0][4], after=rows[0][5], what=rows[0][1],
+        ),
     )  # fmt: skip
 
 
@@ -447,6 +451,12 @@ def tool(result: xr.Dataset, units: ShownUnits) -> Table:
         ),
         tuple(rows),
         note=note,
+        says=say(
+            "At the worst pose the standard uncertainty ({quantity}) goes from {before} to {after}.",
+            quantity=rows[0][0],
+            before=rows[0][1],
+            after=rows[0][2],
+        ),
     )
 
 

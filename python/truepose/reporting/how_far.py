@@ -105,6 +105,19 @@ def cells(study: Study, row: HowFar) -> Mapping[str, str]:
     return dict(zip(NUMBERS, texts, strict=True))
 
 
+def _most(study: Study, row: HowFar) -> str:
+    """How far off the first quantity is before compensation: the worst that is known."""
+    texts, unit = cells(study, row), study.units.error(row.quantity)
+    name = "witness" if math.isfinite(row.sizes["witness"]) else "linear"
+    return say(
+        "The {quantity} can be {size} {unit} off {state}.",
+        quantity=word(row.quantity),
+        size=texts[name],
+        unit=unit.label,
+        state=word(row.state),
+    )
+
+
 def table(study: Study) -> Table:
     """The same as a table."""
     rows = []
@@ -112,12 +125,14 @@ def table(study: Study) -> Table:
         unit = study.units.error(row.quantity)
         texts = cells(study, row).values()
         rows.append((word(row.quantity), word(row.state), *texts, unit.label))
+    first, *_ = how_far(study)
     return Table(
         "how_far",
         say("How far off can the tool be?"),
         ("", "", *(word(name) for name in NUMBERS.values()), ""),
         tuple(rows),
         words=2,
+        says=_most(study, first),
         note=say(
             "The largest over all poses. {share} {missing}: there is no such number.",
             share=share_note(study),

@@ -155,6 +155,7 @@ def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
     missing = not_included_text(evaluation.machine, evaluation.condition)
     if missing:
         note += " " + say("Not included: {missing}.", missing=missing)
+    good = sum(answer.verdict == MET for answer in answers.answers)
     return Table(
         f"part {answers.state.name}",
         say("The part {state}", state=word(answers.state.name)),
@@ -162,6 +163,11 @@ def _state(evaluation: PartEvaluation, answers: StateAnswers) -> Table:
         rows,
         3,
         note,
+        says=say(
+            "{good} of {every} quantities are certainly within tolerance.",
+            good=good,
+            every=len(rows),
+        ),
     )
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from truepose.arrays import Floats
 from truepose.language import say
 
 
@@ -23,6 +26,20 @@ class Table:
     note: str = ""
     says: str = ""
     largest: frozenset[tuple[int, int]] = frozenset()
+
+
+def largest_cells(values: Floats, first: int) -> frozenset[tuple[int, int]]:
+    """The cells of the largest of `values` (n_row, n_column) by size, one a column.
+
+    `first`: column of the table in which the first of them stands. A column of one row, or of
+    which no row is larger than another, has none.
+    """
+    cells = []
+    for column, sizes in enumerate(np.abs(values).T):
+        known = sizes[np.isfinite(sizes)]
+        if known.size > 1 and known.max() > known.min():
+            cells.append((int(np.nanargmax(sizes)), first + column))
+    return frozenset(cells)
 
 
 def with_not_included(table: Table, parts: str) -> Table:

@@ -23,7 +23,7 @@ from truepose.reporting.display import (
 )
 from truepose.reporting.result_words import ends, word
 from truepose.reporting.study import Study, warnings_of
-from truepose.reporting.table import Table, with_not_included
+from truepose.reporting.table import Table, largest_cells, with_not_included
 from truepose.runs.poses import reason_text
 
 if TYPE_CHECKING:
@@ -57,12 +57,21 @@ def ranking(study: Study) -> Table:
         ]
     header.append(say("share, %"))
     columns.append(column(study.values("share")[order] * 100, 1))
+    first, unit = order[0], study.units.error(parts[0])
+    highest = study.values("highest")[order]
     table = Table(
         "ranking",
         say("The sources compared"),
         tuple(header),
         tuple(zip(*columns, strict=True)),
         words=2,
+        says=say(
+            "{source} can do most: {size}, {share} % of all sources' worst cases added up.",
+            source=study.sources[first],
+            size=f"{columns[3][0]} {unit.label}",
+            share=columns[-1][0],
+        ),
+        largest=frozenset((row, 3 + 2 * at) for row, at in largest_cells(highest, 0)),
         note=say(
             "Highest: the worst case of this source alone (linear maximum), at its worst pose."
         ),
@@ -75,14 +84,25 @@ def highest_absolute(study: Study) -> Table:
 
     The rows of all sources together are not in that table of the paper.
     """
-    cells = [
-        column(values) for values in study.shown(_highest(study, "highest", "overall_highest")).T
-    ]
+    highest = study.shown(_highest(study, "highest", "overall_highest"))
+    cells = [column(values) for values in highest.T]
+    labels = _end_labels(study)
+    alike = study.positions or study.rotations
+    row, nth = np.unravel_index(int(np.nanargmax(highest[:, alike])), (len(labels), len(alike)))
+    at = alike[nth]
     return Table(
         "highest_absolute",
         say("Highest absolute error"),
         (say("source"), *(f"{name}, {study.units.error(name).label}" for name in study.components)),
-        tuple(zip(_end_labels(study), *cells, strict=True)),
+        tuple(zip(labels, *cells, strict=True)),
+        says=say(
+            "The largest is {size} {unit} in {component}, of “{row}”.",
+            component=study.components[at],
+            row=labels[row],
+            size=cells[at][row],
+            unit=study.units.error(study.components[at]).label,
+        ),
+        largest=largest_cells(highest, 1),
         note=say(
             "Over all poses, per axis of the base frame, exact. All at lower, all at upper ends: "
             "lengths and offsets all at that end of their tolerance bands, the rest as known; "
@@ -96,11 +116,23 @@ def highest_percent(study: Study) -> Table:
     highest = _highest(study, "highest_percent", "overall_highest_percent")
     shown = [index for index in study.positions if np.isfinite(highest[:, index]).any()]
     cells = [column(highest[:, index], 4) for index in shown]
+    labels = _end_labels(study)
+    says = ""
+    if shown:
+        row, at = np.unravel_index(int(np.nanargmax(highest[:, shown])), (len(labels), len(shown)))
+        says = say(
+            "The largest is {percent} % of {component}, of “{row}”.",
+            percent=cells[at][row],
+            component=study.components[shown[at]],
+            row=labels[row],
+        )
     return Table(
         "highest_percent",
         say("Highest error as a percentage of the coordinate"),
         (say("source"), *(f"{study.components[index]}, %" for index in shown)),
-        tuple(zip(_end_labels(study), *cells, strict=True)),
+        tuple(zip(labels, *cells, strict=True)),
+        says=says,
+        largest=largest_cells(highest[:, shown], 1),
         note=say("Of the commanded coordinate at the same pose, where that is not near zero."),
     )
 
@@ -141,6 +173,13 @@ def compensation(study: Study) -> Table:
             *(f"{word(name)}, {units.error(name).label}" for name in names),
         ),
         tuple(zip([name for name, _, _ in rows], *cells, strict=True)),
+        says=say(
+            "The worst case of {quantity} goes from {before} to {after} {unit}.",
+            quantity=word(names[-1]),
+            before=cells[-1][3],
+            after=cells[-1][7],
+            unit=units.error(names[-1]).label,
+        ),
         note=say(
             "After: the corrected command driven through the actual machine. Known error: of all "
             "that is known. All at lower, all at upper ends: lengths and offsets all at that end "
@@ -243,6 +282,18 @@ def internal_forces(study: Study) -> Table:
         ),
         tuple(zip(*columns, strict=True)),
         words=4,
+        says=say(
+            "{source} loads the machine most: {force} {unit} in {closure}; without clearances "
+            "{rigid} {unit}.",
+            source=columns[0][0],
+            force=columns[4][0],
+            unit=force_unit.label,
+            closure=columns[2][0],
+            rigid=columns[5][0],
+        ),
+        largest=largest_cells(
+            np.stack([highest(name) for name in ("force", "force_rigid")], axis=-1), 4
+        ),
         note=say(
             "Each source alone and without load, where it loads a closure most. Fits: no force "
             "even without clearances. Absorbed: the clearances take all of it; partly: some of "
@@ -260,6 +311,8 @@ def closure_forces(study: Study) -> Table:
         np.abs(strained[f"overall_{name}"].values).max(axis=0) * small.per_si
         for name in ("absorbed", "strain")
     )
+    most = np.abs(force).max(axis=0)
+    worst = where_highest(most)
     return Table(
         "closure_forces",
         say("Forces in the closures"),
@@ -280,6 +333,13 @@ def closure_forces(study: Study) -> Table:
                 strict=True,
             )
         ),
+        says=say(
+            "{closure} carries most: {force} {unit}.",
+            closure=str(strained["closure"].values[worst]),
+            force=number(float(most[worst]), decimals_for(force)),
+            unit=unit.label,
+        ),
+        largest=largest_cells(np.stack([force.min(axis=0), force.max(axis=0)], axis=-1), 1),
         note=say(
             "Over all poses: all sources at their shifts, under all loads. Tension is positive."
         ),
@@ -325,8 +385,16 @@ def answers(machine: Machine, answered: Sequence[Answer]) -> Table:
         ("", say("answer"), *names, say("asked"), say("at")),
         tuple(rows),
         words=2,
+        says=_how_many_met(answered),
         note=note,
     )
+
+
+def _how_many_met(answered: Sequence[Answer]) -> str:
+    judged = [answer.met for answer in answered if answer.met is not None]
+    if not judged:
+        return say("No accuracy is asked.")
+    return say("{met} of {judged} are met.", met=sum(judged), judged=len(judged))
 
 
 def warnings(study: Study) -> Table | None:

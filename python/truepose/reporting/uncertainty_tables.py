@@ -123,6 +123,12 @@ def _sampled_at(machine: Machine, result: xr.Dataset, pose: int) -> Table:
             say("largest sample"),
         ),
         tuple(rows),
+        says=say(
+            "{percent} of the samples have an error ({quantity}) of at most {size}.",
+            percent=percent,
+            quantity=word(quantities(result)[0]),
+            size=_error_text(machine, result, "magnitude_upper", pose),
+        ),
         note=say(
             "At {pose}, where the position is farthest off. {percent} of the samples lie in this "
             "coverage interval, as many below as above it; the shortest interval with as many is "
@@ -132,6 +138,13 @@ def _sampled_at(machine: Machine, result: xr.Dataset, pose: int) -> Table:
         )
         + _drawn(result, pose),
     )
+
+
+def _error_text(machine: Machine, result: xr.Dataset, name: str, pose: int) -> str:
+    """A number of the first quantity at a pose, with its unit, as the tables have it."""
+    unit = machine.shown.error(quantities(result)[0])
+    (text,) = column(np.array([float(result[name].values[pose, 0]) * unit.per_si]))
+    return f"{text} {unit.label}"
 
 
 def _drawn(result: xr.Dataset, pose: int) -> str:
@@ -188,6 +201,18 @@ def _sampled_over(machine: Machine, result: xr.Dataset) -> Table:
         ),
         tuple(rows),
         words=2,
+        says=say(
+            "{percent} of the samples have an error ({quantity}) of at most {size} at any of these "
+            "poses.",
+            percent=percent_text(float(result.attrs["probability"])),
+            quantity=word(quantities(result)[0]),
+            size=_error_text(
+                machine,
+                result,
+                "magnitude_upper",
+                where_highest(result["magnitude_upper"].values[:, 0]),
+            ),
+        ),
         note=say("Farthest: the end of the coverage interval that is farther from zero.")
         + _lost(result),
     )
@@ -249,6 +274,12 @@ def _bounds_at(machine: Machine, result: xr.Dataset, pose: int) -> Table:
             say("linear worst case"),
         ),
         tuple(rows),
+        says=say(
+            "No machine inside the bands has an error ({quantity}) of more than {size} here.",
+            quantity=word(quantities(result)[0]),
+            size=f"{rows[len(components(result))][4]} "
+            f"{machine.shown.error(quantities(result)[0]).label}",
+        ),
         note=say(
             "At {pose}, where the position's bound is highest. For every deviation inside the "
             "bands the tool is there and nowhere else, and its error between these ends, "

@@ -12,6 +12,7 @@ from truepose.language import grouped, marked, say, say_counted
 from truepose.reporting.alike import with_ties, worth_tightening
 from truepose.reporting.display import column, is_position, where_highest
 from truepose.reporting.reading import at_text, components, position_of
+from truepose.reporting.result_words import word
 from truepose.reporting.table import Table
 from truepose.reporting.tables import MOST_LISTED
 from truepose.uncertainty_analysis.shares import first_to_tighten
@@ -151,6 +152,14 @@ def _shares(machine: Machine, result: xr.Dataset, pose: int, of: str, part: str)
         _title(of, part),
         tuple(header),
         rows,
+        says=say(
+            "{name} makes most of the variance ({quantity}): {share} % in total.",
+            name=who.names[0],
+            quantity=word(part),
+            share=rows[0][header.index(say("total, %"))],
+        )
+        if rows
+        else "",
         note=say(
             "At {pose}, where the tool spreads most, of the variances of all components "
             "together. First: what would go if this one were known; total: what would stay if "

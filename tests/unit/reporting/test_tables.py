@@ -12,6 +12,7 @@ from truepose.files.shown_units import METRIC
 from truepose.reporting import how_far, inputs, tables
 from truepose.reporting.display import LOWER, UPPER, column, number, pose_text, where_highest
 from truepose.reporting.study import Study
+from truepose.reporting.table import largest_cells
 from truepose.verdict.answer import BEFORE
 
 STUDIES = {"planar": planar_study(), "hexapod": hexapod_study(3)}
@@ -181,3 +182,24 @@ def test_the_condition_says_all_that_acts() -> None:
     assert rows["temperature gradient of frame"] == "x 0, y 0, z −5 K/m"
     assert rows["further force on the tool"] == "300 N in any direction across x 0, y 0, z 1"
     assert rows["acceleration of the platform"] == "x 0, y 2, z 0 m/s²"
+
+
+def test_the_largest_of_a_column_is_marked_where_it_is_one() -> None:
+    values = np.array([[1.0, 2.0, np.nan], [-3.0, 2.0, np.nan], [np.nan, 2.0, 5.0]])
+    assert largest_cells(values, 1) == {(1, 1)}, "equal ones, and one alone, are not compared"
+
+
+def test_marked_cells_and_sentences_have_the_largest_number_of_their_column(study: Study) -> None:
+    ranked, highest = tables.ranking(study), tables.highest_absolute(study)
+    for table in (ranked, highest):
+        assert table.largest
+        for row, at in table.largest:
+            assert cell(table.rows[row][at]) == max(cell(other[at]) for other in table.rows)
+    assert ranked.says.startswith(f"{ranked.rows[0][0]} can do most: {ranked.rows[0][3]} ")
+    lengths = [cell(text) for row in highest.rows for text in row[1 : 1 + len(study.positions)]]
+    assert f"The largest is {max(lengths):.10g}" in highest.says.replace(".0 ", " ")
+    worst, far = tables.compensation(study), how_far.table(study)
+    assert f"from {worst.rows[3][-1]} to {worst.rows[7][-1]} " in worst.says
+    assert f" {far.rows[0][4]} {far.rows[0][-1]} off" in far.says
+    met = sum(answer.met or False for answer in study.accuracy)
+    assert tables.answers(study.machine, study.accuracy).says.startswith(f"{met} of ")

@@ -197,10 +197,6 @@ def unknowns(result: xr.Dataset, shown_in: ShownUnits, *, bars: bool = True) -> 
         tuple(rows),
         words=2,
         note=note,
-        says=say(
-            "{instrument}: the residuals go from {before} to {after} ({what}).",
-            instrument=rows[0][0], before=rows[0][4], after=rows[0][5], what=rows[0][1],
-        ),
     )  # fmt: skip
 
 
@@ -391,6 +387,10 @@ def residuals(result: xr.Dataset, shown_in: ShownUnits) -> Table:
         tuple(rows),
         words=2,
         note=note,
+        says=say(
+            "{instrument}: the residuals go from {before} to {after} ({what}).",
+            instrument=rows[0][0], before=rows[0][4], after=rows[0][5], what=rows[0][1],
+        ),
     )  # fmt: skip
 
 
@@ -452,7 +452,8 @@ def tool(result: xr.Dataset, units: ShownUnits) -> Table:
         tuple(rows),
         note=note,
         says=say(
-            "At the worst pose the standard uncertainty ({quantity}) goes from {before} to {after}.",
+            "At the worst pose the standard uncertainty ({quantity}) goes from {before} to "
+            "{after}.",
             quantity=rows[0][0],
             before=rows[0][1],
             after=rows[0][2],

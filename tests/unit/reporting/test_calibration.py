@@ -303,3 +303,11 @@ def test_a_row_without_a_pose_is_at_no_place_of_the_map(study: Study) -> None:
         calibration_map.figure(replace(study, calibration=found.assign_coords(nowhere)))
     )
     assert not len(empty.data[0].x)
+
+
+def test_sentences_have_the_numbers_of_their_rows(study: Study) -> None:
+    known = told.tool(study.calibrated, MADE_UNITS)
+    left = told.residuals(study.calibrated, MADE_UNITS)
+    assert f"({known.rows[0][0]}) goes from {known.rows[0][1]} to {known.rows[0][2]}." in known.says
+    name, what, *_, before, after = left.rows[0][:6]
+    assert left.says == f"{name}: the residuals go from {before} to {after} ({what})."

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import isfinite
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from truepose.arrays import Floats
 from truepose.language import say
+
+if TYPE_CHECKING:  # `init --list` shows a table without numpy
+    from truepose.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -35,10 +37,10 @@ def largest_cells(values: Floats, first: int) -> frozenset[tuple[int, int]]:
     which no row is larger than another, has none.
     """
     cells = []
-    for column, sizes in enumerate(np.abs(values).T):
-        known = sizes[np.isfinite(sizes)]
-        if known.size > 1 and known.max() > known.min():
-            cells.append((int(np.nanargmax(sizes)), first + column))
+    for column, sizes in enumerate(abs(values).T.tolist()):
+        known = {row: size for row, size in enumerate(sizes) if isfinite(size)}
+        if known and max(known.values()) > min(known.values()):
+            cells.append((max(known, key=known.__getitem__), first + column))
     return frozenset(cells)
 
 

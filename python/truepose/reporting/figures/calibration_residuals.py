@@ -213,7 +213,13 @@ def _points(
         legendgroup=name,
         showlegend=legend,
         mode="markers",
-        marker={"color": colour, "size": 7, "symbol": symbol, "opacity": 0.85},
+        # Thin and translucent, the colour of a ring would not be seen.
+        marker={
+            "color": colour,
+            "size": 7,
+            "symbol": symbol,
+            "line": {"width": 1.6, "color": colour},
+        },
         hovertemplate="%{text}: %{y:.3f}<extra>" + name + "</extra>",
     )
 

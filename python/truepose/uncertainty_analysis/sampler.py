@@ -110,19 +110,19 @@ class Random:
         linked = self.copula.linked.tolist()
         # The kernel has no quantile function of Student's distribution.
         self._by_hand = any(of.distributions[k].name == _STUDENT for k in linked)
-        described = [
-            _described(distribution, int(stream), int(number))
+        told = [
+            described(distribution, int(stream), int(number))
             for distribution, stream, number in zip(
                 of.distributions, of.streams, of.numbers, strict=True
             )
         ]
         if self._by_hand:
             for k in linked:
-                described[k] |= {"kind": "normal", "sigmas": 1.0}
+                told[k] |= {"kind": "normal", "sigmas": 1.0}
             linked = []
         factor = self.copula.factor if linked else np.empty((0, 0))
         self.variables = KernelVariables(
-            described,
+            told,
             linked,
             factor.ravel().tolist(),
             [members.tolist() for members in of.directions],
@@ -147,23 +147,24 @@ class Random:
         return other
 
 
-def _described(distribution: Distribution, stream: int, number: int) -> dict[str, object]:
-    described: dict[str, object] = {
+def described(distribution: Distribution, stream: int, number: int) -> dict[str, object]:
+    """A variable as the kernel takes it: its distribution, what it belongs to, its number there."""
+    told: dict[str, object] = {
         "kind": distribution.name,
         "sigmas": distribution.sigmas,
         "stream": stream,
         "number": number,
     }
     if distribution.dof is not None:
-        described["dof"] = distribution.dof
+        told["dof"] = distribution.dof
     if distribution.values:
         values, up_to = distribution.steps
-        described |= {
+        told |= {
             "kind": "discrete",
             "values": values.tolist(),
             "probabilities": np.diff(up_to, prepend=0.0).tolist(),
         }
-    return described
+    return told
 
 
 class _Sobol:

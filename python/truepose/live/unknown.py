@@ -1,0 +1,112 @@
+"""What sources leave unknown, for a bundle: variables, and the columns that they move as laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from truepose.machine import Condition, Machine
+from truepose.runs.variables import Variables, variables_at
+from truepose.sources import PoseBlock, Source
+from truepose.uncertainty_analysis.known_shifts import LARGE, PROBING, NoLawError, terms
+from truepose.uncertainty_analysis.sampler import Random, described
+from truepose.verdict.tightening import band_of
+
+
+def unknown(machine: Machine, block: PoseBlock, sources: Sequence[Source]) -> dict[str, Any]:
+    """`variables`, `columns`, `copula` and `directions` of a bundle, of all `sources` together.
+
+    Raises `NoLawError` where a half width follows from the pose by no law of a strut's length, or
+    from what a page's sliders change: temperatures and the wrench.
+    """
+    cold = block.condition
+    every = _variables(machine, block, cold, sources)
+    for condition in _conditions(machine, cold):
+        _require_same(every, _variables(machine, block, condition, sources))
+    drawn = Random(every, 0)
+    linked = drawn.copula.linked.tolist()
+    return {
+        "variables": [
+            {
+                "name": name,
+                "source": source,
+                "group": _group(name, source),
+                "stream": int(stream),
+                "number": int(number),
+                "distribution": {
+                    key: value
+                    for key, value in described(distribution, 0, 0).items()
+                    if key not in ("stream", "number")
+                },
+            }
+            for name, source, stream, number, distribution in zip(
+                every.names,
+                every.sources,
+                every.streams,
+                every.numbers,
+                every.distributions,
+                strict=True,
+            )
+        ],
+        "columns": _columns(block, every),
+        "copula": {"members": linked, "factor": drawn.copula.factor.tolist()} if linked else None,
+        "directions": [members.tolist() for members in every.directions],
+    }
+
+
+def _group(name: str, source: str) -> str:
+    """What is made tighter together with a variable, as page one names it.
+
+    A variable that is named with its source, since another source has the like, is so grouped.
+    """
+    own = name.removeprefix(f"{source}: ")
+    band = band_of(own, source).name
+    return band if own == name else f"{source}: {band}"
+
+
+def correlated_student(unknown: Mapping[str, Any]) -> bool:
+    """Whether a variable is correlated that the kernel cannot draw so: Student's distribution."""
+    members = (unknown["copula"] or {"members": []})["members"]
+    variables = unknown["variables"]
+    return any(variables[at]["distribution"]["kind"] == "student-t" for at in members)
+
+
+def _variables(
+    machine: Machine, block: PoseBlock, condition: Condition, sources: Sequence[Source]
+) -> Variables:
+    acting = [source for source in sources if source.acts(condition)]
+    return variables_at(machine, replace(block, condition=condition), acting)
+
+
+def _conditions(machine: Machine, cold: Condition) -> list[Condition]:
+    """What sliders may come to: warmer parts, a force, and the file's own."""
+    warm = cold.replace(temperature=cold.reference_temperature + LARGE)
+    return [warm, cold.replace(force=(PROBING[0],) * 3), machine.condition]
+
+
+def _require_same(one: Variables, other: Variables) -> None:
+    """Raise `NoLawError` where the bands are others in another condition."""
+    same = (
+        one.names == other.names
+        and np.array_equal(one.columns, other.columns)
+        and np.allclose(one.half_width, other.half_width, rtol=1e-12, atol=0.0)
+    )
+    if not same:
+        raise NoLawError("has bands that follow from the temperature or the wrench")
+
+
+def _columns(block: PoseBlock, every: Variables) -> list[dict[str, Any]]:
+    columns = []
+    for at, (parameter, variable) in enumerate(
+        zip(every.columns.tolist(), every.variable_of.tolist(), strict=True)
+    ):
+        (law,) = terms(block, every.columns[at : at + 1], every.half_width[:, at : at + 1])
+        half = [law.constant, law.slope, law.strut]
+        columns.append({"parameter": parameter, "variable": variable, "half": half})
+    return columns
+
+
+__all__ = ["correlated_student", "unknown"]

@@ -139,7 +139,7 @@ CATALOGUE: dict[str, str] = {
     "no-temperature-log": "an error over time is wanted, but there is no temperature log",
     "bad-times": "the times given are not finite numbers",
     "no-pose-left": "the machine can reach none of the poses",
-    "not-live": "a live page is wanted of a machine with too few poses to find its laws from",
+    "not-live": "a live page is wanted of a machine that is not its file's, or of too few poses",
     "unusable-pose": "a pose cannot be used, and --strict makes that an error",
     "output-not-writable": "the output cannot be written",
     "extra-missing": "an optional package that this needs is not installed",

@@ -13,10 +13,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import ICE_POINT, Shown, ShownUnits, shown_units
-from truepose.live.unknown import correlated_student, unknown
+from truepose.live.unknown import correlated_student, unknown, yields_unsaid
 from truepose.machine import Machine
 from truepose.runs.controller_geometry import require_known_controller
 from truepose.runs.displacement import displacement, sum_deviations
@@ -31,6 +30,7 @@ from truepose.uncertainty_analysis.known_shifts import (
     compliance_laws,
     expanding,
     probed_poses,
+    require_law,
     source_law,
 )
 from truepose.version import version
@@ -47,7 +47,7 @@ def bundle(machine: Machine) -> dict[str, Any]:
     for a calibrated file of which it is not known what its controller works with.
     """
     require_known_controller(machine)
-    block = _probed(machine)
+    block, home = _probed(machine), _home(machine)
     laws, refused = _laws(machine, block)
     sources = [source for source in _sources(machine) if source.name in laws]
     yields = any(law.yields for law in laws.values())
@@ -67,12 +67,12 @@ def bundle(machine: Machine) -> dict[str, Any]:
         "reference_temperature": reference,
         "sources": [
             *(_live(source, laws[source.name]) for source in sources),
-            *(_not_live(machine, source, why) for source, why in refused),
+            *(_not_live(machine, home, source, why) for source, why in refused),
         ],
         "compliance": {
             "own": _rows(own),
             "shared": [list(pair) for pair in shared],
-            "limbs": yields and bool(machine.limbs),
+            "limbs": yields and bool(machine.limbs) and not yields_unsaid(machine, sources),
         },
         **unknown(machine, block, sources),
         "condition": {
@@ -86,7 +86,7 @@ def bundle(machine: Machine) -> dict[str, Any]:
         "workspace": {
             "low": poses.min(axis=0).tolist(),
             "high": poses.max(axis=0).tolist(),
-            "home": _home(machine, poses),
+            "home": home.requested[home.indices[0]].tolist(),
             "poses": len(poses),
         },
         "target": _target(machine),
@@ -95,21 +95,32 @@ def bundle(machine: Machine) -> dict[str, Any]:
 
 
 def _probed(machine: Machine) -> PoseBlock:
+    """Where laws are found. Raises `RequestError` (not-live, no-workspace)."""
+    if machine.replaced:
+        names = ", ".join(sorted(machine.replaced)[:3])
+        raise _cannot(
+            machine,
+            f"values of {names} that were replaced in Python",
+            "the values of the file",
+            "write them into the file",
+        )
     block = probed_poses(machine)
-    if block is None or block.indices.size < FEWEST:
-        raise RequestError(
-            Problem(
-                "not-live",
-                "the machine cannot be made into a live page",
-                file=machine.file,
-                found=f"{0 if block is None else block.indices.size} usable poses about the "
-                "workspace",
-                expected=f"at least {FEWEST}, from which to find how the sources follow from the "
-                "pose",
-                hint="truepose check says why poses cannot be used",
-            )
+    usable = 0 if block is None else block.indices.size
+    if block is None or usable < FEWEST:
+        raise _cannot(
+            machine,
+            f"{usable} usable poses about the workspace",
+            f"at least {FEWEST}, from which to find how the sources follow from the pose",
+            "truepose check says why poses cannot be used",
         )
     return block
+
+
+def _cannot(machine: Machine, found: str, expected: str, hint: str) -> RequestError:
+    message = "the machine cannot be made into a live page"
+    return RequestError(
+        Problem("not-live", message, file=machine.file, found=found, expected=expected, hint=hint)
+    )
 
 
 def _sources(machine: Machine) -> tuple[Source, ...]:
@@ -119,17 +130,21 @@ def _sources(machine: Machine) -> tuple[Source, ...]:
 def _laws(
     machine: Machine, block: PoseBlock
 ) -> tuple[dict[str, SourceLaw], list[tuple[Source, str]]]:
-    """What follows laws, by name, and what does not, with why."""
+    """What follows laws and does anything, by name, and what follows none, with why."""
     laws: dict[str, SourceLaw] = {}
     refused: list[tuple[Source, str]] = []
     for source in _sources(machine):
         try:
             law = source_law(source, block)
+            require_law(source, law, block, machine.condition)
             # Asked of each alone, so that one without laws takes no other with it.
             variables = unknown(machine, block, [source])
             if correlated_student(variables):
                 raise NoLawError("has correlated variables of Student's distribution")
-            laws[source.name] = law
+            told = law.at_reference or any(law.per_kelvin.values()) or variables["variables"]
+            # What does nothing, whatever a slider does, is no row of zeros.
+            if told or law.yields or source.acts(machine.condition):
+                laws[source.name] = law
         except NoLawError as failure:
             refused.append((source, str(failure)))
     return laws, refused
@@ -150,7 +165,7 @@ def _rows(terms: Sequence[Term]) -> list[list[Any]]:
     return [[term.parameter, term.constant, term.slope, term.strut] for term in terms]
 
 
-def _not_live(machine: Machine, source: Source, why: str) -> dict[str, Any]:
+def _not_live(machine: Machine, home: PoseBlock, source: Source, why: str) -> dict[str, Any]:
     """With its largest error alone at its shift, over the file's poses in the file's condition."""
     largest = dict.fromkeys(quantities(machine.components), 0.0)
     if source.acts(machine.condition):
@@ -168,21 +183,27 @@ def _not_live(machine: Machine, source: Source, why: str) -> dict[str, Any]:
         "why": why,
         "largest": largest,
         "banded": source.acts(machine.condition)
-        and bool(source.deviation(machine, machine.condition, _first(machine)).banded.size),
+        and bool(source.deviation(machine, machine.condition, home).banded.size),
     }
 
 
-def _first(machine: Machine) -> PoseBlock:
-    return next(iter(PoseRun(machine, machine.poses(), machine.condition)))
-
-
-def _home(machine: Machine, poses: Floats) -> list[float]:
-    """The pose of the workspace that is nearest to its middle: a pose that is evaluated anyway."""
+def _home(machine: Machine) -> PoseBlock:
+    """The usable pose of the file's nearest to the middle. Raises `RequestError` (not-live)."""
+    poses = machine.poses()
     low, high = poses.min(axis=0), poses.max(axis=0)
     span = np.where(high > low, high - low, 1.0)
     away = np.square((poses - 0.5 * (low + high)) / span).sum(axis=1)
-    home: list[float] = poses[int(np.argmin(away))].tolist()
-    return home
+    nearest = poses[np.argsort(away, kind="stable")]
+    # Most files can use the first; the others are looked at only where it cannot be.
+    for some in (nearest[:1], nearest[1:]):
+        for block in PoseRun(machine, some, machine.condition) if len(some) else ():
+            return block.select(np.arange(block.indices.size) == 0)
+    raise _cannot(
+        machine,
+        "no pose of the workspace that the machine can reach",
+        "at least one",
+        "truepose check says why poses cannot be used",
+    )
 
 
 def _target(machine: Machine) -> dict[str, float]:

@@ -11,7 +11,15 @@ import numpy as np
 from truepose.machine import Condition, Machine
 from truepose.runs.variables import Variables, variables_at
 from truepose.sources import PoseBlock, Source
-from truepose.uncertainty_analysis.known_shifts import LARGE, PROBING, NoLawError, terms
+from truepose.sources._stiffness import lacking
+from truepose.uncertainty_analysis.known_shifts import (
+    LARGE,
+    PROBING,
+    NoLawError,
+    expanding,
+    terms,
+    warmed,
+)
 from truepose.uncertainty_analysis.sampler import Random, described
 from truepose.verdict.tightening import band_of
 
@@ -24,7 +32,7 @@ def unknown(machine: Machine, block: PoseBlock, sources: Sequence[Source]) -> di
     """
     cold = block.condition
     every = _variables(machine, block, cold, sources)
-    for condition in _conditions(machine, cold):
+    for condition in _conditions(block, sources):
         _require_same(every, _variables(machine, block, condition, sources))
     drawn = Random(every, 0)
     linked = drawn.copula.linked.tolist()
@@ -81,10 +89,22 @@ def _variables(
     return variables_at(machine, replace(block, condition=condition), acting)
 
 
-def _conditions(machine: Machine, cold: Condition) -> list[Condition]:
-    """What sliders may come to: warmer parts, a force, and the file's own."""
-    warm = cold.replace(temperature=cold.reference_temperature + LARGE)
-    return [warm, cold.replace(force=(PROBING[0],) * 3), machine.condition]
+def _conditions(block: PoseBlock, sources: Sequence[Source]) -> list[Condition]:
+    """What sliders may come to: warmer parts, a wrench either way, and the file's own."""
+    machine, cold = block.machine, block.condition
+    conditions = [warmed(block, [LARGE] * len(expanding(machine))), machine.condition]
+    if yields_unsaid(machine, sources):
+        return conditions
+    for newtons in (PROBING[0], -PROBING[1]):
+        arm = newtons * machine.characteristic_length
+        conditions.append(cold.replace(force=(newtons,) * 3, moment=(arm,) * 3))
+    return conditions
+
+
+def yields_unsaid(machine: Machine, sources: Sequence[Source]) -> bool:
+    """Whether something is to give way and nobody says how stiff it is: a page takes no wrench."""
+    yields = any(getattr(source, "over_region", None) == "wrench" for source in sources)
+    return yields and bool(lacking(machine.drives, machine.struts, machine.limbs, ""))
 
 
 def _require_same(one: Variables, other: Variables) -> None:
@@ -109,4 +129,4 @@ def _columns(block: PoseBlock, every: Variables) -> list[dict[str, Any]]:
     return columns
 
 
-__all__ = ["correlated_student", "unknown"]
+__all__ = ["correlated_student", "unknown", "yields_unsaid"]

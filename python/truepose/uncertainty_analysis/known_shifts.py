@@ -14,7 +14,7 @@ refused by name.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -105,15 +105,55 @@ def source_law(source: Source, block: PoseBlock) -> SourceLaw:
         return SourceLaw(source.name, (), {}, True)
     cold_shift = _shift(source, block, block.condition)
     _require_no_wrench(source, block, cold_shift)
-    return SourceLaw(
+    parts = expanding(block.machine)
+    law = SourceLaw(
         source.name,
         tuple(terms(block, *cold_shift)),
-        {
-            part: tuple(_per_kelvin(source, block, cold_shift, part))
-            for part in expanding(block.machine)
-        },
+        {part: tuple(_per_kelvin(source, block, cold_shift, part)) for part in parts},
         False,
     )
+    require_law(source, law, block, warmed(block, [LARGE * (1 + k) for k in range(len(parts))]))
+    return law
+
+
+def warmed(block: PoseBlock, rises: Sequence[float]) -> Condition:
+    """The block's condition with each part of `expanding` (in order) by its own rise, K, warmer."""
+    cold = block.condition
+    parts = zip(expanding(block.machine), rises, strict=True)
+    return cold.replace(
+        temperature={part: cold.reference_temperature + rise for part, rise in parts}
+    )
+
+
+def require_law(source: Source, law: SourceLaw, block: PoseBlock, condition: Condition) -> None:
+    """Hold the law of a source that does not yield against the source in `condition`, no wrench.
+
+    Parts that are warm together must add; and a temperature may count that no law knows, that of a
+    part that does not expand. Raises `NoLawError`, or what the source raises in that condition.
+    """
+    if law.yields:
+        return
+    added = [_evaluated(block, law.at_reference)]
+    for part, per_kelvin in law.per_kelvin.items():
+        columns, values = _evaluated(block, per_kelvin)
+        added.append((columns, values * condition.temperature_rise(part)))
+    columns, off = _less(_shift(source, block, condition), sum_deviations(added))
+    # Parts may cancel each other: each is as exact as its own size.
+    sizes = [(of, np.abs(values).max(axis=0, keepdims=True)) for of, values in added]
+    known, size = sum_deviations(sizes)
+    allowed = np.zeros(columns.size)
+    allowed[np.searchsorted(columns, known)] = PROPORTION * size[0]
+    if (np.abs(off).max(axis=0) > allowed).any():
+        raise NoLawError("follows from temperatures in another way than part by part")
+
+
+def _evaluated(block: PoseBlock, terms: Sequence[Term]) -> ParameterDeviation:
+    """What terms say at the poses of the block: parameters (k,), values (n, k)."""
+    values = np.empty((len(block.lengths), len(terms)))
+    for at, term in enumerate(terms):
+        slope = 0.0 if term.strut is None else term.slope * block.lengths[:, term.strut]
+        values[:, at] = term.constant + slope
+    return np.array([term.parameter for term in terms], np.intp), values
 
 
 def expanding(machine: Machine) -> tuple[str, ...]:
@@ -211,6 +251,8 @@ __all__ = [
     "compliance_laws",
     "expanding",
     "probed_poses",
+    "require_law",
     "source_law",
     "terms",
+    "warmed",
 ]

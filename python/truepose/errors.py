@@ -153,6 +153,7 @@ CATALOGUE: dict[str, str] = {
     "witness-not-written": "a witness that a machine file cannot say",
     "no-browser": "a PDF is wanted where no browser is installed that prints it",
     "browser-failed": "the browser that prints a PDF did not start, or did not print",
+    "no-live-kernel": "a live page is wanted where the kernel for browsers was not built",
     "unknown-language": "a language that the report is not written in",
     "unknown-kind": "a kind of machine that is not in the library",
     "no-family": "joint centres are to follow from a family, in a file without one",

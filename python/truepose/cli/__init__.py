@@ -35,6 +35,7 @@ COMMANDS: dict[str, str] = {
     "over-time": "truepose.cli.over_time",
     "strain": "truepose.cli.strain",
     "report": "truepose.cli.report",
+    "live": "truepose.cli.live",
     "part": "truepose.cli.part",
     "gcode": "truepose.cli.gcode",
     "export": "truepose.cli.export",

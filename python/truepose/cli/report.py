@@ -104,7 +104,7 @@ def _report(options: dict[str, Any]) -> int:
     from truepose.files.writing import require_own_folder, require_writable, written_together
     from truepose.reporting import figure_data
     from truepose.reporting.drawing_packages import module_that_draws
-    from truepose.reporting.report import ENDINGS, made, write_page
+    from truepose.reporting.report import ENDINGS, is_pdf, made, write_page
     from truepose.verdict.answer import AFTER
 
     if options["output"] is None:
@@ -126,13 +126,13 @@ def _report(options: dict[str, Any]) -> int:
     if beside:
         require_writable(request.output, ENDINGS, [request.machine_file, *beside])
     machine = _steps.read_machine(request, ENDINGS)
-    browser = _browser() if request.output.suffix.lower() == ".pdf" else None
+    browser = _browser() if is_pdf(request.output) else None
     if data_folder is not None:
         require_own_folder(data_folder, figure_data.is_data_file, "--figure-data")
     text, watching = _steps.machine_text(request), _steps.Watching(request)
     report = made(machine, measurements, program, features, text, watching)
     say_result(report.study.budget)
-    shown_page, contents = report.rendered()
+    shown_page, contents = report.rendered(live=browser is None)
     data = {}
     if data_folder is not None:
         data = figure_data.data_files(contents.drawn.values(), contents.tables)

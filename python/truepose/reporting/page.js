@@ -170,6 +170,8 @@
     addEventListener("resize", focusWide);
     document.addEventListener("toggle", focusWide, true);
     if (forPrint) unfold();
+    // The live part, where there is one, comes first: plotly.js keeps the page busy.
+    if (typeof liveStarted !== "undefined") await liveStarted;
     try {
       drawn = await (await unpacked("figures-data")).json();
       await runPlotly();

@@ -11,6 +11,7 @@ from truepose.language import grouped, say, say_counted
 from truepose.reporting import calibration, how_far, inputs, tables, uncertainty_tables
 from truepose.reporting.accuracy import gains, told, where_answered
 from truepose.reporting.figures import DrawnFigure, draw
+from truepose.reporting.live.part import LivePart
 from truepose.reporting.page_one import PageOne, page_one
 from truepose.reporting.shell import Contents, page_parts, template
 from truepose.reporting.study import Study
@@ -44,16 +45,25 @@ class PartShown:
     process: str
 
 
-def render(study: Study, machine_text: str = "", part: PartShown | None = None) -> str:
+def render(
+    study: Study,
+    machine_text: str = "",
+    part: PartShown | None = None,
+    live: LivePart | str = "",
+) -> str:
     """The page as text. `machine_text` is the machine file, shown as it was read.
 
-    `part`: what the machine makes of a program, where one is given.
+    `part`: what the machine makes of a program, where one is given. `live`: the live part, or why
+    there is none.
     """
-    return rendered(study, machine_text, part)[0]
+    return rendered(study, machine_text, part, live)[0]
 
 
 def rendered(
-    study: Study, machine_text: str = "", part: PartShown | None = None
+    study: Study,
+    machine_text: str = "",
+    part: PartShown | None = None,
+    live: LivePart | str = "",
 ) -> tuple[str, Contents]:
     """The same, and what stands on it, in its order."""
     results = [tables.ranking(study), tables.highest_absolute(study), tables.highest_percent(study)]
@@ -67,7 +77,8 @@ def rendered(
         results.append(left_out)
     drawn = list(draw(study))
     parameters = inputs.parameters(study.machine)
-    parts = page_parts(say("{machine} · positioning error", machine=study.machine.name))
+    title = say("{machine} · positioning error", machine=study.machine.name)
+    parts = page_parts(title, live if isinstance(live, LivePart) else None)
     text = template("page.html.jinja").render(
         machine=study.machine,
         page_one=page_one(study, None if part is None else part.page_one),
@@ -100,6 +111,7 @@ def rendered(
         machine_text=machine_text,
         part=part,
         limits=limits(),
+        not_live=live if isinstance(live, str) else "",
         said=_said(study, len(parameters.rows), part),
         hashes=_hashes(study),
         **parts,

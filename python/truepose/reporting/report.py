@@ -24,6 +24,7 @@ from truepose.verdict.answer import AFTER, BEFORE, Answer, met
 
 if TYPE_CHECKING:
     from truepose.calibration.measurements import Measurements
+    from truepose.reporting.live.part import LivePart
     from truepose.reporting.page import PartShown
     from truepose.reporting.plot import MachinePlot
     from truepose.reporting.shell import Contents
@@ -63,11 +64,16 @@ class MachineReport(Represented):
         """By state, before and after compensation: whether all is met; None if nothing is asked."""
         return {state: met(self.answers, state) for state in (BEFORE, AFTER)}
 
-    def rendered(self) -> tuple[str, Contents]:
-        """The page as text, and what stands on it."""
+    def rendered(self, *, live: bool = True) -> tuple[str, Contents]:
+        """The page as text, and what stands on it; `live`: with its live part, if it can be."""
         page = module_that_draws("truepose.reporting.page")
         with speaking(self.language):
-            text, contents = page.rendered(self.study, self.machine_text, self.page_of_part)
+            shown: LivePart | str = ""
+            if live:
+                from truepose.reporting.live.part import live_or_why_not
+
+                shown = live_or_why_not(self.machine)
+            text, contents = page.rendered(self.study, self.machine_text, self.page_of_part, shown)
         return text, contents
 
     @property
@@ -103,7 +109,7 @@ class MachineReport(Represented):
         Raises `RequestError` (no-browser, browser-failed) where no browser prints a PDF.
         """
         require_writable(Path(path), ENDINGS, [])
-        write_page(self.rendered()[0], Path(path), paper)
+        write_page(self.rendered(live=not is_pdf(Path(path)))[0], Path(path), paper)
 
     def plot(self, figure: str = "machine_drawing") -> MachinePlot:
         """A figure of the page by its name, to be shown in a notebook."""
@@ -170,7 +176,7 @@ def report(
     inputs: Sequence[object] = (machine.file or None, measurements, program, listed)
     files = [Path(name) for name in inputs if isinstance(name, str | Path)]
     require_writable(target, ENDINGS, files)
-    if target.suffix.lower() == ".pdf":
+    if is_pdf(target):
         from truepose.reporting import pdf
 
         pdf.installed_browser()
@@ -220,12 +226,17 @@ def _part(
 
 def write_page(text: str, path: Path, paper: str = "A4", browser: str | None = None) -> None:
     """Write a page, or have a `browser` print it, by default one that is installed."""
-    if path.suffix.lower() == ".pdf":
+    if is_pdf(path):
         from truepose.reporting import pdf
 
         pdf.write(text, path, paper, browser)
         return
     module_that_draws("truepose.reporting.page").write_text(text, path)
+
+
+def is_pdf(path: Path) -> bool:
+    """Whether a page is to be printed: on paper there is no live part."""
+    return path.suffix.lower() == ".pdf"
 
 
 def default_page(machine: Machine) -> Path:
@@ -246,4 +257,12 @@ def file_text(machine: Machine) -> str:
     return text if hashlib.sha256(content).hexdigest() == machine.file_hash else ""
 
 
-__all__ = ["MachineReport", "default_page", "file_text", "made", "report", "write_page"]
+__all__ = [
+    "MachineReport",
+    "default_page",
+    "file_text",
+    "is_pdf",
+    "made",
+    "report",
+    "write_page",
+]

@@ -25,6 +25,9 @@ from truepose.language import say, spoken
 from truepose.reporting.figures import DrawnFigure
 from truepose.reporting.figures._json import as_json
 from truepose.reporting.figures._style import AXIS, DARK, GRID, INK, PAPER, SCENE_GRID
+from truepose.reporting.live.part import LivePart
+from truepose.reporting.live.part import script as live_script
+from truepose.reporting.live.part import style as live_style
 from truepose.reporting.result_words import verdict_of
 from truepose.reporting.table import Table
 from truepose.version import version
@@ -45,6 +48,9 @@ def _folder_of_plotly() -> Path:
 PLOTLY = _folder_of_plotly()
 
 SETTINGS = {"displaylogo": False, "responsive": True, "displayModeBar": "hover"}
+
+DRAWING = ("figure_data.js", "page.js")
+"""Scripts of a page with figures."""
 
 LEVEL = 4
 """Of compression: plotly.js takes 2.0 MB in the page in 0.09 s; at level 9 1.9 MB in 0.21 s."""
@@ -136,21 +142,45 @@ def template(name: str) -> jinja2.Template:
     return environment.get_template(name)
 
 
-def page_parts(title: str) -> dict[str, Any]:
-    """What every page has, of its title."""
-    loader = _loader()
+def page_parts(title: str, live: LivePart | None = None, *, figures: bool = True) -> dict[str, Any]:
+    """What every page has, of its title.
+
+    `live`: its live part, if it has one; without `figures` it has neither plotly.js nor what that
+    draws of.
+    """
+    loader = (live_script() if live else "") + (_together(DRAWING) if figures else "")
     return {
         "title": title,
         "language": spoken().code,
         "version": version(),
-        "css": _together(["page.css", "page_one.css"]),
+        "css": _together(["page.css", "page_one.css"]) + (live_style() if live else ""),
+        "live": live,
         "loader": loader,
-        "loader_hash": base64.b64encode(hashlib.sha256(loader.encode()).digest()).decode(),
-        "plotly": packed(PLOTLY.joinpath("plotly.min.js").read_bytes()),
+        "policy": policy(loader, live=live is not None),
+        "plotly": packed(PLOTLY.joinpath("plotly.min.js").read_bytes()) if figures else "",
         "contents": Contents(),
         "words": _words(),
         "page_number": _page_number(),
     }
+
+
+def policy(script: str, *, live: bool) -> str:
+    """What a page may load and run: its script, by its hash, and what that loads.
+
+    A `live` part compiles WebAssembly, and has a worker whose script it makes itself.
+    """
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    return "; ".join(
+        [
+            "default-src 'none'",
+            "img-src data: blob:",
+            "style-src 'unsafe-inline'",
+            f"script-src 'sha256-{digest}' 'strict-dynamic'"
+            + (" 'wasm-unsafe-eval'; worker-src blob:" if live else ""),
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
+    )
 
 
 def css_text(text: str) -> str:
@@ -192,11 +222,6 @@ def template_of_figures() -> Any:
     return json.loads(PLOTLY.joinpath("templates", "plotly_white.json").read_text("utf-8"))
 
 
-def _loader() -> str:
-    """The script of a page."""
-    return _together(["figure_data.js", "page.js"])
-
-
 def _together(names: Iterable[str]) -> str:
     return "\n".join(_resource(name) for name in names)
 
@@ -211,6 +236,7 @@ __all__ = [
     "css_text",
     "packed",
     "page_parts",
+    "policy",
     "template",
     "template_of_figures",
 ]

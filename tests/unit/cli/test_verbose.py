@@ -12,6 +12,7 @@ from command_line import PLANAR, call
 from truepose._kernel import instruction_set
 from truepose.cli import COMMANDS, cli
 from truepose.explanations import readings
+from truepose.reporting.live import part
 
 Capture = pytest.CaptureFixture[str]
 PROGRAM = "G21 G90 G94 F900\nG0 X300 Y200\nG1 X340 Y210\n"
@@ -26,6 +27,7 @@ COMPUTING: dict[str, tuple[str, ...]] = {
     "over-time": ("over-time", "warm.toml"),
     "strain": ("strain", "over.toml"),
     "report": ("report", "m.toml", *QUICK),
+    "live": ("live", "m.toml"),
     "plan": ("plan", "m.toml", "--instrument", "position=10um", "--poses", "2"),
     "calibrate": ("calibrate", "m.toml", "measured.csv"),
     "compare": ("compare", "m.toml", "m.toml"),
@@ -42,6 +44,9 @@ STEP = re.compile(r"^ *(\d+\.\d{3}) s  (.+)$", re.MULTILINE)
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
+    # A page is written whatever stands in it.
+    Path("kernel.gz").write_bytes(b"")
+    monkeypatch.setattr(part, "kernel_file", lambda: tmp_path / "kernel.gz")
     text = PLANAR.read_text()
     Path("m.toml").write_text(text)
     log = text.replace("\ntemperature = 35", '\ntemperature_log = "log.csv"')

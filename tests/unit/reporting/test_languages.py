@@ -20,7 +20,7 @@ from truepose.reporting.table import Table
 OTHERS = languages()[1:]
 
 ALIKE = {
-    "de": {"CSV", "Position: {rest}", "Shapley", "Shapley, %", "dominant", "in", "linear",
+    "de": {"CSV", "Live", "Position: {rest}", "Shapley", "Shapley, %", "dominant", "in", "linear",
            "linear, %", "relevant"},
     "pt": {"CSV", "Shapley", "Shapley, %", "linear", "linear, %", "nominal", "pose", "singular",
            "total", "total, %", "{count} pose"},

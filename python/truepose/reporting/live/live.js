@@ -1,0 +1,261 @@
+// The live part of a page: a state that sliders change, what the kernel says of it at once, and what a
+// worker finds after that. When it is drawn for the first time the root has `data-live-ready`.
+
+const COMMAND_OF = {before: "nominal", after: "corrected"};
+const STATE_OF = {nominal: "before", corrected: "after"};
+// After so many milliseconds without a step the map is drawn finely.
+const REST = 140;
+
+function livePart(place, setting, ask, module) {
+  const {bundle, drawing, words, scale: colours, worker: script} = setting;
+  const {target, sources} = bundle;
+  const numbers = numbersOf({units: bundle.units, marks: setting.marks});
+  const made = ask({op: "machine", bundle});
+  const {machine, components, commanded} = made;
+  const quantities = quantitiesOf(components);
+  const notLive = sources.filter(source => !source.live);
+  const within = allWithin(bundle.variables);
+  const find = name => place.querySelector(`[data-live="${name}"]`);
+
+  const state = asInTheFile(bundle);
+  let quantity = quantities[0], job = 0, steps = 0, asked = false, rest = null;
+  // What is known of the state shown: `errors` and `status` by state at once, the rest by and by.
+  let known = null;
+
+  const controls = controlsOf({
+    bundle, components, commanded, state, words, numbers, changed: () => changed(),
+  });
+  for (const [title, host] of controls.groups) {
+    const group = element("fieldset", {}, element("legend", {}, title), host);
+    find("controls").append(group);
+  }
+  const cards = cardsOf(find("cards"), find("strip"), {
+    states: {before: words.as_commanded, after: words.compensated}, quantities, target, words, numbers,
+  });
+  const table = sourcesTable(find("sources"), {components, quantities, sources, words, numbers});
+  const reaches = reachesOf({bundle, machine, components, quantities, ask});
+  const view = machineView(find("machine"), {
+    drawing, planar: setting.planar, box: edgesOf(bundle.workspace, commanded),
+    grouped: factor => numbers.fixed(factor, factor < 10 ? 1 : 0),
+  });
+  const limits = controls.ranges.slice(0, commanded.length).map(({low, high}) => [low, high]);
+  const map = mapView(find("map"), {
+    scale: colours, ask, limits, pose: () => state.pose, workspace: bundle.workspace, numbers,
+    commanded, words, moved: () => { controls.show(); changed(); },
+  });
+  const distribution = distributionView(find("distribution"), {numbers, words});
+
+  // A worker that is told of every step, and drops what it had.
+  const address = URL.createObjectURL(new Blob([script], {type: "text/javascript"}));
+  const worker = new Worker(address);
+  worker.postMessage({module, bundle});
+  worker.onmessage = ({data}) => {
+    if (data.id !== job || !known) return;
+    if (data.failed) known.failed = data.failed;
+    else Object.assign(known.later[STATE_OF[data.command]], data);
+    told();
+  };
+  worker.onerror = event => { if (known) { known.failed = event.message; told(); } };
+
+  function changed() {
+    clearTimeout(rest);
+    if (asked) return;
+    asked = true;
+    requestAnimationFrame(() => { asked = false; update(true); });
+  }
+
+  // Everything of the state, the map coarser while it is `moving`.
+  function update(moving) {
+    const begun = performance.now();
+    const at = {machine, condition: state.condition, scale: state.scale};
+    const {status, centres, placements, lengths} = ask({op: "place", machine, poses: [state.pose]});
+    // What of a state comes later: `worst`, `bounds`, `samples`, and whether these are `done`.
+    known = {status: {before: status[0], after: status[0]}, errors: {}, later: {before: {}, after: {}}};
+    const picture = {centres: null, errors: {}, ellipses: {}};
+    let bySource = {}, sizes = {};
+    if (status[0] === "ok") {
+      for (const [name, command] of Object.entries(COMMAND_OF)) {
+        const whole = name === "before" ? {sources: true, centres_actual: true} : {};
+        const told = ask({op: "errors", ...at, poses: [state.pose], command, ...whole});
+        known.status[name] = told.status[0];
+        known.errors[name] = told.status[0] === "ok" ? told.errors[0] : null;
+        if (name === "before") {
+          bySource = Object.fromEntries(Object.entries(told.by_source || {}).map(
+            ([source, errors]) => [source, errors[0]]));
+          picture.actual = known.errors.before && told.actual_centres ? told.actual_centres[0] : null;
+        }
+        picture.errors[name] = known.errors[name] && inSpace(known.errors[name]);
+      }
+      if (known.errors.before) {
+        sizes = reaches(
+          state.pose, lengths[0], state.scale.half_width, bySource, known.errors);
+      }
+      Object.assign(picture, {centres: centres[0], tool: placements[0].slice(0, 3)});
+    }
+    table.show(bySource, sizes, {before: null, after: null, ...known.errors});
+    const largest = Math.max(0, ...Object.values(picture.errors).filter(Boolean).map(
+      error => Math.hypot(...error)));
+    find("factor").textContent = filled(words.magnified, {factor: view.show(picture, largest)});
+    find("outside").textContent = status[0] === "ok" ? "" : words.statuses[status[0]];
+    place.dataset.status = status[0];
+    map.update({...at, components, quantity}, moving);
+    legend();
+    told();
+    worker.postMessage({
+      id: ++job, pose: state.pose, condition: state.condition, scale: state.scale,
+      probabilities: PROBABILITIES, nothing: status[0] !== "ok",
+    });
+    place.dataset.step = performance.now() - begun;
+    place.dataset.steps = ++steps;
+    clearTimeout(rest);
+    if (moving) rest = setTimeout(() => { map.update({...at, components, quantity}, false); legend(); }, REST);
+  }
+
+  const inSpace = error => ["x", "y", "z"].map(name => {
+    const at = components.indexOf(name);
+    return at < 0 ? 0 : error[at];
+  });
+
+  // What is known by now, in words and numbers.
+  function told() {
+    const shown = {};
+    for (const name of Object.keys(COMMAND_OF)) {
+      const later = known.later[name], fine = known.status[name] === "ok";
+      const sizes = Object.fromEntries(LINES.map(line => [line, {}])), verdicts = [];
+      for (const each of quantities) {
+        const size = fine ? sizeOf(known.errors[name], components, each) : null;
+        const sample = fine && later.samples ? columnOf(later.samples, each) : null;
+        const witness = later.worst ? later.worst[each] ?? null : undefined;
+        sizes.known[each] = size;
+        sizes.likely[each] = !fine ? null : sample ? sample.quantiles[0] : undefined;
+        sizes.found[each] = fine ? witness : null;
+        sizes.proven[each] = !fine ? null : boundSaid(later.bounds, each);
+        sizes.asked[each] = target[each] === undefined ? null : target[each];
+        if (target[each] !== undefined) {
+          const found = [size, witness ?? null, within && sample ? sample.maximum : null];
+          verdicts.push(judged(target[each], each, later.bounds, found));
+        }
+      }
+      const verdict = notLive.length ? "none" : !fine ? "outside"
+        : !verdicts.length ? "unasked" : together(verdicts);
+      cards.show(name, verdict, said(verdict, name), sizes);
+      shown[name] = fine && later.samples ? later.samples : null;
+    }
+    view.add({ellipses: Object.fromEntries(Object.entries(shown).map(
+      ([name, read]) => [name, read && read.ellipse]))});
+    if (shown.before || shown.after || !known.errors.before) {
+      distribution.show(shown, quantity, target[quantity]);
+    }
+    counted(shown);
+  }
+
+  function said(verdict, name) {
+    if (verdict === "outside") return words.statuses[known.status[name]] || known.status[name];
+    if (known.failed && verdict === "computing") return words.failed;
+    return words.verdicts[verdict];
+  }
+
+  function boundSaid(bounds, each) {
+    if (bounds === undefined) return undefined;
+    if (bounds.status === "proven") return bounds.magnitude[each];
+    return words.bound_statuses[bounds.status] || MISSING;
+  }
+
+  function counted(shown) {
+    const read = shown.after || shown.before;
+    const done = read && Object.entries(known.later).every(
+      ([name, {done, samples}]) => done || known.status[name] !== "ok" || !samples);
+    find("count").textContent = read
+      ? filled(words.drawn, {count: numbers.fixed(read.count, 0)}) : words.waiting;
+    place.dataset.samples = read ? read.count : 0;
+    place.dataset.settled = done ? "yes" : "no";
+  }
+
+  function legend() {
+    const ends = map.legend();
+    if (!ends) return;
+    find("low").textContent = ends.low;
+    find("high").textContent = ends.high;
+    find("beyond").hidden = !ends.beyond;
+  }
+
+  // Which coordinates the map is over, and of which quantity it and the distribution are.
+  function choices() {
+    const chosen = commanded.map((name, at) => element("option", {value: at}, name));
+    const selects = [find("across"), find("up")];
+    selects.forEach((select, which) => {
+      select.append(...chosen.map(option => option.cloneNode(true)));
+      select.value = map.axes[which];
+      select.addEventListener("change", () => {
+        const values = selects.map(one => Number(one.value));
+        if (values[0] === values[1]) {
+          values[1 - which] = commanded.findIndex((_, at) => at !== values[which]);
+          selects[1 - which].value = values[1 - which];
+        }
+        map.over(...values);
+        update(false);
+      });
+    });
+    const quantitySelect = find("quantity");
+    quantitySelect.append(...quantities.map(
+      name => element("option", {value: name}, words.quantities[name])));
+    quantitySelect.closest("label").hidden = quantities.length < 2;
+    quantitySelect.addEventListener("change", () => {
+      quantity = quantitySelect.value;
+      update(false);
+    });
+    find("fit").addEventListener("click", () => { map.fit(); legend(); });
+    find("reset").addEventListener("click", () => {
+      Object.assign(state, asInTheFile(bundle));
+      controls.show();
+      update(false);
+    });
+  }
+
+  function drawAll() {
+    view.draw();
+    map.draw();
+    distribution.draw();
+  }
+
+  find("scale").style.background = `linear-gradient(to right, ${colours.map(
+    colour => `rgb(${colour.join(",")})`).join(",")})`;
+  find("not-live").replaceChildren(...notLive.map(source => {
+    const size = Object.entries(source.largest || {}).map(
+      ([name, value]) => numbers.error(value, name)).join(", ") || MISSING;
+    const said = filled(words.not_live, {source: source.name, why: source.why, size});
+    return element("li", {}, source.banded ? `${said} ${words.banded}` : said);
+  }));
+  choices();
+  controls.show();
+  new ResizeObserver(drawAll).observe(place);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+  return {update};
+}
+
+async function startLive() {
+  const root = document.documentElement, place = document.getElementById("live");
+  if (!place || !place.querySelector(".live-body") || location.hash === "#print") return;
+  try {
+    if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
+      root.dataset.liveReady = "absent";
+      return;
+    }
+    const text = id => document.getElementById(id).textContent;
+    const setting = JSON.parse(text("live-setting"));
+    let module;
+    try {
+      module = await WebAssembly.compile(await unpackedModule(text("live-kernel")));
+    } catch (failure) {
+      root.dataset.liveReady = "absent";  // a browser without simd does not compile it
+      return;
+    }
+    setting.worker = text("live-worker");
+    const part = livePart(place, setting, await kernelOf(module), module);
+    root.dataset.liveReady = "drawn";
+    part.update(false);
+  } catch (failure) {
+    root.dataset.liveReady = "failed";
+    console.error(failure);
+  }
+}

@@ -1,0 +1,182 @@
+"""The live part of a page put together: the kernel for browsers, a machine as data, and scripts."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from truepose.arrays import Floats
+from truepose.errors import Problem, RequestError
+from truepose.language import say, spoken
+from truepose.reporting.figures._json import as_json
+from truepose.reporting.figures._outline import is_planar, outline
+from truepose.reporting.figures._style import COLOUR_SCALE
+from truepose.reporting.live.labels import labels
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from truepose.machine import Machine
+
+KERNEL = "_kernel.wasm.gz"
+"""The kernel for browsers, a file of the package that `make web` builds."""
+
+SHARED = ("kernel.js",)
+WORKER = (*SHARED, "worker.js")
+PAGE = (
+    *SHARED,
+    "numbers.js", "controls.js", "canvas.js", "machine.js", "map.js", "distribution.js",
+    "verdict.js", "cards.js", "ranking.js", "live.js",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LivePart:
+    """What stands in a page: the kernel in base64, a setting as JSON, and the worker's script."""
+
+    kernel: str
+    setting: str
+    worker: str
+    planar: bool
+
+
+def kernel_file() -> Traversable:
+    """Where the kernel for browsers is, if it was built."""
+    return files("truepose").joinpath(KERNEL)
+
+
+def is_built() -> bool:
+    """Whether there is a kernel for browsers."""
+    return kernel_file().is_file()
+
+
+def packed_kernel(file: Traversable | None = None) -> str:
+    """The kernel for browsers in base64. Raises `RequestError` (no-live-kernel) without one."""
+    there = kernel_file() if file is None else file
+    try:
+        return base64.b64encode(there.read_bytes()).decode("ascii")
+    except OSError as failure:
+        raise RequestError(
+            Problem(
+                "no-live-kernel",
+                "the kernel for browsers was not built",
+                found=f"no {there.name}",
+                expected="a file of the package, as every wheel has it",
+                hint="make web",
+            )
+        ) from failure
+
+
+def live_of(machine: Machine) -> LivePart:
+    """The live part of a machine in its file's condition.
+
+    Raises `RequestError` (no-live-kernel), and as `truepose.live.bundle` does.
+    """
+    from truepose.live import bundle
+
+    return live_part(machine, bundle(machine))
+
+
+def live_or_why_not(machine: Machine) -> LivePart | str:
+    """The same, or where there is none, a sentence that says why."""
+    if not is_built():
+        return say(
+            "This page has no live part: the kernel for browsers, {file}, was not built "
+            "(`make web`).",
+            file=KERNEL,
+        )
+    try:
+        return live_of(machine)
+    except RequestError as failure:
+        (problem, *_) = failure.problems
+        return say("This page has no live part: {reason}.", reason=problem.message)
+
+
+def live_part(machine: Machine, bundle: Mapping[str, Any]) -> LivePart:
+    """The live part of a machine, whose data for the kernel is `bundle`.
+
+    Raises `RequestError` (no-live-kernel).
+    """
+    language = spoken()
+    colours = [str(colour) for _, colour in COLOUR_SCALE]
+    setting = {
+        "bundle": bundle,
+        "drawing": _drawing(machine, bundle["workspace"]["home"]),
+        "planar": is_planar(machine),
+        "words": labels(),
+        "marks": {"decimal": language.decimal_mark, "group": language.group_mark},
+        "scale": [[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for colour in colours],
+    }
+    return LivePart(packed_kernel(), as_json(setting), _together(WORKER), is_planar(machine))
+
+
+def script() -> str:
+    """What the page runs. It says by `liveStarted`, a promise, when it is through."""
+    return f"const liveStarted = (() => {{\n{_together(PAGE)}\nreturn startLive();\n}})();\n"
+
+
+def style() -> str:
+    """What the live part looks like."""
+    return _together(["live.css"])
+
+
+def _drawing(machine: Machine, home: Sequence[float]) -> dict[str, Any]:
+    """What of the picture the kernel does not say: paths of drives, frame, what hangs together.
+
+    `arms`: numbers of the struts that a drive carries, and the pivot that an arm turns about.
+    `platform`: numbers of struts in the order of its outline. `points`: how far it all reaches.
+    """
+    shape = outline(machine, np.asarray(home))
+    drawn = {drive.name: drive.drawing for drive in machine.drives if drive.drawing != "none"}
+    arms = []
+    pivots = iter([arm for arm in shape.arms if len(arm) == 2])
+    for name, drawing in drawn.items():
+        struts = [at for at, strut in enumerate(machine.struts) if strut.drive == name]
+        if not struts:
+            continue
+        pivot = None
+        if drawing == "circle":
+            middle = shape.struts[struts, 0].mean(axis=0)
+            pivot = next(arm[0] for arm in pivots if np.allclose(arm[1], middle)).tolist()
+        arms.append({"struts": struts, "pivot": pivot})
+    return {
+        "paths": [path.tolist() for path in shape.paths],
+        "frame": shape.frame.tolist(),
+        "arms": arms,
+        "platform": _numbers(shape.platform[:-1], shape.struts[:, 1]),
+        "points": [*shape.struts.reshape(-1, 3).tolist(), shape.tool.tolist()],
+    }
+
+
+def _numbers(points: Floats, among: Floats) -> list[int]:
+    """Which of the points `among` (n, 3) each is."""
+    apart = np.linalg.norm(points[:, np.newaxis] - among[np.newaxis], axis=2)
+    return [int(at) for at in apart.argmin(axis=1)]
+
+
+@cache
+def _script(name: str) -> str:
+    return files("truepose.reporting.live").joinpath(name).read_text(encoding="utf-8")
+
+
+def _together(names: Iterable[str]) -> str:
+    return "\n".join(_script(name) for name in names)
+
+
+__all__ = [
+    "LivePart",
+    "is_built",
+    "live_of",
+    "live_or_why_not",
+    "live_part",
+    "packed_kernel",
+    "script",
+    "style",
+]

@@ -1,0 +1,359 @@
+"""The live part in a real browser: its numbers are the package's, and its pixels follow.
+
+Nothing is asked from outside, and where the browser lacks what it takes, the report stays static.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import truepose as tp
+from browser import Heard, opened_browser
+from command_line import MACHINES
+from sweeps import thinned
+from system_package import missing
+from truepose.cli import run
+from truepose.reporting.live import part
+
+SHOWN = ["planar_two_slider", "hexapod", "linear_delta", "tricept"]
+QUICK = {"planar_two_slider"}
+PATIENCE = 60_000
+"""Milliseconds: a busy machine is slow, and slowness is no fault here."""
+
+STEP = """([name, value]) => {
+  const input = document.querySelector(`[data-of="${name}"] input[type=number]`);
+  input.value = value;
+  input.dispatchEvent(new Event("input"));
+}"""
+NUMBER = """name => {
+  const cell = document.querySelector(`#live [data-of="${name}"]`);
+  return cell && "si" in cell.dataset ? Number(cell.dataset.si) : null;
+}"""
+PIXELS = """name => document.querySelector(`#live [data-live="${name}"]`).toDataURL()"""
+SETTLED = "() => document.getElementById('live').dataset.settled === 'yes'"
+WORD = """state => document.querySelector(`#live [data-of="${state}.verdict"]`).textContent"""
+
+
+@dataclass(kw_only=True)
+class LiveVisit(Heard):
+    """A page with a live part, and the machine that it is of."""
+
+    page: Any
+    machine: tp.Machine
+
+    @property
+    def setting(self) -> Any:
+        return json.loads(self.page.locator("#live-setting").text_content())
+
+    def step(self, name: str, value: float) -> None:
+        """Type a number into a control, in the units shown, and wait until it is worked out."""
+        steps = "() => document.getElementById('live').dataset.steps"
+        before = self.page.evaluate(steps)
+        self.page.evaluate(STEP, [name, value])
+        later = f"before => ({steps})() !== before"
+        self.page.wait_for_function(later, arg=before, timeout=PATIENCE)
+
+    def settle(self) -> None:
+        """Wait until the worker has told everything."""
+        self.page.wait_for_function(SETTLED, timeout=PATIENCE)
+
+    def number(self, name: str) -> float | None:
+        found: float | None = self.page.evaluate(NUMBER, name)
+        return found
+
+    def word(self, state: str) -> str:
+        found: str = self.page.evaluate(WORD, state)
+        return found
+
+    def pixels(self, name: str) -> str:
+        found: str = self.page.evaluate(PIXELS, name)
+        return found
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    if not part.is_built():
+        missing("the kernel for browsers is not built: make web")
+    with opened_browser(tmp_path_factory.mktemp("profile")) as context:
+        yield context
+
+
+def opened(browser: Any, file: Path, machine: tp.Machine) -> LiveVisit:
+    page = browser.new_page()
+    seen = LiveVisit(page=page, machine=machine)
+    seen.listen(page)
+    page.goto(file.as_uri(), wait_until="load")
+    page.wait_for_selector("html[data-live-ready=drawn]", timeout=PATIENCE)
+    return seen
+
+
+@pytest.fixture(scope="module")
+def pages(
+    browser: Any, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[[str], LiveVisit]]:
+    """A function: the live page of a machine, which is made and opened once and stays open."""
+    seen: dict[str, LiveVisit] = {}
+
+    def page_of(name: str) -> LiveVisit:
+        if name not in seen:
+            file = tmp_path_factory.mktemp("live") / f"{name}.html"
+            machine = MACHINES / f"{name}.toml"
+            assert run(["live", str(machine), "--output", str(file)]) == 0
+            seen[name] = opened(browser, file, tp.load(machine))
+        return seen[name]
+
+    yield page_of
+    for visit in seen.values():
+        visit.page.close()
+
+
+@pytest.fixture(params=thinned(SHOWN, QUICK))
+def live(request: pytest.FixtureRequest, pages: Callable[[str], LiveVisit]) -> LiveVisit:
+    visit = pages(request.param)
+    visit.page.bring_to_front()
+    visit.page.locator("[data-live=reset]").click()
+    return visit
+
+
+def moved(live: LiveVisit) -> tuple[list[float], tp.Condition]:
+    """Move a slider of each kind; the pose and the condition that the page shows then, SI."""
+    bundle = live.setting["bundle"]
+    units, workspace = bundle["units"], bundle["workspace"]
+    pose = list(workspace["home"])
+    for at, name in enumerate(live.machine.commanded):
+        unit = units["length" if name in "xyz" else "angle"]
+        shown = (pose[at] + 0.2 * (workspace["high"][at] - workspace["low"][at])) / unit["si"]
+        live.step(f"pose.{name}", round(shown, 3))
+        pose[at] = round(shown, 3) * unit["si"]
+    warm = units["temperature"]
+    live.step("temperature", 31.5)
+    temperature = dict.fromkeys(
+        (one["part"] for one in bundle["parts"]), (31.5 + warm["offset"]) * warm["si"]
+    )
+    first = bundle["parts"][0]["part"]
+    live.step(f"temperature.{first}", 33.0)
+    temperature[first] = (33.0 + warm["offset"]) * warm["si"]
+    force = list(live.machine.condition.force)
+    live.step("force.x", 7.5)
+    force[0] = 7.5 * units["force"]["si"]
+    return pose, live.machine.condition.replace(temperature=temperature, force=force)
+
+
+def test_numbers_are_those_of_the_package(live: LiveVisit) -> None:
+    pose, condition = moved(live)
+    budget = tp.budget(live.machine, [pose], condition=condition)
+    corrected = tp.compensate(live.machine, [pose], condition=condition)
+    components = list(live.machine.components)
+
+    def shown(name: str) -> list[float | None]:
+        return [live.number(f"{name}.{component}") for component in components]
+
+    known = budget["overall_error"].values[0]
+    scale = max(abs(known).max(), 1e-9)
+    np.testing.assert_allclose(shown("before"), known, atol=1e-9 * scale + 1e-13, rtol=0)
+    for at, source in enumerate(budget["source"].values):
+        wanted = budget["error"].values[0, at]
+        np.testing.assert_allclose(shown(str(source)), wanted, atol=1e-9 * scale + 1e-13, rtol=0)
+    rest = corrected["residual_middle"].values[0]
+    np.testing.assert_allclose(shown("after"), rest, atol=1e-9 * scale + 1e-12, rtol=0)
+    lengths = [at for at, name in enumerate(components) if name in "xyz"]
+    size = float(np.linalg.norm(known[lengths]))
+    assert live.number("before.known.position") == pytest.approx(size, rel=1e-9)
+    reach = float(budget["linear_maximum"].values[0, 0])
+    assert live.number("before.reach.position") == pytest.approx(reach, rel=0.02)
+
+
+def test_the_bound_and_the_witness_are_those_of_the_package(live: LiveVisit) -> None:
+    pose, condition = moved(live)
+    live.settle()
+    bounds = tp.bounds(live.machine, [pose], condition=condition)
+    proven = float(bounds["magnitude"].values[0, 0])
+    assert live.number("before.proven.position") == pytest.approx(proven, rel=1e-6)
+    found, likely = (live.number(f"before.{name}.position") for name in ("found", "likely"))
+    assert found is not None
+    assert likely is not None
+    assert likely <= found * (1 + 1e-9) <= proven * (1 + 1e-6)
+
+
+def test_the_verdict_is_computing_and_then_what_is_proven_or_found(live: LiveVisit) -> None:
+    setting = live.setting
+    words, target = setting["words"]["verdicts"], setting["bundle"]["target"]
+    unit = setting["bundle"]["units"]["temperature"]
+    reference = setting["bundle"]["reference_temperature"] / unit["si"] - unit["offset"]
+    for name in {variable["group"] for variable in setting["bundle"]["variables"]}:
+        live.step(f"tolerance.{name}", 0.001)
+    seen = live.page.evaluate(
+        f"""reference => {{
+          ({STEP})(["temperature", reference]);
+          return new Promise(done => requestAnimationFrame(() => done(({WORD})("after"))));
+        }}""",
+        reference,
+    )
+    assert seen == words["computing"]
+    live.settle()
+    assert live.word("after") == words["met"]
+    for quantity, asked in target.items():
+        proven = live.number(f"after.proven.{quantity}")
+        assert proven is not None
+        assert proven <= asked
+    # So hot that the machine at its known deviations is too far off.
+    live.step("temperature", 900.0)
+    assert live.word("before") == words["missed"]
+    live.settle()
+    assert live.word("before") == words["missed"]
+
+
+def test_between_proof_and_witness_it_is_undecided(browser: Any) -> None:
+    judged = """([bound, found]) => judgedHere(0.5, "position", bound, found)"""
+    script = part.script().replace("return startLive();", "globalThis.judgedHere = judged;")
+    page = browser.new_page()
+    page.evaluate(script + "0")
+
+    def word(magnitude: float | None, *found: float | None) -> str:
+        bound = {"status": "near_singular"}
+        if magnitude is not None:
+            bound = {"status": "proven", "magnitude": {"position": magnitude}}
+        said: str = page.evaluate(judged, [bound, list(found)])
+        return said
+
+    assert word(0.6, 0.4, None) == "open"
+    assert word(None, 0.4) == "open"
+    assert word(0.5, 0.5) == "met"
+    assert word(0.6, 0.4, 0.51) == "missed"
+    assert word(0.4, 0.3) == "met"
+    page.close()
+
+
+def test_pixels_follow(live: LiveVisit) -> None:
+    live.settle()
+    name = live.machine.commanded[0]
+    before = {canvas: live.pixels(canvas) for canvas in ("machine", "map", "distribution")}
+    bundle = live.setting["bundle"]
+    unit = bundle["units"]["length"]
+    live.step(f"pose.{name}", (bundle["workspace"]["home"][0] + 0.01) / unit["si"])
+    live.settle()
+    for canvas, pixels in before.items():
+        assert live.pixels(canvas) != pixels, canvas
+    if not live.setting["planar"]:
+        turned = live.pixels("machine")
+        live.page.locator("[data-live=machine]").press("ArrowLeft")
+        assert live.pixels("machine") != turned
+
+
+def test_the_scale_of_the_map_stays_until_it_is_asked(live: LiveVisit) -> None:
+    def ends() -> list[str]:
+        return [live.page.locator(f"[data-live={end}]").inner_text() for end in ("low", "high")]
+
+    before = ends()
+    live.step("temperature", 60.0)
+    assert ends() == before
+    assert live.page.locator("[data-live=beyond]").is_visible()
+    live.page.locator("[data-live=fit]").click()
+    assert ends() != before
+    live.page.locator("[data-live=reset]").click()
+    live.page.locator("[data-live=fit]").click()
+    assert ends() == before
+
+
+def test_out_of_reach_is_said_and_not_drawn(live: LiveVisit) -> None:
+    words = live.setting["words"]
+    unit = live.setting["bundle"]["units"]["length"]
+    live.step("pose.x", 30.0 / unit["si"])
+    said = live.page.locator("[data-live=outside]").inner_text()
+    assert said in words["statuses"].values()
+    assert live.word("before") == said
+    assert live.number("before.known.position") is None
+    assert live.number("after.proven.position") is None
+    assert live.page.locator("[data-live=outside]").is_visible()
+    live.page.locator("[data-live=reset]").click()
+    live.settle()
+    assert live.page.locator("[data-live=outside]").is_hidden()
+
+
+def test_nothing_was_asked_and_nothing_went_wrong(live: LiveVisit) -> None:
+    assert live.outside == []
+    assert len([url for url in live.requests if url.startswith("file:")]) == 1
+    assert live.complaints == []
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_serious_keeps_people_from_using_it(
+    width: int, scheme: str, live: LiveVisit
+) -> None:
+    from axe_playwright_python.sync_playwright import Axe
+
+    live.page.set_viewport_size({"width": width, "height": 900})
+    live.page.emulate_media(color_scheme=scheme)
+    wide, window = live.page.evaluate(
+        "() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+    )
+    violations = Axe().run(live.page).response["violations"]
+    live.page.emulate_media(color_scheme="light")
+    live.page.set_viewport_size({"width": 1200, "height": 900})
+    assert wide <= window
+    assert not [
+        (one["id"], one["nodes"][0]["html"][:200])
+        for one in violations
+        if one["impact"] in {"serious", "critical"}
+    ]
+
+
+def test_a_source_that_is_not_live_is_named_and_nothing_judged(
+    pages: Callable[[str], LiveVisit],
+) -> None:
+    live = pages("hexapod_all_sources")
+    live.page.bring_to_front()
+    notes = live.page.locator("[data-live=not-live] li").all_inner_texts()
+    lacking = [one for one in live.setting["bundle"]["sources"] if not one["live"]]
+    assert lacking
+    assert len(notes) == len(lacking)
+    for note, source in zip(notes, lacking, strict=True):
+        assert source["name"] in note
+        assert source["why"] in note
+    live.settle()
+    assert live.word("before") == live.word("after") == live.setting["words"]["verdicts"]["none"]
+
+
+@pytest.mark.parametrize("lacking", ["WebAssembly", "Worker"])
+def test_without_what_it_needs_the_report_stays_static(
+    lacking: str, browser: Any, tmp_path: Path
+) -> None:
+    file = tmp_path / "report.html"
+    machine = MACHINES / "planar_two_slider.toml"
+    assert run(["report", str(machine), "--output", str(file)]) == 0
+    page = browser.new_page()
+    heard = Heard()
+    heard.listen(page)
+    page.add_init_script(f"delete globalThis.{lacking}")
+    page.goto(file.as_uri(), wait_until="load")
+    page.wait_for_selector("html[data-ready=drawn]", timeout=PATIENCE)
+    assert page.locator("#live-absent").is_visible()
+    assert page.locator(".live-body").is_hidden()
+    assert page.locator(".plotly-graph-div .main-svg").count() > 5
+    assert heard.complaints == []
+    page.close()
+
+
+def test_the_report_has_it_and_paper_has_not(browser: Any, tmp_path: Path) -> None:
+    file = tmp_path / "report.html"
+    machine = MACHINES / "planar_two_slider.toml"
+    assert run(["report", str(machine), "--output", str(file)]) == 0
+    live = opened(browser, file, tp.load(machine))
+    live.page.wait_for_selector("html[data-ready=drawn]", timeout=PATIENCE)
+    live.settle()
+    assert live.page.locator("nav a[href='#live']").count() == 1
+    assert live.number("before.known.position") is not None
+    live.page.emulate_media(media="print")
+    assert live.page.locator("#live").is_hidden()
+    live.page.emulate_media(media="screen")
+    assert live.outside == []
+    assert live.complaints == []
+    live.page.close()

@@ -19,6 +19,11 @@ ACTIONLINT := build/release/actionlint-1.7.12/actionlint
 RUST_SOURCES := Cargo.toml Cargo.lock rust-toolchain.toml $(shell find crates -name '*.rs' -o -name Cargo.toml)
 KERNEL := $(wildcard python/truepose/_kernel*.so)
 
+# The kernel for pages: Rust's names of where it runs and is tested, and the file of the package.
+WEB_TARGET := wasm32-unknown-unknown
+WASI_TARGET := wasm32-wasip1
+WEB_KERNEL := python/truepose/_kernel.wasm.gz
+
 # Byte code is kept, whatever the shell says: without it every start compiles the sources anew.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -38,19 +43,39 @@ demo: package ## build, evaluate the planar machine and write its report
 	@echo "The report is $(CURDIR)/$(REPORT): open it in a browser."
 
 .PHONY: package
-package: $(PACKAGE) ## build the kernel and install truepose into .venv
+package: $(PACKAGE) web ## build the kernel and install truepose into .venv
+
+# Without Rust's library for it a checkout does without, and its reports are static; the CI does not.
+.PHONY: web
+web: cargo ## build the kernel for pages, where Rust has its target: rustup target add wasm32-unknown-unknown
+	@if [ -d "$$(rustc --print target-libdir --target $(WEB_TARGET))" ]; then \
+		$(MAKE) --no-print-directory $(WEB_KERNEL); \
+	else \
+		echo "make: no live pages, for Rust lacks their target: rustup target add $(WEB_TARGET)" >&2; \
+		test -z "$$TRUEPOSE_CI"; \
+	fi
 
 # ---- what developers run, and the CI ----
 
 .PHONY: test
 test: test-rust test-python ## run the tests, of each sweep a member or a few: minutes
 
+# The CI has an hour: it does without the kernel's own tests on WebAssembly, which take minutes to compile.
 .PHONY: test-all
-test-all: test-rust test-python-all ## run every test there is, as the CI does
+test-all: test-rust test-python-all $(if $(TRUEPOSE_CI),,test-wasi) ## run every test there is; the CI all but test-wasi
 
 .PHONY: test-rust
 test-rust: cargo $(MADE) ## run the kernel's tests
 	$(CARGO) test --workspace --release --locked
+
+.PHONY: test-wasi
+test-wasi: cargo ## run the kernel's tests on WebAssembly under Node.js: rustup target add wasm32-wasip1
+	@if [ -d "$$(rustc --print target-libdir --target $(WASI_TARGET))" ] && command -v node >/dev/null; then \
+		CARGO_TARGET_WASM32_WASIP1_RUNNER="node --no-warnings $(abspath tests/web/wasi.mjs)" \
+			cargo test --package truepose-kernel --target $(WASI_TARGET) --release --locked; \
+	else \
+		echo "make: no tests on WebAssembly: they need Node.js and rustup target add $(WASI_TARGET)" >&2; \
+	fi
 
 .PHONY: test-python
 test-python: package tools ## run the package's tests, of each sweep a member or a few
@@ -133,7 +158,7 @@ lock: tools ## resolve requirements.lock anew from pyproject.toml, and what whee
 
 # Names of release/targets.py, or `sdist`: `make wheels ONLY=manylinux-x86_64`.
 .PHONY: wheels
-wheels: cargo $(RELEASE_TOOLS) ## build wheels for Linux on x86-64 and ARM, and the sdist, into dist/: minutes each
+wheels: cargo web $(RELEASE_TOOLS) ## build wheels for Linux on x86-64 and ARM, and the sdist, into dist/: minutes each
 	$(dir $(RELEASE_TOOLS))bin/python -m release.build $(ONLY)
 
 # TRY="FILE ... --python PYTHON ...": of dist/ some files, with several Pythons.
@@ -174,7 +199,7 @@ tools: $(TOOLS)
 .PHONY: clean
 clean: ## remove what was built
 	rm -rf build target dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache $(PACKAGE)
-	rm -f python/truepose/_kernel*.so
+	rm -f python/truepose/_kernel*.so $(WEB_KERNEL)
 	find python tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} +
 
 .PHONY: distclean
@@ -211,6 +236,11 @@ $(PACKAGE): $(MADE) pyproject.toml $(CONSTRAINTS) $(RUST_SOURCES) $(if $(KERNEL)
 		$(BIN)/maturin develop --release --locked --extras report,netcdf
 	$(BIN)/python -m compileall -q python/truepose
 	@touch $@
+
+# The same bytes from the same module: gzip -n writes neither name nor time.
+$(WEB_KERNEL): $(RUST_SOURCES) .cargo/config.toml
+	cargo build --profile web --package truepose-web --target $(WEB_TARGET) --target-dir target --locked
+	gzip -9 -n -c target/$(WEB_TARGET)/web/truepose_web.wasm > $@
 
 # Has an environment of its own: zig takes 300 MB.
 $(RELEASE_TOOLS): $(MADE) release/requirements.txt

@@ -17,6 +17,9 @@ from pathlib import Path
 from release import DIST, ROOT
 from release.targets import DEFAULT, SDIST, TARGETS, Target
 
+WEB_KERNEL = "truepose/_kernel.wasm.gz"
+"""The kernel for pages, which every distribution has: `make web` builds it."""
+
 SBOMS = ".dist-info/sboms/"
 """Where a wheel says what it was built from (PEP 770); maturin writes it."""
 
@@ -30,6 +33,7 @@ def main() -> int:
         parser.error(f"no target {', '.join(sorted(unknown))}; there are {', '.join(TARGETS)}")
     DIST.mkdir(exist_ok=True)
     try:
+        require_web_kernel()
         for name in names:
             built = source_distribution() if name == SDIST else wheel(TARGETS[name])
             print(f"{built.relative_to(ROOT)}: {built.stat().st_size / 1e6:.2f} MB", flush=True)
@@ -37,6 +41,14 @@ def main() -> int:
         print(f"release.build: {error}", file=sys.stderr)
         return 2
     return 0
+
+
+def require_web_kernel() -> None:
+    """Raise `RuntimeError` where the kernel for pages was not built."""
+    if not (ROOT / "python" / WEB_KERNEL).exists():
+        raise RuntimeError(
+            "there is no kernel for pages; run: rustup target add wasm32-unknown-unknown, make web"
+        )
 
 
 def source_distribution() -> Path:
@@ -66,15 +78,21 @@ def wheel(target: Target) -> Path:
 
 
 def look_at(built: Path, target: Target) -> None:
-    """Refuse a wheel that is not abi3, lacks its SBOM, or runs on fewer systems than it says."""
+    """Refuse a wheel that is not what it says.
+
+    Not abi3, without its SBOM or the kernel for pages, or for fewer systems than in its name.
+    """
     python, _, platforms = built.stem.partition("-abi3-")
     # Several, where older installers know the same systems by another name.
     tags = platforms.split(".")
     if not python.endswith("-cp311") or not any(tag.startswith(target.tag) for tag in tags):
         raise RuntimeError(f"{built.name} is not cp311-abi3-{target.tag}")
     with zipfile.ZipFile(built) as archive:
-        if not any(SBOMS in name for name in archive.namelist()):
-            raise RuntimeError(f"{built.name} has no SBOM")
+        names = archive.namelist()
+    if not any(SBOMS in name for name in names):
+        raise RuntimeError(f"{built.name} has no SBOM")
+    if WEB_KERNEL not in names:
+        raise RuntimeError(f"{built.name} has no kernel for pages")
     if target.is_linux and (said := audited_tag(built)) != target.tag:
         raise RuntimeError(f"auditwheel says {said} of {built.name}")
 

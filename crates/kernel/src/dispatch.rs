@@ -133,6 +133,8 @@ pub fn dispatch<W: Work>(work: W) {
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
         InstructionSet::Avx2 => unsafe { run_avx2(work) },
+        // In WebAssembly lanes alone: the same numbers, and a smaller module.
+        #[cfg(not(target_family = "wasm"))]
         InstructionSet::Scalar => work.run::<f64>(),
         _ => work.run::<Lanes<PORTABLE>>(),
     }

@@ -50,8 +50,14 @@ def test_what_is_built_by_default_is_known() -> None:
 @pytest.mark.parametrize(
     ("name", "content", "audited", "said"),
     [
-        (NAME, [SBOM], LINUX.tag, None),
-        (NAME, [SBOM], "manylinux_2_28_x86_64", "auditwheel says manylinux_2_28_x86_64"),
+        (NAME, [SBOM, build.WEB_KERNEL], LINUX.tag, None),
+        (NAME, [SBOM], LINUX.tag, "no kernel for pages"),
+        (
+            NAME,
+            [SBOM, build.WEB_KERNEL],
+            "manylinux_2_28_x86_64",
+            "auditwheel says manylinux_2_28_x86_64",
+        ),
         (NAME, ["truepose/_kernel.abi3.so"], LINUX.tag, "no SBOM"),
         (NAME.replace("abi3", "cp311"), [SBOM], LINUX.tag, "is not cp311-abi3"),
         (NAME.replace("2_17", "2_28"), [SBOM], LINUX.tag, "is not cp311-abi3-manylinux_2_17"),
@@ -76,6 +82,16 @@ def test_a_wheel_that_is_not_what_it_says_is_refused(
     else:
         with pytest.raises(RuntimeError, match=said):
             build.look_at(wheel, LINUX)
+
+
+def test_nothing_is_built_without_the_kernel_for_pages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(build, "ROOT", tmp_path)
+    monkeypatch.setattr(build, "DIST", tmp_path)
+    monkeypatch.setattr(sys, "argv", ["build", SDIST])
+    assert build.main() == 2
+    assert "make web" in capsys.readouterr().err
 
 
 def test_a_target_that_rust_has_no_library_for_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-//! How many threads share a batch.
+//! How many threads share a batch, where there are any.
 
 use super::CHUNK;
 use rayon::prelude::*;
@@ -6,60 +6,105 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
-/// The pool in use and the process that started its threads.
-struct Started {
-    process: u32,
-    pool: Arc<ThreadPool>,
+/// Who shares a batch.
+#[derive(Clone)]
+enum Workers {
+    /// The thread that asks: no other can be started.
+    Alone,
+    /// The threads of a pool.
+    Pool(Arc<ThreadPool>),
 }
 
-static POOL: RwLock<Option<Started>> = RwLock::new(None);
-
-/// Threads that share a batch, at most: more than any machine has cores.
-pub const MOST_THREADS: usize = 1024;
-
-/// Uses `count` threads from now on, from one to `MOST_THREADS`.
-pub fn set_threads(count: usize) {
-    let pool = ThreadPoolBuilder::new().num_threads(count.clamp(1, MOST_THREADS)).build();
-    // A machine that cannot start another thread works on with what it has.
-    if let Ok(pool) = pool {
-        let started = Started { process: std::process::id(), pool: Arc::new(pool) };
-        let mut slot = POOL.write().unwrap_or_else(|poisoned| poisoned.into_inner());
-        let before = slot.replace(started);
-        // A fork copies no thread but its own: to end the parent's would wait on their locks.
-        if let Some(before) = before.filter(|before| before.process != std::process::id()) {
-            std::mem::forget(before);
+impl Workers {
+    fn count(&self) -> usize {
+        match self {
+            Workers::Alone => 1,
+            Workers::Pool(pool) => pool.current_num_threads(),
         }
     }
 }
 
-/// The pool that this process started, if there is one, or else how many threads its parent used.
-fn started() -> Result<Arc<ThreadPool>, Option<usize>> {
-    match &*POOL.read().unwrap_or_else(|poisoned| poisoned.into_inner()) {
-        Some(started) if started.process == std::process::id() => Ok(Arc::clone(&started.pool)),
-        Some(started) => Err(Some(started.pool.current_num_threads())),
+/// Those in use and the process that started them.
+struct Started {
+    process: u32,
+    workers: Workers,
+}
+
+static STARTED: RwLock<Option<Started>> = RwLock::new(None);
+
+/// Threads that share a batch, at most: more than any machine has cores.
+pub const MOST_THREADS: usize = 1024;
+
+/// Whether threads can be started at all. WebAssembly has none: rayon would make the asking thread a pool,
+/// which it does only once.
+const THERE_ARE_THREADS: bool = !cfg!(target_family = "wasm");
+
+/// The number of this process; WebAssembly's has none.
+fn process() -> u32 {
+    if THERE_ARE_THREADS { std::process::id() } else { 0 }
+}
+
+/// Uses `count` threads from now on, from one to `MOST_THREADS`.
+pub fn set_threads(count: usize) {
+    let pool = if THERE_ARE_THREADS {
+        ThreadPoolBuilder::new().num_threads(count.clamp(1, MOST_THREADS)).build().ok()
+    } else {
+        None
+    };
+    use_pool(pool);
+}
+
+/// Uses a pool from now on. None: a machine that cannot start another thread works on with those that it
+/// has, and without any on the thread that asks.
+fn use_pool(pool: Option<ThreadPool>) {
+    let process = process();
+    let mut slot = STARTED.write().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let workers = match pool {
+        Some(pool) => Workers::Pool(Arc::new(pool)),
+        None if slot.as_ref().is_some_and(|before| before.process == process) => return,
+        None => Workers::Alone,
+    };
+    let before = slot.replace(Started { process, workers });
+    // A fork copies no thread but its own: to end the parent's would wait on their locks.
+    if let Some(before) = before.filter(|before| before.process != process) {
+        std::mem::forget(before);
+    }
+}
+
+/// Those that this process started, if it did, or else how many threads its parent used.
+fn started() -> Result<Workers, Option<usize>> {
+    match &*STARTED.read().unwrap_or_else(|poisoned| poisoned.into_inner()) {
+        Some(started) if started.process == process() => Ok(started.workers.clone()),
+        Some(started) => Err(Some(started.workers.count())),
         None => Err(None),
     }
 }
 
-/// The pool in use; by default a thread per core, after a fork as many as before it.
-fn pool() -> Arc<ThreadPool> {
+/// Those in use; by default a thread per core, after a fork as many as before it.
+fn workers() -> Workers {
     let before = match started() {
-        Ok(pool) => return pool,
+        Ok(workers) => return workers,
         Err(before) => before,
     };
     set_threads(
         before
             .unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |count| count.get())),
     );
-    started().unwrap_or_else(|_| {
-        let alone = ThreadPoolBuilder::new().use_current_thread().num_threads(1).build();
-        Arc::new(alone.expect("a pool of the current thread starts no thread"))
-    })
+    started().unwrap_or(Workers::Alone)
 }
 
 /// The number of threads in use.
 pub fn threads() -> usize {
-    pool().current_num_threads()
+    workers().count()
+}
+
+/// Runs work that rayon shares out.
+fn install<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    match workers() {
+        // rayon is not asked: without a pool it would make one.
+        Workers::Alone => work(),
+        Workers::Pool(pool) => pool.install(work),
+    }
 }
 
 /// Calls `work(first sample, its part of a, its part of b, its part of c)` for every chunk of `count`
@@ -104,7 +149,7 @@ pub fn for_tables<C: Send>(
             work(first, &mut parts, c);
         }
     } else {
-        pool().install(|| {
+        install(|| {
             pieces.into_par_iter().for_each(|(first, mut parts, c)| work(first, &mut parts, c));
         });
     }
@@ -130,6 +175,54 @@ pub fn share_out<R: Send, T: Send>(
     if runs == 1 {
         return parts.into_iter().map(|(pieces, results)| work(pieces, results)).collect();
     }
-    pool()
-        .install(|| parts.into_par_iter().map(|(pieces, results)| work(pieces, results)).collect())
+    install(|| parts.into_par_iter().map(|(pieces, results)| work(pieces, results)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn numbers_of(count: usize) -> Vec<f64> {
+        let mut numbers = vec![0.0; count];
+        let mut marks = vec![0; count];
+        for_tables(count, vec![(&mut numbers, 1)], &mut marks, |first, tables, marks| {
+            for (at, (number, mark)) in tables[0].iter_mut().zip(marks).enumerate() {
+                (*number, *mark) = ((first + at) as f64, 1);
+            }
+        });
+        assert!(marks.iter().all(|&mark| mark == 1));
+        numbers
+    }
+
+    /// One test, because the threads in use are everyone's.
+    #[test]
+    fn batch_after_batch_is_done_where_no_thread_can_be_started() {
+        let expected: Vec<f64> = (0..20_000).map(f64::from).collect();
+        let slot = || STARTED.write().unwrap_or_else(|poisoned| poisoned.into_inner());
+        *slot() = None;
+        use_pool(None);
+        assert_eq!(threads(), 1);
+        for _ in 0..3 {
+            assert_eq!(numbers_of(20_000), expected);
+            assert_eq!(numbers_of(CHUNK + 1), expected[..=CHUNK]);
+            let mut squares = vec![0; 1000];
+            let runs = share_out(&mut squares, 1000, 1, |pieces, squares| {
+                for (piece, square) in pieces.clone().zip(squares) {
+                    *square = piece * piece;
+                }
+                pieces
+            });
+            assert_eq!((runs.len(), runs[0].clone()), (1, 0..1000));
+            assert_eq!(squares[999], 999 * 999);
+            assert_eq!(install(|| 7), 7);
+        }
+        // Where one can be, as many as are asked for; and those stay where the next ones cannot.
+        if THERE_ARE_THREADS {
+            set_threads(3);
+            use_pool(None);
+            assert_eq!(threads(), 3);
+            assert_eq!(numbers_of(20_000), expected);
+            assert_eq!(share_out(&mut [(); 6], 6, 1, |pieces, _| pieces), [0..2, 2..4, 4..6]);
+        }
+    }
 }

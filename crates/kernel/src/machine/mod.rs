@@ -4,12 +4,16 @@ mod build;
 mod build_chain;
 mod chain;
 mod description;
+mod read;
+mod values;
 
 pub use chain::{Axes, CHAIN_CLOSURES, Chain, Ends, Part, Place, Section, Side};
 pub use description::{
     ChainDescription, Description, DriveDescription, GuideDescription, JointLimit, MachineError,
     StrutDescription,
 };
+pub use read::WRONG_TYPE;
+pub use values::{Table, Value};
 
 use crate::element::guide::GuideFrames;
 use crate::element::{Dimension, Direction, DriveKind, GuideKind};

@@ -7,11 +7,12 @@ mod monte_carlo;
 mod points;
 mod random;
 mod tally;
+mod tally_bytes;
 mod variables;
 
 pub use monte_carlo::{Columns, Study, StudyPose, Whitening, sample, sample_keeping};
 pub use points::{Points, errors};
-pub use tally::Tally;
+pub use tally::{Sums, Tally};
 pub use variables::{Copula, Shape, Variable, Variables};
 
 /// Samples that are drawn and evaluated together: their variables stay in the cache.

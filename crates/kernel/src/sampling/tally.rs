@@ -3,7 +3,7 @@
 use crate::scalar::{LANES, Real};
 
 /// Bins of a histogram, half of them on each side of its origin.
-const BINS: usize = 2048;
+pub(super) const BINS: usize = 2048;
 const MIDDLE: i64 = BINS as i64 / 2;
 /// Values at which the narrowest interval is looked for.
 const STARTS: usize = 1000;
@@ -12,17 +12,22 @@ const STARTS: usize = 1000;
 ///
 /// A value beyond the outermost bin doubles the width, every two bins becoming one: the width is the first
 /// one times a power of two, so the counts in the end do not depend on the order of the values.
-#[derive(Clone, Debug)]
-struct Histogram {
-    origin: f64,
-    per_unit: f64,
-    doublings: u32,
-    lowest: f64,
-    highest: f64,
-    counts: Box<[u64; BINS]>,
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Histogram {
+    pub origin: f64,
+    pub per_unit: f64,
+    pub doublings: u32,
+    pub lowest: f64,
+    pub highest: f64,
+    pub counts: Box<[u64; BINS]>,
 }
 
 impl Histogram {
+    /// How many bins there were in one at first, before any width was doubled.
+    pub fn first_per_unit(&self) -> f64 {
+        self.per_unit * f64::from(self.doublings).exp2()
+    }
+
     /// The width is taken down to a power of two, so that halving and doubling it is exact.
     fn new(origin: f64, width: f64) -> Self {
         Histogram {
@@ -159,7 +164,7 @@ impl Distribution<'_> {
 }
 
 /// Sums over some samples of one set of columns, about their origins.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sums {
     /// How many samples were added.
     pub count: u64,
@@ -196,11 +201,11 @@ impl Sums {
 
 /// What is kept of the samples of one pose, or of one function: columns, the first of which have a
 /// covariance.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Tally {
-    covariant: usize,
-    sums: Sums,
-    histograms: Vec<Histogram>,
+    pub(super) covariant: usize,
+    pub(super) sums: Sums,
+    pub(super) histograms: Vec<Histogram>,
     /// Samples without a result, by status.
     pub failed: [u64; 7],
 }
@@ -221,10 +226,10 @@ impl Tally {
 
     /// The same without samples.
     pub fn blank(&self) -> Self {
-        let histograms = self.histograms.iter().map(|one| {
-            let first = one.per_unit * f64::from(one.doublings).exp2();
-            Histogram::new(one.origin, 1.0 / first)
-        });
+        let histograms = self
+            .histograms
+            .iter()
+            .map(|one| Histogram::new(one.origin, 1.0 / one.first_per_unit()));
         Tally {
             covariant: self.covariant,
             sums: Sums::new(self.columns(), self.covariant),
@@ -311,6 +316,22 @@ impl Tally {
         }
         self.sums.first.push(sum);
         self.histograms.push(histogram);
+    }
+
+    /// Whether another tally is of the same columns, origins and widths, so that the two can be merged.
+    pub fn fits(&self, other: &Tally) -> bool {
+        let same = |(one, other): (&Histogram, &Histogram)| {
+            one.origin == other.origin && one.first_per_unit() == other.first_per_unit()
+        };
+        self.covariant == other.covariant
+            && self.columns() == other.columns()
+            && self.histograms.iter().zip(&other.histograms).all(same)
+    }
+
+    /// Takes its sums, which depend on the order in which they are added: what is left depends on none.
+    pub fn take_sums(&mut self) -> Sums {
+        let none = Sums::new(self.columns(), self.covariant);
+        std::mem::replace(&mut self.sums, none)
     }
 
     /// Adds the samples of another tally of the same origins and widths.

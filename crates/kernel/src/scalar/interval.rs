@@ -20,6 +20,8 @@
 //! [`Interval::ENTIRE`]. The root of an interval that is partly negative is that of its other part,
 //! because the rounding of an exact zero must not spoil a length; so a finite root alone does not
 //! prove that there is one at every point.
+//!
+//! In WebAssembly operations are calls: inlined into every closure they would be a third of a page's kernel.
 
 use super::Scalar;
 use std::f64::consts::{FRAC_2_PI, PI};
@@ -145,7 +147,8 @@ impl Interval {
     }
 
     /// The product with one number: half the work of the product with an interval.
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     pub fn scaled(self, factor: f64) -> Self {
         let (a, b) = (self.lower * factor, self.upper * factor);
         let (lower, upper) = if factor < 0.0 { (b, a) } else { (a, b) };
@@ -324,7 +327,8 @@ impl Interval {
 
 impl Add for Interval {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn add(self, other: Self) -> Self {
         match Self::sum(self.lower + other.lower, self.upper + other.upper) {
             Some(sum) => sum,
@@ -335,7 +339,8 @@ impl Add for Interval {
 
 impl Sub for Interval {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn sub(self, other: Self) -> Self {
         self + -other
     }
@@ -343,7 +348,8 @@ impl Sub for Interval {
 
 impl Mul for Interval {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn mul(self, other: Self) -> Self {
         let (lower, upper) = self.products(other);
         match Self::product(lower, upper) {
@@ -356,7 +362,8 @@ impl Mul for Interval {
 
 impl Div for Interval {
     type Output = Self;
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn div(self, other: Self) -> Self {
         if other.contains(0.0) {
             return Self::ENTIRE;
@@ -386,7 +393,8 @@ impl Scalar for Interval {
     fn lift(self, value: f64) -> Self {
         Self::point(value)
     }
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn mul_add(self, factor: Self, term: Self) -> Self {
         let (lower, upper) = self.products(factor);
         if lower.abs() >= SAFE
@@ -400,7 +408,8 @@ impl Scalar for Interval {
         }
         self * factor + term
     }
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn square(self) -> Self {
         let (lower, upper) = self.absolute();
         let (lower, upper) = (lower * lower, upper * upper);
@@ -417,7 +426,8 @@ impl Scalar for Interval {
             self.square_rarely()
         }
     }
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn square_plus(self, term: Self) -> Self {
         let (lower, upper) = self.absolute();
         let (low, high) = (lower * lower, upper * upper);
@@ -433,7 +443,8 @@ impl Scalar for Interval {
         }
         self.square() + term
     }
-    #[inline(always)]
+    #[cfg_attr(target_family = "wasm", inline(never))]
+    #[cfg_attr(not(target_family = "wasm"), inline(always))]
     fn sqrt(self) -> Self {
         // Roots are normal or zero.
         let (lower, upper) = (most(self.lower, 0.0).sqrt(), self.upper.sqrt());

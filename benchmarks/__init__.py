@@ -27,5 +27,6 @@ BENCHMARKS = (
     Benchmark("gcode", cores=2),
     Benchmark("part"),
     Benchmark("calibration"),
+    Benchmark("live_page", cores=2),
     Benchmark("scaling", cores=2),
 )

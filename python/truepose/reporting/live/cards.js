@@ -37,6 +37,7 @@ function cardsOf(host, strip, {states, quantities, target, words, numbers}) {
     for (const line in cells) {
       cells[line].forEach((cell, at) => {
         const quantity = quantities[at], value = sizes[line][quantity];
+        cell.classList.toggle("said", typeof value === "string");
         put(cell, value, value === undefined ? words.waiting
           : typeof value === "string" ? value
           : numbers.error(value, quantity, target[quantity] ?? null));

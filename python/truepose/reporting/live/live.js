@@ -245,15 +245,16 @@ async function startLive() {
     const setting = JSON.parse(text("live-setting"));
     let module;
     try {
-      module = await WebAssembly.compile(await unpackedModule(text("live-kernel")));
+      module = await compiledModule(text("live-kernel"));
     } catch (failure) {
       root.dataset.liveReady = "absent";  // a browser without simd does not compile it
       return;
     }
     setting.worker = text("live-worker");
     const part = livePart(place, setting, await kernelOf(module), module);
-    root.dataset.liveReady = "drawn";
     part.update(false);
+    place.dataset.ready = performance.now();
+    root.dataset.liveReady = "drawn";
   } catch (failure) {
     root.dataset.liveReady = "failed";
     console.error(failure);

@@ -167,7 +167,9 @@ def _script(name: str) -> str:
 
 
 def _together(names: Iterable[str]) -> str:
-    return "\n".join(_script(name) for name in names)
+    """Scripts or styles one after the other, without indentation and lines of comments."""
+    lines = (line.strip() for name in names for line in _script(name).splitlines())
+    return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 __all__ = [

@@ -38,8 +38,10 @@ function sourcesTable(host, {components, quantities, sources, words, numbers}) {
   // state, null where there is none.
   function show(bySource, reaches, errors) {
     const every = [...Object.values(bySource), ...Object.values(errors)].filter(Boolean);
-    const largest = name => Math.max(0, ...every.map(
-      error => sizeOf(error, components, numbers.isLength(name) ? "position" : "orientation")));
+    const quantityOf = name => numbers.isLength(name) ? "position" : "orientation";
+    const largest = name => Math.max(0,
+      ...every.map(error => sizeOf(error, components, quantityOf(name))),
+      ...Object.values(reaches).map(sizes => sizes[quantityOf(name)]));
     const digits = Object.fromEntries(columns.map(plain).map(name =>
       [name, numbers.decimalsOf(largest(name) / numbers.ofError(name).si)]));
     const decimals = name => digits[name];

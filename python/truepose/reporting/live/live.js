@@ -252,7 +252,7 @@ async function startLive() {
     }
     setting.worker = text("live-worker");
     const part = livePart(place, setting, await kernelOf(module), module);
-    part.update(false);
+    part.update(true);
     place.dataset.ready = performance.now();
     root.dataset.liveReady = "drawn";
   } catch (failure) {

@@ -26,16 +26,17 @@ function mapView(canvas, {scale, ask, limits, pose, workspace, numbers, commande
     const sizes = errors.map(
       (error, at) => status[at] === "ok" ? sizeOf(error, components, quantity) : null);
     shown = {sizes, across, up, quantity};
-    if (!ends || ends.quantity !== quantity) fit();
+    // The first picture is coarse: its scale is that of the fine one that follows it.
+    if (!ends || ends.quantity !== quantity || (ends.coarse && !coarse)) fit(coarse);
     draw();
   }
 
   // The scale from what is shown.
-  function fit() {
+  function fit(coarse = false) {
     const there = shown.sizes.filter(size => size !== null);
     if (!there.length) return;
     const [low, high] = [Math.min(...there), Math.max(...there)];
-    ends = {low, high: high > low ? high : low + 1e-9, quantity: shown.quantity};
+    ends = {low, high: high > low ? high : low + 1e-9, quantity: shown.quantity, coarse};
   }
 
   function draw() {

@@ -72,7 +72,7 @@ def measure() -> list[Row]:
             "MB",
             "at most",
             ASKED_MEGABYTES,
-            f"{1e-6 * len(live.kernel):.2f} MB of it the kernel, as gzip in base64",
+            f"{1e-6 * len(live.kernel):.2f} MB of it the kernel, as gzip in base85",
         ),
     ]
 

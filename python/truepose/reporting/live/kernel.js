@@ -8,10 +8,25 @@ class KernelError extends Error {
   }
 }
 
-// A module of base64 of gzip's form, compiled while it is unpacked.
+// The letters of base85 as part.py writes it: each five are four bytes.
+const LETTERS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;.=>?@^_`{|}~";
+
+function bytesOf(text) {
+  const values = new Uint8Array(128), lacking = (5 - text.length % 5) % 5;
+  for (let at = 0; at < LETTERS.length; at++) values[LETTERS.charCodeAt(at)] = at;
+  const whole = text + "~".repeat(lacking), bytes = new Uint8Array(whole.length / 5 * 4);
+  const view = new DataView(bytes.buffer);
+  for (let from = 0, to = 0; from < whole.length; to += 4) {
+    let value = 0;
+    for (const end = from + 5; from < end; from++) value = value * 85 + values[whole.charCodeAt(from)];
+    view.setUint32(to, value);
+  }
+  return bytes.subarray(0, bytes.length - lacking);
+}
+
+// A module of base85 of gzip's form, compiled while it is unpacked.
 function compiledModule(text) {
-  const letters = atob(text), bytes = new Uint8Array(letters.length);
-  for (let at = 0; at < bytes.length; at++) bytes[at] = letters.charCodeAt(at);
+  const bytes = bytesOf(text);
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   const headers = {"Content-Type": "application/wasm"};
   return WebAssembly.compileStreaming(new Response(stream, {headers}));

@@ -36,7 +36,7 @@ static STARTED: RwLock<Option<Started>> = RwLock::new(None);
 pub const MOST_THREADS: usize = 1024;
 
 /// Whether threads can be started at all. WebAssembly has none: rayon would make the asking thread a pool,
-/// which it does only once.
+/// which it does only once. What asks for this first is not compiled in there.
 const THERE_ARE_THREADS: bool = !cfg!(target_family = "wasm");
 
 /// The number of this process; WebAssembly's has none.
@@ -144,7 +144,7 @@ pub fn for_tables<C: Send>(
         c = tail;
         pieces.push((first, parts, head));
     }
-    if pieces.len() <= 1 || threads() == 1 {
+    if !THERE_ARE_THREADS || pieces.len() <= 1 || threads() == 1 {
         for (first, mut parts, c) in pieces {
             work(first, &mut parts, c);
         }
@@ -163,7 +163,7 @@ pub fn share_out<R: Send, T: Send>(
     width: usize,
     work: impl Fn(Range<usize>, &mut [R]) -> T + Sync,
 ) -> Vec<T> {
-    let runs = threads().min(count).max(1);
+    let runs = if THERE_ARE_THREADS { threads().min(count).max(1) } else { 1 };
     let mut parts = Vec::with_capacity(runs);
     let mut rest = results;
     for run in 0..runs {
@@ -172,7 +172,7 @@ pub fn share_out<R: Send, T: Send>(
         parts.push((pieces, head));
         rest = tail;
     }
-    if runs == 1 {
+    if !THERE_ARE_THREADS || runs == 1 {
         return parts.into_iter().map(|(pieces, results)| work(pieces, results)).collect();
     }
     install(|| parts.into_par_iter().map(|(pieces, results)| work(pieces, results)).collect())

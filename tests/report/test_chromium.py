@@ -248,6 +248,8 @@ def test_figures_follow_the_scheme_and_are_light_in_print(report: Visit) -> None
             found = report.look(f"#figure-{name}", wanted, is_right)
             assert is_right(found), (name, found)
 
+    opened = "() => [...document.querySelectorAll('details')].map(each => each.open)"
+    before = report.page.evaluate(opened)
     try:
         report.page.emulate_media(color_scheme="dark")
         all_are_there(dark, _style.DARK, least=60)
@@ -258,7 +260,7 @@ def test_figures_follow_the_scheme_and_are_light_in_print(report: Visit) -> None
     finally:
         report.page.evaluate("() => dispatchEvent(new Event('afterprint'))")
         report.page.emulate_media(color_scheme="light", media="screen")
-    assert report.page.locator("details[open]").count() == 0
+    assert report.page.evaluate(opened) == before
     assert report.complaints == []
 
 

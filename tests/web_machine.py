@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -31,8 +32,10 @@ class WebMachine:
     number: int
 
     @classmethod
-    def of(cls, kernel: WebKernel, path: Path) -> WebMachine:
-        machine = tp.load(path)
+    def of(
+        cls, kernel: WebKernel, path: Path, settings: Mapping[str, str] | None = None
+    ) -> WebMachine:
+        machine = tp.load(path, settings=dict(settings or {}))
         made = bundle(machine)
         return cls(kernel, machine, made, kernel.ask("machine", bundle=made)["machine"])
 

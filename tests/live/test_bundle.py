@@ -6,6 +6,7 @@ against the library in tests/web.
 
 from __future__ import annotations
 
+import gzip
 import json
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -18,6 +19,7 @@ from command_line import MACHINES
 from sweeps import thinned
 from truepose.errors import TrueposeError
 from truepose.live import bundle
+from truepose.live.laws import at_rest
 from truepose.machine import Condition, Machine
 from truepose.runs.displacement import sum_deviations
 from truepose.runs.poses import PoseRun
@@ -28,9 +30,6 @@ EVERY = sorted(path.stem for path in MACHINES.glob("*.toml"))
 QUICK = {"planar_two_slider", "tricept", "hexapod_all_sources"}
 POSES = 300
 NEVER_LIVE = {
-    "loads": "follows from the pose",
-    "backlash": "follows from the wrench",
-    "clearance": "follows from the wrench",
     "screw_coupling": "follows from the pose",
     "guideway": "follows from the pose",
 }
@@ -125,6 +124,8 @@ def test_known_shifts_and_errors_are_those_of_the_library(name: str) -> None:
     for source in machine.sources:
         if source.name not in live or not source.acts(condition):
             continue
+        if live[source.name]["under_weight"] or hasattr(source, "dead_zones"):
+            continue  # What is read of them is held against the library in tests/web.
         deviation = source.deviation(machine, condition, block)
         columns, wanted = sum_deviations([(deviation.parameters, deviation.shift)])
         own_columns, values = sum_deviations(known(of, live[source.name], block))
@@ -147,9 +148,9 @@ def test_known_shifts_and_errors_are_those_of_the_library(name: str) -> None:
 def test_variables_are_those_of_the_library(name: str) -> None:
     machine, of = made(name)
     condition = other_condition(machine, of, seed=3)
-    block = block_at(machine, other_poses(machine, seed=4), condition)
+    block = at_rest(block_at(machine, other_poses(machine, seed=4), condition))
     live = {source["name"] for source in of["sources"] if source["live"]}
-    sources = [s for s in machine.sources if s.name in live and s.acts(condition)]
+    sources = [s for s in machine.sources if s.name in live and s.acts(block.condition)]
     every = variables_at(machine, block, sources)
     told = of["variables"]
     assert [one["name"] for one in told] == list(every.names)
@@ -232,5 +233,6 @@ def test_no_pose_to_ask_at_is_a_refusal() -> None:
 
 def test_nothing_in_a_bundle_is_large() -> None:
     """A page has it twice, for itself and for its worker."""
-    sizes = {name: len(json.dumps(made(name)[1], separators=(",", ":"))) for name in EVERY}
-    assert max(sizes.values()) < 25_000, sizes
+    texts = {name: json.dumps(made(name)[1], separators=(",", ":")) for name in EVERY}
+    assert max(map(len, texts.values())) < 30_000
+    assert max(len(gzip.compress(text.encode())) for text in texts.values()) < 5_000

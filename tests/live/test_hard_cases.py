@@ -21,6 +21,8 @@ from truepose.machine import Condition, Machine
 from truepose.probability.distributions import ARCSINE
 from truepose.runs.poses import PoseRun
 from truepose.sources import Deviation, PoseBlock
+from truepose.sources._play import DeadZone, pressed
+from weighing_machines import WEIGHING
 
 HERE = Path(__file__).parents[1]
 SAYS_LITTLE = [
@@ -217,3 +219,65 @@ def test_home_can_be_reached_where_the_middle_cannot() -> None:
         len(list(PoseRun(machine, np.array([pose]), machine.condition)))
         for pose in (middle, workspace["home"])
     ] == [0, 1]
+
+
+def loose(block: PoseBlock, threshold: float) -> Deviation:
+    """Play of the first strut, taken up above a load."""
+    column = block.machine.kernel.length_parameters[:1]
+    side, _ = pressed(block, column, block.loads(column, "all"), threshold)
+    return Deviation.of(column, side * 1e-6, np.where(side == 0.0, 1e-6, 0.0))
+
+
+@dataclass(frozen=True)
+class Loose(MadeSource):
+    """A source that says which its dead zones are; `zones` of the machine's first strut."""
+
+    zones: Callable[[int], tuple[DeadZone, ...]] = lambda column: ()
+
+    def dead_zones(self, machine: Machine) -> tuple[DeadZone, ...]:
+        return self.zones(int(machine.kernel.length_parameters[0]))
+
+
+@pytest.mark.parametrize(
+    ("zones", "told"),
+    [
+        (lambda column: (DeadZone(column, 10.0),), True),
+        (lambda column: (DeadZone(column, 200.0),), False),
+        (lambda column: (DeadZone(column + 1, 10.0),), False),
+        (lambda column: (), False),
+    ],
+)
+def test_a_source_that_says_other_dead_zones_than_it_has_is_refused(
+    zones: Callable[[int], tuple[DeadZone, ...]], told: bool
+) -> None:
+    machine = tp.load(MACHINES / "hexapod.toml")
+    source = Loose("loose", of_block=lambda block: loose(block, 10.0), zones=zones)
+    of = bundle(with_sources(machine, *machine.sources, source))
+    (found,) = [one for one in of["sources"] if one["name"] == "loose"]
+    assert found["live"] is told
+    assert told or found["why"] == "has other dead zones than it says"
+    played = [column["play"] for column in of["columns"] if "play" in column]
+    assert [(one["source"], one["threshold"]) for one in played] == [("loose", 10.0)] * told
+
+
+def test_a_force_of_unknown_direction_is_not_live() -> None:
+    settings = dict(WEIGHING["hexapod"]) | {"condition.envelope": '{ force = "100 N" }'}
+    of = bundle(tp.load(MACHINES / "hexapod.toml", settings=settings))
+    not_live = {one["name"]: one["why"] for one in of["sources"] if not one["live"]}
+    assert not_live == dict.fromkeys(
+        ["loads", "backlash", "clearance"], "follows from a force of unknown direction"
+    )
+
+
+def test_a_gradient_along_a_strut_is_named_and_one_of_a_body_is_live() -> None:
+    def thermal(part: str, gradient: str) -> dict[str, Any]:
+        settings = {f"condition.gradient.{part}": gradient}
+        of = bundle(tp.load(MACHINES / "hexapod.toml", settings=settings))
+        (found,) = [one for one in of["sources"] if one["name"] == "thermal"]
+        return found
+
+    of_body = thermal("platform", '["1 K/m", "2 K/m", "-3 K/m"]')
+    assert of_body["live"]
+    assert of_body["at_reference"]
+    along = thermal("strut.1", '"20 K/m"')
+    assert (along["live"], along["why"]) == (False, "follows from the pose")

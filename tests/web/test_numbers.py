@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,18 @@ import numpy as np
 import pytest
 
 import truepose as tp
-from build_machine import machine_files
+from build_machine import MACHINES, machine_files
 from sweeps import thinned
 from truepose import _kernel
 from truepose.arrays import Floats
 from truepose.runs.displacement import displacement, sum_deviations
 from truepose.runs.quantities import POSITIONS, quantities
+from truepose.runs.variables import Variables, stream_of
+from truepose.sources import PoseBlock
 from truepose.uncertainty_analysis.bounds import proven_bounds
 from web_kernel import WebKernel, numbers
 from web_machine import WebMachine
+from weighing_machines import WEIGHING
 
 QUICK = {"hexapod", "tricept", "delta_linear", "planar_two_slider"}
 POSES = 1000
@@ -35,14 +38,21 @@ CLOSE = 1e-12
 """m and rad: of errors, which are at most a few millimetres."""
 
 
+Given = tuple[Path, Mapping[str, str]]
+PLAIN: list[Given] = [(path, {}) for path in machine_files()]
+LOADED: list[Given] = [(MACHINES / f"{name}.toml", keys) for name, keys in WEIGHING.items()]
+
+
 @pytest.fixture(
     scope="module",
-    params=thinned(machine_files(), [path for path in machine_files() if path.stem in QUICK]),
-    ids=lambda path: path.stem,
+    params=thinned(
+        [*PLAIN, *LOADED],
+        [*(one for one in PLAIN if one[0].stem in QUICK), LOADED[0]],
+    ),
+    ids=lambda given: given[0].stem + ("-weighing" if given[1] else ""),
 )
 def machine(request: pytest.FixtureRequest, kernel: WebKernel) -> Iterator[WebMachine]:
-    path: Path = request.param
-    yielded = WebMachine.of(kernel, path)
+    yielded = WebMachine.of(kernel, *request.param)
     yield yielded
     kernel.ask("free", machine=yielded.number)
 
@@ -137,6 +147,30 @@ def scaled(machine: WebMachine) -> tuple[dict[str, Any], dict[str, float]]:
     return {"half_width": factors}, factors
 
 
+def widened(
+    machine: WebMachine, block: PoseBlock, variables: Variables, factors: dict[str, float]
+) -> Variables:
+    """The same with the half widths of every group, and the play behind a shift, by its factor."""
+    groups = {(one["stream"], one["number"]): one["group"] for one in machine.bundle["variables"]}
+    if not groups:
+        return variables
+    # A play that is taken up at every pose is no variable there.
+    identities = zip(variables.streams.tolist(), variables.numbers.tolist(), strict=True)
+    by = np.array([factors[groups[identity]] for identity in identities])
+    shifts = []
+    for source in machine.live:
+        if not source.acts(block.condition):
+            continue
+        deviation = source.deviation(machine.machine, block.condition, block)
+        shift = deviation.shift
+        if hasattr(source, "dead_zones"):
+            stream = stream_of(source.name)
+            shift = shift * [factors[groups[stream, at]] for at in range(shift.shape[1])]
+        shifts.append((deviation.parameters, shift))
+    half_width = variables.half_width * by[variables.variable_of]
+    return replace(variables, shift=sum_deviations(shifts), half_width=half_width)
+
+
 def test_bounds_are_the_same(machine: WebMachine) -> None:
     if machine.machine.kernel.overconstrained:
         pytest.skip("its errors are not proven")
@@ -145,11 +179,7 @@ def test_bounds_are_the_same(machine: WebMachine) -> None:
     block = machine.block(poses, condition)
     variables = machine.variables(block)
     scale, factors = scaled(machine)
-    groups = [one["group"] for one in machine.bundle["variables"]]
-    assert len(groups) == len(variables.names)
-    by = np.array([factors[group] for group in groups])[variables.variable_of]
-    if groups:
-        variables = replace(variables, half_width=variables.half_width * by)
+    variables = widened(machine, block, variables, factors)
     proven = proven_bounds(machine.machine, block, variables)
     kinds = list(quantities(machine.machine.components))
     for at, pose in enumerate(block.indices):

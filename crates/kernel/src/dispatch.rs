@@ -140,6 +140,13 @@ pub fn dispatch<W: Work>(work: W) {
     }
 }
 
+/// The same of work that is seldom done: in WebAssembly sample by sample, the same numbers in a module
+/// that is smaller by all of its lanes.
+#[inline(always)]
+pub fn dispatch_seldom<W: Work>(work: W) {
+    if cfg!(target_family = "wasm") { work.run::<f64>() } else { dispatch(work) }
+}
+
 /// Rows and columns of an 8 x 8 tile exchanged, by the shuffles of the lanes' level: left to itself
 /// the compiler moves the 64 numbers one by one.
 #[inline(always)]

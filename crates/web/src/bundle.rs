@@ -1,8 +1,10 @@
 //! A machine as a page has it: the kernel's, and what is known and unknown of it as laws.
 
+use crate::dead_zones::DeadZone;
 use crate::given::Given;
 use crate::laws::{Law, Term};
 use crate::reply::{Answer, fault};
+use crate::weight::Weight;
 use serde_json::Value as Json;
 use std::collections::BTreeMap;
 use truepose_kernel::machine::{Table, Value, indices_of, parts};
@@ -25,6 +27,8 @@ pub struct Source {
     pub per_kelvin: BTreeMap<String, Vec<Term>>,
     /// Whether it is what gives way under the wrench on the tool.
     pub under_wrench: bool,
+    /// Whether it is what gives way under the machine's own weight.
+    pub under_weight: bool,
 }
 
 /// What gives way, m/N or rad/(N m).
@@ -55,6 +59,8 @@ pub struct Column {
     pub variable: usize,
     /// By how much where that is 1.
     pub half: Law,
+    /// A play that a load may take up.
+    pub play: Option<DeadZone>,
 }
 
 /// All of it.
@@ -71,6 +77,8 @@ pub struct Bundle {
     pub sources: Vec<Source>,
     /// What gives way.
     pub compliance: Compliance,
+    /// What the machine weighs.
+    pub weight: Option<Weight>,
     /// What is not known.
     pub unknowns: Vec<Unknown>,
     /// The same for random numbers; without one that cannot be drawn here.
@@ -112,6 +120,7 @@ impl Bundle {
             reference_temperature: given.item("reference_temperature")?.number()?,
             sources: sources(given, &machine, &names)?,
             compliance: compliance(given, &machine)?,
+            weight: Weight::read(given, &machine)?,
             columns: columns(given, &machine, unknowns.len())?,
             variables: variables(given, shapes, &directions)?,
             unknowns,
@@ -190,6 +199,7 @@ fn sources(given: &Given<'_>, machine: &Machine, parts: &[String]) -> Answer<Vec
             at_reference: Term::list(&source.list_of("at_reference")?, machine)?,
             per_kelvin,
             under_wrench: source.is_asked("under_wrench")?,
+            under_weight: source.is_asked("under_weight")?,
         });
     }
     Ok(sources)
@@ -220,6 +230,7 @@ fn columns(given: &Given<'_>, machine: &Machine, unknowns: usize) -> Answer<Vec<
             parameter: column.item("parameter")?.below(machine.nominal.len(), "parameter")?,
             variable: column.item("variable")?.below(unknowns, "variable")?,
             half: Law::read(&column.item("half")?, machine)?,
+            play: DeadZone::read(column, machine)?,
         })
     };
     given.list_of("columns")?.iter().map(column).collect()

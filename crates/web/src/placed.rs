@@ -1,15 +1,13 @@
 //! Poses with their joints, what is known of the machine there, and where its drives are sent.
 
-use crate::bundle::{Bundle, Source};
+use crate::bundle::Bundle;
 use crate::condition::Condition;
 use crate::given::Given;
 use crate::reply::{Answer, fault};
-use std::collections::BTreeMap;
 use truepose_kernel::Status;
 use truepose_kernel::batch::{self, Deviations, Rows, Samples};
 use truepose_kernel::kinematics;
 use truepose_kernel::spatial::{Pose, add, rotation_matrix};
-use truepose_kernel::statics::PlacedChain;
 
 /// The most poses of one request.
 const MOST_POSES: usize = 1 << 20;
@@ -139,121 +137,6 @@ impl<'a> Placed<'a> {
         }
     }
 
-    /// What is known of the machine at the poses, of some of the live sources together.
-    pub fn shifts<'b>(
-        &self,
-        condition: &Condition,
-        sources: impl Iterator<Item = &'b Source>,
-    ) -> Moved {
-        let mut terms = Vec::new();
-        let mut yields = 0.0;
-        for source in sources {
-            terms.extend(source.at_reference.iter().map(|&term| (term, 1.0)));
-            for (part, of_part) in &source.per_kelvin {
-                let rise = condition.rise.get(part).copied().unwrap_or(0.0);
-                if rise != 0.0 {
-                    terms.extend(of_part.iter().map(|&term| (term, rise)));
-                }
-            }
-            yields += f64::from(u8::from(source.under_wrench));
-        }
-        let mut slots = BTreeMap::new();
-        let place = |parameter: usize, slots: &mut BTreeMap<usize, usize>| {
-            let next = slots.len();
-            *slots.entry(parameter).or_insert(next)
-        };
-        let at: Vec<usize> =
-            terms.iter().map(|(term, _)| place(term.parameter, &mut slots)).collect();
-        let loaded = yields > 0.0 && condition.wrench.iter().any(|&force| force != 0.0);
-        let deflection = if loaded { self.deflection(condition, yields) } else { Moved::default() };
-        let deflected: Vec<usize> =
-            deflection.columns.iter().map(|&column| place(column, &mut slots)).collect();
-        let width = slots.len();
-        let mut values = vec![0.0; width * self.count];
-        for pose in 0..self.count {
-            let (row, lengths) = (&mut values[pose * width..][..width], self.lengths_at(pose));
-            for ((term, factor), &at) in terms.iter().zip(&at) {
-                row[at] += factor * term.law.at(lengths);
-            }
-            if loaded {
-                for (&at, value) in deflected.iter().zip(deflection.row(pose)) {
-                    row[at] += value;
-                }
-            }
-        }
-        let mut columns = vec![0; width];
-        for (parameter, at) in slots {
-            columns[at] = parameter;
-        }
-        Moved { columns, values }
-    }
-
-    /// Loads on parameters under a wrench on the tool, a row a pose; and what became of each.
-    pub fn loads(&self, wrench: &[f64; 6], columns: &[usize]) -> (Vec<f64>, Vec<Status>) {
-        let machine = &self.bundle.machine;
-        let mut loads = vec![0.0; self.count * columns.len()];
-        let mut status = vec![Status::Ok; self.count];
-        if !columns.is_empty() {
-            let quantity = batch::Loads::new(machine, columns, Rows::shared(wrench));
-            batch::first_order(machine, &self.samples(), &quantity, &mut loads, &mut status);
-        }
-        (loads, status)
-    }
-
-    /// How far parameters give way under the wrench: each under its own load and others'.
-    fn deflection(&self, condition: &Condition, times: f64) -> Moved {
-        let Bundle { machine, compliance, .. } = self.bundle;
-        let scale = condition.compliance * times;
-        let mut slots = BTreeMap::new();
-        let mut place = |parameter: usize| {
-            let next = slots.len();
-            *slots.entry(parameter).or_insert(next)
-        };
-        let own: Vec<usize> = compliance.own.iter().map(|term| place(term.parameter)).collect();
-        let shared: Vec<(usize, usize)> =
-            compliance.shared.iter().map(|&(one, other, _)| (place(one), place(other))).collect();
-        let chains = if compliance.limbs { machine.chains.as_slice() } else { &[] };
-        let limbs: Vec<Vec<usize>> = chains
-            .iter()
-            .map(|chain| chain.parameters.iter().map(|&parameter| place(parameter)).collect())
-            .collect();
-        let mut columns = vec![0; slots.len()];
-        for (&parameter, &at) in &slots {
-            columns[at] = parameter;
-        }
-        let (loads, _) = self.loads(&condition.wrench, &columns);
-        let width = columns.len();
-        let mut values = vec![0.0; loads.len()];
-        for pose in 0..self.count {
-            let (loads, lengths) = (&loads[pose * width..][..width], self.lengths_at(pose));
-            let row = &mut values[pose * width..][..width];
-            for (term, &at) in compliance.own.iter().zip(&own) {
-                row[at] += scale * term.law.at(lengths) * loads[at];
-            }
-            let mut give = |one: usize, other: usize, value: f64| {
-                row[one] += scale * value * loads[other];
-                if one != other {
-                    row[other] += scale * value * loads[one];
-                }
-            };
-            for (&(one, other), &(_, _, value)) in shared.iter().zip(&compliance.shared) {
-                give(one, other, value);
-            }
-            let placement = self.pose(pose);
-            let rotation = rotation_matrix(placement.rotation);
-            for (chain, slots) in chains.iter().zip(&limbs) {
-                let at = (&rotation, placement.position);
-                let joints = self.joints_at(pose);
-                let placed = PlacedChain::new(machine, chain, &machine.nominal, joints, at);
-                let matrix = placed.compliance();
-                for (i, k) in chain.places() {
-                    give(slots[i], slots[k], matrix[i][k]);
-                }
-            }
-        }
-        Moved { columns, values }
-    }
-
     /// The joints that the drives are sent to for a machine with these known deviations, and what became
     /// of each pose: also of the nominal command, and where there is no such pose.
     pub fn sent(&self, condition: &Condition, known: &Moved) -> (Vec<f64>, Vec<Status>) {
@@ -293,15 +176,6 @@ impl<'a> Placed<'a> {
         (errors, status)
     }
 
-    /// Half widths of the columns at one pose.
-    pub fn half_widths(&self, condition: &Condition, pose: usize) -> Vec<f64> {
-        let lengths = self.lengths_at(pose);
-        let half = |column: &crate::bundle::Column| {
-            condition.half_width[column.variable] * column.half.at(lengths)
-        };
-        self.bundle.columns.iter().map(half).collect()
-    }
-
     /// Base-side and platform-side centres of the struts' joints, base axes, where the drives are at `joints`,
     /// the parameters are `p` and the platform is at `pose`.
     pub fn centres(&self, joints: &[f64], p: &[f64], pose: &Pose<f64>) -> Vec<[[f64; 3]; 2]> {
@@ -313,6 +187,11 @@ impl<'a> Placed<'a> {
             [limb.base, add(arm, pose.position)]
         });
         centres.collect()
+    }
+
+    /// The same of the nominal machine at one pose.
+    pub fn centres_at(&self, pose: usize) -> Vec<[[f64; 3]; 2]> {
+        self.centres(self.joints_at(pose), &self.bundle.machine.nominal, &self.pose(pose))
     }
 }
 

@@ -76,7 +76,7 @@ impl Run {
         for (&parameter, value) in known.columns.iter().zip(known.row(0)) {
             centre[parameter] += value;
         }
-        let swing = placed.half_widths(condition, 0);
+        let swing = placed.half_widths(condition);
         let parameters: Vec<usize> = bundle.columns.iter().map(|column| column.parameter).collect();
         let variables: Vec<usize> = bundle.columns.iter().map(|column| column.variable).collect();
         let pose = placed.pose(0);

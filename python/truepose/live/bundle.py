@@ -15,6 +15,7 @@ import numpy as np
 
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import ICE_POINT, Shown, ShownUnits, shown_units
+from truepose.live.laws import LiveLaw, live_law, weight
 from truepose.live.unknown import correlated_student, unknown, yields_unsaid
 from truepose.machine import Machine
 from truepose.runs.controller_geometry import require_known_controller
@@ -25,13 +26,10 @@ from truepose.sources import PoseBlock, Source
 from truepose.uncertainty_analysis.known_shifts import (
     FEWEST,
     NoLawError,
-    SourceLaw,
     Term,
     compliance_laws,
     expanding,
     probed_poses,
-    require_law,
-    source_law,
 )
 from truepose.version import version
 
@@ -49,8 +47,8 @@ def bundle(machine: Machine) -> dict[str, Any]:
     require_known_controller(machine)
     block, home = _probed(machine), _home(machine)
     laws, refused = _laws(machine, block)
-    sources = [source for source in _sources(machine) if source.name in laws]
-    yields = any(law.yields for law in laws.values())
+    sources = [law.source for law in laws]
+    yields = any(law.under for law in laws)
     own, shared = compliance_laws(block) if yields else ((), ())
     poses = machine.poses()
     condition = machine.condition
@@ -66,7 +64,7 @@ def bundle(machine: Machine) -> dict[str, Any]:
         "parameters": list(machine.parameters),
         "reference_temperature": reference,
         "sources": [
-            *(_live(source, laws[source.name]) for source in sources),
+            *map(_live, laws),
             *(_not_live(machine, home, source, why) for source, why in refused),
         ],
         "compliance": {
@@ -74,7 +72,8 @@ def bundle(machine: Machine) -> dict[str, Any]:
             "shared": [list(pair) for pair in shared],
             "limbs": yields and bool(machine.limbs) and not yields_unsaid(machine, sources),
         },
-        **unknown(machine, block, sources),
+        "weight": weight(machine),
+        **unknown(block, laws),
         "condition": {
             "temperature": {
                 part: reference + float(np.ravel(condition.temperature_rise(part))[0])
@@ -127,37 +126,41 @@ def _sources(machine: Machine) -> tuple[Source, ...]:
     return cast("tuple[Source, ...]", machine.sources)
 
 
-def _laws(
-    machine: Machine, block: PoseBlock
-) -> tuple[dict[str, SourceLaw], list[tuple[Source, str]]]:
-    """What follows laws and does anything, by name, and what follows none, with why."""
-    laws: dict[str, SourceLaw] = {}
+def _laws(machine: Machine, block: PoseBlock) -> tuple[list[LiveLaw], list[tuple[Source, str]]]:
+    """Of what follows laws and does anything, and what follows none, with why."""
+    laws: list[LiveLaw] = []
     refused: list[tuple[Source, str]] = []
     for source in _sources(machine):
         try:
-            law = source_law(source, block)
-            require_law(source, law, block, machine.condition)
+            law = live_law(source, block)
             # Asked of each alone, so that one without laws takes no other with it.
-            variables = unknown(machine, block, [source])
+            variables = unknown(block, [law])
             if correlated_student(variables):
                 raise NoLawError("has correlated variables of Student's distribution")
-            told = law.at_reference or any(law.per_kelvin.values()) or variables["variables"]
+            shifts = law.shifts.at_reference or any(law.shifts.per_kelvin.values())
             # What does nothing, whatever a slider does, is no row of zeros.
-            if told or law.yields or source.acts(machine.condition):
-                laws[source.name] = law
+            if (
+                shifts
+                or variables["variables"]
+                or law.under == "tool"
+                or source.acts(machine.condition)
+            ):
+                laws.append(law)
         except NoLawError as failure:
             refused.append((source, str(failure)))
     return laws, refused
 
 
-def _live(source: Source, law: SourceLaw) -> dict[str, Any]:
+def _live(law: LiveLaw) -> dict[str, Any]:
+    per_kelvin = law.shifts.per_kelvin.items()
     return {
-        "name": source.name,
-        "doc": source.doc,
+        "name": law.source.name,
+        "doc": law.source.doc,
         "live": True,
-        "at_reference": _rows(law.at_reference),
-        "per_kelvin": {part: _rows(added) for part, added in law.per_kelvin.items() if added},
-        "under_wrench": law.yields,
+        "at_reference": _rows(law.shifts.at_reference),
+        "per_kelvin": {part: _rows(added) for part, added in per_kelvin if added},
+        "under_wrench": law.under == "tool",
+        "under_weight": law.under == "own",
     }
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from truepose.live.laws import LiveLaw, at_rest, play
 from truepose.machine import Condition, Machine
 from truepose.runs.variables import Variables, variables_at
 from truepose.sources import PoseBlock, Source
+from truepose.sources._play import DeadZone
 from truepose.sources._stiffness import lacking
 from truepose.uncertainty_analysis.known_shifts import (
     LARGE,
@@ -24,16 +26,18 @@ from truepose.uncertainty_analysis.sampler import Random, described
 from truepose.verdict.tightening import band_of
 
 
-def unknown(machine: Machine, block: PoseBlock, sources: Sequence[Source]) -> dict[str, Any]:
-    """`variables`, `columns`, `copula` and `directions` of a bundle, of all `sources` together.
+def unknown(block: PoseBlock, laws: Sequence[LiveLaw]) -> dict[str, Any]:
+    """`variables`, `columns`, `copula` and `directions` of a bundle, of all sources together.
 
-    Raises `NoLawError` where a half width follows from the pose by no law of a strut's length, or
-    from what a page's sliders change: temperatures and the wrench.
+    Raises `NoLawError` where a half width follows from the pose by no law of a strut's length, or,
+    but for dead zones, from what a page's sliders change: temperatures and the wrench.
     """
-    cold = block.condition
-    every = _variables(machine, block, cold, sources)
-    for condition in _conditions(block, sources):
-        _require_same(every, _variables(machine, block, condition, sources))
+    rest = at_rest(block)
+    steady = [law.source for law in laws if not law.dead_zones]
+    bands = _variables(rest, rest.condition, steady)
+    for condition in _conditions(block, steady):
+        _require_same(bands, _variables(block, condition, steady))
+    every = _variables(rest, rest.condition, [law.source for law in laws])
     drawn = Random(every, 0)
     linked = drawn.copula.linked.tolist()
     return {
@@ -59,7 +63,7 @@ def unknown(machine: Machine, block: PoseBlock, sources: Sequence[Source]) -> di
                 strict=True,
             )
         ],
-        "columns": _columns(block, every),
+        "columns": _columns(block, every, laws),
         "copula": {"members": linked, "factor": drawn.copula.factor.tolist()} if linked else None,
         "directions": [members.tolist() for members in every.directions],
     }
@@ -82,11 +86,9 @@ def correlated_student(unknown: Mapping[str, Any]) -> bool:
     return any(variables[at]["distribution"]["kind"] == "student-t" for at in members)
 
 
-def _variables(
-    machine: Machine, block: PoseBlock, condition: Condition, sources: Sequence[Source]
-) -> Variables:
+def _variables(block: PoseBlock, condition: Condition, sources: Sequence[Source]) -> Variables:
     acting = [source for source in sources if source.acts(condition)]
-    return variables_at(machine, replace(block, condition=condition), acting)
+    return variables_at(block.machine, replace(block, condition=condition), acting)
 
 
 def _conditions(block: PoseBlock, sources: Sequence[Source]) -> list[Condition]:
@@ -101,9 +103,9 @@ def _conditions(block: PoseBlock, sources: Sequence[Source]) -> list[Condition]:
     return conditions
 
 
-def yields_unsaid(machine: Machine, sources: Sequence[Source]) -> bool:
+def yields_unsaid(machine: Machine, sources: Iterable[Source]) -> bool:
     """Whether something is to give way and nobody says how stiff it is: a page takes no wrench."""
-    yields = any(getattr(source, "over_region", None) == "wrench" for source in sources)
+    yields = any(getattr(source, "yields_under", None) == "tool" for source in sources)
     return yields and bool(lacking(machine.drives, machine.struts, machine.limbs, ""))
 
 
@@ -118,15 +120,30 @@ def _require_same(one: Variables, other: Variables) -> None:
         raise NoLawError("has bands that follow from the temperature or the wrench")
 
 
-def _columns(block: PoseBlock, every: Variables) -> list[dict[str, Any]]:
+def _columns(block: PoseBlock, every: Variables, laws: Sequence[LiveLaw]) -> list[dict[str, Any]]:
+    zones = {law.source.name: iter(_open(block, law)) for law in laws}
     columns = []
     for at, (parameter, variable) in enumerate(
         zip(every.columns.tolist(), every.variable_of.tolist(), strict=True)
     ):
         (law,) = terms(block, every.columns[at : at + 1], every.half_width[:, at : at + 1])
         half = [law.constant, law.slope, law.strut]
-        columns.append({"parameter": parameter, "variable": variable, "half": half})
+        column: dict[str, Any] = {"parameter": parameter, "variable": variable, "half": half}
+        source = every.sources[variable]
+        zone = next(zones[source], None)
+        if zone is not None:
+            column["play"] = play(zone, source)
+        columns.append(column)
     return columns
+
+
+def _open(block: PoseBlock, law: LiveLaw) -> list[DeadZone]:
+    """The source's dead zones that have any width, as its columns with a band are in order."""
+    if not law.dead_zones:
+        return []
+    rest = at_rest(block)
+    banded = law.source.deviation(block.machine, rest.condition, rest).banded
+    return [law.dead_zones[at] for at in banded.tolist()]
 
 
 __all__ = ["correlated_student", "unknown", "yields_unsaid"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -10,6 +12,22 @@ from truepose.sources.pose_block import PoseBlock
 
 NO_LOAD = 1e-9
 """Load, in all that acts on the machine, at or below which a part carries nothing but rounding."""
+
+
+@dataclass(frozen=True)
+class DeadZone:
+    """A play that stays open while little presses on it: what `pressed` is asked of a source.
+
+    `parameter`: the kernel's that it leaves open, m or rad; it is pressed by the load on that.
+    `threshold`, N, or N m of an angle, whose `lever` is the machine's size, m; 1 otherwise.
+    `end`: number of a strut and its end (0 base, 1 platform), where the force differs from that
+    load, a strut's mean, by what `PoseBlock.over_tension` says; else None.
+    """
+
+    parameter: int
+    threshold: float
+    lever: float = 1.0
+    end: tuple[int, int] | None = None
 
 
 def pressed(

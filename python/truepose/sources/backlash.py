@@ -20,7 +20,7 @@ from pydantic import BaseModel, Field
 from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import NonNegativeCoordinate, NonNegativeDriveLoad
-from truepose.sources._play import pressed
+from truepose.sources._play import DeadZone, pressed
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
 from truepose.sources.variation import WITH_DIRECTION, Variation, variation
@@ -97,17 +97,25 @@ class Backlash:
         """In every condition."""
         return True
 
+    def dead_zones(self, machine: Machine) -> tuple[DeadZone, ...]:
+        """One a column of `deviation`."""
+        of_strut = {int(c): at for at, c in enumerate(machine.kernel.length_parameters)}
+        zones = []
+        for joint, threshold in zip(self.joints, self.thresholds, strict=True):
+            drive = machine.drives[joint]
+            column = machine.parameters.index(f"{drive.part}.offset")
+            # A moment on a crank goes by the machine's size, as the moments on the tool do.
+            lever = machine.characteristic_length if drive.coordinate == "angle" else 1.0
+            # A telescopic drive stands at the base end of its strut.
+            end = (of_strut[column], 0) if column in of_strut else None
+            zones.append(DeadZone(column, threshold, lever, end))
+        return tuple(zones)
+
     def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """Where the carriages stand in their play, m or rad, (n, k)."""
-        drives = [machine.drives[joint] for joint in self.joints]
-        columns = np.array(
-            [machine.parameters.index(f"{drive.part}.offset") for drive in drives], np.intp
-        )
-        # A moment on a crank goes by the machine's size, as the moments on the tool do.
-        lever = [
-            machine.characteristic_length if drive.coordinate == "angle" else 1.0
-            for drive in drives
-        ]
+        zones = self.dead_zones(machine)
+        columns = np.array([zone.parameter for zone in zones], np.intp)
+        lever = [zone.lever for zone in zones]
         loads = block.drive_loads(self.joints)
         side, free = pressed(block, columns, loads, self.thresholds, lever)
         if block.travel is not None:

@@ -24,7 +24,7 @@ from truepose.errors import Fault
 from truepose.files.file_table import FileTable
 from truepose.files.quantity import quantity
 from truepose.files.varies import ByItself
-from truepose.sources._play import pressed
+from truepose.sources._play import DeadZone, pressed
 from truepose.sources.deviation import Deviation
 from truepose.sources.pose_block import PoseBlock
 from truepose.sources.variation import WITH_VISIT, Variation, variation
@@ -101,6 +101,14 @@ class Clearance:
     def acts(self, condition: Condition) -> bool:
         """In every condition."""
         return True
+
+    def dead_zones(self, machine: Machine) -> tuple[DeadZone, ...]:
+        """One a column of `deviation`."""
+        columns = machine.kernel.length_parameters.tolist()
+        return tuple(
+            DeadZone(columns[at.strut], self.threshold, end=(at.strut, at.end))
+            for at in self.joints
+        )
 
     def deviation(self, machine: Machine, condition: Condition, block: PoseBlock) -> Deviation:
         """What each joint adds to the distance of its strut's joint centres, m, (n, k)."""

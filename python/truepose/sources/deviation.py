@@ -313,6 +313,9 @@ class Source(Protocol):
 
     A source whose shift depends on the pose may also have `over_region`, which says how, so that
     bounds over a region can enclose it: see `truepose.uncertainty_analysis.bounds_over_region`.
+    One that is what gives way under loads says under which by `yields_under`, a `Cause`; one that
+    stands anywhere in a play while little presses on it has `dead_zones(machine)`, a `DeadZone` a
+    column: so that a page can evaluate it anew (`truepose.live`).
     """
 
     name: ClassVar[str]

@@ -19,7 +19,7 @@ import numpy as np
 from truepose.errors import TrueposeError
 from truepose.sources._stiffness import lacking
 from truepose.sources.deviation import Deviation
-from truepose.sources.pose_block import PoseBlock
+from truepose.sources.pose_block import Cause, PoseBlock
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -39,6 +39,7 @@ class Elastic:
     tables: ClassVar[Mapping[str, type[BaseModel]]] = {}
     sets_overall_edges: ClassVar[bool] = False
     over_region: ClassVar[str] = "wrench"
+    yields_under: ClassVar[Cause] = "tool"
 
     requested: bool
     """The file gives a wrench and a stiffness, were the wrench zero."""

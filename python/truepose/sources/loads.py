@@ -29,7 +29,7 @@ import numpy as np
 from truepose.errors import Problem, TrueposeError
 from truepose.sources._stiffness import lacking
 from truepose.sources.deviation import ARCSINE, OWN_GROUP, UNIFORM, Deviation
-from truepose.sources.pose_block import PoseBlock
+from truepose.sources.pose_block import Cause, PoseBlock
 from truepose.sources.variation import WITH_RUN, variation
 
 if TYPE_CHECKING:
@@ -51,6 +51,7 @@ class Loads:
     doc: ClassVar[str] = "weight and inertia of the machine, and a force of unknown direction"
     tables: ClassVar[Mapping[str, type[BaseModel]]] = {}
     sets_overall_edges: ClassVar[bool] = False
+    yields_under: ClassVar[Cause] = "own"
 
     weighs: bool
     """Something has a mass."""

@@ -165,32 +165,15 @@ class PoseBlock(Represented):
 
         None where no limb weighs anything.
         """
-        struts = {strut.name: strut.mass for strut in self.machine.struts}
-        carried = {strut.name: strut.drive for strut in self.machine.struts}
-        drives = {drive.name: drive.mass for drive in self.machine.drives}
-        masses = [
-            limb.mass
-            + struts.get(limb.strut or "", 0.0)
-            + drives.get(carried.get(limb.strut or "") or "", 0.0)
-            for limb in self.machine.limbs
-        ]
-        if not any(masses):
+        if not limbs_weigh(self.machine):
             return None
         kernel = self.machine.kernel
         return kernel.limb_sag_at(self.joints, self.placements, self.weight.tolist())
 
     @cached_property
     def base_forces(self) -> Floats | None:
-        """(1, n_strut, 3) weight at the base-side joint centres, N, base axes; None: no mass there.
-
-        The struts' other share, and the carriages', in equal parts on the struts that they carry.
-        """
-        struts = self.machine.struts
-        masses = np.array([strut.mass * (1.0 - strut.centre_of_mass) for strut in struts])
-        for drive in self.machine.drives:
-            carried = np.array([strut.drive == drive.name for strut in struts])
-            masses += carried * (drive.mass / carried.sum())
-        forces: Floats = masses[np.newaxis, :, np.newaxis] * self.weight
+        """(1, n_strut, 3) weight at the base-side joint centres, N, base axes; None: no mass."""
+        forces: Floats = base_masses(self.machine)[np.newaxis, :, np.newaxis] * self.weight
         return forces if forces.any() else None
 
     @cached_property
@@ -327,6 +310,31 @@ class PoseBlock(Represented):
             return self.condition.temperature_rise(part)
         rise = self.condition.temperature_rise(part, self.times)
         return rise if isinstance(rise, float) else rise[:, np.newaxis]
+
+
+def base_masses(machine: Machine) -> Floats:
+    """(n_strut,) kg at the base-side joint centres.
+
+    The struts' other share, and the carriages', in equal parts on the struts that they carry.
+    """
+    struts = machine.struts
+    masses = np.array([strut.mass * (1.0 - strut.centre_of_mass) for strut in struts])
+    for drive in machine.drives:
+        carried = np.array([strut.drive == drive.name for strut in struts])
+        masses += carried * (drive.mass / carried.sum())
+    return masses
+
+
+def limbs_weigh(machine: Machine) -> bool:
+    """Whether a limb weighs anything: its tube, its strut, or the carriage of that."""
+    struts = {strut.name: strut for strut in machine.struts}
+    drives = {drive.name: drive.mass for drive in machine.drives}
+    for limb in machine.limbs:
+        strut = struts.get(limb.strut or "")
+        carried = 0.0 if strut is None else strut.mass + drives.get(strut.drive or "", 0.0)
+        if limb.mass + carried:
+            return True
+    return False
 
 
 def _moments(arms: Floats, force: Floats) -> Floats:

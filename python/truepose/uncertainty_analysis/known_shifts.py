@@ -101,7 +101,7 @@ def probed_poses(machine: Machine) -> PoseBlock | None:
 
 def source_law(source: Source, block: PoseBlock) -> SourceLaw:
     """The laws that the source follows at the poses of `probed_poses`. Raises `NoLawError`."""
-    if getattr(source, "over_region", None) == "wrench":
+    if getattr(source, "yields_under", None) == "tool":
         return SourceLaw(source.name, (), {}, True)
     cold_shift = _shift(source, block, block.condition)
     _require_no_wrench(source, block, cold_shift)

@@ -3,7 +3,7 @@
 
 use super::samples::{Group, Rows, Samples};
 use super::threads::for_chunks;
-use crate::dispatch::{Work, dispatch};
+use crate::dispatch::{Work, dispatch_seldom};
 use crate::element::{ParameterGradient, Slots};
 use crate::machine::Machine;
 use crate::scalar::Real;
@@ -22,7 +22,7 @@ pub fn base_loads(
     let width = columns.len();
     for_chunks(samples.count, (out, width), (&mut [], 0), &mut done, |first, out, _, done| {
         let size = done.len();
-        dispatch(Chunk { machine, samples, forces, columns, first, size, out });
+        dispatch_seldom(Chunk { machine, samples, forces, columns, first, size, out });
     });
 }
 

@@ -34,7 +34,7 @@ impl<'a> Asked<'a> {
         let known = placed.shifts(&condition, bundle.sources.iter());
         let (joints, sent) = placed.sent(&condition, &known);
         let (errors, status) = placed.errors(&joints, &known, &sent);
-        let swing = placed.half_widths(&condition, 0);
+        let swing = placed.half_widths(&condition);
         Ok(Asked { known, joints, swing, errors, status: status[0], placed })
     }
 }

@@ -6,7 +6,7 @@ use crate::reply::{Answer, fault, rows, words};
 use crate::state::State;
 use serde_json::{Value, json};
 use truepose_kernel::Status;
-use truepose_kernel::batch;
+use truepose_kernel::batch::{self, Rows};
 
 /// The most numbers of one reply.
 const MOST_NUMBERS: usize = 1 << 24;
@@ -54,8 +54,8 @@ pub fn loads(state: &mut State, request: &Given<'_>) -> Answer<Value> {
     let bundle = state.machine(request)?;
     let placed = Placed::read(request, &bundle)?;
     let columns = columns(request, &placed, 1)?;
-    let wrench = request.item("wrench")?.fixed()?;
-    let (mut loads, found) = placed.loads(&wrench, &columns);
+    let wrench: [f64; 6] = request.item("wrench")?.fixed()?;
+    let (mut loads, found) = placed.loads(Rows::shared(&wrench), &columns);
     let mut status = first_bad(&placed.status, &found);
     blank_bad(&mut loads, columns.len(), &mut status);
     Ok(json!({ "status": words(&status), "loads": rows(&loads, placed.count, columns.len()) }))

@@ -68,27 +68,27 @@ function livePart(place, setting, ask, module) {
   function update(moving) {
     const begun = performance.now();
     const at = {machine, condition: state.condition, scale: state.scale};
-    const {status, centres, placements, lengths} = ask({op: "place", machine, poses: [state.pose]});
+    const {status, centres, placements} = ask({op: "place", machine, poses: [state.pose]});
     // What of a state comes later: `worst`, `bounds`, `samples`, and whether these are `done`.
     known = {status: {before: status[0], after: status[0]}, errors: {}, later: {before: {}, after: {}}};
     const picture = {centres: null, errors: {}, ellipses: {}};
-    let bySource = {}, sizes = {};
+    let bySource = {}, sizes = {}, halfWidths = [];
     if (status[0] === "ok") {
       for (const [name, command] of Object.entries(COMMAND_OF)) {
-        const whole = name === "before" ? {sources: true, centres_actual: true} : {};
+        const whole = name === "before" ? {sources: true, centres_actual: true, half_widths: true} : {};
         const told = ask({op: "errors", ...at, poses: [state.pose], command, ...whole});
         known.status[name] = told.status[0];
         known.errors[name] = told.status[0] === "ok" ? told.errors[0] : null;
         if (name === "before") {
           bySource = Object.fromEntries(Object.entries(told.by_source || {}).map(
             ([source, errors]) => [source, errors[0]]));
+          halfWidths = told.half_widths[0];
           picture.actual = known.errors.before && told.actual_centres ? told.actual_centres[0] : null;
         }
         picture.errors[name] = known.errors[name] && inSpace(known.errors[name]);
       }
       if (known.errors.before) {
-        sizes = reaches(
-          state.pose, lengths[0], state.scale.half_width, bySource, known.errors);
+        sizes = reaches(state.pose, halfWidths, bySource, known.errors);
       }
       Object.assign(picture, {centres: centres[0], tool: placements[0].slice(0, 3)});
     }

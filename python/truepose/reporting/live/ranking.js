@@ -55,21 +55,20 @@ function sourcesTable(host, {components, quantities, sources, words, numbers}) {
   return {show};
 }
 
-// A function: lengths of struts and factors of tolerance groups at a pose, the error of each source
-// there and of all by state -> up to which sizes each goes, to first order.
+// A function: half widths of the columns at a pose, the error of each source there and of all by
+// state -> up to which sizes each goes, to first order.
 function reachesOf({bundle, machine, components, quantities, ask}) {
   const parameters = [...new Set(bundle.columns.map(({parameter}) => parameter))];
-  return (pose, lengths, factors, bySource, errors) => {
+  return (pose, halfWidths, bySource, errors) => {
     const known = {...bySource, ...errors};
     if (!parameters.length) return sizesOf({}, known, components, quantities);
     const {effects} = ask({op: "sensitivities", machine, poses: [pose], columns: parameters});
     const of = new Map(parameters.map((parameter, at) => [parameter, effects[0][at]]));
     const bands = bundle.variables.map(() => components.map(() => 0));
-    for (const {parameter, variable, half: [constant, slope, strut]} of bundle.columns) {
-      const half = (constant + (strut === null ? 0 : slope * lengths[strut]))
-        * (factors[bundle.variables[variable].group] ?? 1);
+    bundle.columns.forEach(({parameter, variable}, column) => {
+      const half = halfWidths[column];
       of.get(parameter).forEach((effect, at) => { bands[variable][at] += half * effect; });
-    }
+    });
     const theirs = Object.fromEntries(Object.keys(errors).map(name => [name, bands]));
     bundle.variables.forEach(({source}, at) => (theirs[source] ||= []).push(bands[at]));
     return sizesOf(theirs, known, components, quantities);

@@ -13,6 +13,7 @@ import click
 
 from truepose.cli import _complete
 from truepose.cli._guard import JSON_ASKED
+from truepose.language import ENGLISH
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -123,6 +124,14 @@ accuracy_option = click.option(
     "--require-accuracy",
     is_flag=True,
     help="Exit with code 1 when the accuracy asked in the machine file is not met.",
+)
+language_option = click.option(
+    "--language",
+    metavar="CODE",
+    default=ENGLISH,
+    shell_complete=_complete.languages,
+    help="Language of the page and of what is printed. Default: en; others are files of "
+    "`languages/`, such as de and pt.",
 )
 
 

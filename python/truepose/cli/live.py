@@ -7,16 +7,15 @@ from typing import Any
 
 import click
 
-from truepose.cli import _complete
 from truepose.cli._options import (
     OutputFile,
     Request,
+    language_option,
     machine_argument,
     set_option,
     takes,
 )
 from truepose.cli._verbose import verbose_option
-from truepose.language import ENGLISH
 
 
 @click.command("live")
@@ -32,14 +31,7 @@ from truepose.language import ENGLISH
         help="Where the page goes. By default beside you, named after the machine file: "
         "hexapod-live.html (of standard input, live.html).",
     ),
-    click.option(
-        "--language",
-        metavar="CODE",
-        default=ENGLISH,
-        shell_complete=_complete.languages,
-        help="Language of the page. Default: en; others are files of `languages/`, such as de and "
-        "pt.",
-    ),
+    language_option,
     verbose_option,
 )
 def command(**options: Any) -> int:

@@ -8,19 +8,18 @@ from typing import Any
 
 import click
 
-from truepose.cli import _complete
 from truepose.cli._options import (
     InputFile,
     OutputFile,
     Request,
     accuracy_option,
+    language_option,
     machine_argument,
     set_option,
     strict_option,
     takes,
 )
 from truepose.cli._verbose import verbose_option
-from truepose.language import ENGLISH
 
 
 @click.command("report")
@@ -70,14 +69,7 @@ from truepose.language import ENGLISH
         help="Write what every figure draws, and every table, as CSV into FOLDER, which is made "
         "where it is not there: figure-3-workspace_maps.csv, by the numbers on the page.",
     ),
-    click.option(
-        "--language",
-        metavar="CODE",
-        default=ENGLISH,
-        shell_complete=_complete.languages,
-        help="Language of the page and of what is printed. Default: en; others are files of "
-        "`languages/`, such as de and pt.",
-    ),
+    language_option,
     strict_option,
     accuracy_option,
     verbose_option,

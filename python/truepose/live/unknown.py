@@ -74,9 +74,9 @@ def _group(name: str, source: str) -> str:
 
     A variable that is named with its source, since another source has the like, is so grouped.
     """
-    own = name.removeprefix(f"{source}: ")
-    band = band_of(own, source).name
-    return band if own == name else f"{source}: {band}"
+    band = band_of(name, source).name
+    prefix = f"{source}: "
+    return prefix + band.removeprefix(prefix) if name.startswith(prefix) else band
 
 
 def correlated_student(unknown: Mapping[str, Any]) -> bool:

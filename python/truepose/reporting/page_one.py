@@ -304,7 +304,7 @@ def _nothing_to_do(after: str | None) -> str:
 
 
 def _tighten(study: Study, of: Tightening) -> str:
-    values = {"band": of.band.name, "parts": _parts(of), "width": _width(study, of)}
+    values = {"band": of.band.shown, "parts": _parts(of), "width": _width(study, of)}
     reached = "; ".join(
         f"{word(one.answer.quantity)} {one.size}" for one in told(study.machine, of.answers)
     )

@@ -47,6 +47,7 @@ SEED = 0
 
 _PART = re.compile(r"^(?P<kind>\w++)\.(?P<part>[^.]++)\.(?P<key>[\w.]*+)$")
 _AXIS = re.compile(r"\.[xyz]$")
+_COUNT = re.compile(r" \([0-9]++\)$")
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,11 @@ class ToleranceBand:
 
     name: str
     source: str
+
+    @property
+    def shown(self) -> str:
+        """Its name, with its source where that is not a tolerance of the machine."""
+        return self.name if self.source == "tolerance" else f"{self.source}: {self.name}"
 
     def members(self, variables: Variables) -> Flags:
         """(n_variable,) which of the variables it has."""
@@ -91,8 +97,12 @@ class Tightening:
 
 
 def band_of(name: str, source: str) -> ToleranceBand:
-    """The band of a variable of a source."""
-    part = _PART.match(name)
+    """The band of a variable of a source.
+
+    What tells it from another variable of its name, its source before it or a count behind it, is
+    not its band's.
+    """
+    part = _PART.match(_COUNT.sub("", name.removeprefix(f"{source}: ")))
     if part is None:
         return ToleranceBand(name, source)
     return ToleranceBand(f"{part['kind']}.*.{_AXIS.sub('', part['key'])}", source)

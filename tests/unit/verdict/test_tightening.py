@@ -32,6 +32,12 @@ def test_a_band_is_of_parts_that_differ_in_their_name_alone() -> None:
         "strut.*.platform", "tolerance"
     )
     assert band_of("strut.1.length", "thermal") != band_of("strut.1.length", "tolerance")
+    named = ("drive.d1.offset", "clearance: drive.d2.offset", "clearance: drive.d3.offset (2)")
+    assert {band_of(name, "clearance") for name in named} == {
+        ToleranceBand("drive.*.offset", "clearance")
+    }
+    assert band_of("drive.d1.offset", "clearance").shown == "clearance: drive.*.offset"
+    assert band_of("drive.d1.offset", "tolerance").shown == "drive.*.offset"
     assert band_of("joint 1, x", "tolerance") == ToleranceBand("joint 1, x", "tolerance")
 
 

@@ -22,11 +22,13 @@ ROOT = DOCS.parent
 sys.path[:0] = [str(HERE), str(DOCS)]
 
 import interface_page  # noqa: E402 they stand beside this file
+import live_pages  # noqa: E402
 import machine_pages  # noqa: E402
 import trust_page  # noqa: E402
 from test_results import Results, read_results  # noqa: E402
 
 import truepose  # noqa: E402
+from truepose.machine.library import machines  # noqa: E402
 
 BESIDE = (
     "ARCHITECTURE.md",
@@ -95,6 +97,9 @@ def make(source: Path, output: Path) -> int:
 
         script = Path(plotly.__file__).parent / "package_data" / "plotly.min.js"
         shutil.copy(script, output / "_static")
+        if live_pages.can_be_written():
+            kinds = [entry.kind for entry in machines()]
+            live_pages.write(output / "docs" / "gallery" / "live", kinds)
     return code
 
 
@@ -110,6 +115,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if asked.release and results.refusal:
         print(f"no site to publish: {results.refusal}", file=sys.stderr)
         return 1
+    if not live_pages.can_be_written():
+        print("No live pages: the kernel for browsers was not built (make web).", file=sys.stderr)
+        if asked.release:
+            return 1
     output = asked.output.resolve()
     source = output.with_name(f"{output.name}-source") / "pages"
     lay_out(source, results)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import live_pages
 from drawing import machine_drawing
 
 import truepose as tp
@@ -21,8 +22,8 @@ is described.
 """
 
 
-def section(entry: LibraryMachine, pictures: Path) -> str:
-    """The section of one machine; its picture goes into `pictures`."""
+def section(entry: LibraryMachine, pictures: Path, *, live: bool) -> str:
+    """The section of one machine, linked to its live page; its picture goes into `pictures`."""
     machine = tp.load(ROOT / "machines" / f"{entry.kind}.toml")
     (pictures / f"{entry.kind}.svg").write_text(machine_drawing(machine), encoding="utf-8")
     answers = tp.accuracy(machine)
@@ -39,6 +40,8 @@ def section(entry: LibraryMachine, pictures: Path) -> str:
 
 {NEWLINE.join(rows)}
 
+{live_pages.link(entry.kind, machine.name) if live else ""}
+
 Commanded: {", ".join(machine.commanded)}. Drives: {drives}. Parameters: {len(machine.parameters)}.
 Machine file: [{entry.kind}.toml](../../machines/{entry.kind}.toml).
 """
@@ -48,5 +51,6 @@ def write(folder: Path) -> None:
     """Write the page and its pictures into the folder of the gallery."""
     pictures = folder / "pictures"
     pictures.mkdir(exist_ok=True)
-    text = "\n".join([HEAD, *(section(entry, pictures) for entry in machines())])
+    live = live_pages.can_be_written()
+    text = "\n".join([HEAD, *(section(entry, pictures, live=live) for entry in machines())])
     (folder / "machines.md").write_text(text, encoding="utf-8")

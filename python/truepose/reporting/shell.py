@@ -156,7 +156,7 @@ def page_parts(title: str, live: LivePart | None = None, *, figures: bool = True
         "css": _together(["page.css", "page_one.css"]) + (live_style() if live else ""),
         "live": live,
         "loader": loader,
-        "policy": policy(loader, live=live is not None),
+        "policy": policy(loader, live=live is not None, beside=bool(live and live.beside)),
         "plotly": packed(PLOTLY.joinpath("plotly.min.js").read_bytes()) if figures else "",
         "contents": Contents(),
         "words": _words(),
@@ -164,18 +164,20 @@ def page_parts(title: str, live: LivePart | None = None, *, figures: bool = True
     }
 
 
-def policy(script: str, *, live: bool) -> str:
+def policy(script: str, *, live: bool, beside: bool = False) -> str:
     """What a page may load and run: its script, by its hash, and what that loads.
 
-    A `live` part compiles WebAssembly, and has a worker whose script it makes itself.
+    A `live` part compiles WebAssembly, and has a worker whose script it makes itself. One whose
+    kernel stands `beside` it loads that, of where it is from itself, and its script loads nothing.
     """
+    loads = "'self'" if beside else "'strict-dynamic'"
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     return "; ".join(
         [
             "default-src 'none'",
             "img-src data: blob:",
             "style-src 'unsafe-inline'",
-            f"script-src 'sha256-{digest}' 'strict-dynamic'"
+            f"script-src 'sha256-{digest}' {loads}"
             + (" 'wasm-unsafe-eval'; worker-src blob:" if live else ""),
             "base-uri 'none'",
             "form-action 'none'",

@@ -15,11 +15,18 @@ if TYPE_CHECKING:
 ENDINGS = (".html",)
 
 
-def html(machine: Machine) -> str:
-    """The page as text. Raises `RequestError` (no-live-kernel), and as `truepose.live.bundle`."""
+def html(machine: Machine, beside: str | None = None, back: str | None = None) -> str:
+    """The page as text.
+
+    `beside`: the address of a script with the kernel (`part.shared_kernel`), which then is not in
+    the page. `back`: of the page that lists all of them. Raises `RequestError` (no-live-kernel),
+    and as `truepose.live.bundle`.
+    """
     title = say("{machine} · live", machine=machine.name)
     return template("live/live_page.html.jinja").render(
-        machine=machine, **page_parts(title, live_of(machine), figures=False)
+        machine=machine,
+        back=back,
+        **page_parts(title, live_of(machine, beside), figures=False),
     )
 
 

@@ -39,9 +39,14 @@ PAGE = (
 
 @dataclass(frozen=True)
 class LivePart:
-    """What stands in a page: the kernel in base85, a setting as JSON, and the worker's script."""
+    """What stands in a page: the kernel in base85, a setting as JSON, and the worker's script.
+
+    `beside`: the address of a script that brings the kernel, which several pages share; the page
+    then has none of its own.
+    """
 
     kernel: str
+    beside: str | None
     setting: str
     worker: str
     planar: bool
@@ -75,14 +80,23 @@ def packed_kernel(file: Traversable | None = None) -> str:
         ) from failure
 
 
-def live_of(machine: Machine) -> LivePart:
-    """The live part of a machine in its file's condition.
+def shared_kernel() -> str:
+    """The script that brings the kernel to pages it stands beside.
+
+    A script, for a page that is opened from disk may fetch nothing. Raises `RequestError`
+    (no-live-kernel).
+    """
+    return f'document.getElementById("live-kernel").textContent = "{packed_kernel()}";\n'
+
+
+def live_of(machine: Machine, beside: str | None = None) -> LivePart:
+    """The live part of a machine in its file's condition; the kernel in it, or in `beside`.
 
     Raises `RequestError` (no-live-kernel), and as `truepose.live.bundle` does.
     """
     from truepose.live import bundle
 
-    return live_part(machine, bundle(machine))
+    return live_part(machine, bundle(machine), beside)
 
 
 def live_or_why_not(machine: Machine) -> LivePart | str:
@@ -100,8 +114,8 @@ def live_or_why_not(machine: Machine) -> LivePart | str:
         return say("This page has no live part: {reason}.", reason=problem.message)
 
 
-def live_part(machine: Machine, bundle: Mapping[str, Any]) -> LivePart:
-    """The live part of a machine, whose data for the kernel is `bundle`.
+def live_part(machine: Machine, bundle: Mapping[str, Any], beside: str | None = None) -> LivePart:
+    """The live part of a machine, whose data for the kernel is `bundle`; as `live_of`.
 
     Raises `RequestError` (no-live-kernel).
     """
@@ -115,7 +129,8 @@ def live_part(machine: Machine, bundle: Mapping[str, Any]) -> LivePart:
         "marks": {"decimal": language.decimal_mark, "group": language.group_mark},
         "scale": [[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for colour in colours],
     }
-    return LivePart(packed_kernel(), as_json(setting), _together(WORKER), is_planar(machine))
+    kernel = packed_kernel() if beside is None else ""
+    return LivePart(kernel, beside, as_json(setting), _together(WORKER), is_planar(machine))
 
 
 def script() -> str:
@@ -181,5 +196,6 @@ __all__ = [
     "live_part",
     "packed_kernel",
     "script",
+    "shared_kernel",
     "style",
 ]

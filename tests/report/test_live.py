@@ -5,9 +5,7 @@ Nothing is asked from outside, and where the browser lacks what it takes, the re
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -17,64 +15,11 @@ import pytest
 import truepose as tp
 from browser import Heard, opened_browser
 from command_line import MACHINES
+from live_visit import PATIENCE, QUICK, SHOWN, STEP, WORD, LiveVisit, moved
 from sweeps import thinned
 from system_package import missing
 from truepose.cli import run
 from truepose.reporting.live import part
-
-SHOWN = ["planar_two_slider", "hexapod", "linear_delta", "tricept"]
-QUICK = {"planar_two_slider"}
-PATIENCE = 60_000
-"""Milliseconds: a busy machine is slow, and slowness is no fault here."""
-
-STEP = """([name, value]) => {
-  const input = document.querySelector(`[data-of="${name}"] input[type=number]`);
-  input.value = value;
-  input.dispatchEvent(new Event("input"));
-}"""
-NUMBER = """name => {
-  const cell = document.querySelector(`#live [data-of="${name}"]`);
-  return cell && "si" in cell.dataset ? Number(cell.dataset.si) : null;
-}"""
-PIXELS = """name => document.querySelector(`#live [data-live="${name}"]`).toDataURL()"""
-SETTLED = "() => document.getElementById('live').dataset.settled === 'yes'"
-WORD = """state => document.querySelector(`#live [data-of="${state}.verdict"]`).textContent"""
-
-
-@dataclass(kw_only=True)
-class LiveVisit(Heard):
-    """A page with a live part, and the machine that it is of."""
-
-    page: Any
-    machine: tp.Machine
-
-    @property
-    def setting(self) -> Any:
-        return json.loads(self.page.locator("#live-setting").text_content())
-
-    def step(self, name: str, value: float) -> None:
-        """Type a number into a control, in the units shown, and wait until it is worked out."""
-        steps = "() => document.getElementById('live').dataset.steps"
-        before = self.page.evaluate(steps)
-        self.page.evaluate(STEP, [name, value])
-        later = f"before => ({steps})() !== before"
-        self.page.wait_for_function(later, arg=before, timeout=PATIENCE)
-
-    def settle(self) -> None:
-        """Wait until the worker has told everything."""
-        self.page.wait_for_function(SETTLED, timeout=PATIENCE)
-
-    def number(self, name: str) -> float | None:
-        found: float | None = self.page.evaluate(NUMBER, name)
-        return found
-
-    def word(self, state: str) -> str:
-        found: str = self.page.evaluate(WORD, state)
-        return found
-
-    def pixels(self, name: str) -> str:
-        found: str = self.page.evaluate(PIXELS, name)
-        return found
 
 
 @pytest.fixture(scope="module")
@@ -120,30 +65,6 @@ def live(request: pytest.FixtureRequest, pages: Callable[[str], LiveVisit]) -> L
     visit.page.bring_to_front()
     visit.page.locator("[data-live=reset]").click()
     return visit
-
-
-def moved(live: LiveVisit) -> tuple[list[float], tp.Condition]:
-    """Move a slider of each kind; the pose and the condition that the page shows then, SI."""
-    bundle = live.setting["bundle"]
-    units, workspace = bundle["units"], bundle["workspace"]
-    pose = list(workspace["home"])
-    for at, name in enumerate(live.machine.commanded):
-        unit = units["length" if name in "xyz" else "angle"]
-        shown = (pose[at] + 0.2 * (workspace["high"][at] - workspace["low"][at])) / unit["si"]
-        live.step(f"pose.{name}", round(shown, 3))
-        pose[at] = round(shown, 3) * unit["si"]
-    warm = units["temperature"]
-    live.step("temperature", 31.5)
-    temperature = dict.fromkeys(
-        (one["part"] for one in bundle["parts"]), (31.5 + warm["offset"]) * warm["si"]
-    )
-    first = bundle["parts"][0]["part"]
-    live.step(f"temperature.{first}", 33.0)
-    temperature[first] = (33.0 + warm["offset"]) * warm["si"]
-    force = list(live.machine.condition.force)
-    live.step("force.x", 7.5)
-    force[0] = 7.5 * units["force"]["si"]
-    return pose, live.machine.condition.replace(temperature=temperature, force=force)
 
 
 def test_numbers_are_those_of_the_package(live: LiveVisit) -> None:

@@ -51,6 +51,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "bounds": ("bounds", str(PLANAR), "-o", "out.json"),
     "shares": ("shares", str(PLANAR), "-o", "out.json"),
     "report": ("report", str(PLANAR), "-o", "page.html", "--figure-data", "data"),
+    "live": ("live", str(PLANAR), "-o", "page.html"),
     "calibrate": (
         "calibrate", str(DATA / "delta_printer.toml"), str(DATA / "delta_positions.csv"),
         "-o", "out.json", "--machine-output", "calibrated.toml", "--date", "2026-01-01",
@@ -69,7 +70,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "export linuxcnc": ("export", "linuxcnc", str(PLANAR), "-o", "export"),
     "export c": ("export", "c", str(HEXAPOD), "-o", "export"),
 }  # fmt: skip
-"""Commands that write; those with several files come up as often as the others."""
+"""Commands that write; those with several files come up as often as the others. `live` needs the
+kernel for browsers."""
 
 PART = "part.ngc"
 PROGRAM = """\

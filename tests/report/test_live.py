@@ -243,6 +243,24 @@ def test_a_source_that_is_not_live_is_named_and_nothing_judged(
     assert live.word("before") == live.word("after") == live.setting["words"]["verdicts"]["none"]
 
 
+def test_in_another_language_why_is_said_in_it(browser: Any, tmp_path: Path) -> None:
+    file, machine = tmp_path / "live.html", MACHINES / "hexapod_all_sources.toml"
+    assert run(["live", str(machine), "--language", "de", "--output", str(file)]) == 0
+    live = opened(browser, file, tp.load(machine))
+    notes = live.page.locator("[data-live=not-live] li").all_inner_texts()
+    lacking = [one for one in live.setting["bundle"]["sources"] if not one["live"]]
+    assert lacking
+    for note, source in zip(notes, lacking, strict=True):
+        assert source["name"] in note
+        assert source["why"] not in note
+        assert live.setting["words"]["sources"][source["name"]]["why"] in note
+    title = live.page.locator("tr[data-of=thermal] th").get_attribute("title")
+    assert title == live.setting["words"]["sources"]["thermal"]["doc"]
+    assert "Wärmeausdehnung" in str(title)
+    assert live.complaints == []
+    live.page.close()
+
+
 @pytest.mark.parametrize("lacking", ["WebAssembly", "Worker"])
 def test_without_what_it_needs_the_report_stays_static(
     lacking: str, browser: Any, tmp_path: Path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from truepose.language import say
@@ -74,6 +75,18 @@ BOUNDS = {
     "no-proof": "not of an over-constrained machine",
 }
 
+# What `NoLawError` says, which the bundle has in English.
+WHY_NOT = {
+    "bands": "has bands that follow from the temperature or the wrench",
+    "dead_zones": "has other dead zones than it says",
+    "envelope": "follows from a force of unknown direction",
+    "parts": "follows from temperatures in another way than part by part",
+    "pose": "follows from the pose",
+    "proportion": "is not in proportion to the temperature",
+    "student": "has correlated variables of Student's distribution",
+    "wrench": "follows from the wrench",
+}
+
 QUANTITIES = {"orientation": "orientation", "position": "position"}
 
 
@@ -88,3 +101,15 @@ def labels() -> dict[str, Any]:
         "bound_statuses": {name: say(BOUNDS[name]) for name in BOUNDS},
         "quantities": {name: say(QUANTITIES[name]) for name in QUANTITIES},
     }
+
+
+def sources_said(sources: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, str]]:
+    """By name of each of a bundle's sources its `doc`, and `why` it is not live, as spoken."""
+    reasons = {WHY_NOT[name]: say(WHY_NOT[name]) for name in WHY_NOT}
+    said = {}
+    for source in sources:
+        doc, why = source["doc"], source.get("why")
+        said[source["name"]] = {"doc": say(doc)}
+        if why is not None:
+            said[source["name"]]["why"] = reasons.get(why, why)
+    return said

@@ -8,7 +8,8 @@ const REST = 140;
 
 function livePart(place, setting, ask, module) {
   const {bundle, drawing, words, scale: colours, worker: script} = setting;
-  const {target, sources} = bundle;
+  const {target} = bundle;
+  const sources = bundle.sources.map(source => ({...source, ...words.sources[source.name]}));
   const numbers = numbersOf({units: bundle.units, marks: setting.marks});
   const made = ask({op: "machine", bundle});
   const {machine, components, commanded} = made;

@@ -18,7 +18,7 @@ from truepose.language import say, spoken
 from truepose.reporting.figures._json import as_json
 from truepose.reporting.figures._outline import is_planar, outline
 from truepose.reporting.figures._style import COLOUR_SCALE
-from truepose.reporting.live.labels import labels
+from truepose.reporting.live.labels import labels, sources_said
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -125,7 +125,7 @@ def live_part(machine: Machine, bundle: Mapping[str, Any], beside: str | None = 
         "bundle": bundle,
         "drawing": _drawing(machine, bundle["workspace"]["home"]),
         "planar": is_planar(machine),
-        "words": labels(),
+        "words": {**labels(), "sources": sources_said(bundle["sources"])},
         "marks": {"decimal": language.decimal_mark, "group": language.group_mark},
         "scale": [[int(colour[at : at + 2], 16) for at in (1, 3, 5)] for colour in colours],
     }

@@ -131,27 +131,6 @@ def test_the_verdict_is_computing_and_then_what_is_proven_or_found(live: LiveVis
     assert live.word("before") == words["missed"]
 
 
-def test_between_proof_and_witness_it_is_undecided(browser: Any) -> None:
-    judged = """([bound, found]) => judgedHere(0.5, "position", bound, found)"""
-    script = part.script().replace("return startLive();", "globalThis.judgedHere = judged;")
-    page = browser.new_page()
-    page.evaluate(script + "0")
-
-    def word(magnitude: float | None, *found: float | None) -> str:
-        bound = {"status": "near_singular"}
-        if magnitude is not None:
-            bound = {"status": "proven", "magnitude": {"position": magnitude}}
-        said: str = page.evaluate(judged, [bound, list(found)])
-        return said
-
-    assert word(0.6, 0.4, None) == "open"
-    assert word(None, 0.4) == "open"
-    assert word(0.5, 0.5) == "met"
-    assert word(0.6, 0.4, 0.51) == "missed"
-    assert word(0.4, 0.3) == "met"
-    page.close()
-
-
 def test_pixels_follow(live: LiveVisit) -> None:
     live.settle()
     name = live.machine.commanded[0]

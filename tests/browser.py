@@ -15,14 +15,16 @@ CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 # The browser looks for no updates and asks no service; WebGL is drawn by the processor.
 FLAGS = [
     "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
-    "--disable-component-update", "--disable-sync", "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
+    "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
 ]  # fmt: skip
 
 
 @contextmanager
-def opened_browser(profile: Path) -> Iterator[Any]:
-    """The browser, with its profile in a folder; skips where it or playwright is missing."""
+def opened_browser(profile: Path, *, live: bool = False) -> Iterator[Any]:
+    """The browser, with its profile in a folder; skips where it or playwright is missing.
+
+    `live`: canvases do not go through WebGL, by which each step of a live page takes seconds.
+    """
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
@@ -35,7 +37,7 @@ def opened_browser(profile: Path) -> Iterator[Any]:
             executable_path=CHROMIUM,
             headless=True,
             viewport={"width": 1200, "height": 900},
-            args=FLAGS,
+            args=[*FLAGS, "--disable-gpu" if live else "--use-angle=swiftshader"],
         )
         yield context
         context.close()

@@ -26,7 +26,7 @@ from truepose.reporting.live import part
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     if not part.is_built():
         missing("the kernel for browsers is not built: make web")
-    with opened_browser(tmp_path_factory.mktemp("profile")) as context:
+    with opened_browser(tmp_path_factory.mktemp("profile"), live=True) as context:
         yield context
 
 

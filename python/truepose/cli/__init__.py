@@ -36,6 +36,7 @@ COMMANDS: dict[str, str] = {
     "strain": "truepose.cli.strain",
     "report": "truepose.cli.report",
     "live": "truepose.cli.live",
+    "studio": "truepose.cli.studio",
     "part": "truepose.cli.part",
     "gcode": "truepose.cli.gcode",
     "export": "truepose.cli.export",

@@ -13,6 +13,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from truepose.arrays import Floats
 from truepose.errors import Problem, RequestError
 from truepose.files.shown_units import ICE_POINT, Shown, ShownUnits, shown_units
 from truepose.live.laws import LiveLaw, live_law, weight
@@ -91,6 +92,16 @@ def bundle(machine: Machine) -> dict[str, Any]:
         "target": _target(machine),
         "units": _units(shown_units(machine.file_units)),
     }
+
+
+def middle_pose(machine: Machine) -> Floats:
+    """(n_commanded,) SI: the usable pose of the file's nearest to the middle of its workspace.
+
+    Raises `RequestError`: no-workspace; not-live where the machine can reach none of them.
+    """
+    home = _home(machine)
+    pose: Floats = home.requested[home.indices[0]]
+    return pose
 
 
 def _probed(machine: Machine) -> PoseBlock:
@@ -249,4 +260,4 @@ def _plain(value: object) -> Any:
     return value
 
 
-__all__ = ["SCHEMA", "bundle"]
+__all__ = ["SCHEMA", "bundle", "middle_pose"]

@@ -52,12 +52,19 @@ def load(
     return _loaded(read(path), settings, registry)
 
 
-def load_text(path: str | Path, text: str, *, registry: Sequence[SourceType]) -> Machine:
+def load_text(
+    path: str | Path,
+    text: str,
+    *,
+    settings: Mapping[str, str] | Sequence[str] = (),
+    registry: Sequence[SourceType],
+) -> Machine:
     """The machine of a text as a machine file at `path` would have it, whether one is there or not.
 
-    Raises `MachineFileError` with every problem of the text.
+    Raises `MachineFileError` with every problem of the text, `RequestError` for a setting that
+    leads nowhere.
     """
-    return _loaded(document_of(path, text.encode(), text), (), registry)
+    return _loaded(document_of(path, text.encode(), text), settings, registry)
 
 
 def _loaded(

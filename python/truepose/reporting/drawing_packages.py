@@ -1,4 +1,4 @@
-"""Pages, figures and languages need the extra `report`; who asks for them without it is told so."""
+"""Pages and languages need the extra `report`, the studio its own: who lacks one is told so."""
 
 from __future__ import annotations
 
@@ -10,21 +10,31 @@ from types import ModuleType
 from truepose.errors import Problem, RequestError
 from truepose.language import speaking
 
+_OF_EXTRA = {
+    "report": ("the report", "jinja2 and plotly"),
+    "studio": ("the studio", "jinja2, plotly, starlette, uvicorn and websockets"),
+}
+"""What needs an extra, and the packages in it."""
 
-def module_that_draws(name: str) -> ModuleType:
-    """A module of pages or figures. Raises `RequestError` (extra-missing) without plotly."""
+
+def module_that_draws(name: str, extra: str = "report") -> ModuleType:
+    """A module of pages or figures, or of the studio, which needs the packages of an extra.
+
+    Raises `RequestError` (extra-missing) without one of them.
+    """
     try:
         return import_module(name)
     except ImportError as failure:
         if failure.name is None or failure.name.startswith("truepose"):
             raise
+        what, packages = _OF_EXTRA[extra]
         raise RequestError(
             Problem(
                 "extra-missing",
-                "the report needs packages that are not installed",
+                f"{what} needs packages that are not installed",
                 found=f"no {failure.name}",
-                expected="jinja2 and plotly",
-                hint="pip install 'truepose[report]'",
+                expected=packages,
+                hint=f"pip install 'truepose[{extra}]'",
             )
         ) from failure
 

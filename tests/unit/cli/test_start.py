@@ -17,7 +17,10 @@ from truepose.cli import COMMANDS
 
 PAGE = Path(truepose.__file__).with_name("help.txt")
 
-HEAVY = ("numpy", "xarray", "pydantic", "pint", "plotly", "jinja2", "rich", "truepose._kernel")
+HEAVY = (
+    "numpy", "xarray", "pydantic", "pint", "plotly", "jinja2", "rich", "truepose._kernel",
+    "starlette", "uvicorn", "websockets", "tomlkit", "multiprocessing",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("arguments", [["--help"], *([name, "--help"] for name in COMMANDS)])

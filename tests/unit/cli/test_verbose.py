@@ -37,7 +37,7 @@ COMPUTING: dict[str, tuple[str, ...]] = {
 }
 IMPORTING = "import"
 """Computes little, but reads files whose hashes count."""
-NOT_COMPUTING = {"init", "explain", "schema", "completion"}
+NOT_COMPUTING = {"init", "explain", "schema", "completion", "studio"}
 STEP = re.compile(r"^ *(\d+\.\d{3}) s  (.+)$", re.MULTILINE)
 
 

@@ -17,10 +17,10 @@ from tomlkit.items import AoT, Array, InlineTable, Table
 from truepose.arrays import Floats
 from truepose.errors import RequestError
 from truepose.files.dimensions import BY_UNIT, DIMENSIONS
-from truepose.files.document import ARRAY_TABLES, Document, read
+from truepose.files.document import ARRAY_TABLES, MACHINE_FILE, Document, document_of, read
 from truepose.files.one_run import real_path
 from truepose.files.settings import apply, of_table
-from truepose.files.text_file import FileKind, read_text
+from truepose.files.text_file import read_text
 from truepose.files.units import UnitSystem, meant
 from truepose.machine import Machine, validation
 from truepose.machine.families.expansion import TABLE as FAMILY
@@ -45,16 +45,22 @@ class MachineText:
     """The text of a machine file, with the machine's settings written into it.
 
     Raises `RequestError` (calibration-file-changed) where the file is not the one that the machine
-    was read from.
+    was read from. `text`: what stands in it, if it is not to be read again; its warnings then stay.
     """
 
-    def __init__(self, original: Path, machine: Machine, changed: RequestError) -> None:
-        _, text = read_text(original, FileKind("a machine file (TOML)", ".toml"))
-        self._document = read(original)
+    def __init__(
+        self, original: Path, machine: Machine, changed: RequestError, text: str | None = None
+    ) -> None:
+        if text is None:
+            _, content = read_text(original, MACHINE_FILE)
+            self._document = read(original)
+            self.toml = tomlkit.parse(_without_warnings(content, machine))
+        else:
+            self._document = document_of(original, text.encode(), text)
+            self.toml = tomlkit.parse(text)
         if self._document.file_hash != machine.file_hash:
             raise changed
         owned = owners(source.tables for source in REGISTRY)
-        self.toml = tomlkit.parse(_without_warnings(text, machine))
         expand(self._document, machine.settings, owned)
         self._units: UnitSystem = validation.units_of(self._document)
         self._machine = machine

@@ -123,7 +123,7 @@ def live_part(machine: Machine, bundle: Mapping[str, Any], beside: str | None = 
     colours = [str(colour) for _, colour in COLOUR_SCALE]
     setting = {
         "bundle": bundle,
-        "drawing": _drawing(machine, bundle["workspace"]["home"]),
+        "drawing": drawing(machine, bundle["workspace"]["home"]),
         "planar": is_planar(machine),
         "words": {**labels(), "sources": sources_said(bundle["sources"])},
         "marks": {"decimal": language.decimal_mark, "group": language.group_mark},
@@ -143,7 +143,7 @@ def style() -> str:
     return _together(["live.css"])
 
 
-def _drawing(machine: Machine, home: Sequence[float]) -> dict[str, Any]:
+def drawing(machine: Machine, home: Sequence[float]) -> dict[str, Any]:
     """What of the picture the kernel does not say: paths of drives, frame, what hangs together.
 
     `arms`: numbers of the struts that a drive carries, and the pivot that an arm turns about.
@@ -190,6 +190,7 @@ def _together(names: Iterable[str]) -> str:
 
 __all__ = [
     "LivePart",
+    "drawing",
     "is_built",
     "live_of",
     "live_or_why_not",

@@ -233,7 +233,7 @@ $(MADE):
 $(PACKAGE): $(MADE) pyproject.toml $(CONSTRAINTS) $(RUST_SOURCES) $(if $(KERNEL),,kernel-missing) | cargo
 	$(BIN)/python -m pip install --quiet --constraint $(CONSTRAINTS) maturin
 	VIRTUAL_ENV=$(abspath $(VENV)) PIP_CONSTRAINT=$(abspath $(CONSTRAINTS)) \
-		$(BIN)/maturin develop --release --locked --extras report,netcdf
+		$(BIN)/maturin develop --release --locked --extras report,netcdf,studio
 	$(BIN)/python -m compileall -q python/truepose
 	@touch $@
 

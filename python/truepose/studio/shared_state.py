@@ -86,13 +86,14 @@ class SharedState:
         """
         file = OpenedFile.read(path)
         if history is not None:
-            try:
-                session = cls(file, history)
-            except TrueposeError:
-                pass  # the file is another one since; its own problems are told below
-            else:
-                session._require_shown(session.settings)
-                return session
+            nowhere = replace(history, now=Settings(history.now.edits))
+            for kept in (history, nowhere):
+                try:
+                    state = cls(file, kept)
+                    state._require_shown(kept.now)
+                except TrueposeError:
+                    continue  # the file is another one since
+                return state
         return cls(file)
 
     @property

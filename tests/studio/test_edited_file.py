@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -139,7 +138,9 @@ def test_other_files_are_not_written_over_unasked(folder: Path) -> None:
     assert (folder / "other.toml").read_text() == "mine"
     file.save_as("other.toml", file.text, replace=True)
     assert (folder / "other.toml").read_text("utf-8") == file.text
-    assert sorted(os.listdir(folder)) == ["m.toml", "other.toml"], "no temporary file is left"
+    assert sorted(one.name for one in folder.iterdir()) == ["m.toml", "other.toml"], (
+        "no temporary file is left"
+    )
 
 
 def test_a_folder_that_is_a_link_is_the_machines_folder(folder: Path) -> None:

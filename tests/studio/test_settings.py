@@ -1,4 +1,4 @@
-"""The state of a studio: edits in their order, steps back and forward, and what JSON keeps of it."""
+"""The state of a studio: edits in their order, steps back and forward, what JSON keeps of it."""
 
 from __future__ import annotations
 

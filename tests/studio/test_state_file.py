@@ -34,7 +34,7 @@ def test_it_is_kept_and_is_its_owners_alone(home: Path) -> None:
     assert read_state(path) == kept
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
-    assert os.listdir(path.parent) == [path.name], "no temporary file is left"
+    assert list(path.parent.iterdir()) == [path], "no temporary file is left"
 
 
 def test_one_for_each_machine_file(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -98,4 +98,4 @@ def test_a_folder_that_takes_none_leaves_nothing(home: Path) -> None:
     path.mkdir(parents=True)
     with pytest.raises(OSError, match=r".+"):
         write_state(path, KeptState())
-    assert os.listdir(path.parent) == ["m.json"]
+    assert list(path.parent.iterdir()) == [path]

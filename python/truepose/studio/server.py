@@ -172,15 +172,10 @@ class Studio:
         self._tasks = [asyncio.create_task(self._hand_on()), asyncio.create_task(self._watch())]
         await self._keep()
 
-    async def end(self) -> None:
-        """End it, with its process."""
-        for task in self._tasks:
-            task.cancel()
-        for task in self._tasks:
-            with suppress(asyncio.CancelledError):
-                await task
+    def end(self) -> None:
+        """End the process that answers. The loop is over, and with it all else."""
         if self._evaluation is not None:
-            await asyncio.to_thread(self._evaluation.close)
+            self._evaluation.close()
 
     # --- requests
 
@@ -384,12 +379,13 @@ def serve(studio: Studio, at: socket.socket, ready: Callable[[], None]) -> None:
     async def run() -> None:
         await studio.begin()
         ready()
-        try:
-            await server.serve(sockets=[at])
-        finally:
-            await studio.end()
+        await server.serve(sockets=[at])
+        await asyncio.sleep(0)  # where a signal that was taken meanwhile is raised again
 
-    asyncio.run(run())
+    try:
+        asyncio.run(run())
+    finally:
+        studio.end()
 
 
 __all__ = ["Studio", "listening", "serve"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,8 @@ class DroppedFile:
 class Question:
     """A machine with its edits in it, what is shown, and who is told how far it is.
 
-    `options` and `files`: of tabs, by the number of each file.
+    `options` and `files`: of tabs, by the number of each file. `folder`: that of the machine file,
+    the only one from which a tab reads.
     """
 
     machine: Machine
@@ -59,6 +61,7 @@ class Question:
     progress: Progress | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[int, DroppedFile] = field(default_factory=dict)
+    folder: Path = Path()
 
     @property
     def condition(self) -> Condition | None:

@@ -27,6 +27,7 @@ from truepose.files.writing import replacing, require_new, require_writable
 from truepose.machine import Machine
 from truepose.machine.loader import load_text
 from truepose.sources import REGISTRY
+from truepose.studio.inside import to_write
 from truepose.studio.settings import Edits
 
 ENDING = ".toml"
@@ -100,7 +101,7 @@ class OpenedFile:
         `..` or a link too; output-exists where one is there and it is not to be replaced;
         output-is-input for the machine file itself; output-ending.
         """
-        target = self._target(name)
+        target = to_write(self.folder, name)
         require_writable(target, [ENDING], [self.path])
         if not replace:
             require_new(target)
@@ -108,24 +109,6 @@ class OpenedFile:
         with replacing(target) as temporary:
             temporary.write_bytes(content)
         return hashlib.sha256(content).hexdigest()
-
-    def _target(self, name: str) -> Path:
-        folder = self.folder
-        try:
-            target = folder / name
-            inside = real_path(target).parent == folder and "\0" not in name
-        except (OSError, ValueError):
-            inside = False
-        if not inside or Path(name).name != name:
-            raise RequestError(
-                Problem(
-                    "output-not-writable",
-                    "the studio writes into the machine file's folder alone",
-                    found=name[:200],
-                    expected="the name of a file in that folder, such as changed.toml",
-                )
-            )
-        return target
 
 
 def _in_order(edited: str, original: str) -> str:

@@ -79,7 +79,7 @@ def answer(job: Job, superseded: Callable[[], bool]) -> Iterator[Given]:
         return
     for asked in job.asked:
         options = dict(asked.options) if isinstance(asked, AskedTab) else {}
-        question = Question(machine, job.settings, progress, options, job.files)
+        question = Question(machine, job.settings, progress, options, job.files, job.path.parent)
         give = TABS[asked.name].give if isinstance(asked, AskedTab) else KINDS[asked].give
         try:
             progress(0, 0)

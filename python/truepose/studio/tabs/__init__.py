@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from truepose.studio.answers import Question, Value
-from truepose.studio.tabs import budget, calibration
+from truepose.studio.tabs import budget, calibration, over_time, part
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,8 @@ class Tab:
 
 
 REGISTRY: tuple[Tab, ...] = tuple(
-    Tab(module.NAME, module.FOLLOWS, module.give) for module in (budget, calibration)
+    Tab(module.NAME, module.FOLLOWS, module.give)
+    for module in (budget, over_time, part, calibration)
 )
 
 TABS = {tab.name: tab for tab in REGISTRY}

@@ -14,11 +14,15 @@ import numpy as np
 
 from truepose.calibration.calibrate import calibrate
 from truepose.calibration.measurements.read_csv import measurements_of_text
+from truepose.calibration.planning.plan import counted_poses, plan
 from truepose.errors import Problem, RequestError
+from truepose.runs.quantities import quantities
 from truepose.studio.answers import EDITS, DroppedFile, Question, Value, finite
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from truepose.calibration.measurements import Measurements
 
 NAME = "calibration"
 FOLLOWS = frozenset({EDITS})
@@ -49,7 +53,27 @@ def give(question: Question) -> Iterator[Value]:
             )
         )
     data = measurements_of_text(dropped.name, dropped.content, _text(dropped), question.machine)
-    yield _told(calibrate(question.machine, data).dataset, question)
+    told = _told(calibrate(question.machine, data).dataset, question)
+    yield told
+    count = question.options.get("plan")
+    if count is not None:
+        yield told | {"planned": _planned(question, data, count)}
+
+
+def _planned(question: Question, data: Measurements, count: Any) -> dict[str, Any]:
+    """The poses to measure next with the instruments of the file, and what they buy.
+
+    Raises as `truepose.plan`.
+    """
+    planned = plan(
+        question.machine, data.instruments, counted_poses(count), progress=question.progress
+    )
+    kinds = list(quantities(question.machine.components))
+    return {
+        "poses": planned.poses.tolist(),
+        "rank": planned.rank.tolist(),
+        "rms": {kind: [finite(v) for v in planned.rms[:, at]] for at, kind in enumerate(kinds)},
+    }
 
 
 def _text(dropped: DroppedFile) -> str:

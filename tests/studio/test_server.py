@@ -20,6 +20,7 @@ from websockets.sync.client import connect
 import truepose as tp
 from command_line import PLANAR, call
 from served_studio import LIMIT, ServedStudio, Window, started, studio_of
+from truepose.cli import run
 from truepose.reporting.live import part
 from truepose.studio.shared_state import EVERY, LARGEST_FILE
 
@@ -102,7 +103,17 @@ def refused(studio: ServedStudio, path: str, **given: Any) -> None:
     assert "content-security-policy" not in headers
 
 
-PATHS = ["/", "/files", "/socket", "/secret.toml", "/../secret.toml", "/m.toml", "/%2e%2e/x", "//"]
+PATHS = [
+    "/",
+    "/files",
+    "/report",
+    "/socket",
+    "/secret.toml",
+    "/../secret.toml",
+    "/m.toml",
+    "/%2e%2e/x",
+    "//",
+]
 
 
 @pytest.mark.parametrize("path", PATHS)
@@ -301,6 +312,26 @@ def test_at_rest_every_number_is_that_of_the_command_for_the_saved_file(
     assert told["verdict"][0]["answer"] == first.answer
 
 
+def test_the_report_is_that_of_the_saved_file(own: ServedStudio, tmp_path: Path) -> None:
+    with own.window() as window:
+        window.edit("accuracy.target", "0.9 mm")
+        window.until("state", number=1)
+        window.say(type="save", name="m2.toml")
+        window.until("saved")
+        status, headers, body = own.get(f"/report?token={own.token}")
+        assert status == 200
+        assert headers["content-type"].startswith("text/html")
+        page = tmp_path / "page.html"
+        saved = tmp_path / "machines" / "m2.toml"
+        assert run(["report", str(saved), "--output", str(page)]) == 0
+        # The name of the file is another one, and nothing else.
+        expected = page.read_text("utf-8").replace("m2.toml", "m.toml")
+        assert re.sub(r"<script.*?</script>", "", body.decode(), flags=re.S) == re.sub(
+            r"<script.*?</script>", "", expected, flags=re.S
+        )
+    assert own.get("/report")[0] == 403
+
+
 # --- what outlives it
 
 
@@ -356,6 +387,26 @@ def test_a_file_that_changes_under_it(own: ServedStudio, tmp_path: Path) -> None
         assert verdict[0]["asked"] == pytest.approx(0.9e-3)
         file.unlink()
         assert window.until("changed")["hash"] is None
+
+
+def test_a_report_that_is_being_made_holds_nobody_up(tmp_path: Path) -> None:
+    file = folder_of(tmp_path) / "m.toml"
+    grid = "grid = { x = [200, 400, 5], y = [100, 300, 5] }"
+    many = file.read_text().replace(grid, "grid = { x = [200, 400, 700], y = [100, 300, 700] }")
+    file.write_text(many)
+    studio = started(file, tmp_path / "state", "--port", str(free_port()))
+    with socket.create_connection(("127.0.0.1", studio.port), LIMIT) as asking:
+        path = f"GET /report?token={studio.token} HTTP/1.1\r\nHost: {studio.host}\r\n\r\n"
+        asking.sendall(path.encode())
+        until = time.monotonic() + LIMIT
+        while len(descendants(studio.process.pid)) < 4:  # trackers, the one that forks, two more
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        children = descendants(studio.process.pid)
+        assert studio.end() == (130, "")
+    while any(map(alive, children)):
+        assert time.monotonic() < until
+        time.sleep(0.02)
 
 
 def test_nothing_is_left_running(tmp_path: Path) -> None:

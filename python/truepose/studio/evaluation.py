@@ -47,6 +47,37 @@ def work(connection: Connection) -> None:
         return
 
 
+def context() -> Any:
+    """How processes are started: forked from one that is warm, where the system can."""
+    forks = "forkserver" in multiprocessing.get_all_start_methods()
+    chosen: Any = multiprocessing.get_context("forkserver" if forks else "spawn")
+    if forks:
+        chosen.set_forkserver_preload(list(WARM))
+    return chosen
+
+
+def by_itself(
+    function: Callable[..., None], *arguments: object, started: Callable[[Any], None]
+) -> Any:
+    """What a process of its own sends over the connection that it gets before its arguments.
+
+    `started` is called with the process, so that another thread can end it. Raises `EOFError` where
+    it is ended before.
+    """
+    of = context()
+    ours, theirs = of.Pipe(duplex=False)
+    process = of.Process(target=function, args=(theirs, *arguments), daemon=True)
+    process.start()
+    started(process)
+    theirs.close()
+    try:
+        with ours:
+            return ours.recv()
+    finally:
+        process.kill()
+        process.join()
+
+
 class Evaluator:
     """The process that answers, and the thread that talks with it.
 
@@ -55,10 +86,7 @@ class Evaluator:
 
     def __init__(self, tell: Callable[[Given], None]) -> None:
         self._tell = tell
-        forks = "forkserver" in multiprocessing.get_all_start_methods()
-        self._context: Any = multiprocessing.get_context("forkserver" if forks else "spawn")
-        if forks:
-            self._context.set_forkserver_preload(list(WARM))
+        self._context = context()
         self._lock = threading.Lock()
         self._waiting: Job | None = None
         self._closed = False
@@ -182,4 +210,4 @@ def _died(job: Job, asked: Asked) -> Given:
     return Given(job.number, asked, problems=[problem.to_dict()])
 
 
-__all__ = ["Evaluator", "work"]
+__all__ = ["Evaluator", "by_itself", "work"]

@@ -26,9 +26,9 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from truepose.errors import TrueposeError
-from truepose.studio import messages
+from truepose.studio import messages, report_page
 from truepose.studio.access import Access
-from truepose.studio.evaluation import Evaluator
+from truepose.studio.evaluation import Evaluator, by_itself
 from truepose.studio.jobs import Given, problems_of
 from truepose.studio.page import studio_page
 from truepose.studio.shared_state import LARGEST_FILE, Replies, SharedState, refused, too_large
@@ -50,7 +50,7 @@ PORTS_TRIED = 20
 MOST_QUOTED = 1000
 """Characters of a refused message that are told back."""
 
-FORBIDDEN, TOO_LARGE = 403, 413
+FORBIDDEN, TOO_LARGE, UNPROCESSABLE = 403, 413, 422
 GOING, TOO_SLOW = 1001, 1013
 """Codes with which a WebSocket is closed."""
 
@@ -148,13 +148,16 @@ class Studio:
         self.session, self.access, self._state = session, access, state
         self._windows: dict[int, _Window] = {}
         self._next = 1
-        self._lock = asyncio.Lock()
+        self._lock, self._reporting = asyncio.Lock(), asyncio.Lock()
         self._given: asyncio.Queue[Given] = asyncio.Queue()
         self._evaluation: Evaluator | None = None
         self._tasks: list[asyncio.Task[None]] = []
+        self._process: Any = None
+        self._stopped = False
         self.not_kept = ""
         routes = [
             Route("/", self._page, methods=["GET"]),
+            Route("/report", self._report, methods=["GET"]),
             Route("/files", self._drop, methods=["POST"]),
             WebSocketRoute("/socket", self._socket),
         ]
@@ -172,6 +175,17 @@ class Studio:
         self._tasks = [asyncio.create_task(self._hand_on()), asyncio.create_task(self._watch())]
         await self._keep()
 
+    def stop(self) -> None:
+        """End what is made in a process of its own: the loop would wait for it."""
+        self._stopped = True
+        if self._process is not None:
+            self._process.kill()
+
+    def _note_process(self, process: Any) -> None:
+        self._process = process
+        if self._stopped:
+            process.kill()
+
     def end(self) -> None:
         """End the process that answers. The loop is over, and with it all else."""
         if self._evaluation is not None:
@@ -185,6 +199,24 @@ class Studio:
         page = await asyncio.to_thread(studio_page, machine, request.headers["host"])
         policy = {"Content-Security-Policy": page.policy}
         return Response(page.text, headers=HEADERS | policy, media_type="text/html")
+
+    async def _report(self, request: Request) -> Response:
+        """The report of what is set now; one is made at a time."""
+        async with self._lock:
+            path, text = self.session.file.path, self.session.text
+        async with self._reporting:
+            try:
+                made = await asyncio.to_thread(
+                    by_itself, report_page.work, path, text, started=self._note_process
+                )
+            except EOFError:  # ended by the system, for want of memory
+                made = ()
+        if not isinstance(made, str):
+            problems = [problem.to_dict() for problem in made]
+            return JSONResponse({"problems": problems}, UNPROCESSABLE, HEADERS)
+        # The policy that stands in the page holds too: it may load nothing.
+        policy = {"Content-Security-Policy": "frame-ancestors 'none'"}
+        return Response(made, headers=HEADERS | policy, media_type="text/html")
 
     async def _drop(self, request: Request) -> Response:
         name = request.query_params.get("name", "")[:200] or "file"
@@ -379,7 +411,10 @@ def serve(studio: Studio, at: socket.socket, ready: Callable[[], None]) -> None:
     async def run() -> None:
         await studio.begin()
         ready()
-        await server.serve(sockets=[at])
+        try:
+            await server.serve(sockets=[at])
+        finally:
+            studio.stop()
         await asyncio.sleep(0)  # where a signal that was taken meanwhile is raised again
 
     try:

@@ -8,12 +8,14 @@ import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from command_line import MACHINES, PLANAR
-from truepose.studio.evaluation import Evaluator
+from truepose.studio.evaluation import Evaluator, context
 from truepose.studio.jobs import Given, Job
+from truepose.studio.rehearsal import rehearse
 from truepose.studio.settings import Settings
 from truepose.studio.shared_state import EVERY
 
@@ -98,6 +100,40 @@ def test_a_process_that_is_ended_is_told_and_replaced(evaluator: Evaluator, hear
     evaluator.ask(job(3))
     assert heard.until(3, "shares")[-1].problems is None
     assert process(evaluator) != first
+
+
+def test_a_process_that_does_not_start_is_told(
+    heard: Heard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the system gives none: the next question is asked anew."""
+
+    class NoProcess:
+        def __init__(self, **_: Any) -> None:
+            pass
+
+        def start(self) -> None:
+            raise OSError("no more processes")
+
+    running = Evaluator(heard.put)
+    heard_before = process(running)
+    with monkeypatch.context() as patch:
+        patch.setattr(type(context()), "Process", NoProcess)
+        os.kill(heard_before, signal.SIGKILL)
+        until = time.monotonic() + LIMIT
+        while Path(f"/proc/{heard_before}/stat").exists() and time.monotonic() < until:
+            if Path(f"/proc/{heard_before}/stat").read_text().split()[2] == "Z":
+                break
+            time.sleep(0.01)
+        running.ask(job(1))
+        problems = heard.until(1, "shares")[-1].problems
+        assert problems is not None
+    running.ask(job(2))
+    assert heard.until(2, "shares")[-1].problems is None
+    running.close()
+
+
+def test_rehearsal_answers_everything() -> None:
+    assert rehearse() == len(EVERY)
 
 
 def test_closing_ends_what_runs(heard: Heard) -> None:

@@ -13,6 +13,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
@@ -118,7 +119,8 @@ class Evaluator:
     # --- inside: the thread
 
     def _run(self) -> None:
-        self._begin()  # so that the first question need not wait for it
+        with suppress(EOFError, OSError):  # who asks is told
+            self._begin()  # so that the first question need not wait for it
         while not self._closed:
             job = self._taken()
             if job is None:
@@ -182,11 +184,16 @@ class Evaluator:
         """The connection to the process, which is started where there is none."""
         if self._connection is None or not self._process.is_alive():
             self._end()
-            self._connection, theirs = self._context.Pipe()
-            self._process = self._context.Process(target=work, args=(theirs,), daemon=True)
-            self._process.start()
-            theirs.close()
-        assert self._connection is not None
+            ours, theirs = self._context.Pipe()
+            process = self._context.Process(target=work, args=(theirs,), daemon=True)
+            try:
+                process.start()
+            except BaseException:
+                ours.close()
+                raise
+            finally:
+                theirs.close()
+            self._connection, self._process = ours, process
         return self._connection
 
     def _end(self) -> None:
